@@ -1,0 +1,1 @@
+"""Batches: many runs, stored once each."""

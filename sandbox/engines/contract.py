@@ -1,0 +1,130 @@
+"""The contract between a scene and whatever computes it.
+
+    ENGINES[name].start(scene, settings) -> Simulation
+    simulation.step() … frame() … contacts() … close()
+
+Adding an engine is one folder that honours these two protocols, and one line in the registry.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from sandbox.action import Action
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.demands import Demand
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
+
+
+class Refusal(Exception):  # noqa: N818, an engine refuses; that is no error of its own
+    """An engine lacks what a scene or a setting asks for. `reasons` names each thing, `able` who could."""
+
+    def __init__(self, engine: str, reasons: tuple[str, ...], able: tuple[str, ...]) -> None:
+        others = f"these could: {', '.join(able)}" if able else "no engine here could"
+        super().__init__(f"{engine} refuses: {'; '.join(reasons)}; {others}")
+        self.engine = engine
+        self.reasons = reasons
+        self.able = able
+
+
+class Divergence(Exception):  # noqa: N818, a result of the physics asked for, not an error of the program
+    """A simulation left what is finite and bounded. It can be read, not stepped further."""
+
+    def __init__(self, time: float, body: str, what: str) -> None:
+        super().__init__(f"at {time:g} s: {body!r} {what}")
+        self.time = time
+        self.body = body
+
+
+class Exhaustion(Exception):  # noqa: N818, as above
+    """A simulation has gathered more than memory should hold. What it has can be read."""
+
+
+Observer = Callable[[float, FloatArray, FloatArray, IntArray], None]
+"""Called after each substep with its starting time (s), the centres (N, 2) at its start and end, and the pairs
+(K, 2) that the engine found in contact at its end, numbered as in `Contacts`."""
+
+
+class Simulation(Protocol):
+    """A running scene. Everything that changes lives in here; all that comes out is a value."""
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s: k·dt."""
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies by number, as they started; spawned ones join at the end."""
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """When each body that was removed, or left world.bounds, was gone: number → s."""
+
+    def step(self) -> None:
+        """Advance by one dt.
+
+        Raises:
+            Divergence: the state is not finite, or beyond all bounds.
+        """
+
+    def finish(self, part: float) -> None:
+        """Advance by a last part of dt, 0 < part < 1, where a run's duration is no multiple of dt.
+
+        No step can follow.
+        """
+
+    def apply(self, action: Action) -> None:
+        """Do what an action says, now; its time is the caller's affair.
+
+        Raises:
+            ActionError: it cannot be done. Nothing has changed then.
+        """
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+
+    def contacts(self) -> Contacts:
+        """Return the contacts that were open since the last call, with the impulse exchanged since then.
+
+        One that lasts keeps the time of its first touch, so a caller knows it again. Recording starts with
+        the first call, which returns those that touch now: who never asks pays nothing.
+        """
+
+    def watch(self, observer: Observer) -> None:
+        """Have an observer called after every substep. Engines without steps never call it."""
+
+    def state_hash(self) -> str:
+        """Return a hash of time and every body's state, bit for bit."""
+
+    def close(self) -> None:
+        """Release what the engine holds."""
+
+
+class Engine(Protocol):
+    """A way to compute scenes. Light to import: what is heavy is imported by `start`."""
+
+    @property
+    def name(self) -> str:
+        """What `--engine` calls it."""
+
+    @property
+    def about(self) -> str:
+        """One line."""
+
+    @property
+    def capabilities(self) -> frozenset[Demand]:
+        """The demands that it models."""
+
+    def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
+        """Return what scene and settings ask for that this engine lacks; none means that it can run them."""
+
+    def resolve(self, scene: Scene, settings: Settings) -> Settings:
+        """Return the settings with every choice that was left to the engine filled in."""
+
+    def start(self, scene: Scene, settings: Settings | None = None) -> Simulation:
+        """Set a scene up; without settings, by its own `[solver]`.
+
+        Raises:
+            Refusal: the engine lacks something that is asked for.
+        """

@@ -1,0 +1,75 @@
+"""PymunkEngine: what pymunk can model, and how its choices are filled in. Imports no pymunk until started."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sandbox.scene.demands import Demand, demands
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+if TYPE_CHECKING:
+    from sandbox.engines.native.simulation import NativeSimulation
+
+PYMUNK_WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
+"""The one word of each choice that describes what pymunk does."""
+
+SLOP_PER_RADIUS = 0.01
+"""pymunk's own slop, 0.1, is in length units: a ball of 5 cm would rest 10 cm deep in the floor."""
+
+BIAS = (1.0 - 0.1) ** 60
+"""pymunk's own: a tenth of an overlap is corrected in 1/60 s."""
+
+PERSISTENCE = 3
+"""pymunk's own."""
+
+
+@dataclass(frozen=True)
+class PymunkEngine:
+    """pymunk (Munk2D): fixed step, discrete detection, sequential impulses with warm starting.
+
+    A substep of length h, in pymunk's order: positions move by the *old* velocity, overlaps are found,
+    velocities get their kick, contacts are solved. For free motion that is explicit Euler, drift–kick.
+    Discrete: a thin wall is tunnelled through when v·h > r + half its thickness.
+    """
+
+    name: str = "pymunk"
+    about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
+    capabilities: frozenset[Demand] = frozenset(Demand)
+
+    def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
+        """Return what scene and settings ask for that pymunk lacks."""
+        lacks = [f"it does not model {demand}" for demand in sorted(demands(scene) - self.capabilities)]
+        for key, word in PYMUNK_WORDS.items():
+            stated = getattr(settings, key)
+            if stated not in (None, word):
+                lacks.append(f"{key} {stated!r} is not a choice it has (only {word!r})")
+        if settings.broad_phase is not None:
+            lacks.append(f"broad_phase {settings.broad_phase!r} is not a choice it has (it has its own tree)")
+        if settings.half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
+            lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has drag")
+        return tuple(lacks)
+
+    def resolve(self, scene: Scene, settings: Settings) -> Settings:
+        """Return the settings with slop, bias, persistence and pymunk's own words filled in."""
+        bodies = scene.bodies
+        touching = np.asarray([e.collides != "none" for e in bodies.elements], dtype=bool)[bodies.element]
+        smallest = float(bodies.radius[touching].min()) if touching.any() else 1.0
+        own = {"slop": SLOP_PER_RADIUS * smallest, "bias": BIAS, "persistence": PERSISTENCE, **PYMUNK_WORDS}
+        return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
+
+    def start(self, scene: Scene, settings: Settings | None = None) -> "NativeSimulation":
+        """Set a scene up in a pymunk space.
+
+        Raises:
+            Refusal: pymunk lacks something that is asked for.
+        """
+        from sandbox.engines.contract import Refusal
+        from sandbox.engines.native.simulation import NativeSimulation
+
+        settings = scene.solver if settings is None else settings
+        missing = self.missing(scene, settings)
+        if missing:
+            raise Refusal(self.name, missing, ())
+        return NativeSimulation(scene, self.resolve(scene, settings))

@@ -1,0 +1,238 @@
+"""MeetingBodies: the bodies that can touch something, in a pymunk space."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pymunk
+
+from sandbox.engines.native.drag import acceleration
+from sandbox.engines.native.limits import BEYOND, FARTHEST, FASTEST
+from sandbox.engines.native.reader import Reader
+from sandbox.engines.native.space import (
+    SurfaceSetter,
+    category,
+    fixed_shapes,
+    gravity_of,
+    new_space,
+    reach_of,
+)
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.meetings import Meetings
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import FloatArray, IntArray
+
+MANY = 5_000
+"""Bodies from which on they are added shuffled: pymunk's tree takes 30 s for 40,000 in a sorted line."""
+
+
+class Member(NamedTuple):
+    """A body in the space, with its shape."""
+
+    body: pymunk.Body
+    shape: pymunk.Circle
+
+    @property
+    def moves(self) -> bool:
+        """It is not fixed."""
+        return self.body.body_type == pymunk.Body.DYNAMIC
+
+
+class MeetingBodies:
+    """Bodies in a space, addressed by their numbers. The space is not made before a first body joins."""
+
+    def __init__(self, scene: Scene, settings: Settings) -> None:
+        self._scene, self._settings = scene, settings
+        self._space = new_space(scene, settings)
+        self._reader = Reader(self._space)
+        self._setter = SurfaceSetter(self._space)
+        self._members: dict[int, Member] = {}
+        self._fixed: list[tuple[pymunk.Body, list[pymunk.Shape]]] = []
+        self._surface_of: IntArray = np.empty(0, np.int64)
+        self._surface_of_fixed: IntArray = np.empty(0, np.int64)
+        self._steady: dict[int, tuple[FloatArray, float]] = {}
+        self._moving = 0
+        self._centre, self._reach = np.zeros(2), math.inf
+        self._state: tuple[IntArray, FloatArray] | None = None
+        self._limit = np.empty(0)
+
+    def __len__(self) -> int:
+        return self._moving
+
+    def join(
+        self,
+        numbers: IntArray,
+        bodies: Bodies,
+        position: FloatArray,
+        velocity: FloatArray,
+        angle: FloatArray,
+        angular_velocity: FloatArray,
+        moment: FloatArray,
+    ) -> None:
+        """Add bodies, (M,) numbers with their present state."""
+        if not len(numbers):
+            return
+        if not self._fixed:
+            self._add_fixed(bodies)
+        order = np.arange(len(numbers))
+        if len(numbers) > MANY:
+            order = np.random.Generator(np.random.PCG64(0)).permutation(len(numbers))
+        for k in order.tolist():
+            number = int(numbers[k])
+            fixed = bool(bodies.fixed[number])
+            kind = pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC
+            body = pymunk.Body(float(bodies.mass[number]), float(moment[k]), body_type=kind)
+            body.position = float(position[k, 0]), float(position[k, 1])
+            body.angle = float(angle[k])
+            if not fixed:
+                body.velocity = float(velocity[k, 0]), float(velocity[k, 1])
+                body.angular_velocity = float(angular_velocity[k])
+                self._moving += 1
+            shape = pymunk.Circle(body, float(bodies.radius[number]))
+            shape.filter = category(fixed, bodies.elements[bodies.element[number]].collides)
+            self._setter.dress(shape, int(self._surface_of[number]))
+            self._space.add(body, shape)
+            self._members[number] = Member(body, shape)
+        self._register()
+
+    def _add_fixed(self, bodies: Bodies) -> None:
+        """Add the fixed things, once there is something to meet them."""
+        starts, speeds = bodies.position[~bodies.fixed], np.hypot(*bodies.velocity[~bodies.fixed].T)
+        centre, reach = reach_of(self._scene, starts, speeds)
+        if self._scene.planes:
+            self._centre, self._reach = centre, reach
+        for thing, surface in zip(self._scene.fixed, self._surface_of_fixed.tolist(), strict=True):
+            body = pymunk.Body(body_type=pymunk.Body.STATIC)
+            shapes = list(fixed_shapes(thing, body, centre, reach))
+            for shape in shapes:
+                shape.filter = category(True, "all")
+                self._setter.dress(shape, surface)
+            self._space.add(body, *shapes)
+            self._fixed.append((body, shapes))
+        where = min(self._reach, FARTHEST)
+        self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
+
+    def _register(self) -> None:
+        moving = {m.body.id: number for number, m in self._members.items() if m.moves}
+        still = {m.body.id: number for number, m in self._members.items() if not m.moves}
+        things = {body.id: -1 - k for k, (body, _) in enumerate(self._fixed)}
+        self._reader.assign(moving, still | things)
+        self._state = None
+
+    def leave(self, numbers: IntArray) -> None:
+        """Take bodies out."""
+        for number in numbers.tolist():
+            member = self._members.pop(number)
+            self._moving -= member.moves
+            self._space.remove(member.shape, member.body)
+            self._steady.pop(number, None)
+        self._state = None
+
+    def renew(self, scene: Scene, meet: Meetings) -> None:
+        """Go on with a scene's changed air, gravity or coefficients, or with more surfaces."""
+        self._scene = scene
+        self._surface_of, self._surface_of_fixed = meet.surfaces.of_body, meet.surfaces.of_fixed
+        self._setter.renew(meet)
+        self._space.gravity = gravity_of(scene)
+        for number, (body, circle) in self._members.items():
+            self._setter.dress(circle, int(self._surface_of[number]))
+            if meet.turnable[number] and math.isinf(body.moment):
+                body.moment = 0.5 * body.mass * circle.radius**2
+        for (_, shapes), surface in zip(self._fixed, self._surface_of_fixed.tolist(), strict=False):
+            for shape in shapes:
+                self._setter.dress(shape, surface)
+
+    def step(self) -> None:
+        """Advance by one substep."""
+        if not self._moving:
+            return
+        self._apply_forces()
+        self._space.step(self._settings.h)
+        self._state = None
+
+    def _apply_forces(self) -> None:
+        """Set what pymunk forgets after each step: the drag on all bodies, the steady forces on some."""
+        world = self._scene.world
+        if world.linear_drag > 0 or world.quadratic_drag > 0:
+            numbers, state = self._read()
+            mass = np.asarray([self._members[n].body.mass for n in numbers.tolist()])[:, None]
+            push = np.zeros((len(numbers), 2))
+            for row, number in enumerate(numbers.tolist()):
+                if number in self._steady:
+                    push[row] = self._steady[number][0] * (1.0 / mass[row])
+            self._reader.push(mass * acceleration(world, state[:, 3:5], push, self._settings.h))
+        else:
+            for number, (force, _) in self._steady.items():
+                self._members[number].body.force = float(force[0]), float(force[1])
+        for number, (_, torque) in self._steady.items():
+            self._members[number].body.torque = torque
+
+    def _read(self) -> tuple[IntArray, FloatArray]:
+        if self._state is None:
+            self._state = self._reader.state()
+        return self._state
+
+    def write(
+        self, position: FloatArray, velocity: FloatArray, angle: FloatArray, angular_velocity: FloatArray
+    ) -> None:
+        """Write the present state into arrays in scene order."""
+        if not self._moving:
+            return
+        numbers, state = self._read()
+        position[numbers], velocity[numbers] = state[:, 0:2], state[:, 3:5]
+        angle[numbers], angular_velocity[numbers] = state[:, 2], state[:, 5]
+
+    def touching(self) -> tuple[IntArray, IntArray, FloatArray]:
+        """Return who touches whom, and the impulse on the first (`Reader.touching`)."""
+        return self._reader.touching()
+
+    def places(self) -> tuple[FloatArray, FloatArray]:
+        """Return the normals and points of `touching`."""
+        return self._reader.places()
+
+    def beyond(self) -> tuple[int, str] | None:
+        """Return a body that is not finite or beyond all bounds, and what is the matter; else None."""
+        if not self._moving:
+            return None
+        numbers, state = self._read()
+        offset = state - np.array([self._centre[0], self._centre[1], 0.0, 0.0, 0.0, 0.0])
+        good = (np.abs(offset) <= self._limit).all(axis=1)
+        if good.all():
+            return None
+        worst = int(np.argmin(good))
+        if not np.isfinite(state[worst]).all() or self._reach > FARTHEST:
+            return int(numbers[worst]), BEYOND
+        return int(numbers[worst]), f"is more than {self._reach:g} m out, where pymunk's half-planes end"
+
+    def moment(self, number: int) -> float:
+        """Return a body's moment of inertia, kg·m²; infinite where nothing in the scene can turn it."""
+        return self._members[number].body.moment
+
+    def give_moment(self, number: int, moment: float) -> None:
+        """Let a body turn from now on."""
+        self._members[number].body.moment = moment
+
+    def push(self, number: int, force: FloatArray, torque: float) -> None:
+        """Let a steady force (N) and torque (N·m) act on a body from now on."""
+        if force.any() or torque:
+            self._steady[number] = force, torque
+        else:
+            self._steady.pop(number, None)
+
+    def set_position(self, number: int, position: FloatArray) -> None:
+        """Put a body somewhere, m."""
+        body = self._members[number].body
+        body.position = float(position[0]), float(position[1])
+        self._space.reindex_shapes_for_body(body)
+        self._state = None
+
+    def set_velocity(self, number: int, velocity: FloatArray) -> None:
+        """Give a body a velocity, m/s."""
+        self._members[number].body.velocity = float(velocity[0]), float(velocity[1])
+        self._state = None
+
+    def set_spin(self, number: int, spin: float) -> None:
+        """Give a body an angular velocity, rad/s."""
+        self._members[number].body.angular_velocity = spin
+        self._state = None

@@ -1,0 +1,95 @@
+"""Reader: the state of a space in one call a frame, through pymunk.batch and one reused buffer."""
+
+import numpy as np
+import pymunk
+from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
+
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+STATE = (
+    BodyFields.BODY_ID
+    | BodyFields.POSITION
+    | BodyFields.ANGLE
+    | BodyFields.VELOCITY
+    | BodyFields.ANGULAR_VELOCITY
+)
+STATE_WIDTH = 6  # x, y, angle, vx, vy, ω: in the order of pymunk's flags
+
+TOUCH = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID | ArbiterFields.TOTAL_IMPULSE | ArbiterFields.CONTACT_COUNT
+PLACE = ArbiterFields.NORMAL | ArbiterFields.POINT_A_1 | ArbiterFields.POINT_B_1
+
+
+class Reader:
+    """Reads bodies and arbiters of one space.
+
+    pymunk lists bodies in an order of its own, which changes when one is removed: rows are told by their id.
+    A buffer's memory moves when it grows and each new one leaks, hence one of each kind, and only copies leave.
+    """
+
+    def __init__(self, space: pymunk.Space) -> None:
+        self._space = space
+        self._bodies, self._arbiters, self._places, self._forces = Buffer(), Buffer(), Buffer(), Buffer()
+        self._base = 0
+        self._number_of: IntArray = np.empty(0, np.int64)
+        self._moves: BoolArray = np.empty(0, np.bool_)
+        self._ids: IntArray = np.empty(0, np.int64)
+        self._rows: IntArray = np.empty(0, np.int64)
+        self._numbers: IntArray = np.empty(0, np.int64)
+
+    def assign(self, moving: dict[int, int], still: dict[int, int]) -> None:
+        """Say which number each body's id stands for: of those that move, and of the static ones."""
+        both = moving | still
+        ids = np.fromiter(both, np.int64, len(both))
+        self._base = int(ids.min()) if len(ids) else 0
+        size = int(ids.max()) - self._base + 1 if len(ids) else 0
+        self._number_of, self._moves = np.zeros(size, np.int64), np.zeros(size, np.bool_)
+        self._number_of[ids - self._base] = np.fromiter(both.values(), np.int64, len(both))
+        self._moves[np.fromiter(moving, np.int64, len(moving)) - self._base] = True
+        self._ids = np.empty(0, np.int64)
+
+    def state(self) -> tuple[IntArray, FloatArray]:
+        """Return the numbers (R,) of the moving bodies, and their states (R, 6): x, y, angle, vx, vy, ω.
+
+        Both are valid until the next call.
+        """
+        self._bodies.clear()
+        get_space_bodies(self._space, STATE, self._bodies)
+        ids = np.frombuffer(self._bodies.int_buf(), np.int64)
+        if not np.array_equal(ids, self._ids):
+            self._ids = ids.copy()
+            self._rows = np.flatnonzero(self._moves[ids - self._base])
+            self._numbers = self._number_of[ids[self._rows] - self._base]
+        table = np.frombuffer(self._bodies.float_buf()).reshape(-1, STATE_WIDTH)
+        count = len(self._rows)
+        if count == 0 or self._rows[-1] == count - 1:  # static bodies come last
+            return self._numbers, table[:count]
+        return self._numbers, table[self._rows]
+
+    def push(self, force: FloatArray) -> None:
+        """Set the force, N, on each body that the last `state` listed, in its order, for the next step only."""
+        self._outgoing = np.zeros((len(self._ids), 2))  # kept alive: pymunk holds a bare pointer into it
+        self._outgoing[self._rows] = force
+        self._forces.set_float_buf(self._outgoing.reshape(-1))
+        set_space_bodies(self._space, BodyFields.FORCE, self._forces)
+
+    def touching(self) -> tuple[IntArray, IntArray, FloatArray]:
+        """Return bodies a and b (K,) of every arbiter that touches now, and the impulse (K, 2) on a, N·s.
+
+        The arbiters' order is the space's own, and the same for `places`.
+        """
+        self._arbiters.clear()
+        get_space_arbiters(self._space, TOUCH, self._arbiters)
+        words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
+        impulse = np.frombuffer(self._arbiters.float_buf()).reshape(-1, 2)
+        self._live = words[:, 2] > 0  # a parted contact is remembered for a while, with no points
+        if not self._live.all():
+            words, impulse = words[self._live], impulse[self._live]
+        a, b = self._number_of[words[:, 0] - self._base], self._number_of[words[:, 1] - self._base]
+        return a, b, impulse
+
+    def places(self) -> tuple[FloatArray, FloatArray]:
+        """Return the normals (K, 2), from a to b, and points (K, 2), midway in the overlap, of `touching`."""
+        self._places.clear()
+        get_space_arbiters(self._space, PLACE, self._places)
+        table = np.frombuffer(self._places.float_buf()).reshape(-1, 6)[self._live]
+        return table[:, 0:2], (table[:, 2:4] + table[:, 4:6]) / 2.0

@@ -1,0 +1,186 @@
+"""NativeSimulation: a scene running in a pymunk space, and beside it, as arrays, what can meet nothing."""
+
+import hashlib
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from sandbox.action import Action
+from sandbox.engines.contract import Divergence, Observer
+from sandbox.engines.native.acting import perform
+from sandbox.engines.native.contacts import ContactLedger
+from sandbox.engines.native.population import Population
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Contacts, FloatArray, Frame
+
+
+class NativeSimulation:
+    """A running scene.
+
+    Scheme: drift–kick, explicit Euler for free motion (position error +g·h·T/2, velocity exact). With `half_kick`
+    velocities start g·h/2 ahead, and are reported that much back: positions under gravity are then exact to
+    rounding until the first contact. In contact the correction goes on being reported, and means nothing there.
+
+    Contacts are found at the end of a substep, with no time of impact: a body that passes a thin thing within one
+    substep is not seen to touch it.
+    """
+
+    def __init__(self, scene: Scene, settings: Settings) -> None:
+        self._settings = settings
+        self._population = Population(scene, settings)
+        self._steps = 0
+        self._part = 0.0
+        self._ledger: ContactLedger | None = None
+        self._observer: Observer | None = None
+        self._retired: dict[int, float] = {}
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return (self._steps + self._part) * self._settings.dt
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies by number, as they started; spawned ones join at the end."""
+        return self._population.bodies
+
+    @property
+    def settings(self) -> Settings:
+        """The settings, with every choice filled in."""
+        return self._settings
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """When each body that is no longer there was gone: number → s."""
+        return MappingProxyType(self._retired)
+
+    @property
+    def flying(self) -> int:
+        """How many bodies are advanced as arrays, outside of pymunk."""
+        return len(self._population.free)
+
+    def step(self) -> None:
+        """Advance by one dt.
+
+        Raises:
+            Divergence: a body is no longer finite, or beyond all bounds. The state can still be read.
+        """
+        self._check_running()
+        for k in range(self._settings.substeps):
+            self._substep(k)
+        self._steps += 1
+        self._guard()
+        self._retire()
+
+    def finish(self, part: float) -> None:
+        """Advance by a last part of dt, 0 < part < 1.
+
+        Whole substeps first. The state within the substep that is cut is interpolated, which for positions is
+        the scheme's own path.
+        """
+        self._check_running()
+        whole, rest = divmod(part * self._settings.substeps, 1.0)
+        for k in range(int(whole)):
+            self._substep(k)
+        before = [array.copy() for array in self._state()]
+        self._substep(int(whole))
+        for now, old in zip(self._state(), before, strict=True):
+            now[...] = old + (now - old) * rest
+        self._part = part
+        self._population.end()
+
+    def apply(self, action: Action) -> None:
+        """Do what an action says, now.
+
+        Raises:
+            ActionError: it cannot be done. Nothing has changed then.
+        """
+        self._check_running()
+        leaving = perform(action, self._population)
+        if leaving is not None:
+            self._take_out(leaving)
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+        population = self._population
+        position, velocity, angle, angular_velocity = (array.copy() for array in self._state())
+        if self._settings.half_kick:
+            velocity[population.moving] -= population.ahead
+        return Frame(self.time, position, velocity, angle, angular_velocity, population.present.copy())
+
+    def contacts(self) -> Contacts:
+        """Return the contacts since the last call; the first call starts the recording."""
+        if self._ledger is None:
+            self._ledger = ContactLedger()
+            self._record(self.time)
+        return self._ledger.take()
+
+    def watch(self, observer: Observer) -> None:
+        """Have an observer called after every substep; this records contacts too."""
+        if self._ledger is None:
+            self.contacts()
+        self._observer = observer
+
+    def state_hash(self) -> str:
+        """Return a SHA-256 of time and every body's state."""
+        frame = self.frame()
+        digest = hashlib.sha256(np.float64(frame.time).tobytes())
+        for array in (frame.position, frame.velocity, frame.angle, frame.angular_velocity, frame.present):
+            digest.update(array.tobytes())
+        return digest.hexdigest()
+
+    def close(self) -> None:
+        """End the simulation. What it holds goes with it."""
+        self._population.end()
+
+    def _check_running(self) -> None:
+        if self._population.ended:
+            raise RuntimeError("the simulation has ended; it can be read, but not go on")
+
+    def _substep(self, k: int) -> None:
+        """Advance by h, the k-th time in this step: both halves apart, as they never meet."""
+        population, h = self._population, self._settings.h
+        start = self.time + k * h
+        before = self._state()[0].copy() if self._observer is not None else None
+        population.free.step()
+        population.meeting.step()
+        population.changed()
+        if self._ledger is not None:
+            self._record(start + h)
+            if self._observer is not None and before is not None:
+                self._observer(start, before, self._state()[0], self._ledger.pairs())
+
+    def _record(self, time: float) -> None:
+        if self._ledger is not None and len(self._population.meeting):
+            self._ledger.record(time, *self._population.meeting.touching(), self._population.meeting.places)
+
+    def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return the present arrays in scene order; they belong to the population."""
+        population = self._population
+        population.refresh()
+        return population.position, population.velocity, population.angle, population.angular_velocity
+
+    def _guard(self) -> None:
+        """Stop what is no longer finite and bounded, or has left the reach within which planes are planes."""
+        for half in (self._population.free, self._population.meeting):
+            beyond = half.beyond()
+            if beyond is not None:
+                number, what = beyond
+                raise Divergence(self.time, self.bodies.names[number], what)
+
+    def _retire(self) -> None:
+        """Take out what has left world.bounds."""
+        bounds = self._population.scene.world.bounds
+        if bounds is None:
+            return
+        position = self._state()[0]
+        outside = ((position < bounds[0]) | (position > bounds[1])).any(axis=1) & self._population.moving
+        for number in np.flatnonzero(outside).tolist():
+            self._take_out(number)
+
+    def _take_out(self, number: int) -> None:
+        self._population.take_out(number)
+        self._retired[number] = self.time

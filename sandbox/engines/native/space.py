@@ -1,0 +1,135 @@
+"""Assembly: the pymunk objects that a scene demands, and none that it does not.
+
+Every library default that matters is stated here. Each fixed thing gets a static body of its own, so that a contact
+tells by its bodies alone who touched.
+"""
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import pymunk
+
+from sandbox.engines.native.coefficients import factors, wrong_pairs
+from sandbox.scene.meetings import Meetings
+from sandbox.scene.model import Collides, Plane, Post, Scene, Wall
+from sandbox.scene.near import FloatArray
+from sandbox.scene.part import BACKING
+from sandbox.scene.settings import Settings
+
+FIXED, LOOSE, SOLITARY = 0b001, 0b010, 0b100
+"""Collision categories: what never moves, balls that meet everything, balls that meet only what is fixed."""
+
+SHORTEST_REACH, LONGEST_REACH = 5e3, 5e6
+"""m; pymunk's half-planes are segments, whose noise grows with their length: 3e-13 m at a reach of 5e3."""
+
+
+def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
+    """Return an empty space with every parameter stated. `settings` must be resolved."""
+    assert settings.slop is not None and settings.bias is not None and settings.persistence is not None
+    space = pymunk.Space(threaded=False)  # two threads are not repeatable
+    space.gravity = gravity_of(scene)
+    space.damping = 1.0  # drag is `drag.py`'s: pymunk's damping would slow spins too, and know no wind
+    space.iterations = settings.iterations
+    space.collision_slop = settings.slop
+    space.collision_bias = settings.bias
+    space.collision_persistence = settings.persistence
+    space.sleep_time_threshold = math.inf  # a sleeping pile would be another model
+    space.idle_speed_threshold = 0.0
+    return space
+
+
+def gravity_of(scene: Scene) -> tuple[float, float]:
+    """Return the gravity that the space itself applies: with drag none, the drag's force holds it then."""
+    dragged = scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
+    return (0.0, 0.0) if dragged else scene.world.gravity
+
+
+def category(fixed: bool, collides: Collides) -> pymunk.ShapeFilter:
+    """Return the filter of a ball."""
+    if fixed:
+        return pymunk.ShapeFilter(categories=FIXED, mask=LOOSE | SOLITARY if collides == "all" else 0)
+    if collides == "all":
+        return pymunk.ShapeFilter(categories=LOOSE, mask=FIXED | LOOSE)
+    return pymunk.ShapeFilter(categories=SOLITARY, mask=FIXED)
+
+
+def reach_of(scene: Scene, starts: FloatArray, speeds: FloatArray) -> tuple[FloatArray, float]:
+    """Return a centre (2,) and how far from it, in each coordinate, bodies may stray while planes stay planes.
+
+    The reach covers twice the way that the fastest body can go in the scene's duration under its gravity.
+    """
+    if not len(starts):
+        return np.zeros(2), SHORTEST_REACH
+    low, high = starts.min(axis=0), starts.max(axis=0)
+    time, gravity = scene.world.duration, math.hypot(*scene.world.gravity)
+    way = float(speeds.max()) * time + 0.5 * gravity * time**2 + math.hypot(*scene.world.wind) * time
+    reach = 2.0 * (float((high - low).max()) + way)
+    return (low + high) / 2.0, float(np.clip(reach, SHORTEST_REACH, LONGEST_REACH))
+
+
+def fixed_shapes(
+    thing: Plane | Wall | Post, body: pymunk.Body, centre: FloatArray, reach: float
+) -> Iterator[pymunk.Shape]:
+    """Yield the shapes of a fixed thing."""
+    if isinstance(thing, Plane):
+        yield _half_plane(thing, body, centre, reach)
+    elif isinstance(thing, Wall):
+        ends = (*thing.points, thing.points[0]) if thing.closed else thing.points
+        for a, b in pairwise(ends):
+            yield pymunk.Segment(body, a, b, thing.thickness / 2.0)
+    else:
+        yield pymunk.Circle(body, thing.radius, thing.position)
+
+
+def _half_plane(plane: Plane, body: pymunk.Body, centre: FloatArray, reach: float) -> pymunk.Segment:
+    """Return a long segment, as thick as a plane's backing is deep, sunk until its face is the plane.
+
+    Its middle lies below `centre`, so its ends are out of reach however far off the plane's own point is.
+    """
+    normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+    along = np.array([-normal[1], normal[0]])
+    point = np.asarray(plane.point)
+    middle = point + along * float((centre - point) @ along) - normal * BACKING
+    a, b = middle - along * 2.0 * reach, middle + along * 2.0 * reach
+    return pymunk.Segment(body, (float(a[0]), float(a[1])), (float(b[0]), float(b[1])), BACKING)
+
+
+class SurfaceSetter:
+    """Gives shapes their elasticity and friction, so that every pair has exactly its own coefficients."""
+
+    def __init__(self, space: pymunk.Space) -> None:
+        self._space = space
+        self._handled: dict[tuple[int, int], list[float]] = {}
+        self._elasticity: list[float] = []
+        self._friction: list[float] = []
+
+    def renew(self, meet: Meetings) -> None:
+        """Work out each surface's factors, and handlers for the pairs that no factors can serve."""
+        surfaces, touching = meet.surfaces, meet.touching
+        for handled in self._handled.values():
+            handled[:] = []
+        stated = [(s.restitution, s.friction) for s in surfaces.surfaces]
+        self._elasticity = factors(surfaces.restitution, touching, [e for e, _ in stated])
+        self._friction = factors(surfaces.friction, touching, [mu for _, mu in stated])
+        wrong = {
+            *wrong_pairs(surfaces.restitution, touching, self._elasticity),
+            *wrong_pairs(surfaces.friction, touching, self._friction),
+        }
+        for a, b in sorted(wrong):
+            values = [float(surfaces.restitution[a, b]), float(surfaces.friction[a, b])]
+            known = self._handled.setdefault((a, b), [])
+            known[:] = values
+            self._space.on_collision(a + 1, b + 1, pre_solve=_set_coefficients, data=known)
+
+    def dress(self, shape: pymunk.Shape, surface: int) -> None:
+        """Give a shape its surface."""
+        shape.elasticity = self._elasticity[surface]
+        shape.friction = self._friction[surface]
+        shape.collision_type = surface + 1  # 0 is what pymunk gives to shapes of no type
+
+
+def _set_coefficients(arbiter: pymunk.Arbiter, _: pymunk.Space, data: list[float]) -> None:
+    if data:
+        arbiter.restitution, arbiter.friction = data

@@ -1,0 +1,47 @@
+"""ENGINES: every engine by name."""
+
+from sandbox.engines.contract import Engine, Refusal, Simulation
+from sandbox.engines.native.engine import PymunkEngine
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+ENGINES: dict[str, Engine] = {
+    "pymunk": PymunkEngine(),
+}
+
+
+class UnknownEngineError(ValueError):
+    """No engine has that name."""
+
+
+def engine(name: str) -> Engine:
+    """Return an engine by name.
+
+    Raises:
+        UnknownEngineError: with the names there are.
+    """
+    try:
+        return ENGINES[name]
+    except KeyError:
+        raise UnknownEngineError(f"no engine {name!r}; engines: {', '.join(ENGINES)}") from None
+
+
+def able(scene: Scene, settings: Settings | None = None) -> tuple[str, ...]:
+    """Return the names of the engines that can run a scene."""
+    settings = scene.solver if settings is None else settings
+    return tuple(name for name, each in ENGINES.items() if not each.missing(scene, settings))
+
+
+def start(scene: Scene, engine_name: str = "pymunk", settings: Settings | None = None) -> Simulation:
+    """Start a scene on an engine.
+
+    Raises:
+        UnknownEngineError: no engine has that name.
+        Refusal: the engine lacks something, with the engines that do not.
+    """
+    settings = scene.solver if settings is None else settings
+    chosen = engine(engine_name)
+    missing = chosen.missing(scene, settings)
+    if missing:
+        raise Refusal(engine_name, missing, able(scene, settings))
+    return chosen.start(scene, settings)

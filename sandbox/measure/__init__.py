@@ -1,0 +1,1 @@
+"""Measuring: running scenes, and telling how right the answers are."""

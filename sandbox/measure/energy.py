@@ -1,0 +1,89 @@
+"""Energy: what a run's bodies have at each recorded time."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.trajectory import BoolArray, FloatArray, Trajectory
+
+CHUNK = 10_000_000
+"""Frames × bodies worked on at once: a few arrays of 80 MB."""
+
+
+class Energies(NamedTuple):
+    """Energies at each of T times, J."""
+
+    kinetic: FloatArray
+    """(T,) ½ m v² + ½ I ω²"""
+    potential: FloatArray
+    """(T,) −m g·x: 0 at the origin"""
+    total: FloatArray
+    """(T,)"""
+
+
+def energies(
+    trajectory: Trajectory, scene: Scene, *, bodies: Bodies | None = None, body: int | None = None
+) -> Energies:
+    """Return the energy of all bodies that move, or of one.
+
+    A body counts from its first frame until it is retired; a fixed one counts nothing. Gravity is the
+    scene's, the moment that of a uniform disc. Where a run diverged, energy may be infinite or nan.
+
+    Args:
+        trajectory: the run.
+        scene: its scene.
+        bodies: the run's bodies, where some were spawned; else the scene's.
+        body: the number of the only body to count.
+
+    Raises:
+        ValueError: the bodies are not those of the run.
+        IndexError: there is no body of that number.
+    """
+    bodies = scene.bodies if bodies is None else bodies
+    frames, count = trajectory.position.shape[:2]
+    if count != len(bodies):
+        raise ValueError(
+            f"the run has {count:,} bodies, described are {len(bodies):,}; pass the run's own"
+        )
+    columns = slice(None)
+    if body is not None:
+        if not 0 <= body < count:
+            raise IndexError(f"no body {body}; the run has {count:,}")
+        columns = slice(body, body + 1)
+
+    mass = np.where(bodies.fixed, 0.0, bodies.mass)[columns]
+    moment = np.where(bodies.fixed, 0.0, bodies.moment)[columns]
+    gravity = np.asarray(scene.world.gravity)
+    gone = np.where(np.isnan(trajectory.retired_time), np.inf, trajectory.retired_time)[columns]
+    seen = np.zeros(len(mass), dtype=np.bool_)
+    kinetic, potential = np.empty(frames), np.empty(frames)
+
+    step = max(1, CHUNK // max(1, len(mass)))
+    for begin in range(0, frames, step):
+        rows = slice(begin, begin + step)
+        position, velocity = trajectory.position[rows, columns], trajectory.velocity[rows, columns]
+        spin = trajectory.angular_velocity[rows, columns]
+        there = _there(position, seen)
+        seen = there[-1]
+        counts = there & (trajectory.time[rows, None] < gone)
+        # A diverged state squares to infinity: that is its energy, not a fault.
+        with np.errstate(over="ignore", invalid="ignore"):
+            squared = np.einsum("tnk,tnk->tn", velocity, velocity)
+            turning = _sum(np.square(spin), counts, moment)
+            kinetic[rows] = 0.5 * (_sum(squared, counts, mass) + turning)
+            potential[rows] = -_sum(position @ gravity, counts, mass)
+    with np.errstate(invalid="ignore"):
+        return Energies(kinetic, potential, kinetic + potential)
+
+
+def _there(position: FloatArray, seen: BoolArray) -> BoolArray:
+    """Tell who has appeared by each frame. A nan after that is a diverged state, and must show in the sum."""
+    there = np.asarray(~np.isnan(position).any(axis=2))
+    there[0] |= seen
+    return np.asarray(np.logical_or.accumulate(there, axis=0))
+
+
+def _sum(values: FloatArray, counts: BoolArray, weights: FloatArray) -> FloatArray:
+    return np.asarray(np.where(counts, values, 0.0) @ weights)

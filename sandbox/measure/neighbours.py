@@ -1,0 +1,146 @@
+"""Neighbours: the pairs of balls that may meet in a substep, kept from one substep to the next.
+
+A Verlet list: it holds every pair within a skin of contact, and stays complete for all bodies that have moved
+less than half the skin since. The few that moved farther, such as a bullet, are held against all others in
+rows; when they become many, the list is built anew.
+Source: L. Verlet, Computer "experiments" on classical fluids I, Phys. Rev. 159 (1967), 98.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from sandbox.scene.near import CHUNK, near_pairs
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+BUILDING = 20_000
+"""What building a list costs, in entries of rows (measured), beside `BUILDING_EACH` for each body."""
+BUILDING_EACH = 50
+LASTING = 6.0
+"""Substeps for which a list is meant to last, as far as half its skin then stays within a radius."""
+LEAST_SKIN = 0.1
+"""Half the skin is at least this part of the typical radius: thin lists save nothing more."""
+CELL_SHARE = 4.5
+"""Of the candidates in a body's nine cells, each pair is met once."""
+
+Meet = Callable[[IntArray, IntArray], BoolArray]
+
+
+class Neighbours:
+    """Pairs of bodies that may come into contact, among `member` of N bodies with these radii (N,), m.
+
+    `meet` says of numbers (K,), (K,) which pairs can touch at all.
+    """
+
+    def __init__(self, radius: FloatArray, member: BoolArray, meet: Meet) -> None:
+        self._radius = radius
+        self._member = member
+        self._meet = meet
+        self._party = np.flatnonzero(member)
+        self._few = BUILDING_EACH + BUILDING // max(len(self._party), 1)
+        self._anchor = np.full((len(radius), 2), np.inf)
+        self._half_skin = 0.0
+        self._first = self._second = np.empty(0, np.int64)
+
+    def pairs(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
+        """Return at least every pair that comes into contact on its way, the lower number first.
+
+        Args:
+            start: centres (N, 2) at the start of the substep, m; rows that are nan never pair.
+            end: the same at its end.
+            fast: (N,) of each pair at least one is.
+
+        Returns:
+            Two index arrays (K,), no pair twice.
+        """
+        strays = self._strays(start, end)
+        if np.count_nonzero(strays) > self._few:
+            self._build(start, end)
+            strays = self._strays(start, end)
+        keep = fast[self._first] | fast[self._second]
+        if strays.any():
+            keep &= ~(strays[self._first] | strays[self._second])
+            first, second = self._astray(start, end, strays)
+            more = fast[first] | fast[second]
+            first = np.concatenate((self._first[keep], first[more]))
+            second = np.concatenate((self._second[keep], second[more]))
+            return first, second
+        return self._first[keep], self._second[keep]
+
+    def _strays(self, start: FloatArray, end: FloatArray) -> BoolArray:
+        """Return who left its half of the skin, (N,)."""
+        limit = self._half_skin**2
+        astray = self._member.copy()
+        for place in (end, start):
+            gone = place - self._anchor
+            gone *= gone
+            astray &= ~(gone[:, 0] + gone[:, 1] <= limit)
+        return astray
+
+    def _astray(self, start: FloatArray, end: FloatArray, strays: BoolArray) -> tuple[IntArray, IntArray]:
+        """Return the pairs with a stray that may meet on their way."""
+        here, there = start[self._party], end[self._party]
+        move = there - here
+        reach = self._radius[self._party] + 0.5 * np.sqrt((move * move).sum(axis=1))
+        rows = np.flatnonzero(strays[self._party])
+        return self._joined(_in_rows(rows, here + 0.5 * move, reach))
+
+    def _build(self, start: FloatArray, end: FloatArray) -> None:
+        """List the pairs within a skin whose width lets all but a few bodies stay for a while."""
+        whole = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
+        self._party = np.flatnonzero(self._member & whole)
+        self._anchor = start.copy()
+        self._first = self._second = np.empty(0, np.int64)
+        if len(self._party) < 2:
+            return
+        place, radius = start[self._party], self._radius[self._party]
+        typical = float(np.median(radius))
+        jump = np.sort(np.sqrt(((end[self._party] - place) ** 2).sum(axis=1)))
+        usual = float(jump[max(len(jump) - 1 - self._few // 2, len(jump) // 2)])
+        self._half_skin = max(usual, min(LASTING * usual, typical), LEAST_SKIN * typical)
+
+        # Large bodies would make the cells large, and let all the small ones meet: those go in rows.
+        reach = radius + self._half_skin * (1 + 1e-9)  # the skin ends in rounding, 1e-16
+        order = np.argsort(-reach, kind="stable")
+        crowd = np.minimum((reach[order] / typical) ** 2, len(order))
+        large = int(np.argmin(np.arange(len(order)) + CELL_SHARE * crowd))
+        self._first, self._second = self._joined(_close(place, reach, order[:large], order[large:]))
+
+    def _joined(self, found: Iterator[tuple[IntArray, IntArray]]) -> tuple[IntArray, IntArray]:
+        """Join chunks of pairs, given as places in the party, and keep those that can touch at all."""
+        pairs = [np.empty((2, 0), np.int64)]
+        for chunk in found:
+            i, j = self._party[chunk[0]], self._party[chunk[1]]
+            able = self._meet(i, j)
+            pairs.append(np.stack((np.minimum(i, j)[able], np.maximum(i, j)[able])))
+        first, second = np.concatenate(pairs, axis=1)
+        return first, second
+
+
+def _close(
+    place: FloatArray, reach: FloatArray, large: IntArray, small: IntArray
+) -> Iterator[tuple[IntArray, IntArray]]:
+    """Yield every pair nearer than the sum of its reaches: the large ones in rows, the small ones by cells."""
+    if len(large):
+        yield from _in_rows(np.sort(large), place, reach)
+    for i, j in near_pairs(place[small], 2 * float(reach[small].max(initial=0.0))):
+        i, j = small[i], small[j]
+        gap = place[j] - place[i]
+        gap *= gap
+        near = gap[:, 0] + gap[:, 1] < (reach[i] + reach[j]) ** 2
+        yield i[near], j[near]
+
+
+def _in_rows(
+    rows: IntArray, centre: FloatArray, reach: FloatArray
+) -> Iterator[tuple[IntArray, IntArray]]:
+    """Yield, in chunks, every pair with one of `rows` that is nearer than the sum of its reaches, once."""
+    in_rows = np.zeros(len(centre), dtype=np.bool_)
+    in_rows[rows] = True
+    for part in np.array_split(rows, max(1, len(rows) * len(centre) // CHUNK)):
+        across, up = (centre[part, axis, None] - centre[:, axis] for axis in (0, 1))
+        near = across * across + up * up < (reach[part, None] + reach) ** 2
+        at, j = np.nonzero(near)
+        i = part[at]
+        once = (j > i) | ~in_rows[j]
+        yield i[once], j[once]

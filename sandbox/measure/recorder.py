@@ -1,0 +1,88 @@
+"""Recorder: arrays for the frames of a run, sized before it starts."""
+
+import math
+import os
+
+import numpy as np
+
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import FloatArray, Frame
+
+BYTES_PER_BODY = 6 * 8
+"""of a frame: x, y, vx, vy, angle, ω"""
+
+SHARE = 0.6
+"""of the free memory that the frames of a run may take"""
+
+
+class TooLargeError(ValueError):
+    """A run whose frames would not fit into memory; `str()` says how it would."""
+
+
+def frame_count(scene: Scene, settings: Settings) -> tuple[int, float]:
+    """Return how many whole steps a run has, and the part of a step (0 ≤ part < 1) that is left for its end.
+
+    A duration within rounding of a whole number of steps is that number.
+    """
+    steps = scene.world.duration / settings.dt
+    whole = round(steps)
+    if abs(steps - whole) <= 1e-9 * max(whole, 1):
+        return max(whole, 1), 0.0
+    return math.floor(steps), steps - math.floor(steps)
+
+
+def free_memory() -> int:
+    """Return the bytes that are free, or where the system does not tell, half of what there is, or 4 GiB."""
+    for name, share in (("SC_AVPHYS_PAGES", 1.0), ("SC_PHYS_PAGES", 0.5)):
+        try:
+            return int(os.sysconf("SC_PAGE_SIZE") * os.sysconf(name) * share)
+        except (AttributeError, ValueError, OSError):
+            continue
+    return 4 * 2**30
+
+
+class Recorder:
+    """The kept frames of a run: every n-th, and the last."""
+
+    def __init__(self, scene: Scene, settings: Settings, bodies: int) -> None:
+        """Allocate.
+
+        Raises:
+            TooLargeError: the frames would not fit.
+        """
+        steps, part = frame_count(scene, settings)
+        self._every = settings.record_every
+        ends_between = part > 0.0 or steps % self._every > 0
+        kept = 1 + steps // self._every + ends_between
+        need, free = kept * bodies * BYTES_PER_BODY, free_memory() * SHARE
+        if need > free:
+            fits = math.ceil(self._every * need / free)
+            raise TooLargeError(
+                f"{kept:,} frames of {bodies:,} bodies take {need / 1e9:.3g} GB, but {free / 1e9:.3g} GB can be "
+                f"used; solver.record_every = {fits} would fit (it is {self._every})"
+            )
+        self._count = 0
+        self.steps, self.part = steps, part
+        self.time: FloatArray = np.empty(kept)
+        # A body that is not there yet is nan.
+        self.position, self.velocity = (np.full((kept, bodies, 2), np.nan) for _ in range(2))
+        self.angle, self.angular_velocity = (np.full((kept, bodies), np.nan) for _ in range(2))
+
+    def wants(self, step: int, last: bool) -> bool:
+        """Tell whether the frame after so many steps is kept."""
+        return last or step % self._every == 0
+
+    def keep(self, frame: Frame, time: float) -> None:
+        """Keep a frame, as of a time."""
+        k, n = self._count, len(frame.position)
+        self.time[k] = time
+        self.position[k, :n], self.velocity[k, :n] = frame.position, frame.velocity
+        self.angle[k, :n], self.angular_velocity[k, :n] = frame.angle, frame.angular_velocity
+        self._count += 1
+
+    def arrays(self, bodies: int) -> dict[str, FloatArray]:
+        """Return what was kept of the first so many bodies."""
+        names = ("position", "velocity", "angle", "angular_velocity")
+        kept = {name: getattr(self, name)[: self._count, :bodies] for name in names}
+        return {"time": self.time[: self._count], **kept}

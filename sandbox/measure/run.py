@@ -1,0 +1,201 @@
+"""Running: a scene on an engine from start to end, recorded and audited."""
+
+from collections.abc import Callable, Sequence
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from sandbox.action import Action, ActionError, Spawn, in_order
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
+from sandbox.engines.registry import engine as engine_named
+from sandbox.engines.registry import start
+from sandbox.measure.audit import Audit
+from sandbox.measure.energy import energies
+from sandbox.measure.recorder import Recorder
+from sandbox.measure.versions import versions
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.file import dumps
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Contacts, FloatArray, IntArray, Trajectory
+
+Progress = Callable[[float], None]
+"""Called now and then with the share of the run that is done, 0 to 1."""
+
+REPORT_EVERY = 0.1  # s
+
+
+def run(
+    scene: Scene,
+    engine: str = "pymunk",
+    *,
+    actions: Sequence[Action] = (),
+    audit: bool = True,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> Trajectory:
+    """Run a scene from start to end.
+
+    Args:
+        scene: what to run.
+        engine: its name in the registry.
+        actions: what happens on the way; each takes effect before the first step that starts at its time or later.
+        audit: count the contacts that the engine misses.
+        progress: who is told how far it is.
+        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
+
+    Returns:
+        What was recorded, also of a run that ended early: its `status` is then `diverged` (the physics left all
+        bounds) or `failed` (an action could not be done, contacts outgrew memory), with the reason; `refused`,
+        with no frames, where the engine lacks something.
+
+    Raises:
+        UnknownEngineError: no engine has that name.
+        TooLargeError: the frames would not fit into memory.
+        pydantic.ValidationError: a setting is wrong.
+    """
+    chosen = engine_named(engine)
+    wanted = scene.solver.replace(**settings) if settings else scene.solver
+    actions = in_order(tuple(actions))
+    try:
+        simulation = start(scene, engine, wanted)
+    except Refusal as refusal:
+        return _refused(scene, engine, wanted, str(refusal))
+    resolved = chosen.resolve(scene, wanted)
+    spawned = sum(isinstance(action, Spawn) for action in actions)
+    recorder = Recorder(scene, resolved, len(scene.bodies) + spawned)
+    auditor = Auditor(scene, simulation) if audit else None
+
+    began = perf_counter()
+    status, reason, steps, contacts = _drive(scene, simulation, resolved, actions, recorder, progress)
+    seconds = perf_counter() - began - (auditor.seconds if auditor else 0.0)
+    bodies = simulation.bodies
+    simulation.close()
+
+    retired = np.full(len(bodies), np.nan)
+    for number, time in simulation.retired.items():
+        retired[number] = time
+    missed = auditor.missed if auditor else _no_misses()
+    info = _info(scene, engine, resolved, status=status, reason=reason, steps=steps, seconds=seconds, audited=audit)
+    trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, missed, info)
+    total = energies(trajectory, scene, bodies=bodies).total
+    info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
+    return trajectory
+
+
+def _info(scene: Scene, engine: str, settings: Settings, **outcome: Any) -> dict[str, Any]:
+    return {
+        "scene": dumps(scene),
+        "engine": engine,
+        "settings": settings.model_dump(mode="json"),
+        "seed": scene.world.seed,
+        "versions": dict(versions()),
+        **outcome,
+    }
+
+
+def _refused(scene: Scene, engine: str, settings: Settings, reason: str) -> Trajectory:
+    """Return a trajectory without frames, which says why."""
+    count = len(scene.bodies)
+    outcome = {"status": "refused", "reason": reason, "steps": 0, "seconds": 0.0, "audited": False}
+    info = _info(scene, engine, settings, **outcome, energy_start=None, energy_end=None)
+    shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
+    frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}
+    return _trajectory(frames, scene.bodies, Contacts.none(), np.full(count, np.nan), _no_misses(), info)
+
+
+def _trajectory(
+    frames: dict[str, FloatArray],
+    bodies: Bodies,
+    contacts: Contacts,
+    retired_time: FloatArray,
+    missed: tuple[FloatArray, IntArray],
+    info: dict[str, Any],
+) -> Trajectory:
+    return Trajectory(
+        time=frames["time"],
+        position=frames["position"],
+        velocity=frames["velocity"],
+        angle=frames["angle"],
+        angular_velocity=frames["angular_velocity"],
+        names=np.asarray(bodies.names, dtype=np.str_),
+        contact_time=contacts.time,
+        contact_pair=contacts.pair,
+        contact_point=contacts.point,
+        contact_normal=contacts.normal,
+        contact_impulse=contacts.impulse,
+        retired_time=retired_time,
+        missed_time=missed[0],
+        missed_pair=missed[1],
+        info=info,
+    )
+
+
+def _no_misses() -> tuple[FloatArray, IntArray]:
+    return np.empty(0), np.empty((0, 2), np.int64)
+
+
+class Auditor:
+    """An audit that times itself, so that a run's seconds are the engine's."""
+
+    def __init__(self, scene: Scene, simulation: Simulation) -> None:
+        self._audit = Audit(scene)
+        self._simulation = simulation
+        self._known = len(scene.bodies)
+        self.seconds = 0.0
+        simulation.watch(self)
+
+    def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
+        """Audit one substep."""
+        began = perf_counter()
+        if len(end) != self._known:
+            self._audit.joined(self._simulation.bodies)
+            self._known = len(end)
+        self._audit(time, start, end, touching)
+        self.seconds += perf_counter() - began
+
+    @property
+    def missed(self) -> tuple[FloatArray, IntArray]:
+        """When, (M,) s, and between whom, (M, 2), contacts were missed."""
+        return self._audit.missed()
+
+
+def _drive(
+    scene: Scene,
+    simulation: Simulation,
+    settings: Settings,
+    actions: tuple[Action, ...],
+    recorder: Recorder,
+    progress: Progress | None,
+) -> tuple[str, str | None, int, Contacts]:
+    """Step to the end. Return status, reason, steps and contacts."""
+    status, reason, step, due = "ok", None, 0, 0
+    steps, part, dt = recorder.steps, recorder.part, settings.dt
+    told = perf_counter()
+    simulation.contacts()
+    recorder.keep(simulation.frame(), 0.0)
+    try:
+        for step in range(steps):
+            while due < len(actions) and actions[due].time <= (step + 1e-9) * dt:
+                simulation.apply(actions[due])
+                due += 1
+            simulation.step()
+            last = step + 1 == steps and part == 0.0
+            if recorder.wants(step + 1, last):
+                recorder.keep(simulation.frame(), scene.world.duration if last else simulation.time)
+            if progress is not None and perf_counter() - told > REPORT_EVERY:
+                told = perf_counter()
+                progress((step + 1) / (steps + part))
+        step = steps
+        if part > 0.0:
+            simulation.finish(part)
+            recorder.keep(simulation.frame(), scene.world.duration)
+    except Divergence as divergence:
+        status, reason = "diverged", str(divergence)
+        recorder.keep(simulation.frame(), divergence.time)
+    except (ActionError, Exhaustion) as error:
+        status, reason = "failed", f"at {step * dt:g} s: {error}"
+    if progress is not None:
+        progress(1.0)
+    return status, reason, step, simulation.contacts()

@@ -1,0 +1,91 @@
+"""Recordings: a session as one JSON document, scene and actions, that any engine can replay."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import ValidationError
+
+from sandbox.action import Action, ActionError, actions_from_json, actions_to_json
+from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.file import from_document, to_document
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was played: with the same engine and versions it leads to the same state, bit for bit."""
+
+    scene: Scene
+    engine: str
+    settings: Settings
+    actions: tuple[Action, ...]
+    duration: float
+    """s"""
+    state_hash: str | None = None
+    """of the state at the end, where it is known"""
+
+    def to_json(self) -> str:
+        """Write it as a JSON document."""
+        document = {
+            "format": FORMAT,
+            "scene": to_document(self.scene),
+            "engine": self.engine,
+            "settings": self.settings.model_dump(mode="json"),
+            "actions": actions_to_json(self.actions),
+            "duration": self.duration,
+            "state_hash": self.state_hash,
+        }
+        return json.dumps(document, indent=1, ensure_ascii=False)
+
+    @classmethod
+    def from_json(cls, text: str, file: str = "<recording>") -> Self:
+        """Read a recording.
+
+        Raises:
+            SceneError: the document, its scene or its actions have faults.
+        """
+        try:
+            document = json.loads(text)
+            if not isinstance(document, Mapping) or document.get("format") != FORMAT:
+                raise ValueError(f"no recording of format {FORMAT}")
+            return cls(
+                scene=from_document(_part(document, "scene", dict), file),
+                engine=_part(document, "engine", str),
+                settings=Settings.model_validate_json(json.dumps(_part(document, "settings", dict))),
+                actions=actions_from_json(json.dumps(_part(document, "actions", list))),
+                duration=float(_part(document, "duration", (int, float))),
+                state_hash=document.get("state_hash"),
+            )
+        except ActionError as error:
+            raise SceneError([Fault(file, None, "actions", line) for line in str(error).splitlines()]) from None
+        except ValidationError as error:
+            faults = [Fault(file, None, f"settings.{e['loc'][0]}", e["msg"]) for e in error.errors()]
+            raise SceneError(faults) from None
+        except (ValueError, RecursionError) as error:
+            raise SceneError([Fault(file, None, "", f"cannot be read: {error}")]) from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a recording from a file.
+
+        Raises:
+            SceneError: as `from_json`.
+        """
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except (OSError, ValueError) as error:
+            raise SceneError([Fault(str(path), None, "", f"cannot be read: {error}")]) from None
+        return cls.from_json(text, str(path))
+
+
+def _part(document: Mapping[str, Any], key: str, kind: type | tuple[type, ...]) -> Any:
+    value = document.get(key)
+    if not isinstance(value, kind) or isinstance(value, bool):
+        raise ValueError(f"`{key}` is missing or of the wrong type")
+    return value

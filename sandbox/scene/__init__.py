@@ -1,0 +1,1 @@
+"""The description of a scene, apart from every engine."""

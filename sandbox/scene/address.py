@@ -1,0 +1,122 @@
+"""Addresses: any value of a scene by its path, as `--set` and sweeps name it.
+
+`solver.dt` · `world.gravity` · `ball.cue.velocity` · `ball.0.radius` · `ball."8 ball".mass`. An element of a
+list is named by its `name`, or by its number from 0.
+"""
+
+import copy
+import tomllib
+from typing import Any
+
+from sandbox.scene.faults import Location
+
+
+class AddressError(ValueError):
+    """A path or value of an override that cannot be used; `str()` says what would be right."""
+
+
+def parse_assignment(text: str) -> tuple[str, Any]:
+    """Split `KEY=VALUE`; the value is TOML, a bare word a string.
+
+    Raises:
+        AddressError: there is no `=`, or no key before it.
+    """
+    key, equals, value = _split(text)
+    if not equals or not key.strip():
+        raise AddressError(f"{text!r} is not KEY=VALUE, such as solver.dt=0.001 or ball.cue.velocity=[1,0]")
+    return key.strip(), parse_value(value.strip())
+
+
+def _split(text: str) -> tuple[str, str, str]:
+    """Split at the first `=` outside quotes."""
+    quote = ""
+    for k, letter in enumerate(text):
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        elif letter == "=":
+            return text[:k], "=", text[k + 1 :]
+    return text, "", ""
+
+
+def parse_value(text: str) -> Any:
+    """Read a TOML value; what is no TOML value is a string."""
+    try:
+        document = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text
+    return document["value"] if set(document) == {"value"} else text
+
+
+def parse_path(path: str) -> tuple[str, ...]:
+    """Split a dotted path; quotes hold names together, as in TOML.
+
+    Raises:
+        AddressError: the path is malformed.
+    """
+    parts: list[str] = []
+    rest = path
+    while True:
+        if rest[:1] in ('"', "'"):
+            end = rest.find(rest[0], 1)
+            if end < 0:
+                raise AddressError(f"{path!r}: a quote is not closed")
+            part, rest = rest[1:end], rest[end + 1 :]
+        else:
+            part, dot, after = rest.partition(".")
+            rest = dot + after
+        if not part:
+            raise AddressError(f"{path!r} is not a path, such as solver.dt or ball.cue.velocity")
+        parts.append(part)
+        if not rest:
+            return tuple(parts)
+        if rest[0] != ".":
+            raise AddressError(f"{path!r}: a dot is missing after {part!r}")
+        rest = rest[1:]
+
+
+def assign(document: dict[str, Any], path: str, value: Any) -> tuple[dict[str, Any], Location]:
+    """Return a copy of a scene document with one value set, and the location that was set.
+
+    Raises:
+        AddressError: the path leads nowhere.
+    """
+    parts = parse_path(path)
+    result = copy.deepcopy(document)
+    here: Any = result
+    location: Location = ()
+    for k, part in enumerate(parts):
+        last = k == len(parts) - 1
+        if isinstance(here, dict):
+            if not last and part not in here:
+                if k > 0 or len(parts) != 2:
+                    raise AddressError(f"{path}: the scene has no {'.'.join(parts[: k + 1])}")
+                here[part] = {}
+            location += (part,)
+            if last:
+                here[part] = value
+            else:
+                here = here[part]
+        elif isinstance(here, list):
+            index = _index(here, part, path)
+            location += (index,)
+            if last:
+                here[index] = value
+            else:
+                here = here[index]
+        else:
+            raise AddressError(f"{path}: {'.'.join(parts[:k])} is a single value, it has no {part!r}")
+    return result, location
+
+
+def _index(elements: list[Any], part: str, path: str) -> int:
+    """Return the index of a list's element, by its name or by its number."""
+    names = [e.get("name") for e in elements if isinstance(e, dict)]
+    if part in names:
+        return next(k for k, e in enumerate(elements) if isinstance(e, dict) and e.get("name") == part)
+    if part.isdecimal() and int(part) < len(elements):
+        return int(part)
+    known = ", ".join(str(n) for n in names[:10] if n is not None)
+    numbers = f"0 to {len(elements) - 1}" if elements else "none"
+    raise AddressError(f"{path}: no element {part!r}; names: {known or 'none'}; numbers: {numbers}")

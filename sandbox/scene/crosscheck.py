@@ -1,0 +1,227 @@
+"""Cross-checks: what a scene's parts say about each other, which no single part can see."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from sandbox.scene.bodies import Bodies, mass_of
+from sandbox.scene.faults import Location
+from sandbox.scene.generators import GeneratorError, size
+from sandbox.scene.model import Disc, Emitter, Generator, Grid, Plane, Scatter, Scene, Surfaced
+from sandbox.scene.near import FloatArray, near_pairs
+from sandbox.scene.part import BACKING, MAX_BODIES, MAX_POSITION, MAX_SPEED, MAX_STEPS
+from sandbox.scene.surfaces import surfaces_of
+
+Found = tuple[Location, str]
+
+MAX_SURFACES = 256
+MAX_OVERLAPS, MAX_OVERLAPS_EACH = 10_000, 10
+"""Overlapping pairs that a scene may start with: this many, and so many more for every body."""
+OVERLAP_BUDGET = 50_000_000
+"""Candidate pairs looked at before the search for overlaps is given up; a few seconds."""
+SHORTEST = 1e-9
+"""m, the least length of a wall's segment"""
+
+
+def crosscheck(scene: Scene) -> list[Found]:
+    """Return every fault that lies between the parts of a scene; none means that it can be run."""
+    materials, generators = list(_materials(scene)), list(_generators(scene))
+    found = [*materials, *_masses(scene), *_fixed(scene), *generators, *_world(scene)]
+    if generators:
+        return found  # what follows counts on being able to lay the bodies out
+    try:
+        bodies = scene.bodies
+    except GeneratorError as error:
+        return [*found, (error.location, str(error))]
+    found += [*_names(scene, bodies), *_states(scene, bodies), *_starts(scene, bodies)]
+    return found if materials else [*found, *_surfaces(scene, bodies)]
+
+
+def _elements(scene: Scene) -> list[tuple[Location, Disc]]:
+    """Return the balls and generators with their locations, in scene order."""
+    kinds: dict[str, tuple[Disc, ...]] = {
+        "ball": scene.balls,
+        "grid": scene.grids,
+        "scatter": scene.scatters,
+        "emitter": scene.emitters,
+    }
+    return [((kind, k), element) for kind, elements in kinds.items() for k, element in enumerate(elements)]
+
+
+def _things(scene: Scene) -> list[tuple[Location, Surfaced]]:
+    """Return the fixed things with their locations, in the order of their numbers."""
+    kinds: dict[str, tuple[Surfaced, ...]] = {"plane": scene.planes, "wall": scene.walls, "post": scene.posts}
+    return [((kind, k), thing) for kind, things in kinds.items() for k, thing in enumerate(things)]
+
+
+def _materials(scene: Scene) -> Iterator[Found]:
+    declared: set[str] = set()
+    for k, material in enumerate(scene.materials):
+        if material.name in declared:
+            yield ("material", k, "name"), f"a second material named {material.name!r}; names are unique"
+        declared.add(material.name)
+
+    known = f"declared are: {', '.join(sorted(declared))}" if declared else "the scene has no [[material]]"
+    stated: set[frozenset[str]] = set()
+    for k, pair in enumerate(scene.pairs):
+        for side, name in enumerate(pair.between):
+            if name not in declared:
+                yield ("pair", k, "between", side), f"no material is named {name!r}; {known}"
+        if frozenset(pair.between) in stated:
+            yield ("pair", k, "between"), "this pair is stated a second time; state it once"
+        stated.add(frozenset(pair.between))
+
+    for location, thing in (*_things(scene), *_elements(scene)):
+        if thing.material is not None and thing.material not in declared:
+            yield (*location, "material"), f"no material is named {thing.material!r}; {known}"
+
+
+def _masses(scene: Scene) -> Iterator[Found]:
+    for location, disc in _elements(scene):
+        if disc.mass is not None and disc.density is not None:
+            yield (*location, "density"), "mass and density are both stated; state one of them"
+        elif not 1e-15 <= mass_of(disc) <= 1e30:
+            message = f"gives a mass of {mass_of(disc):g} kg; masses are 1e-15 to 1e30 kg"
+            yield (*location, "density"), message
+    for k, ball in enumerate(scene.balls):
+        if ball.fixed and (ball.velocity != (0.0, 0.0) or ball.angular_velocity):
+            key = "velocity" if ball.velocity != (0.0, 0.0) else "angular_velocity"
+            yield ("ball", k, key), "a fixed ball never moves; leave this out, or fixed"
+
+
+def _fixed(scene: Scene) -> Iterator[Found]:
+    for k, plane in enumerate(scene.planes):
+        if not has_direction(plane):
+            yield ("plane", k, "normal"), f"{list(plane.normal)} has no direction; such as [0, 1] for a floor"
+    for k, wall in enumerate(scene.walls):
+        if wall.closed and len(wall.points) < 3:
+            yield ("wall", k, "closed"), "two points enclose nothing; a closed wall has three or more"
+        ends = (*wall.points[1:], wall.points[0]) if wall.closed else wall.points[1:]
+        for n, (a, b) in enumerate(zip(wall.points, ends, strict=False)):
+            if math.dist(a, b) < SHORTEST:
+                message = f"lies on the point after it; neighbours are at least {SHORTEST:g} m apart"
+                yield ("wall", k, "points", n), message
+
+
+def _generators(scene: Scene) -> Iterator[Found]:
+    for k, scatter in enumerate(scene.scatters):
+        if any(low > high for low, high in zip(scatter.lower, scatter.upper, strict=True)):
+            yield ("scatter", k, "upper"), "lies below or left of `lower`; it is the upper right corner"
+    for k, emitter in enumerate(scene.emitters):
+        if any(low > high for low, high in zip(emitter.velocity_min, emitter.velocity_max, strict=True)):
+            yield ("emitter", k, "velocity_max"), "is smaller than `velocity_min` in a component"
+    generators: tuple[Generator, ...] = (*scene.grids, *scene.scatters, *scene.emitters)
+    total = len(scene.balls) + sum(map(size, generators))
+    if total > MAX_BODIES:
+        location = next((where for where, _ in reversed(_elements(scene))), ())
+        yield location, f"the scene would hold {total:,} bodies; at most {MAX_BODIES:,}"
+
+
+def _world(scene: Scene) -> Iterator[Found]:
+    if scene.world.bounds is not None:
+        lower, upper = scene.world.bounds
+        if not all(low < high for low, high in zip(lower, upper, strict=True)):
+            yield ("world", "bounds"), "encloses nothing; give the lower left and then the upper right corner"
+    steps = scene.world.duration / scene.solver.h
+    if steps > MAX_STEPS:
+        shortest = scene.world.duration * scene.solver.substeps / MAX_STEPS
+        message = f"{steps:.3g} steps a run; at most {MAX_STEPS:g}, so at least {shortest:g} s for this duration"
+        yield ("solver", "dt"), message
+
+
+def _names(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    seen: set[str] = set()
+    elements, twice = _elements(scene), set[int]()
+    for name, element in zip(bodies.names, bodies.element.tolist(), strict=True):
+        if name in seen and element not in twice:
+            twice.add(element)
+            yield (*elements[element][0], "name"), _taken(name)
+        seen.add(name)
+    for name, (location, _) in zip(scene.fixed_names, _things(scene), strict=True):
+        if name in seen:
+            yield (*location, "name"), _taken(name)
+        seen.add(name)
+
+
+def _taken(name: str) -> str:
+    return f"a second body or fixed thing is called {name!r}; names are unique"
+
+
+def _surfaces(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    distinct = {(s.material, s.restitution, s.friction) for s in (*bodies.elements, *scene.fixed)}
+    if len(distinct) > MAX_SURFACES and len(surfaces_of(scene, bodies).surfaces) > MAX_SURFACES:
+        yield (), f"more than {MAX_SURFACES} different surfaces; share materials between balls"
+
+
+def _states(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    """Check places and speeds that a generator may have carried out of range."""
+    elements = _elements(scene)
+    for wrong, message in (
+        (np.abs(bodies.position).max(axis=1, initial=0) > MAX_POSITION, f"a ball lies beyond ±{MAX_POSITION:g} m"),
+        (np.hypot(*bodies.velocity.T) > MAX_SPEED, f"a ball is faster than {MAX_SPEED:g} m/s"),
+    ):
+        for element in np.unique(bodies.element[wrong]).tolist():
+            yield elements[element][0], message
+    if scene.world.bounds is not None:
+        lower, upper = np.asarray(scene.world.bounds)
+        outside = ((bodies.position < lower) | (bodies.position > upper)).any(axis=1)
+        for element in np.unique(bodies.element[outside]).tolist():
+            yield elements[element][0], "starts outside world.bounds, where bodies are retired"
+
+
+def _starts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    """Check that bodies start where an engine can tell inside from outside."""
+    elements = _elements(scene)
+    touches = np.asarray([e.collides != "none" for e in bodies.elements], dtype=bool)[bodies.element]
+    for plane, name in zip(scene.planes, scene.fixed_names, strict=False):
+        if not has_direction(plane):
+            continue
+        depth = -height_above(plane, bodies.position)
+        for element in np.unique(bodies.element[touches & (depth > BACKING)]).tolist():
+            deepest = float(depth[(bodies.element == element) & touches].max())
+            message = (
+                f"a centre starts {deepest:g} m behind the plane {name!r}; at most {BACKING:g}, "
+                "or it would leave on the wrong side"
+            )
+            yield (*elements[element][0], "origin" if elements[element][0][0] == "grid" else "position"), message
+
+    movers = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
+    overlaps = count_overlaps(bodies.position[movers], bodies.radius[movers])
+    most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(movers.sum())
+    if overlaps > most:
+        location = max(elements, key=lambda e: _population(e[1]))[0]
+        message = (
+            f"the scene starts with {overlaps:,} or more overlapping pairs of balls; at most {most:,} can be solved. "
+            'Spread them, or let them pass through each other with collides = "none" or "fixed"'
+        )
+        yield location, message
+
+
+def _population(element: Disc) -> int:
+    return size(element) if isinstance(element, Grid | Scatter | Emitter) else 1
+
+
+def has_direction(plane: Plane) -> bool:
+    """Tell whether a plane's normal can be normalised."""
+    return 1e-100 <= math.hypot(*plane.normal) <= 1e100
+
+
+def height_above(plane: Plane, position: FloatArray) -> FloatArray:
+    """Return the signed distances (N,) of points (N, 2) from a plane's surface, m."""
+    normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+    return np.asarray((position - np.asarray(plane.point)) @ normal)
+
+
+def count_overlaps(position: FloatArray, radius: FloatArray) -> int:
+    """Count overlapping pairs, stopping early once far too many are found or the budget is spent."""
+    if len(radius) < 2:
+        return 0
+    enough = MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(radius)
+    overlaps = looked_at = 0
+    for i, j in near_pairs(position, 2.0 * float(radius.max())):
+        overlaps += int((np.hypot(*(position[i] - position[j]).T) < radius[i] + radius[j]).sum())
+        looked_at += len(i)
+        if overlaps > enough or looked_at > OVERLAP_BUDGET:
+            break
+    return overlaps

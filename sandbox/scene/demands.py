@@ -1,0 +1,92 @@
+"""Demands: the physics that a scene needs, derived from the scene alone.
+
+An engine assembles only what is demanded, and refuses a scene that demands what it lacks.
+"""
+
+from collections.abc import Iterator
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.scene.meetings import meetings
+from sandbox.scene.model import Plane, Post, Scene, Wall
+
+
+class Demand(StrEnum):
+    """A piece of physics that a scene can need and an engine can have."""
+
+    TRANSLATION = "translation"
+    ROTATION = "rotation"
+    GRAVITY = "gravity"
+    DRAG = "drag"
+    BALL_BALL = "ball-ball"
+    BALL_PLANE = "ball-plane"
+    BALL_SEGMENT = "ball-segment"
+    BALL_POST = "ball-post"
+    RESTITUTION = "restitution"
+    FRICTION = "friction"
+    BOUNDS = "bounds"
+
+
+class Item(NamedTuple):
+    """One line of the bill: a demand, whether the scene makes it, and why or why not."""
+
+    demand: Demand
+    on: bool
+    why: str
+
+
+def demands(scene: Scene) -> frozenset[Demand]:
+    """Return what a scene demands."""
+    return frozenset(item.demand for item in bill(scene) if item.on)
+
+
+def bill(scene: Scene) -> tuple[Item, ...]:
+    """Return every demand with the reason why it is on or off."""
+    return tuple(Item(demand, on, why) for demand, on, why in _items(scene))
+
+
+def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
+    bodies, world, meet = scene.bodies, scene.world, meetings(scene)
+    moving = int((~bodies.fixed).sum())
+    yield Demand.TRANSLATION, moving > 0, _count(moving, "body moves", "bodies move", "nothing moves")
+
+    spinning = int(np.count_nonzero(bodies.angular_velocity))
+    turned = int(meet.turnable.sum())
+    if spinning:
+        why = _count(spinning, "body starts with a spin", "bodies start with a spin", "")
+    else:
+        why = _count(turned, "body can be rubbed into a spin", "bodies can be rubbed into a spin", "nothing can turn a body")
+    yield Demand.ROTATION, bool(spinning or turned), why
+
+    gravity = world.gravity != (0.0, 0.0)
+    yield Demand.GRAVITY, gravity, f"{world.gravity} m/s²" if gravity else "world.gravity is zero"
+
+    drag = world.linear_drag > 0 or world.quadratic_drag > 0
+    why = f"linear {world.linear_drag:g} 1/s, quadratic {world.quadratic_drag:g} 1/m"
+    yield Demand.DRAG, drag, why if drag else "no drag is stated"
+
+    free = int((meet.free & ~bodies.fixed).sum())
+    why = "balls can meet" if meet.ball_ball else f"no two balls can meet; {free} of {moving} can meet nothing"
+    yield Demand.BALL_BALL, meet.ball_ball, why
+
+    for demand, kind, things in (
+        (Demand.BALL_PLANE, Plane, scene.planes),
+        (Demand.BALL_SEGMENT, Wall, scene.walls),
+        (Demand.BALL_POST, Post, scene.posts),
+    ):
+        word = kind.__name__.lower()
+        why = f"{len(things)} {word}s, but nothing can meet them" if things else f"no {word}"
+        yield demand, meet.ball_fixed[kind], f"{len(things)} {word}(s)" if meet.ball_fixed[kind] else why
+
+    touch = bool(meet.touching.any())
+    for demand, most in ((Demand.RESTITUTION, meet.restitution), (Demand.FRICTION, meet.friction)):
+        why = f"up to {most:g}" if most else "0 for every pair that can meet"
+        yield demand, most > 0, why if touch else "nothing can meet"
+
+    yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
+
+
+def _count(n: int, one: str, many: str, none: str) -> str:
+    return none if n == 0 else f"{n:,} {one if n == 1 else many}"

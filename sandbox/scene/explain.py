@@ -1,0 +1,76 @@
+"""Explanations: pydantic's errors in the words of a scene file, each with what would be right."""
+
+import difflib
+import json
+from typing import Any, get_args
+
+from pydantic import BaseModel
+
+from sandbox.scene.faults import Location
+from sandbox.scene.model import Scene
+
+_EXPECTED = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "finite_number": "a finite number",
+    "bool_type": "true or false",
+    "string_type": "text in quotes",
+    "tuple_type": "an array (and a table that may stand several times is headed [[…]])",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "greater_than": "greater than {gt:g}",
+    "greater_than_equal": "{ge:g} or more",
+    "less_than": "less than {lt:g}",
+    "less_than_equal": "{le:g} or less",
+    "too_short": "an array of {min_length} or more",
+    "too_long": "an array of {max_length} at most",
+    "string_too_short": "text of {min_length} or more characters",
+    "string_too_long": "text of {max_length} characters at most",
+    "literal_error": "one of {expected}",
+}
+
+
+def explain(details: Any) -> tuple[Location, str]:
+    """Return the location of one of pydantic's errors, and what is wrong there and would be right."""
+    location: Location = tuple(details["loc"])
+    kind, value, context = details["type"], details["input"], details.get("ctx", {})
+    if kind == "missing":
+        return location, "is missing; it must be given"
+    if kind == "extra_forbidden":
+        return location, f"unknown key; {_known_keys(location)}"
+    if kind == "value_error":
+        return location, str(context["error"])
+    if kind == "string_pattern_mismatch":
+        expected = "text '#rrggbb'" if location[-1] == "colour" else "text without control characters"
+    elif kind in _EXPECTED:
+        expected = _EXPECTED[kind].format(**context)
+    else:
+        expected = details["msg"].removeprefix("Input should be ")
+    return location, f"{_shown(value)} is not right here; it should be {expected}"
+
+
+def _shown(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= 60 else f"{text[:57]}…"
+
+
+def _known_keys(location: Location) -> str:
+    """Say which keys there are at a location, or the one that was likely meant."""
+    known = [field.alias or name for name, field in model_at(location[:-1]).model_fields.items()]
+    close = difflib.get_close_matches(str(location[-1]), known, n=1)
+    return f"did you mean {close[0]!r}?" if close else f"known here: {', '.join(known)}"
+
+
+def model_at(location: Location) -> type[BaseModel]:
+    """Return the model of the table at a location of a scene document."""
+    model: type[BaseModel] = Scene
+    for key in location:
+        if isinstance(key, str):
+            fields = {field.alias or name: field.annotation for name, field in model.model_fields.items()}
+            model = next(m for m in (fields[key], *get_args(fields[key])) if _is_model(m))
+    return model
+
+
+def _is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)

@@ -1,0 +1,135 @@
+"""Scene files: reading, checking, writing. Every fault of a file is reported at once.
+
+Parsing is tomllib's, validation pydantic's strict mode on JSON (so that arrays become tuples); what no model can
+see, such as names that point at nothing, is `crosscheck.py`'s.
+"""
+
+import json
+import re
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from sandbox.scene.address import AddressError, assign, parse_assignment
+from sandbox.scene.crosscheck import crosscheck
+from sandbox.scene.explain import explain
+from sandbox.scene.faults import Fault, Lines, Location, SceneError, path_of
+from sandbox.scene.model import Scene
+from sandbox.scene.salvage import crosscheck_the_rest
+
+MAX_BYTES = 256 * 2**20
+
+Override = str | tuple[str, Any]
+"""`"KEY=VALUE"`, or `(KEY, value)`."""
+
+
+def load(path: str | Path, overrides: Iterable[Override] = ()) -> Scene:
+    """Read a scene file.
+
+    Args:
+        path: the file.
+        overrides: values to set before the scene is checked.
+
+    Raises:
+        SceneError: with every fault found. Nothing is partly loaded.
+    """
+    return loads(_read(path), str(path), overrides)
+
+
+def loads(text: str, file: str = "<scene>", overrides: Iterable[Override] = ()) -> Scene:
+    """Read a scene from a text; `file` is what faults call it.
+
+    Raises:
+        SceneError: with every fault found.
+    """
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError([_syntax_fault(file, error)]) from None
+    except RecursionError:
+        raise SceneError([Fault(file, None, "", "values are nested too deeply for a scene")]) from None
+    if not document:
+        message = 'the file is empty; a scene has at least a body, such as [[ball]] with position and radius'
+        raise SceneError([Fault(file, 1, "", message)])
+    return from_document(document, file, overrides, text)
+
+
+def from_document(
+    document: dict[str, Any], file: str = "<scene>", overrides: Iterable[Override] = (), text: str = ""
+) -> Scene:
+    """Check a scene given as nested dicts and lists, as TOML or JSON would hold it.
+
+    Raises:
+        SceneError: with every fault found; lines are known where the `text` is given.
+    """
+    faults: list[Fault] = []
+    changed: set[Location] = set()
+    for override in overrides:
+        try:
+            path, value = parse_assignment(override) if isinstance(override, str) else override
+            document, location = assign(document, path, value)
+            changed.add(location)
+        except AddressError as error:
+            faults.append(Fault(file, None, "--set", str(error)))
+    if faults:
+        raise SceneError(faults)
+
+    found: list[tuple[Location, str]]
+    try:
+        scene = Scene.model_validate_json(json.dumps(document, default=str))
+    except ValidationError as error:
+        errors = error.errors(include_url=False)
+        found = [explain(details) for details in errors]
+        found += crosscheck_the_rest(document, [tuple(details["loc"]) for details in errors])
+    except (RecursionError, ValueError) as error:
+        found = [((), f"the scene cannot be read: {error}")]
+    else:
+        found = crosscheck(scene)
+        if not found:
+            return scene
+
+    lines = Lines(text)
+    for location, message in dict.fromkeys(found):
+        is_set = any(location[: len(c)] == c for c in changed)
+        line = None if is_set else lines.find(location)
+        path = path_of(location, document) + (" (set)" if is_set else "")
+        faults.append(Fault(file, line, path, message))
+    raise SceneError(sorted(faults, key=lambda fault: (fault.line is None, fault.line or 0)))
+
+
+def dumps(scene: Scene) -> str:
+    """Write a scene as TOML; what is at its default is left out. `loads(dumps(scene)) == scene`."""
+    import tomlkit
+
+    return tomlkit.dumps(to_document(scene))
+
+
+def to_document(scene: Scene) -> dict[str, Any]:
+    """Return a scene as nested dicts and lists, defaults left out."""
+    document = scene.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+    return document or {"title": scene.title}
+
+
+def _read(path: str | Path) -> str:
+    file = str(path)
+    try:
+        if Path(path).stat().st_size > MAX_BYTES:
+            message = f"larger than {MAX_BYTES >> 20} MiB; generators such as [[grid]] say more in less"
+            raise SceneError([Fault(file, None, "", message)])
+        return Path(path).read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+    except OSError as error:
+        raise SceneError([Fault(file, None, "", f"cannot be read: {error.strerror or error}")]) from None
+    except ValueError as error:
+        reason = "is not UTF-8 text; a scene is a TOML file" if isinstance(error, UnicodeDecodeError) else str(error)
+        raise SceneError([Fault(file, None, "", reason)]) from None
+
+
+def _syntax_fault(file: str, error: tomllib.TOMLDecodeError) -> Fault:
+    message = str(error)
+    at = re.search(r" \(at line (\d+), column (\d+)\)$", message)
+    if at is None:
+        return Fault(file, None, "", f"not TOML: {message}")
+    return Fault(file, int(at[1]), "", f"not TOML: {message[: at.start()]}, at column {at[2]}")

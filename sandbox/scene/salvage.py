@@ -1,0 +1,55 @@
+"""Salvage: the sound remainder of a scene document with faults, so that it too can be cross-checked."""
+
+import copy
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from sandbox.scene.crosscheck import Found, crosscheck
+from sandbox.scene.explain import model_at
+from sandbox.scene.faults import Location
+from sandbox.scene.model import Scene
+
+HARMLESS: dict[str, Any] = {
+    "position": [0.0, 0.0],
+    "point": [0.0, 0.0],
+    "normal": [0.0, 1.0],
+    "points": [[0.0, 0.0], [1.0, 0.0]],
+    "radius": 1.0,
+    "origin": [0.0, 0.0],
+    "spacing": [10.0, 10.0],
+    "columns": 1,
+    "count": 1,
+    "lower": [0.0, 0.0],
+    "upper": [1.0, 1.0],
+    "velocity_min": [0.0, 0.0],
+    "velocity_max": [0.0, 0.0],
+}
+"""A value for each key that must be there, standing in for a faulty one."""
+
+
+def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> list[Found]:
+    """Cross-check a document whose values at `wrong` are faulty.
+
+    Those are left out, or given a harmless value where one must be there; what the cross-check then says of the
+    elements they belong to does not count. Nothing is found where too much is wrong to tell.
+    """
+    document = copy.deepcopy(document)
+    touched: set[Location] = set()
+    for location in wrong:
+        depth = 2 if len(location) > 1 and isinstance(location[1], int) else 1
+        holder: Any = document
+        for key in location[:depth]:
+            holder = holder[key]
+        if len(location) <= depth or not isinstance(holder, dict):
+            return []
+        holder.pop(location[depth], None)
+        touched.add(location[:depth])
+        for name, field in model_at(location[:depth]).model_fields.items():
+            if field.is_required() and name not in holder and name in HARMLESS:
+                holder[name] = HARMLESS[name]
+    try:
+        scene = Scene.model_validate_json(json.dumps(document, default=str))
+    except ValueError:
+        return []
+    return [f for f in crosscheck(scene) if not any(f[0][: len(t)] == t for t in touched)]

@@ -1,0 +1,72 @@
+"""Schema: the JSON Schema of a scene file, from the model, so that editors complete and check one."""
+
+import ast
+import inspect
+import json
+import textwrap
+from typing import Any
+
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
+
+from sandbox.scene.model import Scene
+from sandbox.scene.part import Part
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a scene file.
+
+    It knows every key, type and range; what the parts of a scene say about each other only `crosscheck` sees.
+    """
+    model = Scene.model_json_schema(by_alias=True, schema_generator=_Generator)
+    return {"$schema": _Generator.schema_dialect, **model}
+
+
+def dumps() -> str:
+    """Write the schema as a text, the same for the same model; `scenes/scene.schema.json` holds it."""
+    return json.dumps(schema(), indent=2, ensure_ascii=False) + "\n"
+
+
+class _Generator(GenerateJsonSchema):
+    """Fits a schema to TOML, which has no null: what may be None, or is empty, may be left out.
+
+    It also takes over the docstrings of fields. Pydantic can, but would read its own source to do so at every
+    start of every command.
+    """
+
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        default = schema.get("default")
+        if default is None or default == () or isinstance(default, Part):
+            return self.generate_inner(schema["schema"])
+        return super().default_schema(schema)
+
+    def field_title_should_be_set(self, schema: Any) -> bool:  # noqa: ARG002, its name is pydantic's
+        return False  # an editor shows the key itself
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
+        result = super().model_schema(schema)
+        descriptions = _docstrings(schema["cls"])
+        for name, field in schema["cls"].model_fields.items():
+            if name in descriptions:
+                result["properties"][field.alias or name]["description"] = descriptions[name]
+        return result
+
+
+def _docstrings(model: type[Part]) -> dict[str, str]:
+    """Return what is written below the fields of a model and of those it inherits from."""
+    found: dict[str, str] = {}
+    for part in reversed(model.__mro__):
+        if issubclass(part, Part):
+            (definition,) = ast.parse(textwrap.dedent(inspect.getsource(part))).body
+            assert isinstance(definition, ast.ClassDef)
+            for field, text in zip(definition.body, definition.body[1:], strict=False):
+                match field, text:
+                    case (
+                        ast.AnnAssign(target=ast.Name(id=name)),
+                        ast.Expr(value=ast.Constant(value=str(words))),
+                    ):
+                        found[name] = inspect.cleandoc(words)
+    return found

@@ -1,0 +1,53 @@
+"""Settings: how a scene is solved. One frozen value, the `[solver]` table of a scene file."""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field
+
+from sandbox.scene.part import Part
+
+Integrator = Literal["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]
+Detection = Literal["discrete", "bisect", "swept", "shrink"]
+Response = Literal["impulse", "penalty"]
+BroadPhase = Literal["all_pairs", "circles", "sweep", "grid", "oriented"]
+
+
+class Settings(Part):
+    """Every choice a solver is given. `None` leaves a choice to the engine, which then states its own.
+
+    An engine that cannot honour a stated choice refuses it.
+    """
+
+    dt: Annotated[float, Field(ge=1e-9, le=10)] = 0.01
+    """The frame step, s. Frames lie at k·dt."""
+    substeps: Annotated[int, Field(ge=1, le=1000)] = 1
+    """Solver steps a frame; each advances h = dt / substeps."""
+    iterations: Annotated[int, Field(ge=1, le=10_000)] = 10
+    """Passes of an iterative contact solver in each substep."""
+    slop: Annotated[float, Field(ge=0, le=1e9)] | None = None
+    """Overlap that is left uncorrected, m."""
+    bias: Annotated[float, Field(ge=0, le=1)] | None = None
+    """The share of an overlap that still remains one second later."""
+    persistence: Annotated[int, Field(ge=1, le=1000)] | None = None
+    """Substeps for which a parted contact's impulses are remembered, to warm-start the next touch."""
+    half_kick: bool = False
+    """Start half a kick ahead (v + g·h/2), so that uniformly accelerated free motion is exact."""
+    integrator: Integrator | None = None
+    detection: Detection | None = None
+    response: Response | None = None
+    broad_phase: BroadPhase | None = None
+    record_every: Annotated[int, Field(ge=1, le=1_000_000_000)] = 1
+    """Keep every n-th frame, and always the last."""
+
+    @property
+    def h(self) -> float:
+        """The substep, s."""
+        return self.dt / self.substeps
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with some choices changed, checked as strictly as a scene file.
+
+        Raises:
+            pydantic.ValidationError: a name or a value is wrong.
+        """
+        return type(self).model_validate({**self.model_dump(), **changes})

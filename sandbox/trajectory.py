@@ -1,0 +1,171 @@
+"""What comes out of a simulation: frames, contacts, and whole trajectories as arrays."""
+
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Frame:
+    """The state of N bodies at one time, in scene order."""
+
+    time: float
+    """s"""
+    position: FloatArray
+    """(N, 2) m"""
+    velocity: FloatArray
+    """(N, 2) m/s"""
+    angle: FloatArray
+    """(N,) rad"""
+    angular_velocity: FloatArray
+    """(N,) rad/s"""
+    present: BoolArray
+    """(N,) false once removed or retired: the body then stays where it was, with no velocity"""
+
+
+class ContactEvent(NamedTuple):
+    """One contact, from its first touch on."""
+
+    time: float
+    """of the first touch, s"""
+    pair: tuple[int, int]
+    """body numbers, the lower first; a fixed thing is −1 − k and stands second"""
+    point: tuple[float, float]
+    """of the first touch, m"""
+    normal: tuple[float, float]
+    """of the first touch, from the first of the pair to the second"""
+    impulse: tuple[float, float]
+    """given by the first of the pair to the second while it lasted, N·s"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Contacts:
+    """C contacts as arrays, one row each, in the order of their first touch."""
+
+    time: FloatArray
+    """(C,) s"""
+    pair: IntArray
+    """(C, 2) body numbers; fixed things are −1 − k"""
+    point: FloatArray
+    """(C, 2) m"""
+    normal: FloatArray
+    """(C, 2)"""
+    impulse: FloatArray
+    """(C, 2) N·s"""
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return no contacts."""
+        return cls(np.empty(0), np.empty((0, 2), np.int64), *(np.empty((0, 2)) for _ in range(3)))
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __iter__(self) -> Iterator[ContactEvent]:
+        columns = (self.time, self.pair, self.point, self.normal, self.impulse)
+        for time, *vectors in zip(*(column.tolist() for column in columns), strict=True):
+            yield ContactEvent(time, *map(tuple, vectors))
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A whole run: T frames of N bodies, and its C contacts. Attributes bear the names of the stored arrays."""
+
+    time: FloatArray
+    """(T,) s"""
+    position: FloatArray
+    """(T, N, 2) m; a body that is not there yet is nan"""
+    velocity: FloatArray
+    """(T, N, 2) m/s"""
+    angle: FloatArray
+    """(T, N) rad"""
+    angular_velocity: FloatArray
+    """(T, N) rad/s"""
+    names: npt.NDArray[np.str_]
+    """(N,)"""
+    contact_time: FloatArray
+    """(C,) s"""
+    contact_pair: IntArray
+    """(C, 2) body numbers; −1 − k for the k-th fixed thing: planes, walls, posts"""
+    contact_point: FloatArray
+    """(C, 2) m"""
+    contact_normal: FloatArray
+    """(C, 2) from the first of the pair to the second"""
+    contact_impulse: FloatArray
+    """(C, 2) N·s, given by the first of the pair to the second"""
+    retired_time: FloatArray
+    """(N,) s, when a body left world.bounds or was removed; nan where it did neither"""
+    missed_time: FloatArray
+    """(M,) s, start of the step in which the engine missed a contact"""
+    missed_pair: IntArray
+    """(M, 2) who should have touched, numbered as in `contact_pair`"""
+    info: Mapping[str, Any] = field(default_factory=dict)
+    """What was run and how it went: scene (TOML), engine, settings, seed, status, reason, steps, seconds,
+    energy_start, energy_end, audited, versions."""
+
+    @property
+    def status(self) -> str:
+        """`ok`, `diverged`, `refused` or `failed`."""
+        return str(self.info["status"])
+
+    @property
+    def reason(self) -> str | None:
+        """Why the status is not `ok`."""
+        reason = self.info["reason"]
+        return None if reason is None else str(reason)
+
+    @property
+    def missed_contacts(self) -> int | None:
+        """How many contacts the engine missed; unknown (None) where the run was not audited."""
+        return len(self.missed_time) if self.info["audited"] else None
+
+    def number(self, name: str) -> int:
+        """Return a body's number.
+
+        Raises:
+            KeyError: no body has that name.
+        """
+        found = np.flatnonzero(self.names == name)
+        if not len(found):
+            raise KeyError(name)
+        return int(found[0])
+
+    def save(self, path: str | Path) -> Path:
+        """Write the arrays as one compressed `.npz`, to a temporary name first: never half a file."""
+        path = Path(path)
+        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "info"}
+        arrays["info"] = np.asarray(json.dumps(dict(self.info), ensure_ascii=False))
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=".tmp")
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                np.savez_compressed(stream, **arrays)
+            Path(temporary).replace(path)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
+        return path
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read what `save` wrote.
+
+        Raises:
+            ValueError: the file is no stored trajectory.
+        """
+        with np.load(path, allow_pickle=False) as arrays:
+            missing = {f.name for f in fields(cls)} - set(arrays.files)
+            if missing:
+                raise ValueError(f"{path} is no stored run: it has no {', '.join(sorted(missing))}")
+            values = {f.name: arrays[f.name] for f in fields(cls)}
+        return cls(**{**values, "info": json.loads(str(values["info"]))})
