@@ -15,6 +15,7 @@ from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
 FORMAT = 1
+MAX_DURATION = 1e9  # s, as of a scene
 
 
 @dataclass(frozen=True)
@@ -54,18 +55,21 @@ class Recording:
             document = json.loads(text)
             if not isinstance(document, Mapping) or document.get("format") != FORMAT:
                 raise ValueError(f"no recording of format {FORMAT}")
+            duration = _part(document, "duration", (int, float))
+            if not 0 <= duration <= MAX_DURATION:
+                raise ValueError(f"a `duration` is 0 to {MAX_DURATION:g} s")
             return cls(
                 scene=from_document(_part(document, "scene", dict), file),
                 engine=_part(document, "engine", str),
                 settings=Settings.model_validate_json(json.dumps(_part(document, "settings", dict))),
                 actions=actions_from_json(json.dumps(_part(document, "actions", list))),
-                duration=float(_part(document, "duration", (int, float))),
-                state_hash=document.get("state_hash"),
+                duration=float(duration),
+                state_hash=_part(document, "state_hash", (str, type(None))),
             )
         except ActionError as error:
             raise SceneError([Fault(file, None, "actions", line) for line in str(error).splitlines()]) from None
         except ValidationError as error:
-            faults = [Fault(file, None, f"settings.{e['loc'][0]}", e["msg"]) for e in error.errors()]
+            faults = [Fault(file, None, ".".join(("settings", *map(str, e["loc"]))), e["msg"]) for e in error.errors()]
             raise SceneError(faults) from None
         except (ValueError, RecursionError) as error:
             raise SceneError([Fault(file, None, "", f"cannot be read: {error}")]) from None

@@ -3,6 +3,8 @@
 import json
 import os
 import tempfile
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -163,9 +165,12 @@ class Trajectory:
         Raises:
             ValueError: the file is no stored trajectory.
         """
-        with np.load(path, allow_pickle=False) as arrays:
-            missing = {f.name for f in fields(cls)} - set(arrays.files)
-            if missing:
-                raise ValueError(f"{path} is no stored run: it has no {', '.join(sorted(missing))}")
-            values = {f.name: arrays[f.name] for f in fields(cls)}
-        return cls(**{**values, "info": json.loads(str(values["info"]))})
+        try:
+            with Path(path).open("rb") as stream, np.lib.npyio.NpzFile(stream, allow_pickle=False) as arrays:
+                missing = {f.name for f in fields(cls)} - set(arrays.files)
+                if missing:
+                    raise ValueError(f"it has no {', '.join(sorted(missing))}")
+                values = {f.name: arrays[f.name] for f in fields(cls)}
+            return cls(**{**values, "info": json.loads(str(values["info"]))})
+        except (ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+            raise ValueError(f"{path} is no stored run: {error}") from None

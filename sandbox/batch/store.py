@@ -241,14 +241,10 @@ class Store:
             reason = error.strerror or error
             raise StoreError(f"{self.directory}: {reason}; name a folder that you may write to") from None
         except sqlite3.OperationalError as error:
-            message = (
-                f"{self._database}: {error}; a store needs a folder that you may write to, with room left"
-            )
+            message = f"{self._database}: {error}; a store needs a folder that you may write to, with room left"
             raise StoreError(message) from None
         except sqlite3.DatabaseError as error:
-            message = (
-                f"{self._database}: {error}; name another folder, or remove the file if it is not needed"
-            )
+            message = f"{self._database}: {error}; name another folder, or remove the file if it is not needed"
             raise StoreError(message) from None
 
 

@@ -44,9 +44,7 @@ def energies(
     bodies = scene.bodies if bodies is None else bodies
     frames, count = trajectory.position.shape[:2]
     if count != len(bodies):
-        raise ValueError(
-            f"the run has {count:,} bodies, described are {len(bodies):,}; pass the run's own"
-        )
+        raise ValueError(f"the run has {count:,} bodies, described are {len(bodies):,}; pass the run's own")
     columns = slice(None)
     if body is not None:
         if not 0 <= body < count:

@@ -70,12 +70,12 @@ class Neighbours:
     def _strays(self, start: FloatArray, end: FloatArray) -> BoolArray:
         """Return who left its half of the skin, (N,)."""
         limit = self._half_skin**2
-        astray = self._member.copy()
-        for place in (end, start):
+        home = np.ones(len(self._radius), dtype=np.bool_)
+        for place in (start, end):
             gone = place - self._anchor
             gone *= gone
-            astray &= ~(gone[:, 0] + gone[:, 1] <= limit)
-        return astray
+            home &= gone[:, 0] + gone[:, 1] <= limit
+        return self._member & ~home
 
     def _astray(self, start: FloatArray, end: FloatArray, strays: BoolArray) -> tuple[IntArray, IntArray]:
         """Return the pairs with a stray that may meet on their way."""
@@ -131,9 +131,7 @@ def _close(
         yield i[near], j[near]
 
 
-def _in_rows(
-    rows: IntArray, centre: FloatArray, reach: FloatArray
-) -> Iterator[tuple[IntArray, IntArray]]:
+def _in_rows(rows: IntArray, centre: FloatArray, reach: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
     """Yield, in chunks, every pair with one of `rows` that is nearer than the sum of its reaches, once."""
     in_rows = np.zeros(len(centre), dtype=np.bool_)
     in_rows[rows] = True

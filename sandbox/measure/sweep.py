@@ -8,6 +8,21 @@ import numpy as np
 
 from sandbox.trajectory import BoolArray, FloatArray
 
+TOLERANCE = 1e-6
+"""Depth, as a part of the contact distance, up to which a contact does not count: a graze so shallow turns a path
+by some 1e-3 at most, and an engine that rounds otherwise may rightly find none."""
+
+CLEAR = 1 - TOLERANCE / 2
+"""A pair this part of its contact distance apart is clear: bodies that were laid out to touch are."""
+
+DEEP = 1 - TOLERANCE
+"""A pair nearer than this part of its contact distance is deep in contact."""
+
+JUMP = float(np.sqrt(CLEAR**2 - DEEP**2))
+"""The shortest path, as a part of the contact distance, that leads from clear to past the closest approach of a
+contact that is deep there: half a chord. Distance to anything convex is curved by 1/distance at most; so, going
+back by x from the closest approach q, it is at most √(q² + x²), hence x² ≥ CLEAR² − DEEP²."""
+
 PARALLEL = 1e-9
 """Sine of the angle below which a path counts as neither nearing nor leaving: far above rounding (1e-16), far
 below any angle at which a contact is an approach."""

@@ -12,15 +12,26 @@ from warnings import catch_warnings, filterwarnings
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.font_manager import fontManager
 from matplotlib.lines import Line2D
-from matplotlib.text import Text
 
 from sandbox.measure.closed_form import ClosedForm, closed_form
-from sandbox.measure.energy import Energies, energies
+from sandbox.measure.energy import energies
+from sandbox.report.panels import (
+    CLOSED,
+    FAINT,
+    INK,
+    STILL,
+    add_legend,
+    draw,
+    draw_closed,
+    dress,
+    key,
+    literal,
+    shortened,
+)
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray, FloatArray, Trajectory
+from sandbox.trajectory import FloatArray, Trajectory
 
 FORMATS: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 """Suffixes that can be written, each with the metadata to leave out: the same run makes the same picture."""
@@ -29,16 +40,10 @@ MOST_BODIES = 5
 """Drawn where none is named."""
 MOST_CONTACTS = 40
 """From here on contacts would hide the curves, and are left out."""
-MOST_POINTS = 4000
-"""Points to a curve; longer ones keep the extremes of every stretch."""
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9")
 """Of Okabe and Ito (2008): told apart under every common colour blindness. Their yellow is too pale on white."""
 ENERGY = {"kinetic": "#56B4E9", "potential": "#CC79A7", "total": "#444444"}
-INK, FAINT = "#222222", "#8a8a8a"
-
-FALLBACK_FONTS = ("Noto Sans CJK JP", "Hiragino Sans", "Microsoft YaHei", "Segoe UI Emoji", "Noto Sans Arabic")
-"""For names beyond what the font that comes with matplotlib can write."""
 
 
 class Curve(NamedTuple):
@@ -95,7 +100,9 @@ def format_of(path: str | Path) -> str:
     """
     suffix = Path(path).suffix.lower()
     if suffix not in FORMATS:
-        raise ValueError(f"{str(path)!r}: a plot is written as {', '.join(FORMATS)}; {suffix or 'no suffix'} is not one")
+        raise ValueError(
+            f"{str(path)!r}: a plot is written as {', '.join(FORMATS)}; {suffix or 'no suffix'} is not one"
+        )
     return suffix[1:]
 
 
@@ -118,8 +125,8 @@ def draw_run(
         _curve(trajectory, scene, number, colour) for number, colour in zip(numbers, cycle(COLOURS), strict=False)
     ]
     axes = _moving_axes(curves)
-    figure = Figure(figsize=(5.0 + 3.0 * len(axes), 8.0), layout="constrained", facecolor="white")
-    rows = [[f"{what} {'xy'[axis]}" for axis in axes] for what in ("position", "velocity")]
+    figure = Figure(figsize=(5.0 + 3.0 * len(axes), 8.0), facecolor="white")
+    rows: Any = [[f"{what} {'xy'[axis]}" for axis in axes] for what in ("position", "velocity")]
     panels = figure.subplot_mosaic([*rows, ["energy"] * len(axes)], sharex=True)
 
     for axis in axes:
@@ -127,25 +134,30 @@ def draw_run(
             panel = panels[f"{what} {'xy'[axis]}"]
             panel.set_ylabel(f"{what} {'xy'[axis]}, {unit}")
             for curve in curves:
-                _line(panel, trajectory.time, getattr(curve, what)[:, axis], curve.colour)
+                draw(panel, trajectory.time, getattr(curve, what)[:, axis], curve.colour)
             for curve in curves:
                 if curve.form is not None:
-                    _closed(panel, trajectory.time, getattr(curve.form, what)[:, axis], curve.form.valid)
+                    draw_closed(panel, trajectory.time, getattr(curve.form, what)[:, axis], curve.form.valid)
     _draw_energy(panels["energy"], trajectory, scene, run_bodies, dict(zip(numbers, curves, strict=True)))
 
     contacts = _contacts(trajectory, numbers)
-    for panel in panels.values():
-        _dress(panel)
+    for name, panel in panels.items():
+        dress(panel)
+        # The energy panel is wider than its neighbours above: these need a time of their own.
+        panel.tick_params(labelbottom=name == "energy" or (len(axes) > 1 and name.startswith("velocity")))
+        if not panel.lines:
+            panel.text(0.5, 0.5, "no body to draw", transform=panel.transAxes, ha="center", color=FAINT)
         for time in contacts:
-            panel.axvline(time, color=FAINT, lw=0.7, alpha=0.4, zorder=0.5)
+            panel.axvline(time, ymax=0.07, color=FAINT, lw=1.0, zorder=0.5)
 
-    entries = [(curve.name, Line2D([], [], color=curve.colour, lw=WIDE, alpha=SHEER)) for curve in curves]
+    entries = [(curve.name, key(curve.colour)) for curve in curves]
     if any(curve.form is not None for curve in curves):
         entries.append(("closed form", Line2D([], [], **CLOSED)))
     if len(contacts):
-        entries.append(("contact", Line2D([], [], color=FAINT, lw=0.9, alpha=0.6)))
-    if entries:
-        _legend(figure, entries, loc="outside lower center", ncols=min(len(entries), 4))
+        entries.append(("contact", Line2D([], [], color=FAINT, lw=0, marker="|", ms=9)))
+    columns = 12 * figure.get_figwidth() / max((12 + len(shortened(name)) for name, _ in entries), default=1)
+    add_legend(figure, entries, loc="outside lower center", ncols=min(max(int(columns), 1), 4, len(entries) or 1))
+    figure.align_ylabels()
     _title(figure, trajectory, scene, curves)
     return figure
 
@@ -174,8 +186,74 @@ def _curve(trajectory: Trajectory, scene: Scene, number: int, colour: str) -> Cu
 
 def _moving_axes(curves: list[Curve]) -> list[int]:
     """Return the axes along which something moves; both, where nothing does."""
-    if not curves:
-        return [0, 1]
-    places = _shown(np.stack([curve.position for curve in curves], axis=1))
-    spans = [np.ptp(p, axis=0).max() if len(p := _finite_rows(places[..., axis])) else 0.0 for axis in (0, 1)]
-    return [axis for axis in (0, 1) if spans[axis] > REST * max(spans)] or [0, 1]
+    span = [max((_span(curve.position[:, axis]) for curve in curves), default=0.0) for axis in (0, 1)]
+    return [axis for axis in (0, 1) if span[axis] > STILL * max(span)] or [0, 1]
+
+
+def _span(values: FloatArray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.ptp(finite)) if len(finite) else 0.0
+
+
+def _contacts(trajectory: Trajectory, numbers: list[int]) -> list[float]:
+    own = np.isin(trajectory.contact_pair, numbers).any(axis=1)
+    return trajectory.contact_time[own].tolist() if 0 < own.sum() < MOST_CONTACTS else []
+
+
+def _draw_energy(panel: Axes, trajectory: Trajectory, scene: Scene, bodies: Bodies, curves: dict[int, Curve]) -> None:
+    """Draw the energy of the whole scene, and what it would be where every body that moves has a closed form."""
+    panel.set_ylabel("energy of the scene, J")
+    panel.set_xlabel("time, s")
+    measured = energies(trajectory, scene, bodies=bodies)
+    for name, colour in ENERGY.items():
+        draw(panel, trajectory.time, getattr(measured, name), colour)
+    entries = [(name, key(colour)) for name, colour in ENERGY.items()]
+    add_legend(panel, entries, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3, borderaxespad=0.0)
+
+    forms = {number: curve.form for number, curve in curves.items() if curve.form is not None}
+    if not forms or any(number not in forms for number in np.flatnonzero(~bodies.fixed).tolist()):
+        return
+    position, velocity = trajectory.position.copy(), trajectory.velocity.copy()
+    valid = np.ones(len(trajectory.time), dtype=np.bool_)
+    for number, form in forms.items():
+        position[:, number], velocity[:, number] = form.position, form.velocity
+        valid &= form.valid
+    # No closed form here turns a body, so spins stay as they were recorded.
+    ideal = energies(replace(trajectory, position=position, velocity=velocity), scene, bodies=bodies)
+    for name in ENERGY:
+        draw_closed(panel, trajectory.time, getattr(ideal, name), valid)
+
+
+def _title(figure: Figure, trajectory: Trajectory, scene: Scene, curves: list[Curve]) -> None:
+    """Write, above the panels, the scene's title, how it was run, and how far it is from the closed form."""
+    info = trajectory.info
+    settings = info.get("settings", {})
+    steps = f"dt {settings.get('dt', scene.solver.dt):g} s"
+    if settings.get("substeps", 1) > 1:
+        steps += f" in {settings['substeps']} substeps"
+    lines = [f"{info['engine']} · {steps}" if info.get("engine") else steps]
+    errors = {curve.name: _largest_error(curve) for curve in curves if curve.form is not None}
+    if errors:
+        worst = max(errors, key=errors.__getitem__)
+        of = f" ({shortened(worst)})" if len(curves) > 1 else ""
+        lines.append(f"largest position error against the closed form: {errors[worst]:.3g} m{of}")
+    elif curves:
+        lines.append("no closed form to compare with")
+    if info.get("status", "ok") != "ok":
+        lines.append(shortened(f"{info['status']}: {info.get('reason') or 'no reason given'}", 100))
+
+    tall = figure.get_figheight()
+    place: dict[str, Any] = {"x": 0.1 / figure.get_figwidth(), "va": "top", "color": INK}
+    title = figure.text(
+        y=1 - 0.10 / tall, s=shortened(scene.title or "untitled scene", 60), fontsize=16, weight="bold", **place
+    )
+    below = figure.text(y=1 - 0.44 / tall, s="\n".join(lines), fontsize=10.5, linespacing=1.4, **place)
+    literal(title)
+    literal(below)
+    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1 - (0.5 + 0.21 * len(lines)) / tall))
+
+
+def _largest_error(curve: Curve) -> float:
+    assert curve.form is not None
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.max(np.hypot(*(curve.position - curve.form.position)[curve.form.valid].T)))

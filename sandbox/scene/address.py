@@ -44,7 +44,7 @@ def parse_value(text: str) -> Any:
     """Read a TOML value; what is no TOML value is a string."""
     try:
         document = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # also an integer of thousands of digits
         return text
     return document["value"] if set(document) == {"value"} else text
 
@@ -83,7 +83,10 @@ def assign(document: dict[str, Any], path: str, value: Any) -> tuple[dict[str, A
         AddressError: the path leads nowhere.
     """
     parts = parse_path(path)
-    result = copy.deepcopy(document)
+    try:
+        result = copy.deepcopy(document)
+    except RecursionError:
+        raise AddressError(f"{path}: the scene's values are nested too deeply") from None
     here: Any = result
     location: Location = ()
     for k, part in enumerate(parts):
@@ -115,7 +118,7 @@ def _index(elements: list[Any], part: str, path: str) -> int:
     names = [e.get("name") for e in elements if isinstance(e, dict)]
     if part in names:
         return next(k for k, e in enumerate(elements) if isinstance(e, dict) and e.get("name") == part)
-    if part.isdecimal() and int(part) < len(elements):
+    if part.isdecimal() and len(part) < 10 and int(part) < len(elements):
         return int(part)
     known = ", ".join(str(n) for n in names[:10] if n is not None)
     numbers = f"0 to {len(elements) - 1}" if elements else "none"

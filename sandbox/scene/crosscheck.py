@@ -184,7 +184,9 @@ def _starts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
                 f"a centre starts {deepest:g} m behind the plane {name!r}; at most {BACKING:g}, "
                 "or it would leave on the wrong side"
             )
-            yield (*elements[element][0], "origin" if elements[element][0][0] == "grid" else "position"), message
+            location = elements[element][0]
+            key = {"grid": "origin", "scatter": "lower"}.get(str(location[0]), "position")
+            yield (*location, key), message
 
     movers = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
     overlaps = count_overlaps(bodies.position[movers], bodies.radius[movers])

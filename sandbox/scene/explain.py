@@ -39,6 +39,8 @@ def explain(details: Any) -> tuple[Location, str]:
         return location, "is missing; it must be given"
     if kind == "extra_forbidden":
         return location, f"unknown key; {_known_keys(location)}"
+    if kind == "json_invalid":
+        return location, f"the scene cannot be read: {context['error']}"
     if kind == "value_error":
         return location, str(context["error"])
     if kind == "string_pattern_mismatch":

@@ -1,8 +1,11 @@
 """Faults: everything that is wrong with a scene, each with file, line, path and what would be right."""
 
+import json
+import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 Key = str | int
@@ -39,6 +42,7 @@ def path_of(location: Location, document: Any) -> str:
     for key in location:
         here = _child(here, key)
         if isinstance(key, str):
+            key = key if key.isprintable() and key else json.dumps(key)
             parts.append(f".{key}" if parts else key)
             continue
         name = here.get("name") if isinstance(here, dict) else None
@@ -54,54 +58,104 @@ def _child(value: Any, key: Key) -> Any:
 
 
 class Lines:
-    """Finds the line on which a location of a TOML text begins.
+    """Finds the line on which a location of a TOML text begins: of a key, a table's heading, an array's element.
 
-    A text cut off after n lines, with up to `CLOSERS` missing brackets added, parses to what the first n lines
-    say; so the line sought is the first n at which the location exists, found by bisection. This needs no
-    parser of our own and understands every way to write a key.
+    The text is known to parse, so one pass over its tokens is enough to follow where it stands, in linear time.
+    Keys and headings are still read by tomllib.
     """
 
-    CLOSERS = 4
-    MAX_TEXT = 4_000_000  # characters; beyond, a fault goes without its line rather than wait for minutes
+    MAX_TEXT = 16_000_000  # characters; beyond, a fault goes without its line rather than fill the memory
 
     def __init__(self, text: str) -> None:
-        self._lines = text.splitlines(keepends=True) if len(text) <= self.MAX_TEXT else []
-        self._parsed: dict[int, Any] = {}
+        self._text = text if len(text) <= self.MAX_TEXT else ""
+        self._lines: dict[Location, int] | None = None
 
     def find(self, location: Location) -> int | None:
         """Return the line (from 1) of a location, or of the nearest table around it that exists."""
-        while location:
-            low, high = 0, len(self._lines)
-            if self._holds(high, location):
-                while high - low > 1:
-                    middle = (low + high) // 2
-                    low, high = (low, middle) if self._holds(middle, location) else (middle, high)
-                return high
+        if self._lines is None:
+            self._lines = _lines_of(self._text)
+        while location and location not in self._lines:
             location = location[:-1]
-        return None
+        return self._lines.get(location)
 
-    def _holds(self, count: int, location: Location) -> bool:
-        """Tell whether the location exists in the first `count` lines.
 
-        Inside a string of several lines nothing parses; what was complete before it decides.
-        """
-        here = None
-        while count > 0 and (here := self._parse(count)) is None:
-            count -= 1
-        for key in location:
-            here = _child(here, key)
-            if here is None:
-                return False
-        return True
+_TOKEN = re.compile(
+    r'''"""(?:\\.|[^\\])*?"{3,5}|'{3}.*?'{3,5}|"(?:\\.|[^"\\])*"|'[^']*'|#[^\n]*|[][{},=\n]|[^][{},=#"'\s]+''',
+    re.DOTALL,
+)
+"""Strings of the four kinds, comments, punctuation, and runs of anything else."""
 
-    def _parse(self, count: int) -> Any:
-        if count not in self._parsed:
-            text = "".join(self._lines[:count])
-            self._parsed[count] = None
-            for closers in range(self.CLOSERS + 1):
-                try:
-                    self._parsed[count] = tomllib.loads(text + "]" * closers)
-                    break
-                except (tomllib.TOMLDecodeError, RecursionError):
-                    continue
-        return self._parsed[count]
+
+def _lines_of(text: str) -> dict[Location, int]:
+    """Return the line of every location of a valid TOML text."""
+    lines: dict[Location, int] = {}
+    table: Location = ()  # of the heading in force
+    counts: dict[Location, int] = {}  # elements so far of each [[table]]
+    within: list[tuple[Location, int]] = []  # open arrays with their next index, inline tables with −1
+    line, start, begun, state = 1, 0, 1, "key"
+    where: Location = ()  # of the value at hand
+
+    for token in _TOKEN.finditer(text + "\n"):
+        sign = token[0]
+        if sign == "\n" or sign[0] == "#":
+            if state == "heading":
+                table = _enter(_parsed(text[start : token.start()]), counts)
+                _note(lines, table, begun)
+            if not within:
+                state = "key"
+        elif state == "key" and sign != "}":
+            start, begun = token.start(), line
+            state = "heading" if sign == "[" else "in key"
+        elif state == "in key":
+            if sign == "=":
+                keys = _parsed(text[start : token.start()] + "=0")[0]
+                where = (within[-1][0] if within else table) + keys
+                _note(lines, where, begun)
+                state = "value"
+        elif state == "value" and sign != "]":
+            if within and within[-1][1] >= 0:
+                array, index = within.pop()
+                within.append((array, index + 1))
+                where = (*array, index)
+                lines[where] = line
+            if sign in ("[", "{"):
+                within.append((where, 0 if sign == "[" else -1))
+            state = {"[": "value", "{": "key"}.get(sign, "done")
+        elif sign in ("]", "}") and state != "heading":
+            within.pop()
+            state = "done"
+        elif sign == "," and state == "done":
+            state = "value" if within[-1][1] >= 0 else "key"
+        line += sign.count("\n")
+    return lines
+
+
+@lru_cache(maxsize=10_000)
+def _parsed(text: str) -> tuple[tuple[str, ...], bool]:
+    """Return the keys of `key = 0`, `[heading]` or `[[heading]]`, and whether it was the last."""
+    keys: list[str] = []
+    here: Any = tomllib.loads(text)
+    while isinstance(here, dict) and here:
+        key, here = next(iter(here.items()))
+        keys.append(key)
+    return tuple(keys), isinstance(here, list)
+
+
+def _enter(heading: tuple[tuple[str, ...], bool], counts: dict[Location, int]) -> Location:
+    """Return the location of the table that a heading opens."""
+    keys, many = heading
+    location: Location = ()
+    for key in keys[:-1]:
+        location += (key,)
+        if location in counts:
+            location += (counts[location] - 1,)
+    location += (keys[-1],)
+    if many:
+        counts[location] = counts.get(location, 0) + 1
+    return (*location, counts[location] - 1) if many else location
+
+
+def _note(lines: dict[Location, int], location: Location, line: int) -> None:
+    """Enter a location and the tables around it that come into being with it."""
+    for length in range(1, len(location) + 1):
+        lines.setdefault(location[:length], line)

@@ -4,7 +4,6 @@ Parsing is tomllib's, validation pydantic's strict mode on JSON (so that arrays 
 see, such as names that point at nothing, is `crosscheck.py`'s.
 """
 
-import json
 import re
 import tomllib
 from collections.abc import Iterable
@@ -18,9 +17,11 @@ from sandbox.scene.crosscheck import crosscheck
 from sandbox.scene.explain import explain
 from sandbox.scene.faults import Fault, Lines, Location, SceneError, path_of
 from sandbox.scene.model import Scene
-from sandbox.scene.salvage import crosscheck_the_rest
+from sandbox.scene.salvage import crosscheck_the_rest, read_model
 
 MAX_BYTES = 256 * 2**20
+
+_TOO_DEEP = re.compile(r"(?<![\w-])(?:[\w-]+\.){100}")
 
 Override = str | tuple[str, Any]
 """`"KEY=VALUE"`, or `(KEY, value)`."""
@@ -46,9 +47,13 @@ def loads(text: str, file: str = "<scene>", overrides: Iterable[Override] = ()) 
         SceneError: with every fault found.
     """
     try:
+        if _TOO_DEEP.search(text):  # tomllib's memory grows with the square of a key's depth
+            raise RecursionError
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneError([_syntax_fault(file, error)]) from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise SceneError([Fault(file, None, "", f"cannot be read: {error}")]) from None
     except RecursionError:
         raise SceneError([Fault(file, None, "", "values are nested too deeply for a scene")]) from None
     if not document:
@@ -79,7 +84,7 @@ def from_document(
 
     found: list[tuple[Location, str]]
     try:
-        scene = Scene.model_validate_json(json.dumps(document, default=str))
+        scene = read_model(document)
     except ValidationError as error:
         errors = error.errors(include_url=False)
         found = [explain(details) for details in errors]

@@ -73,8 +73,9 @@ def _scatter(scatter: Scatter, random: np.random.Generator, index: int) -> tuple
     if scatter.collides == "all":
         reach = 2.0 * scatter.radius
         covered = scatter.count * math.pi * scatter.radius**2 / float(np.prod(upper - lower + reach))
-        rejected = _overlapping(position, reach) if covered < JAMMED else np.arange(scatter.count)
-        for _ in range(ROUNDS if covered < JAMMED else 0):
+        jams = scatter.count > 1 and covered >= JAMMED
+        rejected = np.arange(scatter.count) if jams else _overlapping(position, reach)
+        for _ in range(0 if jams else ROUNDS):
             if not len(rejected):
                 break
             position[rejected] = lower + random.random((len(rejected), 2)) * (upper - lower)

@@ -60,9 +60,7 @@ def find(text: str) -> Path:
     names_of = {name: scene.name for scene in scenes for name in (scene.path.stem, scene.name)}
     close = dict.fromkeys(names_of[match] for match in difflib.get_close_matches(text, names_of, n=3))
     meant = f"; did you mean {' or '.join(close)}?" if close else ";"
-    raise UnknownSceneError(
-        f"no file and no shipped scene is called {text!r}{meant} `sandbox scenes` lists them"
-    )
+    raise UnknownSceneError(f"no file and no shipped scene is called {text!r}{meant} `sandbox scenes` lists them")
 
 
 def _is_file(text: str) -> bool:

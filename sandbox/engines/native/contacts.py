@@ -1,76 +1,75 @@
 """ContactLedger: one row for each contact, from arbiters that pymunk shows anew after every substep."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from sandbox.engines.contract import Exhaustion
+from sandbox.engines.native.memory import PartedMemory
+from sandbox.engines.native.rows import RowTable
 from sandbox.trajectory import BoolArray, Contacts, FloatArray, IntArray
 
 MAX_ROWS = 20_000_000
 """Rows kept before a run is stopped: 1.6 GB."""
 
-Places = Callable[[], tuple[FloatArray, FloatArray]]
-
 
 class ContactLedger:
     """Contacts since the last `take`. One that lasts is one row, its impulse summed."""
 
-    def __init__(self) -> None:
+    def __init__(self, things: int, joints: bool, persistence: int) -> None:
+        """Start empty.
+
+        Args:
+            things: how many fixed things there are.
+            joints: whether a pair can show as several arbiters, as a ball in the corner of a polyline does.
+            persistence: substeps for which pymunk remembers a parted contact.
+        """
+        self._things, self._joints = things, joints
+        self._rows = RowTable()
         self._count = 0
         self._time: FloatArray = np.empty(256)
         self._pair: IntArray = np.empty((256, 2), np.int64)
         self._vectors: FloatArray = np.empty((256, 6))  # point, normal, impulse
-        self._key: IntArray = np.empty(0, np.int64)
-        self._row: IntArray = np.empty(0, np.int64)
-        self._shared = False  # whether two arbiters belong to one row
+        self._row: IntArray = np.empty(0, np.int64)  # of what touches now
+        self._memory = PartedMemory(persistence)
+        self._last = np.empty((0, 2)), np.empty((0, 2))  # impulses and normals, as pymunk reported them
 
-    def record(self, time: float, a: IntArray, b: IntArray, on_a: FloatArray, places: Places) -> None:
+    def record(
+        self, time: float, a: IntArray, b: IntArray, impulse: FloatArray, normal: FloatArray, point: FloatArray
+    ) -> None:
         """Enter what touches at a time.
 
         Args:
             time: s.
             a: (K,) one of each pair's bodies; fixed things are negative.
             b: (K,) the other.
-            on_a: (K, 2) impulse that `a` got in the last substep, N·s.
-            places: returns normals (a to b) and points, (K, 2) each; asked only if a contact is new.
+            impulse: (K, 2) that `a` got in the last substep, N·s.
+            normal: (K, 2) from `a` to `b`.
+            point: (K, 2) m.
         """
         swapped = (a < 0) | ((b >= 0) & (b < a))
         first, second = np.where(swapped, b, a), np.where(swapped, a, b)
-        impulse = np.where(swapped[:, None], on_a, -on_a)  # given by the first to the second
-        key = (first << 32) + second
-        if np.array_equal(key, self._key):  # a settled scene: the same contacts in the same order
-            self._add(self._row, impulse)
-            return
-
-        row = self._known_rows(key)
-        new = np.flatnonzero(row < 0)
+        # Fixed things, −1 − k, become 0 … F − 1, and bodies follow them: small whole numbers for the table.
+        before = self._rows.key
+        row, new, gone = self._rows.find(first, second + self._things)
+        self._memory.forget_and_advance()
+        if gone.any():
+            self._memory.part(before[gone], *(array[gone] for array in self._last))
+        impulse, normal = impulse.copy(), normal.copy()
+        self._last = impulse.copy(), normal
         if len(new):
-            # A polyline's joint shows as two arbiters of one pair: one contact.
-            _, leader, group = np.unique(key[new], return_index=True, return_inverse=True)
-            rank = np.argsort(np.argsort(leader))  # rows in the order in which pymunk shows them
-            row[new] = self._count + rank[group.reshape(-1)]
-            opening = new[np.sort(leader)]
-            normal, point = places()
-            self._open(time, first[opening], second[opening], point[opening], normal[opening], swapped[opening])
-        self._key, self._row = key, row
-        self._shared = len(np.unique(row)) < len(row)
-        self._add(row, impulse)
-
-    def _add(self, row: IntArray, impulse: FloatArray) -> None:
-        if self._shared:
-            np.add.at(self._vectors[:, 4:6], row, impulse)
+            impulse[new] -= self._memory.excess(self._rows.key[new], normal[new])
+            leader, group = new, np.arange(len(new))
+            if self._joints:
+                _, at, group = np.unique(self._rows.key[new], return_index=True, return_inverse=True)
+                leader, group = new[at], group.reshape(-1)
+            row[new] = self._count + group
+            self._open(time, first[leader], second[leader], point[leader], normal[leader], swapped[leader])
+        self._rows.keep(row)
+        self._row = row
+        given = np.where(swapped[:, None], impulse, -impulse)  # by the first to the second
+        if self._joints:
+            np.add.at(self._vectors[:, 4:6], row, given)
         else:
-            self._vectors[row, 4:6] += impulse
-
-    def _known_rows(self, key: IntArray) -> IntArray:
-        """Return the row of each contact that was there a substep ago, −1 for the others."""
-        if not len(self._key):
-            return np.full(len(key), -1, np.int64)
-        order = np.argsort(self._key)
-        at = np.minimum(np.searchsorted(self._key, key, sorter=order), len(order) - 1)
-        found = order[at]
-        return np.where(self._key[found] == key, self._row[found], -1)
+            self._vectors[row, 4:6] += given
 
     def _open(
         self,
@@ -108,6 +107,7 @@ class ContactLedger:
         taken = Contacts(self._time[:n].copy(), self._pair[:n].copy(), point, normal, impulse)
         lasting = np.unique(self._row)
         self._row = np.searchsorted(lasting, self._row)
+        self._rows.keep(self._row)
         self._count = len(lasting)
         self._time[: self._count] = taken.time[lasting]
         self._pair[: self._count] = taken.pair[lasting]

@@ -53,9 +53,9 @@ class MeetingBodies:
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self._steady: dict[int, tuple[FloatArray, float]] = {}
         self._moving = 0
-        self._centre, self._reach = np.zeros(2), math.inf
+        self._reach = math.inf
         self._state: tuple[IntArray, FloatArray] | None = None
-        self._limit = np.empty(0)
+        self._middle, self._limit = np.zeros(6), np.full(6, math.inf)
 
     def __len__(self) -> int:
         return self._moving
@@ -101,7 +101,7 @@ class MeetingBodies:
         starts, speeds = bodies.position[~bodies.fixed], np.hypot(*bodies.velocity[~bodies.fixed].T)
         centre, reach = reach_of(self._scene, starts, speeds)
         if self._scene.planes:
-            self._centre, self._reach = centre, reach
+            self._middle[0:2], self._reach = centre, reach
         for thing, surface in zip(self._scene.fixed, self._surface_of_fixed.tolist(), strict=True):
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
             shapes = list(fixed_shapes(thing, body, centre, reach))
@@ -128,6 +128,11 @@ class MeetingBodies:
             self._space.remove(member.shape, member.body)
             self._steady.pop(number, None)
         self._state = None
+
+    @property
+    def joints(self) -> bool:
+        """Whether a ball can touch one fixed thing twice at once."""
+        return any(len(shapes) > 1 for _, shapes in self._fixed)
 
     def renew(self, scene: Scene, meet: Meetings) -> None:
         """Go on with a scene's changed air, gravity or coefficients, or with more surfaces."""
@@ -183,23 +188,19 @@ class MeetingBodies:
         position[numbers], velocity[numbers] = state[:, 0:2], state[:, 3:5]
         angle[numbers], angular_velocity[numbers] = state[:, 2], state[:, 5]
 
-    def touching(self) -> tuple[IntArray, IntArray, FloatArray]:
-        """Return who touches whom, and the impulse on the first (`Reader.touching`)."""
+    def touching(self) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
+        """Return who touches whom now, and how (`Reader.touching`)."""
         return self._reader.touching()
-
-    def places(self) -> tuple[FloatArray, FloatArray]:
-        """Return the normals and points of `touching`."""
-        return self._reader.places()
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a body that is not finite or beyond all bounds, and what is the matter; else None."""
         if not self._moving:
             return None
         numbers, state = self._read()
-        offset = state - np.array([self._centre[0], self._centre[1], 0.0, 0.0, 0.0, 0.0])
-        good = (np.abs(offset) <= self._limit).all(axis=1)
+        good = np.abs(state - self._middle) <= self._limit
         if good.all():
             return None
+        good = good.all(axis=1)
         worst = int(np.argmin(good))
         if not np.isfinite(state[worst]).all() or self._reach > FARTHEST:
             return int(numbers[worst]), BEYOND

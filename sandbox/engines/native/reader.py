@@ -15,8 +15,15 @@ STATE = (
 )
 STATE_WIDTH = 6  # x, y, angle, vx, vy, ω: in the order of pymunk's flags
 
-TOUCH = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID | ArbiterFields.TOTAL_IMPULSE | ArbiterFields.CONTACT_COUNT
-PLACE = ArbiterFields.NORMAL | ArbiterFields.POINT_A_1 | ArbiterFields.POINT_B_1
+TOUCH = (
+    ArbiterFields.BODY_A_ID
+    | ArbiterFields.BODY_B_ID
+    | ArbiterFields.TOTAL_IMPULSE
+    | ArbiterFields.NORMAL
+    | ArbiterFields.CONTACT_COUNT
+    | ArbiterFields.POINT_A_1
+    | ArbiterFields.POINT_B_1
+)
 
 
 class Reader:
@@ -28,7 +35,7 @@ class Reader:
 
     def __init__(self, space: pymunk.Space) -> None:
         self._space = space
-        self._bodies, self._arbiters, self._places, self._forces = Buffer(), Buffer(), Buffer(), Buffer()
+        self._bodies, self._arbiters, self._forces = Buffer(), Buffer(), Buffer()
         self._base = 0
         self._number_of: IntArray = np.empty(0, np.int64)
         self._moves: BoolArray = np.empty(0, np.bool_)
@@ -72,24 +79,19 @@ class Reader:
         self._forces.set_float_buf(self._outgoing.reshape(-1))
         set_space_bodies(self._space, BodyFields.FORCE, self._forces)
 
-    def touching(self) -> tuple[IntArray, IntArray, FloatArray]:
-        """Return bodies a and b (K,) of every arbiter that touches now, and the impulse (K, 2) on a, N·s.
+    def touching(self) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
+        """Return what touches now.
 
-        The arbiters' order is the space's own, and the same for `places`.
+        Returns:
+            Bodies a and b (K,) by number; the impulse on a (K, 2), N·s; the normal (K, 2) from a to b; the point
+            (K, 2), midway in the overlap, m. Valid until the next call.
         """
         self._arbiters.clear()
         get_space_arbiters(self._space, TOUCH, self._arbiters)
         words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
-        impulse = np.frombuffer(self._arbiters.float_buf()).reshape(-1, 2)
-        self._live = words[:, 2] > 0  # a parted contact is remembered for a while, with no points
-        if not self._live.all():
-            words, impulse = words[self._live], impulse[self._live]
+        table = np.frombuffer(self._arbiters.float_buf()).reshape(-1, 8)
+        live = words[:, 2] > 0  # a parted contact is remembered for a while, with no points
+        if not live.all():
+            words, table = words[live], table[live]
         a, b = self._number_of[words[:, 0] - self._base], self._number_of[words[:, 1] - self._base]
-        return a, b, impulse
-
-    def places(self) -> tuple[FloatArray, FloatArray]:
-        """Return the normals (K, 2), from a to b, and points (K, 2), midway in the overlap, of `touching`."""
-        self._places.clear()
-        get_space_arbiters(self._space, PLACE, self._places)
-        table = np.frombuffer(self._places.float_buf()).reshape(-1, 6)[self._live]
-        return table[:, 0:2], (table[:, 2:4] + table[:, 4:6]) / 2.0
+        return a, b, table[:, 0:2], table[:, 2:4], (table[:, 4:6] + table[:, 6:8]) * 0.5

@@ -114,7 +114,8 @@ class NativeSimulation:
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
-            self._ledger = ContactLedger()
+            meeting = self._population.meeting
+            self._ledger = ContactLedger(len(self._population.scene.fixed), meeting.joints, self._settings.persistence or 1)
             self._record(self.time)
         return self._ledger.take()
 
@@ -155,7 +156,7 @@ class NativeSimulation:
 
     def _record(self, time: float) -> None:
         if self._ledger is not None and len(self._population.meeting):
-            self._ledger.record(time, *self._population.meeting.touching(), self._population.meeting.places)
+            self._ledger.record(time, *self._population.meeting.touching())
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the present arrays in scene order; they belong to the population."""

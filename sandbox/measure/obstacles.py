@@ -1,0 +1,189 @@
+"""Obstacles: the fixed things of a scene, and which moving circles an engine let through them."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+
+from sandbox.measure.sweep import (
+    CLEAR,
+    DEEP,
+    JUMP,
+    TOLERANCE,
+    approaching,
+    closest_to_segment,
+    dot,
+    from_segment,
+)
+from sandbox.measure.touching import Touching
+from sandbox.scene.model import Plane, Post, Scene
+from sandbox.scene.part import BACKING, Point
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+PLANE_ROUNDING = 1e-11
+"""m: the tolerance at planes is no less; engines make them of shapes kilometres large, which round at 3e-13 m."""
+
+CHUNK = 1 << 18
+"""Circles × obstacles looked at together: bounds memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """The planes, and the walls and posts as segments with round ends: a post is a segment of no length."""
+
+    point: FloatArray
+    """(L, 2) of each plane, m"""
+    normal: FloatArray
+    """(L, 2) of each plane, unit, out of the solid"""
+    tail: FloatArray
+    """(S, 2) of each segment, m"""
+    along: FloatArray
+    """(S, 2) from its tail to its head, m"""
+    half: FloatArray
+    """(S,) half its thickness, m"""
+    number: IntArray
+    """(S,) the fixed thing that it is part of, −1 − k"""
+
+    @classmethod
+    def of(cls, scene: Scene) -> Self:
+        """Gather a scene's fixed things."""
+        normal = _rows([plane.normal for plane in scene.planes])
+        normal /= np.abs(normal).max(axis=1, keepdims=True, initial=0.0)  # any length may be given: 1e±300 too
+        rows: list[tuple[float, ...]] = []
+        half: list[float] = []
+        number: list[int] = []
+        line: tuple[Point, ...]
+        for k, thing in enumerate(scene.fixed):
+            if isinstance(thing, Plane):
+                continue
+            if isinstance(thing, Post):
+                line, width = (thing.position, thing.position), thing.radius
+            else:
+                line, width = thing.points + thing.points[: thing.closed], thing.thickness / 2
+            rows += [(*a, *b) for a, b in pairwise(line)]
+            half += [width] * (len(line) - 1)
+            number += [-1 - k] * (len(line) - 1)
+        ends = np.asarray(rows, dtype=np.float64).reshape(-1, 4)
+        return cls(
+            point=_rows([plane.point for plane in scene.planes]),
+            normal=normal / np.sqrt(dot(normal, normal))[:, None],
+            tail=ends[:, :2],
+            along=ends[:, 2:] - ends[:, :2],
+            half=np.asarray(half, dtype=np.float64),
+            number=np.asarray(number, dtype=np.int64),
+        )
+
+    def __len__(self) -> int:
+        return len(self.point) + len(self.tail)
+
+    def missed(
+        self,
+        who: IntArray,
+        start: FloatArray,
+        end: FloatArray,
+        radius: FloatArray,
+        before: Touching,
+        after: Touching,
+    ) -> IntArray:
+        """Return the pairs (M, 2) that were missed, as `Audit` defines it.
+
+        Args:
+            who: numbers of the circles (F,) to look at.
+            start: their centres (F, 2) at the start of the substep, m, finite.
+            end: the same at its end.
+            radius: (F,) m.
+            before: what the engine found at the start.
+            after: what it found at the end.
+        """
+        found = [np.empty((0, 2), np.int64)]
+        parts = len(who) * max(len(self.point), len(self.tail)) // CHUNK + 1
+        for part in np.array_split(np.arange(len(who)), parts):
+            path = who[part], start[part], end[part], radius[part]
+            if len(part) and len(self.point):
+                found.append(self._planes(*path, before, after))
+            if len(part) and len(self.tail):
+                found.append(self._walls(*path, before, after))
+        return np.concatenate(found)
+
+    def _planes(
+        self,
+        who: IntArray,
+        start: FloatArray,
+        end: FloatArray,
+        radius: FloatArray,
+        before: Touching,
+        after: Touching,
+    ) -> IntArray:
+        first = dot(start[:, None] - self.point, self.normal)
+        last = dot(end[:, None] - self.point, self.normal)
+        tolerance = np.maximum(TOLERANCE * radius, PLANE_ROUNDING)
+        came_in = (first >= (radius - tolerance / 2)[:, None]) & (last < (radius - tolerance)[:, None])
+        came_in &= (dot(end - start, end - start) >= (JUMP * radius) ** 2)[:, None]
+        i, plane = np.nonzero(came_in)
+        pair = np.column_stack((who[i], -1 - plane))
+        in_time = after.has(pair) & (last[i, plane] >= -BACKING)
+        return pair[~in_time & ~before.has(pair)]
+
+    def _walls(
+        self,
+        who: IntArray,
+        start: FloatArray,
+        end: FloatArray,
+        radius: FloatArray,
+        before: Touching,
+        after: Touching,
+    ) -> IntArray:
+        i, s = self._in_reach(start, end, radius)
+        tail, along, contact = self.tail[s], self.along[s], radius[i] + self.half[s]
+        here, there = start[i], end[i]
+        nearest2, crossed = closest_to_segment(here, there, tail, along)
+        deep = nearest2 < (DEEP * contact) ** 2
+        if not deep.any():
+            return np.empty((0, 2), np.int64)
+
+        first = from_segment(here, tail, along)
+        first2 = dot(first, first)
+        last = from_segment(there, tail, along)
+        approached = (dot(last, last) < contact**2) & approaching(last, there - here)
+        apart = first2 >= (CLEAR * contact) ** 2
+
+        # From segments to things: rows of one body and one wall share a place in `pair`.
+        pair, place = np.unique(np.column_stack((who[i], self.number[s])), axis=0, return_inverse=True)
+        place = place.reshape(-1)
+        known = before.has(pair)
+        nearest = np.full(len(pair), np.inf)
+        np.minimum.at(nearest, place, first2)
+
+        # A contact at the start was with the nearest segment, or with those as near.
+        held = known[place] & (first2 <= nearest[place] + TOLERANCE * contact**2)
+        through = _any(crossed & apart & ~held, place, len(pair))
+        came_in = _any(deep, place, len(pair)) & ~_any(~apart, place, len(pair)) & ~known
+        in_time = after.has(pair) & _any(approached, place, len(pair))
+        return np.asarray(pair[through | (came_in & ~in_time)], dtype=np.int64)
+
+    def _in_reach(self, start: FloatArray, end: FloatArray, radius: FloatArray) -> tuple[IntArray, IntArray]:
+        """Return the circles and segments, (K,) each, that may meet on a path long enough to skip a look."""
+        middle = self.tail + 0.5 * self.along
+        size = 0.5 * np.sqrt(dot(self.along, self.along)) + self.half
+        move = end - start
+        length2 = dot(move, move)
+        mean = start + 0.5 * move
+        across, up = (mean[:, axis, None] - middle[:, axis] for axis in (0, 1))
+        reach = (radius + 0.5 * np.sqrt(length2))[:, None] + size
+        near = across * across + up * up <= reach * reach * (1 + 1e-9)  # rounding must not hide a pair
+        near &= length2[:, None] >= (JUMP * (radius[:, None] + self.half)) ** 2
+        i, s = np.nonzero(near)
+        first = from_segment(start[i], self.tail[s], self.along[s])
+        reach = radius[i] + self.half[s] + np.sqrt(length2[i])
+        close = dot(first, first) <= reach * reach
+        return i[close], s[close]
+
+
+def _any(condition: BoolArray, place: IntArray, count: int) -> BoolArray:
+    """Return for which of `count` places any condition holds."""
+    return np.asarray(np.bincount(place[condition], minlength=count) > 0)
+
+
+def _rows(pairs: list[tuple[float, float]]) -> FloatArray:
+    return np.asarray(pairs, dtype=np.float64).reshape(-1, 2)

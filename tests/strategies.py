@@ -1,0 +1,323 @@
+"""Hypothesis strategies: scene documents as TOML would hold them, whole and sound, and the texts that say them."""
+
+import json
+import math
+import random
+from typing import Any
+
+from hypothesis import strategies as st
+
+from sandbox.scene.faults import Location
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Scene
+
+Document = dict[str, Any]
+
+
+def numbers(low: float, high: float) -> st.SearchStrategy[float]:
+    """Floats within bounds, and whole numbers as TOML integers."""
+    floats = st.floats(low, high, allow_nan=False, allow_infinity=False)
+    first, last = math.ceil(max(low, -(2**53))), math.floor(min(high, 2**53))
+    return floats | st.integers(first, last) if first <= last else floats
+
+
+def names() -> st.SearchStrategy[str]:
+    """Names of bodies and materials: any text without control characters; none that looks like a default name."""
+    letters = st.characters(exclude_categories=["Cc", "Cs", "Zl", "Zp"], exclude_characters="-")
+    return st.sampled_from(["cue", "8 ball", "a.b", "it's", 'say "hi"', "[x]", "#1", "=", "0"]) | st.text(
+        letters, min_size=1, max_size=12
+    )
+
+
+def pairs(low: float, high: float) -> st.SearchStrategy[list[float]]:
+    """Arrays of two numbers."""
+    return st.lists(numbers(low, high), min_size=2, max_size=2)
+
+
+def _coefficients() -> Document:
+    return {
+        "restitution": numbers(0, 1),
+        "friction": numbers(0, 1000),
+    }
+
+
+@st.composite
+def _elements(draw: st.DrawFn, required: Document, optional: Document, materials: list[str]) -> Document:
+    optional = {**optional, **_coefficients(), "colour": st.from_regex("#[0-9a-fA-F]{6}", fullmatch=True)}
+    if materials:
+        optional["material"] = st.sampled_from(materials)
+    return dict(draw(st.fixed_dictionaries(required, optional=optional)))
+
+
+@st.composite
+def documents(draw: st.DrawFn, most: int = 3) -> Document:
+    """Sound scene documents of up to `most` elements of each kind.
+
+    With planes everything stays within some hundred metres, so that nothing starts deep behind one; without, places
+    reach 1e15 m.
+    """
+    document: Document = draw(
+        st.fixed_dictionaries({}, optional={"title": st.text(max_size=20), "about": st.text(max_size=40)})
+    )
+    listed = lambda one: draw(st.lists(one, max_size=most))  # noqa: E731, a name for a word used ten times
+    materials = draw(st.lists(names(), unique=True, max_size=3))
+    document["material"] = [
+        {"name": name, **draw(st.fixed_dictionaries({}, optional=_coefficients()))} for name in materials
+    ]
+    if materials:
+        sides = st.lists(st.sampled_from(materials), min_size=2, max_size=2)
+        between = draw(st.lists(sides, max_size=3, unique_by=lambda two: frozenset(two)))
+        document["pair"] = [
+            {"between": two, **draw(st.fixed_dictionaries({}, optional=_coefficients()))} for two in between
+        ]
+
+    document["plane"] = listed(
+        _elements({"point": pairs(-300, 300), "normal": pairs(-1e3, 1e3).filter(any_length)}, {}, materials)
+    )
+    far = 300.0 if document["plane"] else 1e15
+    corners = st.lists(st.tuples(st.integers(-99, 99), st.integers(-99, 99)), min_size=3, max_size=5, unique=True)
+    points = corners.map(lambda rows: [[x * 0.25, y * 0.25] for x, y in rows])
+    document["wall"] = listed(
+        _elements({"points": points}, {"thickness": numbers(0, 10), "closed": st.booleans()}, materials)
+    )
+    document["post"] = listed(_elements({"position": pairs(-far, far), "radius": numbers(1e-9, 1e9)}, {}, materials))
+
+    disc = {
+        "angle": numbers(-1e12, 1e12),
+        "collides": st.sampled_from(["all", "fixed", "none"]),
+    }
+    spin = {"angular_velocity": numbers(-1e12, 1e12)}
+    speed = 7e11  # m/s in each component: 1e12 / √2, rounded down
+    heavy = {"mass": numbers(1e-15, 1e30)}
+    dense = {"density": numbers(1e-6, 1e6)}  # with the radii below, masses of 1e-18 … 1e12 would do; see `small`
+    small = numbers(1e-2, 0.1)
+    ball = {"position": pairs(-far, far), "radius": numbers(1e-9, 1e9)}
+    moving = {"velocity": pairs(-speed, speed)}
+    document["ball"] = listed(
+        _elements(ball, {**disc, **spin, **moving, **heavy}, materials)
+        | _elements({**ball, "radius": small, **dense}, {**disc, **spin, **moving}, materials)
+        | _elements({**ball, "fixed": st.just(True)}, {**disc, **heavy}, materials)
+    )
+    grid = {
+        "origin": pairs(-100, 100),
+        "columns": st.integers(1, 4),
+        "spacing": pairs(-10, 10),
+        "radius": small,
+    }
+    jitter = {"jitter": numbers(0, 1), "velocity_jitter": numbers(0, 1e11), "rows": st.integers(1, 3)}
+    document["grid"] = listed(_elements(grid, {**disc, **spin, **jitter, **heavy}, materials))
+    scatter = {
+        "count": st.integers(1, 6),
+        "lower": pairs(-100, 0),
+        "upper": pairs(3, 100),
+        "radius": small,
+    }
+    document["scatter"] = listed(_elements(scatter, {**disc, **spin, **dense}, materials))
+    emitter = {
+        "position": pairs(-100, 100),
+        "count": st.integers(1, 6),
+        "velocity_min": pairs(-speed, 0),
+        "velocity_max": pairs(0, speed),
+    }
+    document["emitter"] = listed(_elements(emitter, {**disc, **spin, **heavy}, materials))
+
+    nameable = ("plane", "wall", "post", "ball", "grid", "scatter", "emitter")
+    things = [thing for kind in nameable for thing in document[kind]]
+    called = draw(st.lists(st.none() | names(), min_size=len(things), max_size=len(things), unique_by=_unless_none()))
+    for thing, name in zip(things, called, strict=True):
+        if name is not None:
+            thing["name"] = name
+    document["world"] = draw(
+        st.fixed_dictionaries(
+            {},
+            optional={
+                "gravity": pairs(-1e9, 1e9),
+                "duration": numbers(1e-9, 999),
+                "seed": st.integers(0, 2**63 - 1),
+                "linear_drag": numbers(0, 1e9),
+                "quadratic_drag": numbers(0, 1e9),
+                "wind": pairs(-speed, speed),
+                "bounds": st.just([[-1e16, -1e16], [1e16, 1e16]]),
+            },
+        )
+    )
+    document["solver"] = draw(
+        st.fixed_dictionaries(
+            {},
+            optional={
+                "dt": numbers(1e-4, 10),
+                "substeps": st.integers(1, 100),
+                "iterations": st.integers(1, 10_000),
+                "slop": numbers(0, 1e9),
+                "bias": numbers(0, 1),
+                "persistence": st.integers(1, 1000),
+                "half_kick": st.booleans(),
+                "integrator": st.sampled_from(
+                    ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]
+                ),
+                "detection": st.sampled_from(["discrete", "bisect", "swept", "shrink"]),
+                "response": st.sampled_from(["impulse", "penalty"]),
+                "broad_phase": st.sampled_from(["all_pairs", "circles", "sweep", "grid", "oriented"]),
+                "record_every": st.integers(1, 10**9),
+            },
+        )
+    )
+    kept = {key: value for key, value in document.items() if value not in ([], {})}
+    return kept or {"title": ""}
+
+
+def any_length(vector: list[float]) -> bool:
+    """Tell whether a vector is long enough to have a direction."""
+    return math.hypot(*vector) > 1e-90
+
+
+def _unless_none() -> Any:
+    """Return a key for `unique_by` under which every None is another."""
+    return lambda name: object() if name is None else name
+
+
+def scenes(most: int = 3) -> st.SearchStrategy[Scene]:
+    """Sound scenes."""
+    return documents(most).map(from_document)
+
+
+def junk() -> st.SearchStrategy[Any]:
+    """Values of any kind that TOML or JSON can hold, most of them wrong wherever they stand."""
+    leaves = (
+        st.none()
+        | st.booleans()
+        | st.integers()
+        | st.integers(-(10**400), 10**400)
+        | st.floats()
+        | st.text(max_size=5)
+        | st.dates()
+        | st.datetimes()
+        | st.times()
+    )
+    return st.recursive(
+        leaves, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=4)
+    )
+
+
+class Rendered:
+    """A document written as TOML in one of its many ways, and the line of every location of it."""
+
+    def __init__(self, document: Document, chance: random.Random) -> None:
+        self._chance = chance
+        self._line = 1
+        self._parts: list[str] = []
+        self.lines: dict[Location, int] = {}
+        self._document(document)
+        self.text = "".join(self._parts)
+
+    def _write(self, text: str) -> None:
+        self._parts.append(text)
+        self._line += text.count("\n")
+
+    def _note(self, location: Location) -> None:
+        for length in range(1, len(location) + 1):
+            self.lines.setdefault(location[:length], self._line)
+
+    def _fill(self) -> None:
+        """Write blank lines and comments, some of them traps."""
+        traps = ["", "   ", "# [[ball]]", "# radius = 1", '# """', "# '", "#\u2028]", "# ]\x85}", "\t# name = \"x"]
+        for _ in range(self._chance.choice((0, 0, 1, 2))):
+            self._write(self._chance.choice(traps) + "\n")
+
+    def _end(self) -> None:
+        self._write(self._chance.choice(("", "  ", " # ] x = 1", "\t#'''")) + self._chance.choice(("\n", "\r\n")))
+
+    def _key(self, key: str) -> str:
+        bare = key.isascii() and key.replace("_", "").isalnum()
+        return self._chance.choice((key, json.dumps(key), f"'{key}'")) if bare else json.dumps(key)
+
+    def _document(self, document: Document) -> None:
+        tables: list[tuple[str, list[Document] | Document]] = []
+        for key, value in self._shuffled(document.items()):
+            is_table = isinstance(value, dict)
+            is_array = isinstance(value, list) and value and all(isinstance(v, dict) for v in value)
+            if (is_table or is_array) and self._chance.random() < 0.9:
+                tables.append((key, value))
+            elif is_table and value and self._chance.random() < 0.5:
+                self._table((key,), value, f"{self._key(key)}.")
+            else:
+                self._table((), {key: value})
+        waiting = [(key, value if isinstance(value, list) else [value]) for key, value in tables]
+        several = {key: isinstance(value, list) for key, value in tables}
+        written = dict.fromkeys(several, 0)
+        while waiting:
+            place = self._chance.randrange(len(waiting))
+            key, values = waiting[place]
+            self._fill()
+            heading = f"[[{self._key(key)}]]" if several[key] else f"[ {self._key(key)} ]"
+            location: Location = (key, written[key]) if several[key] else (key,)
+            self._note(location)
+            self._write(heading)
+            self._end()
+            self._table(location, values[written[key]])
+            written[key] += 1
+            if written[key] == len(values):
+                del waiting[place]
+
+    def _shuffled(self, items: Any) -> list[Any]:
+        items = list(items)
+        self._chance.shuffle(items)
+        return items
+
+    def _table(self, location: Location, table: Document, prefix: str = "") -> None:
+        for key, value in self._shuffled(table.items()):
+            self._fill()
+            self._note((*location, key))
+            self._write(prefix + self._key(key) + self._chance.choice((" = ", "=", "\t=  ")))
+            self._value((*location, key), value)
+            self._end()
+
+    def _value(self, location: Location, value: Any) -> None:
+        if isinstance(value, dict):
+            self._write("{ ")
+            for n, (key, inner) in enumerate(self._shuffled(value.items())):
+                self._write(", " if n else "")
+                self._note((*location, key))
+                self._write(f"{self._key(key)} = ")
+                self._value((*location, key), inner)
+            self._write(" }")
+        elif isinstance(value, list):
+            self._write("[")
+            for n, inner in enumerate(value):
+                self._break()
+                self._note((*location, n))
+                self._value((*location, n), inner)
+                self._break()
+                self._write("," if n < len(value) - 1 or self._chance.random() < 0.3 else "")
+            self._break()
+            self._write("]")
+        else:
+            self._write(self._scalar(value))
+
+    def _break(self) -> None:
+        self._write(self._chance.choice(("", "", " ", "\n", "  # , ]\n")))
+
+    def _scalar(self, value: Any) -> str:
+        if isinstance(value, str):
+            plain = json.dumps(value).replace("\x7f", "\\u007f")
+            ways = [_toml_escapes(plain)]
+            if value and value.isprintable() and "'" not in value:
+                ways += [f"'{value}'", f"'''\n{value}'''"]
+            if "\\" not in plain and value.isprintable():
+                ways.append(f'"""\\\n   {value}"""' if value.strip() == value else f'"""{value}"""')
+            return self._chance.choice(ways)
+        if isinstance(value, bool):
+            return "true" if value else "false"
+        return repr(value)
+
+
+def _toml_escapes(text: str) -> str:
+    """Turn JSON's pairs of surrogates into characters; TOML has no such escapes."""
+    return json.dumps(json.loads(text), ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+@st.composite
+def rendered(draw: st.DrawFn, of: st.SearchStrategy[Document] | None = None) -> tuple[Document, Rendered]:
+    """A document and a text that says it."""
+    document = draw(documents() if of is None else of)
+    return document, Rendered(document, draw(st.randoms(use_true_random=False)))
