@@ -101,10 +101,15 @@ def run_id(
     versions: Mapping[str, str],
     actions: tuple[Action, ...] = (),
 ) -> str:
-    """Return the id of a run, 20 hex digits: a hash of everything that decides how it goes."""
+    """Return the id of a run, 20 hex digits: a hash of everything that decides how it goes.
+
+    The settings are the resolved ones; what the scene's own `[solver]` says does not count beside them.
+    """
+    document = to_document(scene)
+    document.pop("solver", None)
     return _hash(
         {
-            "scene": to_document(scene),
+            "scene": document,
             "engine": engine,
             "settings": settings.model_dump(mode="json"),
             "seed": seed,

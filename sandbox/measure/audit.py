@@ -47,7 +47,7 @@ class Audit:
         self._obstacles = Obstacles.of(scene)
         self._times: list[FloatArray] = []
         self._pairs: list[IntArray] = []
-        self._before = np.empty((0, 2), np.int64)
+        self._before = Touching(np.empty((0, 2), np.int64))
         self.joined(scene.bodies if bodies is None else bodies)
 
     def joined(self, bodies: Bodies) -> None:
@@ -91,14 +91,14 @@ class Audit:
             raise ValueError(f"{len(start)} bodies, where the audit knows of {self._number}")
         if not len(self._radius):
             return
-        before, self._before = self._before, touching.copy()
+        before, self._before = self._before, Touching(touching)
         start, end = start[self._part], end[self._part]
         with np.errstate(invalid="ignore", over="ignore"):  # diverging bodies reach inf; they drop out below
             move = end - start
             move *= move
             fast = np.asarray(move[:, 0] + move[:, 1] >= self._least2)
         if fast.any():
-            self._look(time, start, end, fast, Touching(before), Touching(touching))
+            self._look(time, start, end, fast, before, self._before)
 
     def _look(
         self, time: float, start: FloatArray, end: FloatArray, fast: BoolArray, before: Touching, after: Touching

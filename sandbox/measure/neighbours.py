@@ -38,6 +38,7 @@ class Neighbours:
         self._meet = meet
         self._party = np.flatnonzero(member)
         self._few = BUILDING_EACH + BUILDING // max(len(self._party), 1)
+        self._typical = float(np.median(radius[self._party])) if len(self._party) else 0.0
         self._anchor = np.full((len(radius), 2), np.inf)
         self._half_skin = 0.0
         self._first = self._second = np.empty(0, np.int64)
@@ -55,17 +56,15 @@ class Neighbours:
         """
         strays = self._strays(start, end)
         if np.count_nonzero(strays) > self._few:
-            self._build(start, end)
+            if not self._build(start, end):
+                return self._swept(start, end, fast, self._member)
             strays = self._strays(start, end)
         keep = fast[self._first] | fast[self._second]
-        if strays.any():
-            keep &= ~(strays[self._first] | strays[self._second])
-            first, second = self._astray(start, end, strays)
-            more = fast[first] | fast[second]
-            first = np.concatenate((self._first[keep], first[more]))
-            second = np.concatenate((self._second[keep], second[more]))
-            return first, second
-        return self._first[keep], self._second[keep]
+        if not strays.any():
+            return self._first[keep], self._second[keep]
+        keep &= ~(strays[self._first] | strays[self._second])
+        first, second = self._swept(start, end, fast, strays)
+        return np.concatenate((self._first[keep], first)), np.concatenate((self._second[keep], second))
 
     def _strays(self, start: FloatArray, end: FloatArray) -> BoolArray:
         """Return who left its half of the skin, (N,)."""
@@ -77,58 +76,71 @@ class Neighbours:
             home &= gone[:, 0] + gone[:, 1] <= limit
         return self._member & ~home
 
-    def _astray(self, start: FloatArray, end: FloatArray, strays: BoolArray) -> tuple[IntArray, IntArray]:
-        """Return the pairs with a stray that may meet on their way."""
-        here, there = start[self._party], end[self._party]
+    def _swept(
+        self, start: FloatArray, end: FloatArray, fast: BoolArray, strays: BoolArray
+    ) -> tuple[IntArray, IntArray]:
+        """Return the pairs with a stray that may meet on their way: by the circles around their paths."""
+        party = self._party[np.isfinite(start[self._party] + end[self._party]).all(axis=1)]
+        here, there = start[party], end[party]
         move = there - here
-        reach = self._radius[self._party] + 0.5 * np.sqrt((move * move).sum(axis=1))
-        rows = np.flatnonzero(strays[self._party])
-        return self._joined(_in_rows(rows, here + 0.5 * move, reach))
+        reach = self._radius[party] + 0.5 * np.sqrt((move * move).sum(axis=1)) * (1 + 1e-9)  # rounding, 1e-16
+        which = np.flatnonzero(strays[party])
+        if len(which) > self._few:
+            close = self._close(here + 0.5 * move, reach)
+        else:
+            close = _in_rows(which, here + 0.5 * move, reach)
+        return self._joined(party, close, fast)
 
-    def _build(self, start: FloatArray, end: FloatArray) -> None:
-        """List the pairs within a skin whose width lets all but a few bodies stay for a while."""
-        whole = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
-        self._party = np.flatnonzero(self._member & whole)
-        self._anchor = start.copy()
+    def _build(self, start: FloatArray, end: FloatArray) -> bool:
+        """List the pairs within a skin whose width lets all but a few bodies stay for a while.
+
+        Returns whether that was worth it: with most moving on by more than a radius, no list lasts.
+        """
+        self._anchor[:] = np.inf
         self._first = self._second = np.empty(0, np.int64)
-        if len(self._party) < 2:
-            return
-        place, radius = start[self._party], self._radius[self._party]
-        typical = float(np.median(radius))
-        jump = np.sort(np.sqrt(((end[self._party] - place) ** 2).sum(axis=1)))
+        party = self._party[np.isfinite(start[self._party] + end[self._party]).all(axis=1)]
+        if not len(party):
+            return False
+        jump = np.sort(np.sqrt(((end[party] - start[party]) ** 2).sum(axis=1)))
         usual = float(jump[max(len(jump) - 1 - self._few // 2, len(jump) // 2)])
-        self._half_skin = max(usual, min(LASTING * usual, typical), LEAST_SKIN * typical)
+        if usual > self._typical:
+            return False
+        self._half_skin = max(min(LASTING * usual, self._typical), LEAST_SKIN * self._typical)
+        self._anchor = start.copy()
+        reach = self._radius[party] + self._half_skin * (1 + 1e-9)  # the skin ends in rounding, 1e-16
+        everyone = np.ones_like(self._member)
+        self._first, self._second = self._joined(party, self._close(start[party], reach), everyone)
+        return True
 
-        # Large bodies would make the cells large, and let all the small ones meet: those go in rows.
-        reach = radius + self._half_skin * (1 + 1e-9)  # the skin ends in rounding, 1e-16
+    def _close(self, place: FloatArray, reach: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
+        """Yield every pair nearer than the sum of its reaches, by cells.
+
+        Large reaches would make the cells large and let all the small ones meet: those go in rows.
+        """
         order = np.argsort(-reach, kind="stable")
-        crowd = np.minimum((reach[order] / typical) ** 2, len(order))
+        crowd = np.minimum((reach[order] / self._typical) ** 2, len(order))
         large = int(np.argmin(np.arange(len(order)) + CELL_SHARE * crowd))
-        self._first, self._second = self._joined(_close(place, reach, order[:large], order[large:]))
+        if large:
+            yield from _in_rows(np.sort(order[:large]), place, reach)
+        small = order[large:]
+        for i, j in near_pairs(place[small], 2 * float(reach[small].max(initial=0.0))):
+            i, j = small[i], small[j]
+            gap = place[j] - place[i]
+            gap *= gap
+            near = gap[:, 0] + gap[:, 1] < (reach[i] + reach[j]) ** 2
+            yield i[near], j[near]
 
-    def _joined(self, found: Iterator[tuple[IntArray, IntArray]]) -> tuple[IntArray, IntArray]:
-        """Join chunks of pairs, given as places in the party, and keep those that can touch at all."""
+    def _joined(
+        self, party: IntArray, found: Iterator[tuple[IntArray, IntArray]], fast: BoolArray
+    ) -> tuple[IntArray, IntArray]:
+        """Join chunks of pairs, given as places in the party, that can touch at all and have a fast body."""
         pairs = [np.empty((2, 0), np.int64)]
         for chunk in found:
-            i, j = self._party[chunk[0]], self._party[chunk[1]]
-            able = self._meet(i, j)
+            i, j = party[chunk[0]], party[chunk[1]]
+            able = self._meet(i, j) & (fast[i] | fast[j])
             pairs.append(np.stack((np.minimum(i, j)[able], np.maximum(i, j)[able])))
         first, second = np.concatenate(pairs, axis=1)
         return first, second
-
-
-def _close(
-    place: FloatArray, reach: FloatArray, large: IntArray, small: IntArray
-) -> Iterator[tuple[IntArray, IntArray]]:
-    """Yield every pair nearer than the sum of its reaches: the large ones in rows, the small ones by cells."""
-    if len(large):
-        yield from _in_rows(np.sort(large), place, reach)
-    for i, j in near_pairs(place[small], 2 * float(reach[small].max(initial=0.0))):
-        i, j = small[i], small[j]
-        gap = place[j] - place[i]
-        gap *= gap
-        near = gap[:, 0] + gap[:, 1] < (reach[i] + reach[j]) ** 2
-        yield i[near], j[near]
 
 
 def _in_rows(rows: IntArray, centre: FloatArray, reach: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:

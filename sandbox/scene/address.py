@@ -21,14 +21,14 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     Raises:
         AddressError: there is no `=`, or no key before it.
     """
-    key, equals, value = _split(text)
+    key, equals, value = split_assignment(text)
     if not equals or not key.strip():
         raise AddressError(f"{text!r} is not KEY=VALUE, such as solver.dt=0.001 or ball.cue.velocity=[1,0]")
     return key.strip(), parse_value(value.strip())
 
 
-def _split(text: str) -> tuple[str, str, str]:
-    """Split at the first `=` outside quotes."""
+def split_assignment(text: str) -> tuple[str, str, str]:
+    """Split `KEY=VALUE` at the first `=` outside quotes into key, `=` and value."""
     quote = ""
     for k, letter in enumerate(text):
         if quote:

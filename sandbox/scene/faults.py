@@ -24,7 +24,8 @@ class Fault:
 
     def __str__(self) -> str:
         place = self.file if self.line is None else f"{self.file}:{self.line}"
-        return f"{place}: {self.path}: {self.message}" if self.path else f"{place}: {self.message}"
+        text = f"{place}: {self.path}: {self.message}" if self.path else f"{place}: {self.message}"
+        return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
 class SceneError(Exception):
@@ -99,7 +100,7 @@ def _lines_of(text: str) -> dict[Location, int]:
         sign = token[0]
         if sign == "\n" or sign[0] == "#":
             if state == "heading":
-                table = _enter(_parsed(text[start : token.start()]), counts)
+                table = _enter(_parsed(text[start : token.start()].rstrip()), counts)
                 _note(lines, table, begun)
             if not within:
                 state = "key"

@@ -51,7 +51,7 @@ def loads(text: str, file: str = "<scene>", overrides: Iterable[Override] = ()) 
             raise RecursionError
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise SceneError([_syntax_fault(file, error)]) from None
+        raise SceneError([_syntax_fault(file, text, error)]) from None
     except ValueError as error:  # an integer of thousands of digits
         raise SceneError([Fault(file, None, "", f"cannot be read: {error}")]) from None
     except RecursionError:
@@ -132,9 +132,9 @@ def _read(path: str | Path) -> str:
         raise SceneError([Fault(file, None, "", reason)]) from None
 
 
-def _syntax_fault(file: str, error: tomllib.TOMLDecodeError) -> Fault:
+def _syntax_fault(file: str, text: str, error: tomllib.TOMLDecodeError) -> Fault:
     message = str(error)
     at = re.search(r" \(at line (\d+), column (\d+)\)$", message)
-    if at is None:
-        return Fault(file, None, "", f"not TOML: {message}")
+    if at is None:  # at the end of the document
+        return Fault(file, text.rstrip("\n").count("\n") + 1, "", f"not TOML: {message}")
     return Fault(file, int(at[1]), "", f"not TOML: {message[: at.start()]}, at column {at[2]}")

@@ -1,0 +1,102 @@
+"""Outcomes: runs made, or found in the store, and the row that tells of each."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sandbox.batch.plan import Job
+from sandbox.batch.store import Store, run_id
+from sandbox.engines.registry import engine as engine_named
+from sandbox.measure.run import Progress, run
+from sandbox.measure.versions import versions
+from sandbox.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A run that is over."""
+
+    job: Job
+    id: str
+    trajectory: Trajectory
+    path: Path | None
+    """of the stored arrays"""
+    repeated: bool
+    """It was in the store already, and was not run again."""
+
+    def row(self) -> dict[str, Any]:
+        """Return the run as one JSON object; figures that are not finite are null."""
+        run, info = self.trajectory, self.trajectory.info
+        seconds, steps = info["seconds"], info["steps"]
+        simulated = float(run.time[-1]) if len(run.time) else 0.0
+        return {
+            "id": self.id,
+            "scene": self.job.label,
+            "title": self.job.scene.title,
+            "engine": self.job.engine,
+            "settings": info["settings"],
+            "seed": info["seed"],
+            "status": run.status,
+            "reason": run.reason,
+            "seconds": _number(seconds),
+            "steps": steps,
+            "steps_per_second": _number(steps / seconds if seconds else None),
+            "realtime_factor": _number(simulated / seconds if seconds else None),
+            "energy_start": _number(info["energy_start"]),
+            "energy_end": _number(info["energy_end"]),
+            "contacts": len(run.contact_time),
+            "missed_contacts": run.missed_contacts,
+            "retired": {
+                str(name): time for name, time in zip(run.names, run.retired_time.tolist(), strict=True) if time == time
+            },
+            "final": self._final(),
+            "path": None if self.path is None else str(self.path),
+        }
+
+    def _final(self) -> dict[str, Any]:
+        run = self.trajectory
+        if not len(run.time):
+            return {}
+        columns = zip(
+            run.names.tolist(),
+            run.position[-1].tolist(),
+            run.velocity[-1].tolist(),
+            run.angle[-1].tolist(),
+            run.angular_velocity[-1].tolist(),
+            strict=True,
+        )
+        return {
+            name: {
+                "position": [_number(x) for x in position],
+                "velocity": [_number(v) for v in velocity],
+                "angle": _number(angle),
+                "angular_velocity": _number(spin),
+            }
+            for name, position, velocity, angle, spin in columns
+        }
+
+
+def _number(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
+
+
+def execute(job: Job, store: Store | None = None, progress: Progress | None = None, audit: bool = True) -> Outcome:
+    """Make a run, and store it where there is a store; one that is stored already is read, not repeated.
+
+    Raises:
+        TooLargeError: the frames would not fit into memory.
+        StoreError: the store cannot be used.
+    """
+    engine = engine_named(job.engine)
+    settings = job.scene.solver
+    if not engine.missing(job.scene, settings):
+        settings = engine.resolve(job.scene, settings)
+    number = run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions)
+    found = store.find(number) if store is not None else None
+    if store is not None and found is not None:
+        path = store.file(found)
+        return Outcome(job, number, Trajectory.load(path), path, repeated=True)
+    trajectory = run(job.scene, job.engine, actions=job.actions, audit=audit, progress=progress)
+    path = store.file(store.add(trajectory, number)) if store is not None else None
+    return Outcome(job, number, trajectory, path, repeated=False)

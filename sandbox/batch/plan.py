@@ -1,0 +1,116 @@
+"""Plans: which runs a command asks for. Scenes, sweeps, seeds and engines multiply."""
+
+import math
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from sandbox.scene.address import AddressError, parse_assignment, parse_value, split_assignment
+from sandbox.scene.file import Override, load
+from sandbox.scene.model import Scene
+
+MOST_POINTS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to be made: a scene as it is to be run, and on what."""
+
+    label: str
+    """the scene as the user named it"""
+    scene: Scene
+    engine: str
+    actions: tuple[Any, ...] = ()
+
+
+def plan(
+    scenes: Sequence[tuple[str, str]],
+    engines: Sequence[str],
+    overrides: Sequence[Override] = (),
+    sweeps: Sequence[str] = (),
+    seeds: int | None = None,
+) -> list[Job]:
+    """Lay out every run, in order: scene by scene, the last sweep changing fastest, then seeds, then engines.
+
+    Args:
+        scenes: label and path of each.
+        engines: names.
+        overrides: `KEY=VALUE`, set in every run.
+        sweeps: `KEY=A,B,C` or `KEY=LOW:HIGH:N[:log]`.
+        seeds: how many, from 1 on; without, each scene's own.
+
+    Raises:
+        SceneError: a scene has faults, as it stands or with a value set.
+        AddressError: a sweep cannot be understood.
+    """
+    axes: list[list[Override]] = [[(key, value) for value in values] for key, values in map(parse_sweep, sweeps)]
+    if seeds is not None:
+        axes.append([("world.seed", seed) for seed in range(1, seeds + 1)])
+    if math.prod(len(axis) for axis in axes) > MOST_POINTS:
+        raise AddressError(f"the sweeps multiply to more than {MOST_POINTS:,} runs")
+    return [
+        Job(label, scene, engine)
+        for label, path in scenes
+        for point in product(*axes)
+        for scene in (load(path, (*overrides, *point)),)
+        for engine in engines
+    ]
+
+
+def parse_sweep(text: str) -> tuple[str, list[Any]]:
+    """Read `KEY=A,B,C` or `KEY=LOW:HIGH:N[:log]` into the key and its values.
+
+    Raises:
+        AddressError: it is neither.
+    """
+    key, _ = parse_assignment(text)
+    values = split_assignment(text)[2].strip()
+    parts = values.split(":")
+    if len(parts) in (3, 4) and not values.startswith(('"', "'", "[")):
+        return key, list(_range(text, parts))
+    found = [parse_value(value) for value in _split(values)]
+    if not values or "" in found:
+        raise AddressError(f"{text!r}: a value is missing; KEY=A,B,C or KEY=LOW:HIGH:N or KEY=LOW:HIGH:N:log")
+    return key, found
+
+
+def _range(text: str, parts: list[str]) -> Iterator[float]:
+    try:
+        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+    except ValueError:
+        raise AddressError(f"{text!r}: a range is LOW:HIGH:N, two numbers and how many values") from None
+    log = len(parts) == 4
+    if log and parts[3] != "log":
+        raise AddressError(f"{text!r}: {parts[3]!r} is unknown; KEY=LOW:HIGH:N:log spaces by equal factors")
+    if not (1 <= count <= MOST_POINTS and math.isfinite(low) and math.isfinite(high)):
+        raise AddressError(f"{text!r}: a range has finite ends and 1 to {MOST_POINTS:,} values")
+    if log and not 0.0 < low <= high:
+        raise AddressError(f"{text!r}: equal factors need 0 < LOW <= HIGH")
+    for k in range(count):
+        share = k / (count - 1) if count > 1 else 0.0
+        if k and k == count - 1:
+            yield high  # not a rounding beside it
+        else:
+            yield low * (high / low) ** share if log else low + (high - low) * share
+
+
+def _split(values: str) -> list[str]:
+    """Split at the commas that separate TOML values, not at those within arrays or texts."""
+    parts, start = [], 0
+    for k, letter in enumerate(values):
+        if letter == "," and _is_whole(values[start:k]):
+            parts.append(values[start:k].strip())
+            start = k + 1
+    return [*parts, values[start:].strip()]
+
+
+def _is_whole(text: str) -> bool:
+    if not any(mark in text for mark in "[\"'{"):
+        return True
+    try:
+        tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return False
+    return True

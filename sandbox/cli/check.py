@@ -1,0 +1,85 @@
+"""`sandbox check`: validate scenes, print the bill of physics, who can run them, and what would go wrong."""
+
+import math
+from typing import Any
+
+import click
+
+from sandbox.cli.reading import fault_rows, paths_of, print_json
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.forecast import largest_safe_dt, warnings
+from sandbox.scene.demands import Item, bill
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import load
+from sandbox.scene.model import Scene
+
+
+@click.command(name="check")
+@click.argument("scenes", nargs=-1, required=True)
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene first")
+@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
+@click.option("--quiet", is_flag=True, help="say only what is wrong")
+def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, quiet: bool) -> int:
+    """Check scenes: faults, what they demand, which engines can run them, what would go wrong."""
+    documents = []
+    status = 0
+    for name in scenes:
+        try:
+            path = paths_of([name])[0][1]
+            scene = load(path, overrides)
+        except SceneError as error:
+            status = 2
+            documents.append(_faulty(name, error))
+            if not as_json:
+                click.echo(str(error), err=True)
+            continue
+        document, items = _checked(name, scene)
+        documents.append(document)
+        if not any(engine["ok"] for engine in document["engines"].values()):
+            status = max(status, 1)
+        if not as_json:
+            _print(name, scene, document, items, quiet)
+    if as_json:
+        print_json(documents[0] if len(documents) == 1 else {"scenes": documents})
+    return status
+
+
+def _faulty(name: str, error: SceneError) -> dict[str, Any]:
+    faults = fault_rows(error.faults)
+    return {"scene": name, "ok": False, "faults": faults, "demands": [], "engines": {}, "warnings": []}
+
+
+def _checked(name: str, scene: Scene) -> tuple[dict[str, Any], tuple[Item, ...]]:
+    items = bill(scene)
+    engines = {}
+    for engine in ENGINES.values():
+        missing = engine.missing(scene, scene.solver)
+        engines[engine.name] = {"ok": not missing, "missing": list(missing)}
+    safe = largest_safe_dt(scene)
+    document = {
+        "scene": name,
+        "title": scene.title,
+        "ok": True,
+        "faults": [],
+        "demands": [str(item.demand) for item in items if item.on],
+        "bill": [{"demand": str(item.demand), "on": item.on, "why": item.why} for item in items],
+        "engines": engines,
+        "safe_dt": safe if math.isfinite(safe) else None,
+        "warnings": [{"kind": w.kind, "message": w.message, **w.figures} for w in warnings(scene)],
+    }
+    return document, items
+
+
+def _print(name: str, scene: Scene, document: dict[str, Any], items: tuple[Item, ...], quiet: bool) -> None:
+    if not quiet:
+        click.echo(f"{name}: {scene.title}" if scene.title else name)
+        for item in items:
+            mark = click.style("on ", fg="green", bold=True) if item.on else click.style("off", dim=True)
+            click.echo(f"  {mark}  {item.demand:<12} {item.why}")
+        for engine, verdict in document["engines"].items():
+            click.echo(f"  engine {engine}: {'; '.join(verdict['missing']) or 'models all of it'}")
+        safe = document["safe_dt"]
+        say = "at any dt nothing can tunnel" if safe is None else f"nothing can tunnel up to dt = {safe:.4g} s"
+        click.echo(f"  {say}; the scene's is {scene.solver.dt:g} s")
+    for warning in document["warnings"]:
+        click.echo(f"{'' if not quiet else name + ': '}{'  ' if not quiet else ''}warning: {warning['message']}")

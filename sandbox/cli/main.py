@@ -1,0 +1,72 @@
+"""`sandbox …`: the commands, each loaded only when it is called."""
+
+import importlib
+import sys
+from typing import Any
+
+import click
+
+COMMANDS = {
+    "run": "run scenes headless and tell how they went",
+    "check": "check scenes: faults, what they demand, who can run them, what would go wrong",
+    "scenes": "list the scenes that ship",
+    "engines": "list the engines",
+    "schema": "print the JSON Schema of a scene file",
+}
+"""Each command's line of help stands here, so that help needs to import none of them."""
+
+
+class Commands(click.Group):
+    """A group whose commands live in modules of their names."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002, click's signature
+        """Return the commands in the order of use."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import a command."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"sandbox.cli.{cmd_name}").command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="sandbox2d", prog_name="sandbox")
+def cli() -> None:
+    """A 2D game physics sandbox: a scene is a file, the engine a choice, and every price is measured."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line, and exit.
+
+    Status: 0 done; 1 done, and something failed the question asked; 2 wrong input; 130 interrupted.
+    """
+    sys.exit(call(arguments))
+
+
+def call(arguments: list[str] | None = None) -> int:
+    """Run the command line and return its exit status. A fault of the user's is one line, never a traceback."""
+    try:
+        status: Any = cli.main(arguments, prog_name="sandbox", standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message(), err=True)
+        return 2
+    except click.ClickException as error:
+        context = getattr(error, "ctx", None)
+        where = context.command_path if context is not None else "sandbox"
+        click.echo(f"{where}: {error.format_message()}", err=True)
+        return 2
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        return 130
+    except BrokenPipeError:
+        # The reader has gone, as `| head` does; leave nothing to flush at exit.
+        sys.stdout = None  # type: ignore[assignment]
+        return 0
+    return status if isinstance(status, int) else 0

@@ -1,0 +1,268 @@
+"""Reading and writing scene files: whatever comes in, a Scene or a SceneError comes out."""
+
+import random
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import strategies
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import dumps, from_document, load, loads, to_document
+from sandbox.scene.model import Scene
+
+BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
+KEYS = sorted({field.alias or name for name, field in Scene.model_fields.items()} | {"x", "", "name", "radius", "count"})
+
+
+def check_faults(error: SceneError, file: str, lines: int) -> None:
+    """Check what every fault promises."""
+    assert error.faults
+    assert str(error) == "\n".join(map(str, error.faults))
+    for fault in error.faults:
+        assert fault.file == file
+        assert fault.message
+        assert fault.line is None or 1 <= fault.line <= lines
+        assert len(str(fault).splitlines()) == 1
+
+
+def only_scene_error(text: str) -> None:
+    try:
+        assert isinstance(loads(text, "f.toml"), Scene)
+    except SceneError as error:
+        check_faults(error, "f.toml", text.count("\n") + 1)
+
+
+@given(st.text())
+@example("\ufeff" + BALL)
+@example("a = 1" + "0" * 5000)
+@example("a = 0x1" + "0" * 5000)
+@example("a = " + "[" * 100_000)
+@example("a = " + "[" * 300 + "]" * 300)
+@example("a" + ".a" * 100_000 + " = 1")
+@example("a" + ".a" * 80 + " = 1")
+@example("x = {" + "a = {" * 5000)
+@example('"a\\nb" = 1')
+@example("[[ball]]\n'' = 1\n\"\\u001b[31m\" = 2")
+@example("ball = [[]]")
+@example("ball = [[[1]], 2]")
+@example("[ball.0]\nradius = 1")
+@example("[[ball]]\n[ball.position]\nx = 1")
+@example("[[world.bounds]]\n")
+def test_any_text_gives_a_scene_or_a_scene_error(text: str) -> None:
+    only_scene_error(text)
+
+
+@given(
+    st.lists(
+        st.sampled_from(
+            [f"[[{key}]]\n" for key in KEYS if key]
+            + [f"[{key}]\n" for key in KEYS if key]
+            + ["position = [0, 0]\n", "radius = 1\n", "name = 'a'\n", "material = 'm'\n", "between = ['m', 'm']\n"]
+            + ["points = [[0, 0], [1, 1]]\n", "point = [0, 1]\n", "normal = [0, 0]\n", "count = 9\n", "lower = [0, 0]\n"]
+            + ["upper = [1, 1]\n", "velocity = [\n1e13,\n0]\n", "radius = 'x'\n", "# [[ball]]\n", "dt = 0\n", "seed = -1\n"]
+            + ["velocity_min = [1, 1]\n", "velocity_max = [0, 0]\n", "columns = 2\n", "spacing = [0, 0]\n", "\n", "x = 1\n"]
+            + ["bounds = [[0, 0], [0, 1]]\n", "origin = [2, 2]\n", "mass = 1\n", "density = 1\n", "fixed = true\n"]
+        ),
+        max_size=25,
+    )
+)
+def test_any_mixture_of_lines_gives_a_scene_or_a_scene_error(lines: list[str]) -> None:
+    only_scene_error("".join(lines))
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary())
+@example(BALL.encode("utf-16"))
+@example(b"\x00")
+@example(b"\xff\xfe")
+@example(b"title = '\xc3\x28'")
+def test_any_bytes_give_a_scene_or_a_scene_error(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "f.toml"
+    path.write_bytes(content)
+    try:
+        assert isinstance(load(path), Scene)
+    except SceneError as error:
+        check_faults(error, str(path), content.count(b"\n") + 1)
+
+
+@given(st.dictionaries(st.sampled_from(KEYS), strategies.junk()))
+@example({"ball": [{"position": [0, 0], "radius": 10**5000}]})
+@example({"title": "\ud800"})
+@example({"\ud800": 1})
+@example({"balls": [{"raduis": 1}]})
+@example({"material": [{"name": "a", "frction": 1}], "materials": [{"name": 1}]})
+def test_any_document_gives_a_scene_or_a_scene_error(document: dict[str, Any]) -> None:
+    try:
+        assert isinstance(from_document(document, "f"), Scene)
+    except SceneError as error:
+        check_faults(error, "f", 0)
+
+
+@given(strategies.documents(), strategies.junk(), st.randoms(use_true_random=False))
+def test_any_value_anywhere_gives_a_scene_or_a_scene_error(document: Any, value: Any, chance: random.Random) -> None:
+    here: Any = document
+    while True:
+        key = chance.choice(list(here) if isinstance(here, dict) else range(len(here)))
+        if not isinstance(here[key], dict | list) or not here[key] or chance.random() < 0.2:
+            break
+        here = here[key]
+    here[key] = value
+    try:
+        assert isinstance(from_document(document, "f"), Scene)
+    except SceneError as error:
+        check_faults(error, "f", 0)
+
+
+@given(strategies.scenes())
+def test_scene_written_and_read_again_is_equal(scene: Scene) -> None:
+    text = dumps(scene)
+    again = loads(text)
+    assert again == scene
+    assert dumps(again) == text
+    assert from_document(to_document(scene)) == scene
+
+
+@given(strategies.rendered())
+def test_scene_means_the_same_however_it_is_written(said: tuple[strategies.Document, strategies.Rendered]) -> None:
+    document, rendered = said
+    assert tomllib.loads(rendered.text.replace("\r\n", "\n")) == document
+    assert loads(rendered.text) == from_document(document)
+
+
+@given(st.text(max_size=200), st.text(max_size=200))
+def test_title_and_about_of_any_text_are_written_and_read_again(title: str, about: str) -> None:
+    scene = from_document({"title": title, "about": about})
+    assert loads(dumps(scene)) == scene
+
+
+def test_scene_at_its_defaults_is_written_as_no_empty_file() -> None:
+    assert loads(dumps(Scene())) == Scene()
+
+
+def test_scene_is_read_from_a_file_with_bom_and_dos_line_ends(tmp_path: Path) -> None:
+    path = tmp_path / "a name with spaces.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + f'about = """a\nb"""\n{BALL}'.replace("\n", "\r\n").encode())
+    scene = load(path)
+    assert scene.balls == loads(BALL).balls
+    assert scene.about == "a\nb"
+    path.write_bytes(b"\xef\xbb\xbf" + f"{BALL}raduis = 1\n".replace("\n", "\r\n").encode())
+    with pytest.raises(SceneError) as caught:
+        load(path)
+    assert [(fault.line, fault.path) for fault in caught.value.faults] == [(4, "ball[0].raduis")]
+
+
+@pytest.mark.parametrize("text", ["", "\n", "   \n\t\n", "# only a comment", "\r\n\r\n", "# a comment\n" * 420_000])
+def test_file_without_content_is_a_fault(text: str) -> None:
+    with pytest.raises(SceneError, match="empty") as caught:
+        loads(text, "e.toml")
+    assert [(fault.file, fault.line) for fault in caught.value.faults] == [("e.toml", 1)]
+
+
+def test_fault_beyond_megabytes_of_comments_has_its_line() -> None:
+    with pytest.raises(SceneError) as caught:
+        loads("# a comment\n" * 420_000 + BALL + "x = 1")
+    assert [(fault.line, fault.path) for fault in caught.value.faults] == [(420_004, "ball[0].x")]
+
+
+@pytest.mark.parametrize(
+    ("text", "line"), [("a = ", 1), ("\n\n[[ball]\n", 3), ("a = 1\na = 2", 2), ("a = 'x\n", 1), ("x", 1), ("\n= 1", 2)]
+)
+def test_text_that_is_no_toml_is_one_fault_with_its_line(text: str, line: int) -> None:
+    with pytest.raises(SceneError, match="not TOML") as caught:
+        loads(text)
+    assert [fault.line for fault in caught.value.faults] == [line]
+
+
+def test_missing_file_directory_and_impossible_path_are_faults(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.toml", tmp_path, f"{tmp_path}/a\0b.toml", tmp_path / ("x" * 5000), ""):
+        with pytest.raises(SceneError) as caught:
+            load(path)
+        assert len(caught.value.faults) == 1
+        assert caught.value.faults[0].file == str(path)
+
+
+def test_file_of_other_text_encodings_is_a_fault(tmp_path: Path) -> None:
+    path = tmp_path / "f.toml"
+    for content in (BALL.encode("utf-16"), b"title = '\xe9'", bytes(range(256)) * 100):
+        path.write_bytes(content)
+        with pytest.raises(SceneError):
+            load(path)
+
+
+def test_file_beyond_the_limit_is_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "huge.toml"
+    with path.open("wb") as stream:
+        stream.truncate(2**40)  # sparse: takes no room
+    with pytest.raises(SceneError, match="larger than 256 MiB"):
+        load(path)
+
+
+def test_many_faults_are_all_reported_with_their_lines() -> None:
+    block = "[[ball]]\nposition = [0, 0]\nraduis = 1\n"
+    with pytest.raises(SceneError) as caught:
+        loads(block * 2000)
+    places = {(fault.line, fault.path) for fault in caught.value.faults}
+    assert places == {(3 * k + 3, f"ball[{k}].raduis") for k in range(2000)} | {
+        (3 * k + 1, f"ball[{k}].radius") for k in range(2000)
+    }
+
+
+def test_faults_come_in_the_order_of_their_lines() -> None:
+    text = f"{BALL}raduis = 1\n[world]\nseed = -1\n[[plane]]\npoint = [0, 0]\nnormal = [0, 0]\n[solver]\ndt = 0\n"
+    with pytest.raises(SceneError) as caught:
+        loads(text)
+    assert [fault.line for fault in caught.value.faults] == [4, 6, 9, 11]
+
+
+def test_override_changes_the_scene() -> None:
+    scene = loads(f"{BALL}name = 'cue'\n", overrides=["ball.cue.velocity=[1,0]", "solver.dt=0.5", ("world.seed", 7)])
+    assert scene.balls[0].velocity == (1.0, 0.0)
+    assert (scene.solver.dt, scene.world.seed) == (0.5, 7)
+
+
+def test_later_override_outranks_an_earlier_one() -> None:
+    assert loads(BALL, overrides=["solver.dt=0.5", "solver.dt=0.25"]).solver.dt == 0.25
+
+
+def test_fault_of_an_override_says_so_and_has_no_line() -> None:
+    with pytest.raises(SceneError) as caught:
+        loads(f"{BALL}[solver]\ndt = 0.1\n", "s.toml", ["solver.dt=20", "ball.0.mass=-1"])
+    assert [(fault.line, fault.path) for fault in caught.value.faults] == [
+        (None, "solver.dt (set)"),
+        (None, "ball[0].mass (set)"),
+    ]
+
+
+def test_override_can_mend_a_fault_of_the_file() -> None:
+    assert loads(f"{BALL}mass = -1\n", overrides=["ball.0.mass=2"]).balls[0].mass == 2.0
+
+
+@pytest.mark.parametrize(
+    "override", ["solver.dt", "=1", "nowhere.x.y=1", "ball.none.mass=1", "ball.9.mass=1", "solver.dt.x=1", "title.x=1", ""]
+)
+def test_override_that_leads_nowhere_is_a_fault(override: str) -> None:
+    with pytest.raises(SceneError, match="--set"):
+        loads(f"title = 't'\n{BALL}[solver]\ndt = 0.1", overrides=[override])
+
+
+def test_overrides_that_lead_nowhere_are_all_reported() -> None:
+    with pytest.raises(SceneError) as caught:
+        loads(BALL, overrides=["x", "ball.none.mass=1", "ball.0.mass=2"])
+    assert len(caught.value.faults) == 2
+
+
+@given(st.text(max_size=30), st.text(max_size=30))
+@example("title", "[" * 100_000)
+@example("title", "1" * 5000)
+@example("ball." + "1" * 5000 + ".mass", "1")
+@example("ball.²", "1")
+@example("title", "1\nx = 2")
+def test_any_override_gives_a_scene_or_a_scene_error(key: str, value: str) -> None:
+    try:
+        assert isinstance(loads(BALL, overrides=[f"{key}={value}"]), Scene)
+    except SceneError as error:
+        assert error.faults
