@@ -1,14 +1,13 @@
 """What comes out of a simulation: frames, contacts, and whole trajectories as arrays."""
 
 import json
-import os
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple, Self
+from uuid import uuid4
 
 import numpy as np
 import numpy.typing as npt
@@ -113,7 +112,7 @@ class Trajectory:
     missed_pair: IntArray
     """(M, 2) who should have touched, numbered as in `contact_pair`"""
     info: Mapping[str, Any] = field(default_factory=dict)
-    """What was run and how it went: scene (TOML), engine, settings, seed, status, reason, steps, seconds,
+    """What was run and how it went: scene (TOML), engine, settings, actions, seed, status, reason, steps, seconds,
     energy_start, energy_end, audited, versions."""
 
     @property
@@ -148,13 +147,13 @@ class Trajectory:
         path = Path(path)
         arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "info"}
         arrays["info"] = np.asarray(json.dumps(dict(self.info), ensure_ascii=False))
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=".tmp")
+        temporary = path.with_name(f".{path.name}-{uuid4().hex}.tmp")
         try:
-            with os.fdopen(handle, "wb") as stream:
+            with temporary.open("xb") as stream:
                 np.savez_compressed(stream, **arrays)
-            Path(temporary).replace(path)
+            temporary.replace(path)
         except BaseException:
-            Path(temporary).unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
             raise
         return path
 

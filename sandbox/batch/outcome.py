@@ -95,8 +95,8 @@ def execute(job: Job, store: Store | None = None, progress: Progress | None = No
     number = run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions)
     found = store.find(number) if store is not None else None
     if store is not None and found is not None:
-        path = store.file(found)
-        return Outcome(job, number, Trajectory.load(path), path, repeated=True)
+        file = store.file(found)
+        return Outcome(job, number, Trajectory.load(file), file, repeated=True)
     trajectory = run(job.scene, job.engine, actions=job.actions, audit=audit, progress=progress)
     path = store.file(store.add(trajectory, number)) if store is not None else None
     return Outcome(job, number, trajectory, path, repeated=False)

@@ -67,6 +67,6 @@ def call(arguments: list[str] | None = None) -> int:
         return 130
     except BrokenPipeError:
         # The reader has gone, as `| head` does; leave nothing to flush at exit.
-        sys.stdout = None  # type: ignore[assignment]
+        sys.stdout = None
         return 0
     return status if isinstance(status, int) else 0

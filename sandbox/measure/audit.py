@@ -6,13 +6,18 @@ between is lost to it; what it finds on the far side it pushes out there.
 
 import numpy as np
 
+from sandbox.measure.looks import Looks
 from sandbox.measure.neighbours import Neighbours
-from sandbox.measure.obstacles import Obstacles
+from sandbox.measure.obstacles import Obstacles, Paths
 from sandbox.measure.sweep import CLEAR, DEEP, JUMP, approaching, closest_to_origin, dot
-from sandbox.measure.touching import Touching
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+LONGEST_BATCH = 32
+"""Substeps examined together: spreads the cost of a call of numpy."""
+BATCH_ROWS = 1 << 14
+"""Centres in a batch of more than one substep: they stay in cache."""
 
 FAR = 1e50
 """m: who is farther out is diverging and does not count; fourth powers of it still are finite."""
@@ -47,11 +52,57 @@ class Audit:
         self._obstacles = Obstacles.of(scene)
         self._times: list[FloatArray] = []
         self._pairs: list[IntArray] = []
-        self._before = Touching(np.empty((0, 2), np.int64))
-        self.joined(scene.bodies if bodies is None else bodies)
+        self._looks = Looks()
+        self._looks.add(np.empty((0, 2), np.int64))
+        self._lay_out(scene.bodies if bodies is None else bodies)
 
     def joined(self, bodies: Bodies) -> None:
         """Take note that bodies were added; `bodies` are all of them."""
+        self._examine()
+        self._lay_out(bodies)
+
+    def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
+        """Take note of one substep; they are examined some at a time. The arrays are copied.
+
+        Args:
+            time: at its start, s.
+            start: centres (N, 2), m.
+            end: centres (N, 2), m.
+            touching: pairs (K, 2) in contact at the end, numbered as in `Contacts`.
+
+        Raises:
+            ValueError: N is not the number of bodies; `joined` tells of new ones.
+        """
+        if len(start) != self._number:
+            raise ValueError(f"{len(start)} bodies, where the audit knows of {self._number}")
+        if not len(self._radius):
+            return
+        row = len(self._time)
+        self._start[row] = start[self._part]
+        self._end[row] = end[self._part]
+        self._looks.add(touching)
+        self._time.append(time)
+        if len(self._time) == len(self._start):
+            self._examine()
+
+    @property
+    def times(self) -> FloatArray:
+        """When the substep of each miss began, (M,) s."""
+        self._examine()
+        return np.concatenate((np.empty(0), *self._times))
+
+    @property
+    def pairs(self) -> IntArray:
+        """Who missed whom, (M, 2), numbered as in `Contacts`; by time, then by number."""
+        self._examine()
+        return np.concatenate((np.empty((0, 2), np.int64), *self._pairs))
+
+    def missed(self) -> tuple[FloatArray, IntArray]:
+        """Return `times` and `pairs`."""
+        return self.times, self.pairs
+
+    def _lay_out(self, bodies: Bodies) -> None:
+        """Derive who can meet what, and how far each must move at least to skip a look."""
         every = np.asarray([e.collides == "all" for e in bodies.elements], np.bool_)[bodies.element]
         some = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element]
         moves, to_all, still = some & ~bodies.fixed, every & ~bodies.fixed, every & bodies.fixed
@@ -75,64 +126,38 @@ class Audit:
         self._least2 = least[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
         self._neighbours = Neighbours(self._radius, member[part], self._meet)
 
-    def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
-        """Look at one substep.
+        batch = max(1, min(LONGEST_BATCH, BATCH_ROWS // max(1, len(self._radius))))
+        self._time: list[float] = []
+        self._start = np.empty((batch, len(self._radius), 2))
+        self._end = np.empty_like(self._start)
 
-        Args:
-            time: at its start, s.
-            start: centres (N, 2), m.
-            end: centres (N, 2), m.
-            touching: pairs (K, 2) in contact at the end, numbered as in `Contacts`.
-
-        Raises:
-            ValueError: N is not the number of bodies; `joined` tells of new ones.
-        """
-        if len(start) != self._number:
-            raise ValueError(f"{len(start)} bodies, where the audit knows of {self._number}")
-        if not len(self._radius):
-            return
-        before, self._before = self._before, Touching(touching)
-        start, end = start[self._part], end[self._part]
+    def _examine(self) -> None:
+        """Examine the substeps that wait."""
+        start, end = self._start[: len(self._time)], self._end[: len(self._time)]
         with np.errstate(invalid="ignore", over="ignore"):  # diverging bodies reach inf; they drop out below
             move = end - start
             move *= move
-            fast = np.asarray(move[:, 0] + move[:, 1] >= self._least2)
+            fast = np.asarray(move[..., 0] + move[..., 1] >= self._least2)
         if fast.any():
-            self._look(time, start, end, fast, before, self._before)
+            lost = ~((np.abs(start) < FAR) & (np.abs(end) < FAR)).all(axis=2)
+            if lost.any():
+                start[lost] = end[lost] = np.nan
+                fast &= ~lost
+            found = self._balls(start, end, fast), self._fixed(start, end, fast)
+            when = np.concatenate([when for when, _ in found])
+            pairs = np.concatenate([pairs for _, pairs in found])
+            if len(when):
+                order = np.lexsort((pairs[:, 1], pairs[:, 0], when))
+                self._times.append(np.asarray(self._time)[when[order]])
+                self._pairs.append(pairs[order])
+        self._time.clear()
+        self._looks.forget()
 
-    def _look(
-        self, time: float, start: FloatArray, end: FloatArray, fast: BoolArray, before: Touching, after: Touching
-    ) -> None:
-        """Examine the part that matters, in which `fast` bodies move far enough to skip a look."""
-        lost = ~((np.abs(start) < FAR).all(axis=1) & (np.abs(end) < FAR).all(axis=1))
-        if lost.any():
-            start, end = (np.where(lost[:, None], np.nan, place) for place in (start, end))
-            fast = fast & ~lost
-        who = np.flatnonzero(fast & self._moves)
-        paths = who + self._offset, start[who], end[who], self._radius[who]
-        missed = np.concatenate(
-            (
-                self._balls(start, end, fast, before, after),
-                self._obstacles.missed(*paths, before, after),
-            )
-        )
-        if len(missed):
-            self._pairs.append(missed[np.lexsort((missed[:, 1], missed[:, 0]))])
-            self._times.append(np.full(len(missed), time))
-
-    @property
-    def times(self) -> FloatArray:
-        """When the substep of each miss began, (M,) s."""
-        return np.concatenate((np.empty(0), *self._times))
-
-    @property
-    def pairs(self) -> IntArray:
-        """Who missed whom, (M, 2), numbered as in `Contacts`."""
-        return np.concatenate((np.empty((0, 2), np.int64), *self._pairs))
-
-    def missed(self) -> tuple[FloatArray, IntArray]:
-        """Return `times` and `pairs`."""
-        return self.times, self.pairs
+    def _fixed(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
+        """Return when (M,) which pairs (M, 2) of a body and a fixed thing were missed."""
+        when, who = np.nonzero(fast & self._moves)
+        paths = Paths(when, who + self._offset, start[when, who], end[when, who], self._radius[who])
+        return self._obstacles.missed(paths, self._looks)
 
     def _meet(self, i: IntArray, j: IntArray) -> BoolArray:
         """Return which pairs of bodies can touch."""
@@ -141,18 +166,18 @@ class Audit:
         able |= self._still[i] & self._moves[j]
         return np.asarray(able)
 
-    def _balls(
-        self, start: FloatArray, end: FloatArray, fast: BoolArray, before: Touching, after: Touching
-    ) -> IntArray:
-        """Return the missed pairs of bodies, (M, 2)."""
-        i, j = self._neighbours.pairs(start, end, fast)
-        gap = start[j] - start[i]
-        move = end[j] - start[j] - (end[i] - start[i])
-        distance2 = (self._radius[i] + self._radius[j]) ** 2
-        able = (dot(gap, move) < 0) & (dot(gap, gap) >= CLEAR**2 * distance2)
-        able &= dot(move, move) >= JUMP**2 * distance2
+    def _balls(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
+        """Return when (M,) which pairs (M, 2) of bodies were missed."""
+        when, i, j = self._neighbours.encounters(start, end, fast)
+        gap = start[when, j] - start[when, i]
+        move = end[when, j] - end[when, i] - gap
+        contact2 = (self._radius[i] + self._radius[j]) ** 2
+        able = dot(gap, move) < 0
+        able &= dot(gap, gap) >= CLEAR**2 * contact2
+        able &= dot(move, move) >= JUMP**2 * contact2
         at = np.flatnonzero(able)
-        at = at[closest_to_origin(gap[at], move[at]) < DEEP**2 * distance2[at]]
-        pair = np.column_stack((i[at], j[at])) + self._offset
-        in_time = after.has(pair) & approaching(gap[at] + move[at], move[at])
-        return pair[~in_time & ~before.has(pair)]
+        at = at[closest_to_origin(gap[at], move[at]) < DEEP**2 * contact2[at]]
+        when, pair = when[at], np.column_stack((i[at], j[at])) + self._offset
+        in_time = self._looks.found(when + 1, pair) & approaching(gap[at] + move[at], move[at])
+        missed = ~in_time & ~self._looks.found(when, pair)
+        return when[missed], pair[missed]

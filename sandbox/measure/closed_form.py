@@ -1,7 +1,7 @@
 """Closed forms: what a body does by formula, to hold a simulation against.
 
 Two motions have one here: flight under uniform gravity and linear drag, and the bouncing of a ball on one
-plane square to gravity. Nothing is stepped; every time is evaluated on its own.
+plane that gravity is square to. Nothing is stepped; every time is evaluated on its own.
 """
 
 import math
@@ -97,7 +97,7 @@ def bounces(
         time: (T,) s.
         height: between ball and plane at time 0, m, ≥ 0.
         velocity: away from the plane at time 0, m/s.
-        gravity: towards the plane, m/s², > 0.
+        gravity: towards the plane, m/s², ≥ 0; without any, the ball bounces at most once.
         restitution: 0…1.
 
     Returns:
@@ -106,9 +106,11 @@ def bounces(
     Raises:
         ValueError: height, gravity or restitution is out of range.
     """
-    if not (height >= 0 and gravity > 0 and 0 <= restitution <= 1):
-        raise ValueError("bounces need height >= 0, gravity > 0 and restitution 0…1")
+    if not (height >= 0 and gravity >= 0 and 0 <= restitution <= 1):
+        raise ValueError("bounces need height >= 0, gravity >= 0 and restitution 0…1")
     t, e = np.asarray(time, dtype=np.float64), restitution
+    if gravity == 0.0:
+        return _one_bounce(t, height, velocity, e)
     impact = math.sqrt(velocity * velocity + 2.0 * gravity * height)
     # The two forms of one root, each free of cancellation for its sign.
     up = velocity > 0 or impact == 0
@@ -123,6 +125,15 @@ def bounces(
         speed = impact * (launch - 2.0 * since)
     fallen = np.maximum(height + velocity * t - 0.5 * gravity * t * t, 0.0)
     return np.where(falling, fallen, above), np.where(falling, velocity - gravity * t, speed)
+
+
+def _one_bounce(time: FloatArray, height: float, velocity: float, restitution: float) -> tuple[FloatArray, FloatArray]:
+    if velocity >= 0.0:
+        return height + velocity * time, np.full_like(time, velocity)
+    impact = height / -velocity
+    coming, rebound = time < impact, restitution * -velocity
+    above = np.where(coming, np.maximum(height + velocity * time, 0.0), rebound * (time - impact))
+    return above, np.where(coming, velocity, rebound)
 
 
 def _flight(tau: FloatArray, e: float) -> tuple[FloatArray, FloatArray]:
@@ -148,7 +159,7 @@ def valid_until(trajectory: Trajectory, number: int) -> float:
 def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm | None:
     """Return the best closed form of a body at a run's times, or None where it has none.
 
-    Bouncing, where the scene has one plane and gravity is square to it, there is no drag, and nothing rubs:
+    Bouncing, where the scene has one plane, gravity is square to it or 0, there is no drag, and nothing rubs:
     friction is 0, or the ball neither spins nor moves along the plane. It holds until the ball meets anything
     else. Otherwise free flight up to the first contact, by what the run recorded or because the formula itself
     reaches a plane. Contacts that the engine missed count where the run was audited; a missed bounce does not
@@ -186,7 +197,7 @@ def _bouncing(trajectory: Trajectory, scene: Scene, bodies: Bodies, number: int)
     normal, pull = _unit(scene.planes[0]), np.asarray(world.gravity)
     start, velocity = bodies.position[number], bodies.velocity[number]
     down = -float(pull @ normal)
-    if down <= 0.0 or not _parallel(pull, normal):
+    if down < 0.0 or not _parallel(pull, normal):
         return None
 
     # Planes come first among the fixed things: the only plane is fixed thing 0, in contacts −1.

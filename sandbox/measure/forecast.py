@@ -28,7 +28,7 @@ COARSE = 1e-3
 
 
 @dataclass(frozen=True)
-class Warning:  # noqa: A001, that is what it is; the module is always named with it
+class Warning:
     """Something that will, or may, go wrong."""
 
     kind: str

@@ -2,7 +2,7 @@
 
 A Verlet list: it holds every pair within a skin of contact, and stays complete for all bodies that have moved
 less than half the skin since. The few that moved farther, such as a bullet, are held against all others in
-rows; when they become many, the list is built anew.
+rows; when those have cost as much as a list does, it is built anew.
 Source: L. Verlet, Computer "experiments" on classical fluids I, Phys. Rev. 159 (1967), 98.
 """
 
@@ -17,13 +17,16 @@ BUILDING = 20_000
 """What building a list costs, in entries of rows (measured), beside `BUILDING_EACH` for each body."""
 BUILDING_EACH = 50
 LASTING = 6.0
-"""Substeps for which a list is meant to last, as far as half its skin then stays within a radius."""
+"""Batches of substeps for which a list is meant to last, as far as half its skin then stays within a radius."""
 LEAST_SKIN = 0.1
 """Half the skin is at least this part of the typical radius: thin lists save nothing more."""
 CELL_SHARE = 4.5
 """Of the candidates in a body's nine cells, each pair is met once."""
 
 Meet = Callable[[IntArray, IntArray], BoolArray]
+Pairs = tuple[IntArray, IntArray]
+Encounters = tuple[IntArray, IntArray, IntArray]
+"""In which substep, which body, which other one, (K,) each."""
 
 
 class Neighbours:
@@ -37,82 +40,96 @@ class Neighbours:
         self._member = member
         self._meet = meet
         self._party = np.flatnonzero(member)
-        self._few = BUILDING_EACH + BUILDING // max(len(self._party), 1)
         self._typical = float(np.median(radius[self._party])) if len(self._party) else 0.0
+        self._cost = BUILDING + BUILDING_EACH * len(self._party)
+        self._few = self._cost // max(len(self._party), 1)
+        self._spent = 0
         self._anchor = np.full((len(radius), 2), np.inf)
         self._half_skin = 0.0
         self._first = self._second = np.empty(0, np.int64)
 
-    def pairs(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
-        """Return at least every pair that comes into contact on its way, the lower number first.
+    def encounters(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> Encounters:
+        """Return at least every pair that comes into contact on its way, in each of B substeps.
 
         Args:
-            start: centres (N, 2) at the start of the substep, m; rows that are nan never pair.
+            start: centres (B, N, 2) at the start of each substep, m; rows that are nan never pair.
             end: the same at its end.
-            fast: (N,) of each pair at least one is.
+            fast: (B, N) of each pair at least one is.
 
         Returns:
-            Two index arrays (K,), no pair twice.
+            Substeps, and of each pair the lower and the higher number, (K,) each; nothing twice.
         """
         strays = self._strays(start, end)
-        if np.count_nonzero(strays) > self._few:
-            if not self._build(start, end):
-                return self._swept(start, end, fast, self._member)
+        self._spent += len(start) * int(np.count_nonzero(strays)) * len(self._party)
+        if self._spent > self._cost:
+            if not self._build(start, end) and len(start) > 1:
+                half = len(start) // 2
+                early = self.encounters(start[:half], end[:half], fast[:half])
+                when, first, second = self.encounters(start[half:], end[half:], fast[half:])
+                return _joined([early, (when + half, first, second)])
             strays = self._strays(start, end)
-        keep = fast[self._first] | fast[self._second]
-        if not strays.any():
-            return self._first[keep], self._second[keep]
-        keep &= ~(strays[self._first] | strays[self._second])
-        first, second = self._swept(start, end, fast, strays)
-        return np.concatenate((self._first[keep], first)), np.concatenate((self._second[keep], second))
+        keep = fast[:, self._first] | fast[:, self._second]
+        astray = bool(strays.any())
+        if astray:
+            keep &= ~(strays[self._first] | strays[self._second])
+        when, at = np.nonzero(keep)
+        found = [(when, self._first[at], self._second[at])]
+        if astray:
+            for step in np.flatnonzero(fast.any(axis=1)).tolist():
+                first, second = self._swept(start[step], end[step], fast[step], strays)
+                found.append((np.full(len(first), step), first, second))
+        return _joined(found)
 
     def _strays(self, start: FloatArray, end: FloatArray) -> BoolArray:
-        """Return who left its half of the skin, (N,)."""
+        """Return who left its half of the skin in any of the substeps, (N,)."""
         limit = self._half_skin**2
         home = np.ones(len(self._radius), dtype=np.bool_)
         for place in (start, end):
             gone = place - self._anchor
             gone *= gone
-            home &= gone[:, 0] + gone[:, 1] <= limit
+            home &= (gone[..., 0] + gone[..., 1] <= limit).all(axis=0)
         return self._member & ~home
 
-    def _swept(
-        self, start: FloatArray, end: FloatArray, fast: BoolArray, strays: BoolArray
-    ) -> tuple[IntArray, IntArray]:
+    def _whole(self, start: FloatArray, end: FloatArray) -> IntArray:
+        """Return the numbers of those who are there before and after."""
+        return self._party[np.isfinite(start[self._party] + end[self._party]).all(axis=1)]
+
+    def _swept(self, start: FloatArray, end: FloatArray, fast: BoolArray, strays: BoolArray) -> Pairs:
         """Return the pairs with a stray that may meet on their way: by the circles around their paths."""
-        party = self._party[np.isfinite(start[self._party] + end[self._party]).all(axis=1)]
+        party = self._whole(start, end)
         here, there = start[party], end[party]
         move = there - here
         reach = self._radius[party] + 0.5 * np.sqrt((move * move).sum(axis=1)) * (1 + 1e-9)  # rounding, 1e-16
+        middle = here + 0.5 * move
         which = np.flatnonzero(strays[party])
-        if len(which) > self._few:
-            close = self._close(here + 0.5 * move, reach)
-        else:
-            close = _in_rows(which, here + 0.5 * move, reach)
-        return self._joined(party, close, fast)
+        close = self._close(middle, reach) if len(which) > self._few else _in_rows(which, middle, reach)
+        first, second = self._numbered(party, close, fast)
+        keep = strays[first] | strays[second]
+        return first[keep], second[keep]
 
     def _build(self, start: FloatArray, end: FloatArray) -> bool:
         """List the pairs within a skin whose width lets all but a few bodies stay for a while.
 
-        Returns whether that was worth it: with most moving on by more than a radius, no list lasts.
+        Returns whether that is worth it: with most moving by more than a radius, no list lasts.
         """
+        self._spent = 0
         self._anchor[:] = np.inf
         self._first = self._second = np.empty(0, np.int64)
-        party = self._party[np.isfinite(start[self._party] + end[self._party]).all(axis=1)]
+        party = self._whole(start[0], end[-1])
         if not len(party):
             return False
-        jump = np.sort(np.sqrt(((end[party] - start[party]) ** 2).sum(axis=1)))
+        jump = np.sort(np.sqrt(((end[-1, party] - start[0, party]) ** 2).sum(axis=1)))
         usual = float(jump[max(len(jump) - 1 - self._few // 2, len(jump) // 2)])
         if usual > self._typical:
             return False
         self._half_skin = max(min(LASTING * usual, self._typical), LEAST_SKIN * self._typical)
-        self._anchor = start.copy()
+        self._anchor[party] = start[0, party]
         reach = self._radius[party] + self._half_skin * (1 + 1e-9)  # the skin ends in rounding, 1e-16
         everyone = np.ones_like(self._member)
-        self._first, self._second = self._joined(party, self._close(start[party], reach), everyone)
+        self._first, self._second = self._numbered(party, self._close(start[0, party], reach), everyone)
         return True
 
-    def _close(self, place: FloatArray, reach: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
+    def _close(self, place: FloatArray, reach: FloatArray) -> Iterator[Pairs]:
         """Yield every pair nearer than the sum of its reaches, by cells.
 
         Large reaches would make the cells large and let all the small ones meet: those go in rows.
@@ -130,9 +147,7 @@ class Neighbours:
             near = gap[:, 0] + gap[:, 1] < (reach[i] + reach[j]) ** 2
             yield i[near], j[near]
 
-    def _joined(
-        self, party: IntArray, found: Iterator[tuple[IntArray, IntArray]], fast: BoolArray
-    ) -> tuple[IntArray, IntArray]:
+    def _numbered(self, party: IntArray, found: Iterator[Pairs], fast: BoolArray) -> Pairs:
         """Join chunks of pairs, given as places in the party, that can touch at all and have a fast body."""
         pairs = [np.empty((2, 0), np.int64)]
         for chunk in found:
@@ -143,7 +158,7 @@ class Neighbours:
         return first, second
 
 
-def _in_rows(rows: IntArray, centre: FloatArray, reach: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
+def _in_rows(rows: IntArray, centre: FloatArray, reach: FloatArray) -> Iterator[Pairs]:
     """Yield, in chunks, every pair with one of `rows` that is nearer than the sum of its reaches, once."""
     in_rows = np.zeros(len(centre), dtype=np.bool_)
     in_rows[rows] = True
@@ -154,3 +169,8 @@ def _in_rows(rows: IntArray, centre: FloatArray, reach: FloatArray) -> Iterator[
         i = part[at]
         once = (j > i) | ~in_rows[j]
         yield i[once], j[once]
+
+
+def _joined(found: list[Encounters]) -> Encounters:
+    when, first, second = (np.concatenate(column) for column in zip(*found, strict=True))
+    return when, first, second

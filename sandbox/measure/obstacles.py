@@ -6,6 +6,7 @@ from typing import Self
 
 import numpy as np
 
+from sandbox.measure.looks import Looks
 from sandbox.measure.sweep import (
     CLEAR,
     DEEP,
@@ -16,7 +17,6 @@ from sandbox.measure.sweep import (
     dot,
     from_segment,
 )
-from sandbox.measure.touching import Touching
 from sandbox.scene.model import Plane, Post, Scene
 from sandbox.scene.part import BACKING, Point
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
@@ -26,6 +26,27 @@ PLANE_ROUNDING = 1e-11
 
 CHUNK = 1 << 18
 """Circles × obstacles looked at together: bounds memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """Where F circles went in one substep each."""
+
+    when: IntArray
+    """(F,) the substep"""
+    who: IntArray
+    """(F,) number of the body"""
+    start: FloatArray
+    """(F, 2) m, finite"""
+    end: FloatArray
+    """(F, 2) m"""
+    radius: FloatArray
+    """(F,) m"""
+
+    def some(self, which: IntArray) -> Self:
+        """Return some of them."""
+        columns = (self.when, self.who, self.start, self.end, self.radius)
+        return type(self)(*(column[which] for column in columns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,70 +98,39 @@ class Obstacles:
     def __len__(self) -> int:
         return len(self.point) + len(self.tail)
 
-    def missed(
-        self,
-        who: IntArray,
-        start: FloatArray,
-        end: FloatArray,
-        radius: FloatArray,
-        before: Touching,
-        after: Touching,
-    ) -> IntArray:
-        """Return the pairs (M, 2) that were missed, as `Audit` defines it.
-
-        Args:
-            who: numbers of the circles (F,) to look at.
-            start: their centres (F, 2) at the start of the substep, m, finite.
-            end: the same at its end.
-            radius: (F,) m.
-            before: what the engine found at the start.
-            after: what it found at the end.
-        """
-        found = [np.empty((0, 2), np.int64)]
-        parts = len(who) * max(len(self.point), len(self.tail)) // CHUNK + 1
-        for part in np.array_split(np.arange(len(who)), parts):
-            path = who[part], start[part], end[part], radius[part]
+    def missed(self, paths: Paths, looks: Looks) -> tuple[IntArray, IntArray]:
+        """Return when (M,) which pairs (M, 2) were missed, as `Audit` defines it; look k precedes substep k."""
+        found = [(np.empty(0, np.int64), np.empty((0, 2), np.int64))]
+        parts = len(paths.who) * max(len(self.point), len(self.tail)) // CHUNK + 1
+        for part in np.array_split(np.arange(len(paths.who)), parts):
             if len(part) and len(self.point):
-                found.append(self._planes(*path, before, after))
+                found.append(self._planes(paths.some(part), looks))
             if len(part) and len(self.tail):
-                found.append(self._walls(*path, before, after))
-        return np.concatenate(found)
+                found.append(self._walls(paths.some(part), looks))
+        return np.concatenate([when for when, _ in found]), np.concatenate([pair for _, pair in found])
 
-    def _planes(
-        self,
-        who: IntArray,
-        start: FloatArray,
-        end: FloatArray,
-        radius: FloatArray,
-        before: Touching,
-        after: Touching,
-    ) -> IntArray:
-        first = dot(start[:, None] - self.point, self.normal)
-        last = dot(end[:, None] - self.point, self.normal)
-        tolerance = np.maximum(TOLERANCE * radius, PLANE_ROUNDING)
-        came_in = (first >= (radius - tolerance / 2)[:, None]) & (last < (radius - tolerance)[:, None])
-        came_in &= (dot(end - start, end - start) >= (JUMP * radius) ** 2)[:, None]
+    def _planes(self, paths: Paths, looks: Looks) -> tuple[IntArray, IntArray]:
+        first = dot(paths.start[:, None] - self.point, self.normal)
+        last = dot(paths.end[:, None] - self.point, self.normal)
+        tolerance = np.maximum(TOLERANCE * paths.radius, PLANE_ROUNDING)
+        came_in = first >= (paths.radius - tolerance / 2)[:, None]
+        came_in &= last < (paths.radius - tolerance)[:, None]
+        move = paths.end - paths.start
+        came_in &= (dot(move, move) >= (JUMP * paths.radius) ** 2)[:, None]
         i, plane = np.nonzero(came_in)
-        pair = np.column_stack((who[i], -1 - plane))
-        in_time = after.has(pair) & (last[i, plane] >= -BACKING)
-        return pair[~in_time & ~before.has(pair)]
+        when, pair = paths.when[i], np.column_stack((paths.who[i], -1 - plane))
+        in_time = looks.found(when + 1, pair) & (last[i, plane] >= -BACKING)
+        missed = ~in_time & ~looks.found(when, pair)
+        return when[missed], pair[missed]
 
-    def _walls(
-        self,
-        who: IntArray,
-        start: FloatArray,
-        end: FloatArray,
-        radius: FloatArray,
-        before: Touching,
-        after: Touching,
-    ) -> IntArray:
-        i, s = self._in_reach(start, end, radius)
-        tail, along, contact = self.tail[s], self.along[s], radius[i] + self.half[s]
-        here, there = start[i], end[i]
+    def _walls(self, paths: Paths, looks: Looks) -> tuple[IntArray, IntArray]:
+        i, s = self._in_reach(paths)
+        tail, along, contact = self.tail[s], self.along[s], paths.radius[i] + self.half[s]
+        here, there = paths.start[i], paths.end[i]
         nearest2, crossed = closest_to_segment(here, there, tail, along)
         deep = nearest2 < (DEEP * contact) ** 2
         if not deep.any():
-            return np.empty((0, 2), np.int64)
+            return np.empty(0, np.int64), np.empty((0, 2), np.int64)
 
         first = from_segment(here, tail, along)
         first2 = dot(first, first)
@@ -148,34 +138,36 @@ class Obstacles:
         approached = (dot(last, last) < contact**2) & approaching(last, there - here)
         apart = first2 >= (CLEAR * contact) ** 2
 
-        # From segments to things: rows of one body and one wall share a place in `pair`.
-        pair, place = np.unique(np.column_stack((who[i], self.number[s])), axis=0, return_inverse=True)
-        place = place.reshape(-1)
-        known = before.has(pair)
-        nearest = np.full(len(pair), np.inf)
+        # From segments to things: rows of one path and one wall share a place.
+        both, place = np.unique(np.column_stack((i, self.number[s])), axis=0, return_inverse=True)
+        place, count = place.reshape(-1), len(both)
+        when, pair = paths.when[both[:, 0]], np.column_stack((paths.who[both[:, 0]], both[:, 1]))
+        known = looks.found(when, pair)
+        nearest = np.full(count, np.inf)
         np.minimum.at(nearest, place, first2)
 
         # A contact at the start was with the nearest segment, or with those as near.
         held = known[place] & (first2 <= nearest[place] + TOLERANCE * contact**2)
-        through = _any(crossed & apart & ~held, place, len(pair))
-        came_in = _any(deep, place, len(pair)) & ~_any(~apart, place, len(pair)) & ~known
-        in_time = after.has(pair) & _any(approached, place, len(pair))
-        return np.asarray(pair[through | (came_in & ~in_time)], dtype=np.int64)
+        through = _any(crossed & apart & ~held, place, count)
+        came_in = _any(deep, place, count) & ~_any(~apart, place, count) & ~known
+        in_time = looks.found(when + 1, pair) & _any(approached, place, count)
+        missed = through | (came_in & ~in_time)
+        return when[missed], pair[missed]
 
-    def _in_reach(self, start: FloatArray, end: FloatArray, radius: FloatArray) -> tuple[IntArray, IntArray]:
-        """Return the circles and segments, (K,) each, that may meet on a path long enough to skip a look."""
+    def _in_reach(self, paths: Paths) -> tuple[IntArray, IntArray]:
+        """Return the paths and segments, (K,) each, that may meet, where the path can skip a look."""
         middle = self.tail + 0.5 * self.along
         size = 0.5 * np.sqrt(dot(self.along, self.along)) + self.half
-        move = end - start
+        move = paths.end - paths.start
         length2 = dot(move, move)
-        mean = start + 0.5 * move
+        mean = paths.start + 0.5 * move
         across, up = (mean[:, axis, None] - middle[:, axis] for axis in (0, 1))
-        reach = (radius + 0.5 * np.sqrt(length2))[:, None] + size
+        reach = (paths.radius + 0.5 * np.sqrt(length2))[:, None] + size
         near = across * across + up * up <= reach * reach * (1 + 1e-9)  # rounding must not hide a pair
-        near &= length2[:, None] >= (JUMP * (radius[:, None] + self.half)) ** 2
+        near &= length2[:, None] >= (JUMP * (paths.radius[:, None] + self.half)) ** 2
         i, s = np.nonzero(near)
-        first = from_segment(start[i], self.tail[s], self.along[s])
-        reach = radius[i] + self.half[s] + np.sqrt(length2[i])
+        first = from_segment(paths.start[i], self.tail[s], self.along[s])
+        reach = paths.radius[i] + self.half[s] + np.sqrt(length2[i])
         close = dot(first, first) <= reach * reach
         return i[close], s[close]
 

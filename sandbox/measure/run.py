@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sandbox.action import Action, ActionError, Spawn, in_order
+from sandbox.action import Action, ActionError, Spawn, actions_to_json, in_order
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
 from sandbox.engines.registry import engine as engine_named
 from sandbox.engines.registry import start
@@ -61,7 +61,7 @@ def run(
     try:
         simulation = start(scene, engine, wanted)
     except Refusal as refusal:
-        return _refused(scene, engine, wanted, str(refusal))
+        return _refused(scene, engine, wanted, actions, str(refusal))
     resolved = chosen.resolve(scene, wanted)
     spawned = sum(isinstance(action, Spawn) for action in actions)
     recorder = Recorder(scene, resolved, len(scene.bodies) + spawned)
@@ -77,29 +77,31 @@ def run(
     for number, time in simulation.retired.items():
         retired[number] = time
     missed = auditor.missed if auditor else _no_misses()
-    info = _info(scene, engine, resolved, status=status, reason=reason, steps=steps, seconds=seconds, audited=audit)
+    outcome = {"status": status, "reason": reason, "steps": steps, "seconds": seconds, "audited": audit}
+    info = _info(scene, engine, resolved, actions, **outcome)
     trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, missed, info)
     total = energies(trajectory, scene, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     return trajectory
 
 
-def _info(scene: Scene, engine: str, settings: Settings, **outcome: Any) -> dict[str, Any]:
+def _info(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, ...], **outcome: Any) -> dict[str, Any]:
     return {
         "scene": dumps(scene),
         "engine": engine,
         "settings": settings.model_dump(mode="json"),
+        "actions": actions_to_json(actions),
         "seed": scene.world.seed,
         "versions": dict(versions()),
         **outcome,
     }
 
 
-def _refused(scene: Scene, engine: str, settings: Settings, reason: str) -> Trajectory:
+def _refused(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, ...], reason: str) -> Trajectory:
     """Return a trajectory without frames, which says why."""
     count = len(scene.bodies)
     outcome = {"status": "refused", "reason": reason, "steps": 0, "seconds": 0.0, "audited": False}
-    info = _info(scene, engine, settings, **outcome, energy_start=None, energy_end=None)
+    info = _info(scene, engine, settings, actions, **outcome, energy_start=None, energy_end=None)
     shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
     frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}
     return _trajectory(frames, scene.bodies, Contacts.none(), np.full(count, np.nan), _no_misses(), info)

@@ -104,9 +104,7 @@ def _laid_out(
         position=position,
         velocity=velocity,
         angle=each([e.angle for e in elements]),
-        angular_velocity=each(
-            [0.0 if still else e.angular_velocity for e, still in zip(elements, fixed, strict=True)]
-        ),
+        angular_velocity=each([0.0 if still else e.angular_velocity for e, still in zip(elements, fixed, strict=True)]),
         radius=each([e.radius for e in elements]),
         mass=each([mass_of(e) for e in elements]),
         fixed=np.repeat(np.asarray(fixed, dtype=np.bool_), counts),

@@ -57,7 +57,9 @@ def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
     if spinning:
         why = _count(spinning, "body starts with a spin", "bodies start with a spin", "")
     else:
-        why = _count(turned, "body can be rubbed into a spin", "bodies can be rubbed into a spin", "nothing can turn a body")
+        why = _count(
+            turned, "body can be rubbed into a spin", "bodies can be rubbed into a spin", "nothing can turn a body"
+        )
     yield Demand.ROTATION, bool(spinning or turned), why
 
     gravity = world.gravity != (0.0, 0.0)

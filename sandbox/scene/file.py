@@ -57,7 +57,7 @@ def loads(text: str, file: str = "<scene>", overrides: Iterable[Override] = ()) 
     except RecursionError:
         raise SceneError([Fault(file, None, "", "values are nested too deeply for a scene")]) from None
     if not document:
-        message = 'the file is empty; a scene has at least a body, such as [[ball]] with position and radius'
+        message = "the file is empty; a scene has at least a body, such as [[ball]] with position and radius"
         raise SceneError([Fault(file, 1, "", message)])
     return from_document(document, file, overrides, text)
 

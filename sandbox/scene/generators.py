@@ -93,9 +93,7 @@ def _scatter(scatter: Scatter, random: np.random.Generator, index: int) -> tuple
 
 def _overlapping(position: FloatArray, reach: float) -> IntArray:
     """Return the later ball of every overlapping pair."""
-    late = [
-        np.maximum(i, j)[np.hypot(*(position[i] - position[j]).T) < reach] for i, j in near_pairs(position, reach)
-    ]
+    late = [np.maximum(i, j)[np.hypot(*(position[i] - position[j]).T) < reach] for i, j in near_pairs(position, reach)]
     return np.unique(np.concatenate(late)) if late else np.empty(0, dtype=np.int64)
 
 
@@ -103,4 +101,3 @@ def _emitter(emitter: Emitter, random: np.random.Generator) -> tuple[FloatArray,
     slowest, fastest = np.asarray(emitter.velocity_min), np.asarray(emitter.velocity_max)
     position = np.tile(np.asarray(emitter.position), (emitter.count, 1))
     return position, slowest + random.random((emitter.count, 2)) * (fastest - slowest)
-

@@ -76,9 +76,7 @@ def meetings(scene: Scene, bodies: Bodies | None = None) -> Meetings:
         free=~meets[member],
         turnable=(turned & moving)[member],
         ball_ball=bool(pair.any()),
-        ball_fixed={
-            kind: bool(moving.any()) and any(isinstance(f, kind) for f in scene.fixed) for kind in FIXED_KINDS
-        },
+        ball_fixed={kind: bool(moving.any()) and any(isinstance(f, kind) for f in scene.fixed) for kind in FIXED_KINDS},
         touching=touching,
     )
 

@@ -19,9 +19,7 @@ BACKING = 1000.0  # m: how deep the solid behind a plane is taken to be; no cent
 class Part(BaseModel):
     """A frozen, strict piece of a scene: no unknown keys, no coercion, no infinities."""
 
-    model_config = ConfigDict(
-        strict=True, extra="forbid", frozen=True, allow_inf_nan=False, validate_by_name=True
-    )
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, validate_by_name=True)
 
 
 def _speed_in_range(vector: tuple[float, float]) -> tuple[float, float]:
@@ -47,9 +45,7 @@ Density = Annotated[float, Field(ge=1e-30, le=1e30)]
 Restitution = Annotated[float, Field(ge=0, le=1)]
 Friction = Annotated[float, Field(ge=0, le=1000)]
 
-Name = Annotated[
-    str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$")
-]
+Name = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$")]
 """A body's or material's name: any text without control characters."""
 
 Colour = Annotated[str, StringConstraints(pattern=r"^#[0-9a-fA-F]{6}$")]

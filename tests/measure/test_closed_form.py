@@ -182,10 +182,30 @@ def test_a_dead_ball_stays_where_it_lands() -> None:
     assert velocity.tolist() == [-G * 0.5, 0.0]
 
 
-@pytest.mark.parametrize(("height", "gravity", "e"), [(-1.0, G, 0.5), (1.0, 0.0, 0.5), (1.0, G, 1.1), (1.0, G, np.nan)])
+@pytest.mark.parametrize(("height", "gravity", "e"), [(-1.0, G, 0.5), (1.0, -G, 0.5), (1.0, G, 1.1), (1.0, G, np.nan)])
 def test_bounces_out_of_range_are_refused(height: float, gravity: float, e: float) -> None:
     with pytest.raises(ValueError, match="bounces need"):
         bounces(np.zeros(1), height, 0.0, gravity, e)
+
+
+def test_without_gravity_a_ball_bounces_once() -> None:
+    time = np.array([0.0, 1.0, 2.0, 3.0, 100.0])
+    height, velocity = bounces(time, 4.0, -2.0, 0.0, 0.5)
+    assert height.tolist() == [4.0, 2.0, 0.0, 1.0, 98.0]
+    assert velocity.tolist() == [-2.0, -2.0, 1.0, 1.0, 1.0]
+    height, velocity = bounces(time, 4.0, 2.0, 0.0, 0.5)
+    assert height.tolist() == [4.0, 6.0, 8.0, 10.0, 204.0]
+    assert velocity.tolist() == [2.0] * 5
+
+
+def test_closed_form_without_gravity_is_mirrored_by_a_plane() -> None:
+    scene = loads(GROUND + BALL.replace("0.8", "1.0") + "velocity = [2.0, -4.0]\n")
+    time = np.arange(5.0)
+    form = closed_form(run_of(scene, time, contacts=((1.5, (0, -1)),)), scene, 0)
+    assert form is not None
+    assert form.valid.all()
+    assert form.position[:, 0].tolist() == [1.0, 3.0, 5.0, 7.0, 9.0]
+    assert form.position[:, 1].tolist() == [5.5, 1.5, 3.5, 7.5, 11.5]
 
 
 def test_valid_until_is_the_first_contact_or_retirement() -> None:

@@ -45,12 +45,14 @@ class ContactLedger:
             normal: (K, 2) from `a` to `b`.
             point: (K, 2) m.
         """
+        self._memory.forget_and_advance()
+        if not len(a) and not len(self._row):
+            return
         swapped = (a < 0) | ((b >= 0) & (b < a))
         first, second = np.where(swapped, b, a), np.where(swapped, a, b)
         # Fixed things, −1 − k, become 0 … F − 1, and bodies follow them: small whole numbers for the table.
         before = self._rows.key
         row, new, gone = self._rows.find(first, second + self._things)
-        self._memory.forget_and_advance()
         if gone.any():
             self._memory.part(before[gone], *(array[gone] for array in self._last))
         impulse, normal = impulse.copy(), normal.copy()

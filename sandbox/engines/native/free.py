@@ -153,6 +153,8 @@ class FreeFlight:
 
     def step(self) -> None:
         """Advance by one substep: positions by the old velocity, then velocities by their kick."""
+        if not len(self.numbers):
+            return
         forced = self._forced_kick() if self._dragged or self._pushed else None
         for position, velocity in self._blocks:
             moved = self._moved[: len(position)]

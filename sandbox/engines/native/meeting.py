@@ -8,7 +8,7 @@ import pymunk
 
 from sandbox.engines.native.drag import acceleration
 from sandbox.engines.native.limits import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.native.reader import Reader
+from sandbox.engines.native.reader import Reader, Touching
 from sandbox.engines.native.space import (
     SurfaceSetter,
     category,
@@ -127,6 +127,7 @@ class MeetingBodies:
             self._moving -= member.moves
             self._space.remove(member.shape, member.body)
             self._steady.pop(number, None)
+        self._reader.members_changed()
         self._state = None
 
     @property
@@ -188,7 +189,7 @@ class MeetingBodies:
         position[numbers], velocity[numbers] = state[:, 0:2], state[:, 3:5]
         angle[numbers], angular_velocity[numbers] = state[:, 2], state[:, 5]
 
-    def touching(self) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
+    def touching(self) -> Touching:
         """Return who touches whom now, and how (`Reader.touching`)."""
         return self._reader.touching()
 
@@ -197,11 +198,10 @@ class MeetingBodies:
         if not self._moving:
             return None
         numbers, state = self._read()
-        good = np.abs(state - self._middle) <= self._limit
-        if good.all():
+        within = np.abs(state - self._middle) <= self._limit
+        if within.all():
             return None
-        good = good.all(axis=1)
-        worst = int(np.argmin(good))
+        worst = int(np.argmin(np.all(within, axis=1)))
         if not np.isfinite(state[worst]).all() or self._reach > FARTHEST:
             return int(numbers[worst]), BEYOND
         return int(numbers[worst]), f"is more than {self._reach:g} m out, where pymunk's half-planes end"

@@ -6,13 +6,7 @@ from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, 
 
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
-STATE = (
-    BodyFields.BODY_ID
-    | BodyFields.POSITION
-    | BodyFields.ANGLE
-    | BodyFields.VELOCITY
-    | BodyFields.ANGULAR_VELOCITY
-)
+STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 STATE_WIDTH = 6  # x, y, angle, vx, vy, ω: in the order of pymunk's flags
 
 TOUCH = (
@@ -24,6 +18,12 @@ TOUCH = (
     | ArbiterFields.POINT_A_1
     | ArbiterFields.POINT_B_1
 )
+
+
+Touching = tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]
+"""Bodies a and b (K,) by number; the impulse on a (K, 2), N·s; the normal (K, 2) from a to b; the point (K, 2), m."""
+
+NOTHING: Touching = np.empty(0, np.int64), np.empty(0, np.int64), *(np.empty((0, 2)) for _ in range(3))
 
 
 class Reader:
@@ -39,7 +39,7 @@ class Reader:
         self._base = 0
         self._number_of: IntArray = np.empty(0, np.int64)
         self._moves: BoolArray = np.empty(0, np.bool_)
-        self._ids: IntArray = np.empty(0, np.int64)
+        self._moved, self._first, self._all = True, True, 0
         self._rows: IntArray = np.empty(0, np.int64)
         self._numbers: IntArray = np.empty(0, np.int64)
 
@@ -52,43 +52,49 @@ class Reader:
         self._number_of, self._moves = np.zeros(size, np.int64), np.zeros(size, np.bool_)
         self._number_of[ids - self._base] = np.fromiter(both.values(), np.int64, len(both))
         self._moves[np.fromiter(moving, np.int64, len(moving)) - self._base] = True
-        self._ids = np.empty(0, np.int64)
+        self._moved = True
 
     def state(self) -> tuple[IntArray, FloatArray]:
         """Return the numbers (R,) of the moving bodies, and their states (R, 6): x, y, angle, vx, vy, ω.
 
         Both are valid until the next call.
         """
+        if self._moved:
+            self._read_order()
         self._bodies.clear()
         get_space_bodies(self._space, STATE, self._bodies)
-        ids = np.frombuffer(self._bodies.int_buf(), np.int64)
-        if not np.array_equal(ids, self._ids):
-            self._ids = ids.copy()
-            self._rows = np.flatnonzero(self._moves[ids - self._base])
-            self._numbers = self._number_of[ids[self._rows] - self._base]
         table = np.frombuffer(self._bodies.float_buf()).reshape(-1, STATE_WIDTH)
-        count = len(self._rows)
-        if count == 0 or self._rows[-1] == count - 1:  # static bodies come last
-            return self._numbers, table[:count]
-        return self._numbers, table[self._rows]
+        return self._numbers, table[: len(self._rows)] if self._first else table[self._rows]
+
+    def members_changed(self) -> None:
+        """Note that bodies came or went, which moves rows."""
+        self._moved = True
+
+    def _read_order(self) -> None:
+        """Find out by their ids which row is which body. The order holds until bodies come or go."""
+        self._bodies.clear()
+        get_space_bodies(self._space, BodyFields.BODY_ID, self._bodies)
+        ids = np.frombuffer(self._bodies.int_buf(), np.int64) - self._base
+        self._rows = np.flatnonzero(self._moves[ids])
+        self._numbers = self._number_of[ids[self._rows]]
+        self._first = np.array_equal(self._rows, np.arange(len(self._rows)))  # static bodies come last
+        self._all = len(ids)
+        self._moved = False
 
     def push(self, force: FloatArray) -> None:
         """Set the force, N, on each body that the last `state` listed, in its order, for the next step only."""
-        self._outgoing = np.zeros((len(self._ids), 2))  # kept alive: pymunk holds a bare pointer into it
+        self._outgoing = np.zeros((self._all, 2))  # kept alive: pymunk holds a bare pointer into it
         self._outgoing[self._rows] = force
         self._forces.set_float_buf(self._outgoing.reshape(-1))
         set_space_bodies(self._space, BodyFields.FORCE, self._forces)
 
-    def touching(self) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
-        """Return what touches now.
-
-        Returns:
-            Bodies a and b (K,) by number; the impulse on a (K, 2), N·s; the normal (K, 2) from a to b; the point
-            (K, 2), midway in the overlap, m. Valid until the next call.
-        """
+    def touching(self) -> Touching:
+        """Return what touches now, points midway in the overlap. Valid until the next call."""
         self._arbiters.clear()
         get_space_arbiters(self._space, TOUCH, self._arbiters)
         words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
+        if not len(words):
+            return NOTHING
         table = np.frombuffer(self._arbiters.float_buf()).reshape(-1, 8)
         live = words[:, 2] > 0  # a parted contact is remembered for a while, with no points
         if not live.all():

@@ -115,7 +115,9 @@ class NativeSimulation:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
             meeting = self._population.meeting
-            self._ledger = ContactLedger(len(self._population.scene.fixed), meeting.joints, self._settings.persistence or 1)
+            self._ledger = ContactLedger(
+                len(self._population.scene.fixed), meeting.joints, self._settings.persistence or 1
+            )
             self._record(self.time)
         return self._ledger.take()
 

@@ -1,0 +1,138 @@
+"""Faults and the lines they stand on."""
+
+import random
+from typing import Any
+
+import pytest
+import strategies
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sandbox.scene.faults import Fault, Lines, SceneError, path_of
+from sandbox.scene.file import loads
+
+
+@given(strategies.rendered())
+def test_line_found_is_the_line_where_the_key_is(said: tuple[strategies.Document, strategies.Rendered]) -> None:
+    rendered = said[1]
+    lines = Lines(rendered.text)
+    assert {location: lines.find(location) for location in rendered.lines} == rendered.lines
+
+
+@given(strategies.rendered(), st.integers(), st.text(min_size=1))
+def test_line_of_what_is_not_there_is_the_line_of_the_table_around_it(
+    said: tuple[strategies.Document, strategies.Rendered], index: int, key: str
+) -> None:
+    rendered = said[1]
+    lines = Lines(rendered.text)
+    for location, line in rendered.lines.items():
+        assert lines.find((*location, index % 1000 + 1000)) == line
+        assert lines.find((*location, f"no {key}", index)) == line
+    assert lines.find((f"no {key}",)) is None
+
+
+def spoilt(document: strategies.Document, chance: random.Random) -> tuple[strategies.Document, tuple[Any, ...]]:
+    """Put one value of the wrong kind, or one unknown key, into a document; return it and where."""
+    here: Any = document
+    location: tuple[Any, ...] = ()
+    while isinstance(here, dict | list) and here:
+        key = chance.choice(list(here) if isinstance(here, dict) else range(len(here)))
+        location += (key,)
+        holder, here = here, here[key]
+        if isinstance(here, dict) and chance.random() < 0.5:
+            here["zzz"] = 1
+            return document, (*location, "zzz")
+    if isinstance(here, bool):
+        holder[key] = 0
+    else:
+        holder[key] = True if isinstance(here, str | list) else "0.1"
+    return document, location
+
+
+@given(
+    st.tuples(strategies.documents(), st.randoms(use_true_random=False)).map(lambda both: spoilt(*both)),
+    st.randoms(use_true_random=False),
+)
+def test_every_fault_has_file_line_path_and_message(
+    both: tuple[strategies.Document, tuple[Any, ...]], chance: random.Random
+) -> None:
+    document, location = both
+    rendered = strategies.Rendered(document, chance)
+    with pytest.raises(SceneError) as caught:
+        loads(rendered.text, "a scene.toml")
+    assert rendered.lines[location] in [fault.line for fault in caught.value.faults]
+    for fault in caught.value.faults:
+        assert fault.file == "a scene.toml"
+        assert fault.line in set(rendered.lines.values())
+        assert fault.path
+        assert fault.message
+        assert str(fault).startswith(f"a scene.toml:{fault.line}: ")
+
+
+def line(text: str, *location: str | int) -> int | None:
+    return Lines(text).find(location)
+
+
+def test_line_in_dotted_keys_and_inline_tables() -> None:
+    text = "world.seed = 1\nworld . 'wind' = [0,\n 1]\nsolver = {dt = 0.1, x = [\n[1], {y = 2}]}\n"
+    assert line(text, "world") == 1
+    assert line(text, "world", "seed") == 1
+    assert line(text, "world", "wind") == 2
+    assert line(text, "world", "wind", 0) == 2
+    assert line(text, "world", "wind", 1) == 3
+    assert line(text, "solver", "dt") == 4
+    assert line(text, "solver", "x", 0, 0) == 5
+    assert line(text, "solver", "x", 1, "y") == 5
+
+
+def test_line_in_tables_of_tables() -> None:
+    text = "[[a]]\nb.c = 1\n[[a.d]]\nx = 1\n[[a.d]]\nx = 2\n[a.e]\nx = 3\n[[a]]\n[[a.d]]\n\nx = 4\n[f.g.h]\ni = 1"
+    assert line(text, "a") == 1
+    assert line(text, "a", 0, "b", "c") == 2
+    assert line(text, "a", 0, "d", 1, "x") == 6
+    assert line(text, "a", 0, "e", "x") == 8
+    assert line(text, "a", 1) == 9
+    assert line(text, "a", 1, "d", 0, "x") == 12
+    assert line(text, "f", "g") == 13
+    assert line(text, "f", "g", "h", "i") == 14
+
+
+@pytest.mark.parametrize(
+    "trap",
+    [
+        's = "# [x]"', "s = '[x]'", 's = """\n[x]\ny = 1\n"""', "s = '''\n\"\"\"\n'''", 's = "\\\\"', 's = "\\""',
+        's = """a\\"""b"""', "# '''", '# """', "s = ''", 's = ""', 's = """"""', "s = ''''a''''", 's = """"a"""""',
+        's = ["]", \'}\', "]", # ]\n]', "s = {}", "s = []", "s = [[], [], ]", "s = [{}, {}]", "s = 1979-05-27 07:32:00",
+        "s = {a = '}', b = [1, # }\n2]}", "'[x]' = 1", '"a = b" = 1', '"a\\"=" = 1', "s = 'a\u2028b\x85c'", "[s] # ]",
+        "[ 's]' ]", '[[ s . "]]" ]]', "s.t . 'u=' = 1", "\t", "s = +1e+5", "s=''''''",
+    ],
+)  # fmt: skip
+def test_line_after_what_looks_like_something_else(trap: str) -> None:
+    text = f"{trap}\n[end]\n  z = [1,\n2]"
+    base = trap.count("\n") + 1
+    assert line(text, "end") == base + 1
+    assert line(text, "end", "z") == base + 2
+    assert line(text, "end", "z", 1) == base + 3
+    assert line(text.replace("\n", "\r\n"), "end", "z") == base + 2
+
+
+def test_line_of_anything_in_no_text_is_none() -> None:
+    assert line("", "a") is None
+    assert line("a = 1") is None
+
+
+def test_path_calls_elements_by_name_where_they_have_a_printable_one() -> None:
+    document = {"ball": [{"name": "cue"}, {}, {"name": "a\x1bb"}, {"name": 3}], "x\ny": 1}
+    assert path_of(("ball", 0, "velocity", 1), document) == "ball.cue.velocity[1]"
+    assert path_of(("ball", 1, "mass"), document) == "ball[1].mass"
+    assert path_of(("ball", 2), document) == "ball[2]"
+    assert path_of(("ball", 3), document) == "ball[3]"
+    assert path_of(("x\ny",), document) == '"x\\ny"'
+    assert path_of(("nowhere", 7, "x"), document) == "nowhere[7].x"
+    assert path_of((), document) == ""
+
+
+def test_fault_is_one_line_whatever_it_speaks_of() -> None:
+    assert str(Fault("s.toml", 3, "ball.cue", "is wrong")) == "s.toml:3: ball.cue: is wrong"
+    assert str(Fault("s.toml", None, "", "is wrong")) == "s.toml: is wrong"
+    assert str(Fault("a\nb", 1, "é", "\x1b[31m \u2028 \x85 \ud800")) == "a\\nb:1: é: \\x1b[31m \\u2028 \\x85 \\ud800"
