@@ -6,15 +6,18 @@
 Adding an engine is one folder that honours these two protocols, and one line in the registry.
 """
 
-from collections.abc import Callable, Mapping
-from typing import Protocol
+from __future__ import annotations
 
-from sandbox.action import Action
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.demands import Demand
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Protocol, TypeAlias
+
+if TYPE_CHECKING:  # a contract is for reading; engines that only refuse should not pay for its nouns
+    from sandbox.action import Action
+    from sandbox.scene.bodies import Bodies
+    from sandbox.scene.demands import Demand
+    from sandbox.scene.model import Scene
+    from sandbox.scene.settings import Settings
+    from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
 
 
 class Refusal(Exception):  # noqa: N818, an engine refuses; that is no error of its own
@@ -41,7 +44,7 @@ class Exhaustion(Exception):  # noqa: N818, as above
     """A simulation has gathered more than memory should hold. What it has can be read."""
 
 
-Observer = Callable[[float, FloatArray, FloatArray, IntArray], None]
+Observer: TypeAlias = "Callable[[float, FloatArray, FloatArray, IntArray], None]"
 """Called after each substep with its starting time (s), the centres (N, 2) at its start and end, and the pairs
 (K, 2) that the engine found in contact at its end, numbered as in `Contacts`."""
 

@@ -4,6 +4,8 @@ A fixed-step engine looks for overlap at the end of each substep only. What come
 between is lost to it; what it finds on the far side it pushes out there.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from sandbox.measure.looks import Looks
@@ -18,6 +20,9 @@ LONGEST_BATCH = 32
 """Substeps examined together: spreads the cost of a call of numpy."""
 BATCH_ROWS = 1 << 14
 """Centres in a batch of more than one substep: they stay in cache."""
+
+CHUNK = 1 << 13
+"""Encounters looked at together: they stay in cache."""
 
 FAR = 1e50
 """m: who is farther out is diverging and does not count; fourth powers of it still are finite."""
@@ -134,16 +139,20 @@ class Audit:
     def _examine(self) -> None:
         """Examine the substeps that wait."""
         start, end = self._start[: len(self._time)], self._end[: len(self._time)]
-        with np.errstate(invalid="ignore", over="ignore"):  # diverging bodies reach inf; they drop out below
+        with np.errstate(invalid="ignore", over="ignore"):  # diverging bodies reach inf; they drop out here
             move = end - start
             move *= move
-            fast = np.asarray(move[..., 0] + move[..., 1] >= self._least2)
+            length2 = move[..., 0] + move[..., 1]
+            fast = np.asarray(length2 >= self._least2)
         if fast.any():
-            lost = ~((np.abs(start) < FAR) & (np.abs(end) < FAR)).all(axis=2)
+            when, who = np.nonzero(fast)
+            lost = ~((np.abs(start[when, who]) < FAR) & (np.abs(end[when, who]) < FAR)).all(axis=1)
             if lost.any():
-                start[lost] = end[lost] = np.nan
-                fast &= ~lost
-            found = self._balls(start, end, fast), self._fixed(start, end, fast)
+                when, who = when[lost], who[lost]
+                start[when, who] = end[when, who] = np.nan
+                fast[when, who] = False
+            nearing = 2 * float(np.sqrt(np.max(length2, where=length2 < np.inf, initial=0.0)))
+            found = self._balls(start, end, fast, nearing), self._fixed(start, end, fast)
             when = np.concatenate([when for when, _ in found])
             pairs = np.concatenate([pairs for _, pairs in found])
             if len(when):
@@ -166,18 +175,41 @@ class Audit:
         able |= self._still[i] & self._moves[j]
         return np.asarray(able)
 
-    def _balls(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
-        """Return when (M,) which pairs (M, 2) of bodies were missed."""
+    def _balls(self, start: FloatArray, end: FloatArray, fast: BoolArray, nearing: float) -> tuple[IntArray, IntArray]:
+        """Return when (M,) which pairs (M, 2) of bodies were missed; none comes nearer by more than `nearing`."""
         when, i, j = self._neighbours.encounters(start, end, fast)
-        gap = start[when, j] - start[when, i]
-        move = end[when, j] - end[when, i] - gap
-        contact2 = (self._radius[i] + self._radius[j]) ** 2
-        able = dot(gap, move) < 0
-        able &= dot(gap, gap) >= CLEAR**2 * contact2
-        able &= dot(move, move) >= JUMP**2 * contact2
-        at = np.flatnonzero(able)
-        at = at[closest_to_origin(gap[at], move[at]) < DEEP**2 * contact2[at]]
+        parts = len(when) // CHUNK + 1
+        at = np.concatenate(
+            [
+                begin + self._deep(start, end, nearing, *(column[begin:stop] for column in (when, i, j)))
+                for begin, stop in pairwise(np.linspace(0, len(when), parts + 1, dtype=np.int64).tolist())
+            ]
+        )
         when, pair = when[at], np.column_stack((i[at], j[at])) + self._offset
-        in_time = self._looks.found(when + 1, pair) & approaching(gap[at] + move[at], move[at])
-        missed = ~in_time & ~self._looks.found(when, pair)
-        return when[missed], pair[missed]
+        last = _offset(end, when, i[at], j[at])
+        late = ~approaching(last, last - _offset(start, when, i[at], j[at]))
+        late[~late] = ~self._looks.found(when[~late] + 1, pair[~late])
+        when, pair = when[late], pair[late]
+        new = ~self._looks.found(when, pair)
+        return when[new], pair[new]
+
+    def _deep(
+        self, start: FloatArray, end: FloatArray, nearing: float, when: IntArray, i: IntArray, j: IntArray
+    ) -> IntArray:
+        """Return which encounters lead from clear into deep contact on a path that can skip a look."""
+        gap = _offset(start, when, i, j)
+        distance2, contact = dot(gap, gap), self._radius[i] + self._radius[j]
+        at = np.flatnonzero((distance2 >= (CLEAR * contact) ** 2) & (distance2 <= (contact + nearing) ** 2))
+        gap, contact = gap[at], contact[at]
+        move = _offset(end, when[at], i[at], j[at]) - gap
+        able = (dot(gap, move) < 0) & (dot(move, move) >= (JUMP * contact) ** 2)
+        able &= closest_to_origin(gap, move) < (DEEP * contact) ** 2
+        return at[able]
+
+
+def _offset(place: FloatArray, when: IntArray, i: IntArray, j: IntArray) -> FloatArray:
+    """Return where the second of each pair is from the first, (K, 2)."""
+    # As complex numbers two coordinates are fetched at once: three times as fast as rows of an array.
+    point, row = place.view(np.complex128).reshape(-1), when * place.shape[1]
+    between = point.take(row + j) - point.take(row + i)
+    return np.asarray(between.view(np.float64).reshape(-1, 2))

@@ -165,11 +165,10 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
     reaches a plane. Contacts that the engine missed count where the run was audited; a missed bounce does not
     end the bouncing, which is right then.
 
-    Actions are not seen here: the run must have been left alone. Where bodies were spawned, none has a closed
-    form.
+    A run that actions interfered with has none.
     """
     bodies = scene.bodies
-    if trajectory.names.tolist() != list(bodies.names) or bodies.fixed[number]:
+    if trajectory.info.get("actions") or trajectory.names.tolist() != list(bodies.names) or bodies.fixed[number]:
         return None
     form = _bouncing(trajectory, scene, bodies, number) or _flying(trajectory, scene, bodies, number)
     return form if form is not None and np.count_nonzero(form.valid) > 1 else None

@@ -16,8 +16,8 @@ from sandbox.trajectory import BoolArray, FloatArray, IntArray
 BUILDING = 20_000
 """What building a list costs, in entries of rows (measured), beside `BUILDING_EACH` for each body."""
 BUILDING_EACH = 50
-LASTING = 6.0
-"""Batches of substeps for which a list is meant to last, as far as half its skin then stays within a radius."""
+LASTING = 32.0
+"""Substeps for which a list is meant to last, as far as half its skin then stays within a radius."""
 LEAST_SKIN = 0.1
 """Half the skin is at least this part of the typical radius: thin lists save nothing more."""
 CELL_SHARE = 4.5
@@ -41,11 +41,9 @@ class Neighbours:
         self._meet = meet
         self._party = np.flatnonzero(member)
         self._typical = float(np.median(radius[self._party])) if len(self._party) else 0.0
-        self._cost = BUILDING + BUILDING_EACH * len(self._party)
-        self._few = self._cost // max(len(self._party), 1)
-        self._spent = 0
+        self._few = BUILDING_EACH + BUILDING // max(len(self._party), 1)
         self._anchor = np.full((len(radius), 2), np.inf)
-        self._half_skin = 0.0
+        self._half_skin = self._typical
         self._first = self._second = np.empty(0, np.int64)
 
     def encounters(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> Encounters:
@@ -60,20 +58,28 @@ class Neighbours:
             Substeps, and of each pair the lower and the higher number, (K,) each; nothing twice.
         """
         strays = self._strays(start, end)
-        self._spent += len(start) * int(np.count_nonzero(strays)) * len(self._party)
-        if self._spent > self._cost:
-            if not self._build(start, end) and len(start) > 1:
-                half = len(start) // 2
-                early = self.encounters(start[:half], end[:half], fast[:half])
-                when, first, second = self.encounters(start[half:], end[half:], fast[half:])
-                return _joined([early, (when + half, first, second)])
+        count = np.count_nonzero(strays)
+        if count > self._few:
+            usual = self._usual(start[0], end[0])
+            skin = min(max(LASTING * usual, LEAST_SKIN * self._typical), self._typical)
+            lasting = max(1, int(skin / usual)) if usual > 0 else len(start)
+            if lasting < len(start):
+                early = self.encounters(start[:lasting], end[:lasting], fast[:lasting])
+                when, first, second = self.encounters(start[lasting:], end[lasting:], fast[lasting:])
+                return _joined([early, (when + lasting, first, second)])
+            self._build(start[0], skin if skin >= usual else None)
+        elif count:
+            self._renew(start[0], strays)
+        if count:
             strays = self._strays(start, end)
-        keep = fast[:, self._first] | fast[:, self._second]
+        ever = fast.any(axis=0)
+        listed = ever[self._first] | ever[self._second]
         astray = bool(strays.any())
         if astray:
-            keep &= ~(strays[self._first] | strays[self._second])
-        when, at = np.nonzero(keep)
-        found = [(when, self._first[at], self._second[at])]
+            listed &= ~(strays[self._first] | strays[self._second])
+        first, second = self._first[listed], self._second[listed]
+        when, at = np.nonzero(fast[:, first] | fast[:, second])
+        found = [(when, first[at], second[at])]
         if astray:
             for step in np.flatnonzero(fast.any(axis=1)).tolist():
                 first, second = self._swept(start[step], end[step], fast[step], strays)
@@ -82,13 +88,14 @@ class Neighbours:
 
     def _strays(self, start: FloatArray, end: FloatArray) -> BoolArray:
         """Return who left its half of the skin in any of the substeps, (N,)."""
-        limit = self._half_skin**2
-        home = np.ones(len(self._radius), dtype=np.bool_)
-        for place in (start, end):
-            gone = place - self._anchor
-            gone *= gone
-            home &= (gone[..., 0] + gone[..., 1] <= limit).all(axis=0)
-        return self._member & ~home
+        # Of the box around its places, the corner that is farthest from its anchor.
+        low = np.minimum(start.min(axis=0), end.min(axis=0)) - self._anchor
+        high = np.maximum(start.max(axis=0), end.max(axis=0)) - self._anchor
+        far = np.maximum(high, -low)
+        far *= far
+        distance2 = far[:, 0] + far[:, 1]
+        gone = np.isnan(start[0, :, 0])
+        return self._member & ~(distance2 <= self._half_skin**2) & ~gone
 
     def _whole(self, start: FloatArray, end: FloatArray) -> IntArray:
         """Return the numbers of those who are there before and after."""
@@ -107,27 +114,36 @@ class Neighbours:
         keep = strays[first] | strays[second]
         return first[keep], second[keep]
 
-    def _build(self, start: FloatArray, end: FloatArray) -> bool:
-        """List the pairs within a skin whose width lets all but a few bodies stay for a while.
+    def _renew(self, place: FloatArray, strays: BoolArray) -> None:
+        """Take strays back into the list, where they are now."""
+        self._anchor[strays] = place[strays]
+        party = self._party[np.isfinite(self._anchor[self._party]).all(axis=1)]
+        reach = self._radius[party] + self._half_skin * (1 + 1e-9)  # the skin ends in rounding, 1e-16
+        rows = np.flatnonzero(strays[party])
+        everyone = np.ones_like(self._member)
+        first, second = self._numbered(party, _in_rows(rows, self._anchor[party], reach), everyone)
+        keep = ~(strays[self._first] | strays[self._second])
+        self._first = np.concatenate((self._first[keep], first))
+        self._second = np.concatenate((self._second[keep], second))
 
-        Returns whether that is worth it: with most moving by more than a radius, no list lasts.
-        """
-        self._spent = 0
+    def _usual(self, start: FloatArray, end: FloatArray) -> float:
+        """Return how far bodies move in a substep, all but a few, m."""
+        party = self._whole(start, end)
+        jump = np.sort(np.sqrt(((end[party] - start[party]) ** 2).sum(axis=1)))
+        return float(jump[max(len(jump) - 1 - self._few // 2, len(jump) // 2)]) if len(jump) else 0.0
+
+    def _build(self, place: FloatArray, half_skin: float | None) -> None:
+        """List the pairs within a skin, or none, where bodies move too far for any list to last."""
         self._anchor[:] = np.inf
         self._first = self._second = np.empty(0, np.int64)
-        party = self._whole(start[0], end[-1])
-        if not len(party):
-            return False
-        jump = np.sort(np.sqrt(((end[-1, party] - start[0, party]) ** 2).sum(axis=1)))
-        usual = float(jump[max(len(jump) - 1 - self._few // 2, len(jump) // 2)])
-        if usual > self._typical:
-            return False
-        self._half_skin = max(min(LASTING * usual, self._typical), LEAST_SKIN * self._typical)
-        self._anchor[party] = start[0, party]
-        reach = self._radius[party] + self._half_skin * (1 + 1e-9)  # the skin ends in rounding, 1e-16
+        if half_skin is None:
+            return
+        self._half_skin = half_skin
+        party = self._whole(place, place)
+        self._anchor[party] = place[party]
+        reach = self._radius[party] + half_skin * (1 + 1e-9)  # the skin ends in rounding, 1e-16
         everyone = np.ones_like(self._member)
-        self._first, self._second = self._numbered(party, self._close(start[0, party], reach), everyone)
-        return True
+        self._first, self._second = self._numbered(party, self._close(place[party], reach), everyone)
 
     def _close(self, place: FloatArray, reach: FloatArray) -> Iterator[Pairs]:
         """Yield every pair nearer than the sum of its reaches, by cells.
@@ -140,11 +156,11 @@ class Neighbours:
         if large:
             yield from _in_rows(np.sort(order[:large]), place, reach)
         small = order[large:]
+        x, y = np.ascontiguousarray(place.T)
         for i, j in near_pairs(place[small], 2 * float(reach[small].max(initial=0.0))):
             i, j = small[i], small[j]
-            gap = place[j] - place[i]
-            gap *= gap
-            near = gap[:, 0] + gap[:, 1] < (reach[i] + reach[j]) ** 2
+            across, up = x[j] - x[i], y[j] - y[i]
+            near = across * across + up * up < (reach[i] + reach[j]) ** 2
             yield i[near], j[near]
 
     def _numbered(self, party: IntArray, found: Iterator[Pairs], fast: BoolArray) -> Pairs:

@@ -110,6 +110,11 @@ class Obstacles:
         return np.concatenate([when for when, _ in found]), np.concatenate([pair for _, pair in found])
 
     def _planes(self, paths: Paths, looks: Looks) -> tuple[IntArray, IntArray]:
+        # Of most bodies it is plain that they end above; that is found in one product, if with more rounding.
+        above = paths.end @ self.normal.T - dot(self.point, self.normal)
+        rounding = 1e-12 * (np.abs(paths.end).max() + np.abs(self.point).max())
+        paths = paths.some(np.flatnonzero((above < (paths.radius + rounding)[:, None]).any(axis=1)))
+
         first = dot(paths.start[:, None] - self.point, self.normal)
         last = dot(paths.end[:, None] - self.point, self.normal)
         tolerance = np.maximum(TOLERANCE * paths.radius, PLANE_ROUNDING)

@@ -33,7 +33,7 @@ def split_assignment(text: str) -> tuple[str, str, str]:
     for k, letter in enumerate(text):
         if quote:
             quote = "" if letter == quote else quote
-        elif letter in "\"'":
+        elif letter in "\"'" and text[:k].strip()[-1:] in ("", "."):  # as in paths: only where a part begins
             quote = letter
         elif letter == "=":
             return text[:k], "=", text[k + 1 :]

@@ -9,7 +9,7 @@ from sandbox.scene.bodies import Bodies, mass_of
 from sandbox.scene.faults import Location
 from sandbox.scene.generators import GeneratorError, size
 from sandbox.scene.model import Disc, Emitter, Generator, Grid, Plane, Scatter, Scene, Surfaced
-from sandbox.scene.near import FloatArray, near_pairs
+from sandbox.scene.near import FloatArray, IntArray, near_pairs
 from sandbox.scene.part import BACKING, MAX_BODIES, MAX_POSITION, MAX_SPEED, MAX_STEPS
 from sandbox.scene.surfaces import surfaces_of
 
@@ -161,12 +161,12 @@ def _states(scene: Scene, bodies: Bodies) -> Iterator[Found]:
         (np.abs(bodies.position).max(axis=1, initial=0) > MAX_POSITION, f"a ball lies beyond ±{MAX_POSITION:g} m"),
         (np.hypot(*bodies.velocity.T) > MAX_SPEED, f"a ball is faster than {MAX_SPEED:g} m/s"),
     ):
-        for element in np.unique(bodies.element[wrong]).tolist():
+        for element in _each(bodies.element[wrong]):
             yield elements[element][0], message
     if scene.world.bounds is not None:
         lower, upper = np.asarray(scene.world.bounds)
         outside = ((bodies.position < lower) | (bodies.position > upper)).any(axis=1)
-        for element in np.unique(bodies.element[outside]).tolist():
+        for element in _each(bodies.element[outside]):
             yield elements[element][0], "starts outside world.bounds, where bodies are retired"
 
 
@@ -178,7 +178,7 @@ def _starts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
         if not has_direction(plane):
             continue
         depth = -height_above(plane, bodies.position)
-        for element in np.unique(bodies.element[touches & (depth > BACKING)]).tolist():
+        for element in _each(bodies.element[touches & (depth > BACKING)]):
             deepest = float(depth[(bodies.element == element) & touches].max())
             message = (
                 f"a centre starts {deepest:g} m behind the plane {name!r}; at most {BACKING:g}, "
@@ -198,6 +198,10 @@ def _starts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
             'Spread them, or let them pass through each other with collides = "none" or "fixed"'
         )
         yield location, message
+
+
+def _each(elements: IntArray) -> list[int]:
+    return sorted(set(elements.tolist()))
 
 
 def _population(element: Disc) -> int:

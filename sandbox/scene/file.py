@@ -86,7 +86,7 @@ def from_document(
     try:
         scene = read_model(document)
     except ValidationError as error:
-        errors = error.errors(include_url=False)
+        errors = [e for e in error.errors(include_url=False) if not _only_seems_short(e)]
         found = [explain(details) for details in errors]
         found += crosscheck_the_rest(document, [tuple(details["loc"]) for details in errors])
     except (RecursionError, ValueError) as error:
@@ -130,6 +130,11 @@ def _read(path: str | Path) -> str:
     except ValueError as error:
         reason = "is not UTF-8 text; a scene is a TOML file" if isinstance(error, UnicodeDecodeError) else str(error)
         raise SceneError([Fault(file, None, "", reason)]) from None
+
+
+def _only_seems_short(details: Any) -> bool:
+    """Tell whether an array is long enough; pydantic counts only the elements that have no faults of their own."""
+    return details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]
 
 
 def _syntax_fault(file: str, text: str, error: tomllib.TOMLDecodeError) -> Fault:

@@ -4,6 +4,8 @@ Each generator draws from a stream of its own, keyed by the seed, its kind and i
 that adding one generator changes no other. Only uniform doubles are drawn: their stream is stable in numpy.
 """
 
+from __future__ import annotations  # `np.random` in an annotation would import it wherever scenes are read
+
 import math
 
 import numpy as np

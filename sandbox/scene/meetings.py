@@ -63,9 +63,9 @@ def meetings(scene: Scene, bodies: Bodies | None = None) -> Meetings:
     rubs = surfaces.friction > 0
     turned = (pair & rubs[np.ix_(surface, surface)]).any(axis=1)
 
-    fixed_surface = np.unique(surfaces.of_fixed)
+    fixed_surface = np.flatnonzero(np.bincount(surfaces.of_fixed))
     if len(fixed_surface):
-        reached = np.unique(surface[moving])
+        reached = surface[moving]
         touching[np.ix_(reached, fixed_surface)] = True
         touching[np.ix_(fixed_surface, reached)] = True
         turned |= moving & rubs[np.ix_(surface, fixed_surface)].any(axis=1)
@@ -86,6 +86,10 @@ def _classes(bodies: Bodies, surfaces: Surfaces) -> tuple[IntArray, IntArray, In
     collides = [element.collides for element in bodies.elements]
     meets_all = np.asarray([c == "all" for c in collides], dtype=np.int64)[bodies.element]
     meets_any = np.asarray([c != "none" for c in collides], dtype=np.int64)[bodies.element]
-    rows = np.column_stack((surfaces.of_body, bodies.fixed.astype(np.int64), meets_all, meets_any))
-    classes, member, count = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
-    return classes, member.reshape(-1), count
+    code = surfaces.of_body << 3 | bodies.fixed.astype(np.int64) << 2 | meets_all << 1 | meets_any
+    counts = np.bincount(code)
+    present = np.flatnonzero(counts)
+    row_of = np.zeros(len(counts), np.int64)
+    row_of[present] = np.arange(len(present))
+    classes = np.column_stack((present >> 3, present >> 2 & 1, present >> 1 & 1, present & 1))
+    return classes, row_of[code], counts[present]

@@ -181,8 +181,8 @@ class Scene(Part):
     title: Annotated[str, StringConstraints(max_length=200)] = ""
     about: Annotated[str, StringConstraints(max_length=2000)] = ""
     """What to look for."""
-    world: World = World()
-    solver: Settings = Settings()
+    world: World = Field(default_factory=World)
+    solver: Settings = Field(default_factory=Settings)
     materials: tuple[Material, ...] = Field((), alias="material")
     pairs: tuple[Pair, ...] = Field((), alias="pair")
     planes: tuple[Plane, ...] = Field((), alias="plane")

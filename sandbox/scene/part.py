@@ -19,7 +19,10 @@ BACKING = 1000.0  # m: how deep the solid behind a plane is taken to be; no cent
 class Part(BaseModel):
     """A frozen, strict piece of a scene: no unknown keys, no coercion, no infinities."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, validate_by_name=True)
+    # Validators are built on first use: of a dozen models, a command mostly needs the one of a whole scene.
+    model_config = ConfigDict(
+        strict=True, extra="forbid", frozen=True, allow_inf_nan=False, validate_by_name=True, defer_build=True
+    )
 
 
 def _speed_in_range(vector: tuple[float, float]) -> tuple[float, float]:

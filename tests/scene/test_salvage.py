@@ -34,7 +34,7 @@ def expect(text: str, wanted: Iterable[str]) -> None:
         ("[[wall]]\npoints = [[0, 0]]\n", "wall[0].points"),
         ("[[ball]]\nposition = [5, 5]\nradius = -1\n", "ball[1].radius"),
         ("[[ball]]\nposition = [5, 5]\nradius = 1\nname = ''\n", "ball[1].name"),
-        ("[[material]]\nname = 'm'\nrestitution = 2\n", "material[0].restitution"),
+        ("[[material]]\nname = 'm'\nrestitution = 2\n", "material.m.restitution"),
         ("[[grid]]\norigin = [0, 0]\ncolumns = 0\nspacing = [1, 1]\nradius = 0.1\n", "grid[0].columns"),
         ("[[scatter]]\ncount = 0\nlower = [0, 0]\nupper = [1, 1]\nradius = 0.1\n", "scatter[0].count"),
         ("[[emitter]]\nposition = [0, 0]\ncount = 1\nvelocity_min = [0, 0]\nvelocity_max = 0\n", "emitter[0].velocity_max"),

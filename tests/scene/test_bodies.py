@@ -1,0 +1,136 @@
+"""Bodies: numbering and starting state."""
+
+import math
+
+import numpy as np
+import strategies
+from hypothesis import given
+
+from sandbox.scene.bodies import mass_of
+from sandbox.scene.file import loads
+from sandbox.scene.generators import size
+from sandbox.scene.model import Ball, Emitter, Grid, Scatter, Scene
+
+SCENE = """
+[[emitter]]
+position = [9, 9]
+count = 2
+velocity_min = [1, 1]
+velocity_max = [1, 1]
+[[ball]]
+position = [1, 2]
+velocity = [3, 4]
+angle = 5
+angular_velocity = 6
+radius = 2
+density = 0.5
+[[grid]]
+name = "row"
+origin = [0, 20]
+columns = 2
+spacing = [7, 0]
+radius = 1
+mass = 8
+angular_velocity = 2
+[[ball]]
+name = "rock"
+position = [50, 0]
+radius = 1
+fixed = true
+[[scatter]]
+count = 1
+lower = [-9, -9]
+upper = [-9, -9]
+velocity = [2, 1]
+radius = 1
+"""
+
+
+def test_bodies_are_numbered_balls_grids_scatters_emitters() -> None:
+    bodies = loads(SCENE).bodies
+    assert bodies.names == ("ball-1", "rock", "row-1", "row-2", "scatter-1-1", "emitter-1-1", "emitter-1-2")
+    assert bodies.position.tolist() == [[1, 2], [50, 0], [0, 20], [7, 20], [-9, -9], [9, 9], [9, 9]]
+    assert bodies.velocity.tolist() == [[3, 4], [0, 0], [0, 0], [0, 0], [2, 1], [1, 1], [1, 1]]
+    assert bodies.angle.tolist() == [5, 0, 0, 0, 0, 0, 0]
+    assert bodies.angular_velocity.tolist() == [6, 0, 2, 2, 0, 0, 0]
+    assert bodies.radius.tolist() == [2, 1, 1, 1, 1, 0.05, 0.05]
+    assert bodies.mass.tolist() == [0.5 * math.pi * 4, 1, 8, 8, 1, 1, 1]
+    assert bodies.fixed.tolist() == [False, True, False, False, False, False, False]
+    assert bodies.element.tolist() == [0, 1, 2, 2, 3, 4, 4]
+    assert [type(element) for element in bodies.elements] == [Ball, Ball, Grid, Scatter, Emitter]
+    assert len(bodies) == 7
+
+
+def test_mass_is_stated_or_from_the_density_or_one() -> None:
+    at = {"position": (0.0, 0.0), "radius": 3.0}
+    assert mass_of(Ball(**at, mass=2.5)) == 2.5
+    assert mass_of(Ball(**at, density=2.0)) == 2.0 * math.pi * 9.0
+    assert mass_of(Ball(**at)) == 1.0
+
+
+def test_moment_is_that_of_a_disc() -> None:
+    bodies = loads(SCENE).bodies
+    assert np.array_equal(bodies.moment, bodies.mass * bodies.radius**2 / 2)
+
+
+def test_joined_body_gets_the_next_number_and_leaves_the_others() -> None:
+    bodies = loads(SCENE).bodies
+    more = bodies.joined_by(Ball(position=(1.0, 1.0), velocity=(2.0, 3.0), radius=0.5, mass=4.0, angle=1.0), "new")
+    assert more.names == (*bodies.names, "new")
+    for key in ("position", "velocity", "angle", "angular_velocity", "radius", "mass", "fixed", "element"):
+        assert np.array_equal(getattr(more, key)[:-1], getattr(bodies, key))
+    assert more.position[-1].tolist() == [1, 1]
+    assert more.velocity[-1].tolist() == [2, 3]
+    assert (more.radius[-1], more.mass[-1], more.angle[-1], more.fixed[-1]) == (0.5, 4.0, 1.0, False)
+    assert more.elements[more.element[-1]].mass == 4.0
+    assert len(bodies) == 7
+
+
+def test_joined_fixed_body_has_no_velocity() -> None:
+    more = loads(SCENE).bodies.joined_by(Ball(position=(0.0, 0.0), velocity=(2.0, 3.0), radius=1.0, fixed=True), "new")
+    assert more.fixed[-1]
+    assert more.velocity[-1].tolist() == [0, 0]
+
+
+def test_scene_without_bodies_has_empty_arrays() -> None:
+    bodies = Scene().bodies
+    assert len(bodies) == 0
+    assert bodies.position.shape == bodies.velocity.shape == (0, 2)
+    assert bodies.radius.shape == bodies.moment.shape == (0,)
+    assert Scene().fixed_names == ()
+
+
+def test_fixed_things_are_numbered_planes_walls_posts() -> None:
+    text = """
+    [[post]]
+    position = [0, 0]
+    radius = 1
+    [[wall]]
+    points = [[0, 0], [1, 0]]
+    [[plane]]
+    name = "floor"
+    point = [0, 0]
+    normal = [0, 1]
+    [[wall]]
+    points = [[0, 0], [1, 0]]
+    """
+    scene = loads(text)
+    assert scene.fixed_names == ("floor", "wall-1", "wall-2", "post-1")
+    assert scene.fixed == (*scene.planes, *scene.walls, *scene.posts)
+
+
+@given(strategies.scenes())
+def test_arrays_of_any_scene_agree_in_shape_and_are_finite(scene: Scene) -> None:
+    bodies = scene.bodies
+    n = len(scene.balls) + sum(map(size, (*scene.grids, *scene.scatters, *scene.emitters)))
+    assert len(bodies) == len(set(bodies.names)) == n
+    assert bodies.position.shape == bodies.velocity.shape == (n, 2)
+    for key in ("angle", "angular_velocity", "radius", "mass", "fixed", "element", "moment"):
+        assert getattr(bodies, key).shape == (n,)
+        assert np.isfinite(getattr(bodies, key)).all()
+    assert np.isfinite(bodies.position).all()
+    assert np.isfinite(bodies.velocity).all()
+    assert not bodies.velocity[bodies.fixed].any()
+    assert not bodies.angular_velocity[bodies.fixed].any()
+    assert len(scene.fixed_names) == len(scene.fixed)
+    assert not set(scene.fixed_names) & set(bodies.names)

@@ -1,0 +1,85 @@
+"""Demands: what physics a scene needs, and why."""
+
+from typing import Any
+
+import pytest
+import strategies
+from hypothesis import given
+
+from sandbox.scene.demands import Demand, Item, bill, demands
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Scene
+
+BALL: dict[str, Any] = {"position": [0.0, 0.0], "radius": 1.0}
+ROCK: dict[str, Any] = {**BALL, "fixed": True}
+GHOST: dict[str, Any] = {**BALL, "collides": "none"}
+PLANE: dict[str, Any] = {"point": [0, 0], "normal": [0, 1]}
+WALL: dict[str, Any] = {"points": [[0, 0], [1, 0]]}
+POST: dict[str, Any] = {"position": [0, 0], "radius": 1}
+
+CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
+    (Demand.TRANSLATION, True, {"ball": [BALL, BALL, ROCK]}, "2 bodies move"),
+    (Demand.TRANSLATION, True, {"ball": [BALL]}, "1 body moves"),
+    (Demand.TRANSLATION, False, {"ball": [ROCK]}, "nothing moves"),
+    (Demand.TRANSLATION, False, {"title": "t"}, "nothing moves"),
+    (Demand.ROTATION, True, {"ball": [{**GHOST, "angular_velocity": 1}]}, "1 body starts with a spin"),
+    (Demand.ROTATION, True, {"ball": [{**BALL, "friction": 0.5}, BALL]}, "2 bodies can be rubbed"),
+    (Demand.ROTATION, True, {"ball": [BALL], "plane": [{**PLANE, "friction": 0.5}]}, "1 body can be rubbed"),
+    (Demand.ROTATION, False, {"ball": [BALL, BALL]}, "nothing can turn"),
+    (Demand.ROTATION, False, {"ball": [{**GHOST, "friction": 0.5}] * 2}, "nothing can turn"),
+    (Demand.ROTATION, False, {"ball": [{**BALL, "friction": 0}, {**BALL, "friction": 9}]}, "nothing can turn"),
+    (Demand.GRAVITY, True, {"world": {"gravity": [0, -1.62]}, "ball": [BALL]}, "-1.62"),
+    (Demand.GRAVITY, False, {"world": {"gravity": [0, 0]}, "ball": [BALL]}, "zero"),
+    (Demand.DRAG, True, {"world": {"linear_drag": 0.5}, "ball": [BALL]}, "linear 0.5"),
+    (Demand.DRAG, True, {"world": {"quadratic_drag": 0.25}, "ball": [BALL]}, "quadratic 0.25"),
+    (Demand.DRAG, False, {"world": {"wind": [5, 0]}, "ball": [BALL]}, "no drag"),
+    (Demand.BALL_BALL, True, {"ball": [BALL, BALL]}, "can meet"),
+    (Demand.BALL_BALL, True, {"ball": [{**BALL, "collides": "fixed"}, ROCK]}, "can meet"),
+    (Demand.BALL_BALL, False, {"ball": [BALL, GHOST]}, "2 of 2 can meet nothing"),
+    (Demand.BALL_BALL, False, {"ball": [BALL], "plane": [PLANE]}, "0 of 1 can meet nothing"),
+    (Demand.BALL_PLANE, True, {"ball": [BALL], "plane": [PLANE]}, "1 plane"),
+    (Demand.BALL_PLANE, False, {"ball": [GHOST], "plane": [PLANE]}, "nothing can meet"),
+    (Demand.BALL_PLANE, False, {"ball": [ROCK], "plane": [PLANE]}, "nothing can meet"),
+    (Demand.BALL_PLANE, False, {"ball": [BALL], "wall": [WALL]}, "no plane"),
+    (Demand.BALL_SEGMENT, True, {"ball": [BALL], "wall": [WALL, WALL]}, "2 wall"),
+    (Demand.BALL_SEGMENT, False, {"ball": [GHOST], "wall": [WALL]}, "nothing can meet"),
+    (Demand.BALL_SEGMENT, False, {"ball": [BALL], "post": [POST]}, "no wall"),
+    (Demand.BALL_POST, True, {"ball": [{**BALL, "collides": "fixed"}], "post": [POST]}, "1 post"),
+    (Demand.BALL_POST, False, {"ball": [GHOST], "post": [POST]}, "nothing can meet"),
+    (Demand.BALL_POST, False, {"ball": [BALL]}, "no post"),
+    (Demand.RESTITUTION, True, {"ball": [{**BALL, "restitution": 0.75}, BALL]}, "up to 0.75"),
+    (Demand.RESTITUTION, False, {"ball": [{**BALL, "restitution": 0.75}, {**BALL, "restitution": 0}]}, "0 for every pair"),
+    (Demand.RESTITUTION, False, {"ball": [{**BALL, "restitution": 0.75}, GHOST]}, "nothing can meet"),
+    (Demand.FRICTION, True, {"ball": [{**BALL, "friction": 0.75}, {**BALL, "friction": 2}]}, "up to 1.5"),
+    (Demand.FRICTION, False, {"ball": [BALL, BALL]}, "0 for every pair"),
+    (Demand.FRICTION, False, {"ball": [{**GHOST, "friction": 1}], "plane": [{**PLANE, "friction": 1}]}, "nothing can meet"),
+    (Demand.BOUNDS, True, {"world": {"bounds": [[-1, -1], [1, 1]]}, "ball": [BALL]}, "given"),
+    (Demand.BOUNDS, False, {"ball": [BALL]}, "no bounds"),
+]
+
+
+@pytest.mark.parametrize(("demand", "on", "document", "why"), CASES)
+def test_demand_is_made_or_not_for_a_reason(demand: Demand, on: bool, document: dict[str, Any], why: str) -> None:
+    scene = from_document(document)
+    item = next(item for item in bill(scene) if item.demand is demand)
+    assert item.on is on
+    assert why in item.why
+    assert (demand in demands(scene)) is on
+
+
+def test_cases_show_every_demand_on_and_off() -> None:
+    assert {(demand, on) for demand, on, _, _ in CASES} == {(demand, on) for demand in Demand for on in (True, False)}
+
+
+@given(strategies.scenes())
+def test_bill_lists_every_demand_once_with_a_reason(scene: Scene) -> None:
+    items = bill(scene)
+    assert sorted(item.demand for item in items) == sorted(Demand)
+    assert all(isinstance(item, Item) and item.why for item in items)
+    assert demands(scene) == {item.demand for item in items if item.on}
+
+
+def test_fireworks_demand_nothing_but_flight() -> None:
+    emitter = {"position": [0, 0], "count": 100, "velocity_min": [-1, 8], "velocity_max": [1, 12]}
+    scene = from_document({"world": {"gravity": [0, -9.81]}, "emitter": [emitter]})
+    assert demands(scene) == {Demand.TRANSLATION, Demand.GRAVITY}

@@ -1,0 +1,152 @@
+"""Grids, scatters and emitters: what they expand to."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sandbox.scene.generators import GeneratorError, expand, size
+from sandbox.scene.model import Emitter, Grid, Scatter, Scene, World
+
+GRID = Grid(origin=(1.0, 2.0), columns=3, rows=2, spacing=(0.5, -4.0), radius=0.1)
+SCATTER = Scatter(count=200, lower=(-5.0, 0.0), upper=(5.0, 20.0), radius=0.1)
+EMITTER = Emitter(position=(3.0, 4.0), count=200, velocity_min=(-1.0, 8.0), velocity_max=(1.0, 12.0))
+LOOSE = {
+    "grid": Grid(origin=(0.0, 0.0), columns=20, spacing=(1.0, 1.0), radius=0.1, jitter=0.1, velocity_jitter=1.0),
+    "scatter": Scatter(count=20, lower=(0.0, 0.0), upper=(9.0, 9.0), radius=0.1, velocity_jitter=1.0),
+    "emitter": Emitter(position=(0.0, 0.0), count=20, velocity_min=(0.0, 0.0), velocity_max=(1.0, 1.0)),
+}
+
+
+def uniform_mean(values: np.ndarray, low: float, high: float) -> None:
+    """Check that values are uniform in [low, high) as far as range, mean and variance tell."""
+    n, width = len(values), high - low
+    assert low <= values.min()
+    assert values.max() <= high
+    assert abs(values.mean() - (low + high) / 2) < 5 * width / math.sqrt(12 * n)  # 5 σ of a mean of n
+    assert abs(values.var() - width**2 / 12) < 5 * width**2 / math.sqrt(180 * n)  # 5 σ of the variance of n
+
+
+def test_grid_counts_along_rows_from_the_origin() -> None:
+    position, velocity = expand(GRID, 0, 0)
+    assert position.tolist() == [[1.0, 2.0], [1.5, 2.0], [2.0, 2.0], [1.0, -2.0], [1.5, -2.0], [2.0, -2.0]]
+    assert velocity.tolist() == [[0.0, 0.0]] * 6
+
+
+def test_grid_without_jitter_does_not_depend_on_the_seed() -> None:
+    assert np.array_equal(expand(GRID, 0, 0), expand(GRID, 99, 3))
+
+
+def test_grid_jitter_moves_each_coordinate_by_up_to_its_amount() -> None:
+    grid = Grid(origin=(0.0, 0.0), columns=50, rows=50, spacing=(1.0, 1.0), radius=0.1, jitter=0.2, velocity=(3.0, 0.0),
+                velocity_jitter=0.5)  # fmt: skip
+    still = Grid(origin=(0.0, 0.0), columns=50, rows=50, spacing=(1.0, 1.0), radius=0.1)
+    position, velocity = expand(grid, 7, 0)
+    moved = position - expand(still, 7, 0)[0]
+    for axis in (0, 1):
+        uniform_mean(moved[:, axis], -0.2 - 1e-14, 0.2 + 1e-14)  # rounding of the difference of numbers up to 50
+    uniform_mean(velocity[:, 0], 2.5, 3.5)
+    uniform_mean(velocity[:, 1], -0.5, 0.5)
+
+
+def test_scatter_stays_in_its_box_without_overlap() -> None:
+    position, velocity = expand(SCATTER, 3, 0)
+    uniform_mean(position[:, 0], -5.0, 5.0)
+    uniform_mean(position[:, 1], 0.0, 20.0)
+    assert not velocity.any()
+    apart = np.hypot(*(position[:, None] - position[None]).transpose(2, 0, 1))
+    assert apart[np.triu_indices(200, 1)].min() >= 0.2
+
+
+@given(
+    st.integers(0, 2**63 - 1),
+    st.integers(1, 40),
+    st.floats(0.01, 1.0),
+    st.floats(0.1, 0.3),
+    st.floats(0.2, 5.0),
+)
+def test_scatter_never_overlaps(seed: int, count: int, radius: float, cover: float, shape: float) -> None:
+    side = math.sqrt(count * math.pi * radius**2 / cover)
+    scatter = Scatter(count=count, lower=(0.0, 0.0), upper=(side * shape, side / shape), radius=radius)
+    position, _ = expand(scatter, seed, 0)
+    assert position.shape == (count, 2)
+    assert (position >= 0).all()
+    assert (position <= [side * shape, side / shape]).all()
+    apart = np.hypot(*(position[:, None] - position[None]).transpose(2, 0, 1)) + 1e9 * np.eye(count)
+    assert apart.min() >= 2 * radius
+
+
+@pytest.mark.parametrize("collides", ["none", "fixed"])
+def test_scatter_that_passes_through_itself_may_overlap(collides: str) -> None:
+    scatter = SCATTER.model_copy(update={"radius": 100.0, "collides": collides})
+    assert expand(scatter, 0, 0)[0].shape == (200, 2)
+
+
+@pytest.mark.parametrize("radius", [0.9, 0.6])
+def test_scatter_that_does_not_fit_says_so(radius: float) -> None:
+    with pytest.raises(GeneratorError, match=r"do not fit.*lower the\s+count") as caught:
+        expand(SCATTER.model_copy(update={"radius": radius}), 0, 4)
+    assert caught.value.location == ("scatter", 4, "count")
+
+
+def test_emitter_draws_velocities_between_its_two() -> None:
+    emitter = EMITTER.model_copy(update={"count": 5000})
+    position, velocity = expand(emitter, 1, 0)
+    assert (position == [3.0, 4.0]).all()
+    uniform_mean(velocity[:, 0], -1.0, 1.0)
+    uniform_mean(velocity[:, 1], 8.0, 12.0)
+    assert abs(np.corrcoef(velocity.T)[0, 1]) < 5 / math.sqrt(5000)  # 5 σ of a correlation of 5,000 independent pairs
+
+
+def test_emitter_of_one_velocity_has_no_spread() -> None:
+    emitter = EMITTER.model_copy(update={"velocity_min": (1.0, 2.0), "velocity_max": (1.0, 2.0)})
+    assert (expand(emitter, 1, 0)[1] == [1.0, 2.0]).all()
+
+
+@pytest.mark.parametrize("kind", LOOSE)
+def test_same_seed_same_balls_and_another_seed_others(kind: str) -> None:
+    first, again, other, elsewhere = (expand(LOOSE[kind], seed, k) for seed, k in ((5, 0), (5, 0), (6, 0), (5, 1)))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    assert not np.array_equal(first, elsewhere)
+
+
+def test_kinds_of_generators_draw_from_streams_of_their_own() -> None:
+    grid = Grid(origin=(0.0, 0.0), columns=20, spacing=(0.0, 0.0), radius=0.1, velocity_jitter=0.5)
+    emitter = Emitter(position=(0.0, 0.0), count=20, velocity_min=(-0.5, -0.5), velocity_max=(0.5, 0.5))
+    assert not np.isclose(expand(grid, 0, 0)[1], expand(emitter, 0, 0)[1]).any()
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2**32, 2**63 - 1])
+def test_every_seed_serves(seed: int) -> None:
+    assert np.isfinite(expand(LOOSE["scatter"], seed, 0)).all()
+
+
+@pytest.mark.parametrize("kind", LOOSE)
+def test_adding_generators_changes_none_before(kind: str) -> None:
+    field = f"{kind}s"
+    alone = Scene(world=World(seed=4), **{field: (LOOSE[kind],)}).bodies
+    several = {f"{other}s": (generator,) for other, generator in LOOSE.items()}
+    several[field] = (LOOSE[kind], LOOSE[kind].model_copy(update={"name": "more"}))
+    more = Scene(world=World(seed=4), **several).bodies
+    mine = [name in alone.names for name in more.names]
+    assert sum(mine) == 20
+    assert np.array_equal(more.position[mine], alone.position)
+    assert np.array_equal(more.velocity[mine], alone.velocity)
+
+
+def test_changing_a_count_keeps_the_first_of_an_emitter() -> None:
+    more = EMITTER.model_copy(update={"count": 300})
+    assert np.array_equal(expand(more, 0, 0)[1][:200], expand(EMITTER, 0, 0)[1])
+
+
+def test_draws_are_those_of_the_first_release() -> None:
+    # PCG64 keyed by [seed, kind, index]: numpy promises the stream of `random()` for good
+    expected = np.random.Generator(np.random.PCG64([1, 2, 0])).random((200, 2)) * [2.0, 4.0] + [-1.0, 8.0]
+    assert np.array_equal(expand(EMITTER, 1, 0)[1], expected)
+
+
+def test_size_counts_balls() -> None:
+    assert [size(generator) for generator in (GRID, SCATTER, EMITTER)] == [6, 200, 200]

@@ -1,0 +1,118 @@
+"""Recordings: scene and actions as one JSON document."""
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import strategies
+from hypothesis import example, given
+from hypothesis import strategies as st
+from test_action import actions
+
+from sandbox.action import Action, Impulse
+from sandbox.recording import Recording
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import loads
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+RECORDING = Recording(
+    scene=loads('[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 1\n'),
+    engine="pymunk",
+    settings=Settings(dt=0.001, slop=0.1),
+    actions=(Impulse(time=0.5, body="a", impulse=(1.0, 2.0)),),
+    duration=1.5,
+    state_hash="00ff",
+)
+
+
+def document() -> dict[str, Any]:
+    return dict(json.loads(RECORDING.to_json()))
+
+
+def paths(text: str) -> list[str]:
+    with pytest.raises(SceneError) as caught:
+        Recording.from_json(text, "r.json")
+    for fault in caught.value.faults:
+        assert fault.file == "r.json"
+        assert fault.message
+    return [fault.path for fault in caught.value.faults]
+
+
+def test_recording_written_and_read_again_is_equal() -> None:
+    assert Recording.from_json(RECORDING.to_json()) == RECORDING
+
+
+@given(strategies.scenes(), actions(), strategies.numbers(0, 1e9), st.none() | st.text(max_size=9))
+def test_any_recording_written_and_read_again_is_equal(
+    scene: Scene, done: tuple[Action, ...], duration: float, state_hash: str | None
+) -> None:
+    recording = Recording(scene, "reference", scene.solver, done, duration, state_hash)
+    text = recording.to_json()
+    assert Recording.from_json(text) == recording
+    assert Recording.from_json(text).to_json() == Recording.from_json(text).to_json()
+
+
+def test_recording_is_read_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "r.json"
+    path.write_text(RECORDING.to_json(), encoding="utf-8")
+    assert Recording.load(path) == RECORDING
+
+
+def test_recording_that_cannot_be_read_is_a_fault(tmp_path: Path) -> None:
+    binary = tmp_path / "b.json"
+    binary.write_bytes(b"\xff\xfe\x00")
+    for path in (tmp_path / "none.json", tmp_path, binary):
+        with pytest.raises(SceneError) as caught:
+            Recording.load(path)
+        assert [fault.file for fault in caught.value.faults] == [str(path)]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "null", "[]", "3", "{", "{}", '{"format": 2}', "[" * 100_000, "1" * 5000, '{"format": "1"}', "nan", "\x00"]
+)
+def test_text_that_is_no_recording_is_a_fault(text: str) -> None:
+    assert paths(text) == [""]
+
+
+@pytest.mark.parametrize("key", ["format", "scene", "engine", "settings", "actions", "duration"])
+def test_recording_without_one_of_its_parts_is_a_fault(key: str) -> None:
+    without = document()
+    del without[key]
+    assert paths(json.dumps(without)) == [""]
+
+
+@pytest.mark.parametrize(
+    ("change", "path"),
+    [
+        ({"scene": 3}, ""), ({"engine": 3}, ""), ({"engine": None}, ""), ({"settings": []}, ""), ({"actions": {}}, ""),
+        ({"duration": "1"}, ""), ({"duration": True}, ""), ({"duration": -1.0}, ""), ({"duration": math.nan}, ""),
+        ({"duration": math.inf}, ""), ({"duration": 10**400}, ""), ({"state_hash": 3}, ""), ({"state_hash": []}, ""),
+        ({"settings": {"dt": -1}}, "settings.dt"), ({"settings": {"zzz": -1}}, "settings.zzz"),
+        ({"settings": {"\ud800": 1}}, "settings"), ({"actions": [3]}, "actions"), ({"actions": ["\ud800"]}, "actions"),
+        ({"scene": {"ball": [{"position": [0, 0], "radius": -1}]}}, "ball[0].radius"),
+        ({"scene": {"ball": [{"position": [0, 0], "radius": 1, "material": "x"}]}}, "ball[0].material"),
+        ({"scene": {"title": "\ud800"}}, ""), ({"scene": {"balls": [{"x": 1}]}}, "balls"),
+    ],
+)  # fmt: skip
+def test_recording_with_a_wrong_part_is_a_fault(change: dict[str, Any], path: str) -> None:
+    assert paths(json.dumps({**document(), **change})) == [path]
+
+
+@given(st.sampled_from(sorted(document())), strategies.junk())
+@example("settings", {"": 1})
+@example("scene", {})
+def test_any_part_gives_a_recording_or_a_scene_error(key: str, value: Any) -> None:
+    text = json.dumps({**document(), key: value}, default=str)
+    try:
+        assert isinstance(Recording.from_json(text), Recording)
+    except SceneError as error:
+        assert error.faults
+
+
+def test_recording_is_frozen() -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        RECORDING.engine = "box2d"  # type: ignore[misc] # the point of the test

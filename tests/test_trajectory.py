@@ -1,0 +1,214 @@
+"""Trajectories: arrays that are stored whole or not at all."""
+
+import dataclasses
+import math
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from sandbox.trajectory import ContactEvent, Contacts, Trajectory
+
+ARRAYS = [field.name for field in dataclasses.fields(Trajectory) if field.name != "info"]
+
+
+def trajectory(frames: int = 4, bodies: int = 3, contacts: int = 2, **info: Any) -> Trajectory:
+    """Return a trajectory of random numbers."""
+    draw = np.random.default_rng(1).standard_normal
+    return Trajectory(
+        time=np.arange(frames) * 0.1,
+        position=draw((frames, bodies, 2)),
+        velocity=draw((frames, bodies, 2)),
+        angle=draw((frames, bodies)),
+        angular_velocity=draw((frames, bodies)),
+        names=np.array([f"bödy {k} 🎱" for k in range(bodies)], dtype=np.str_),
+        contact_time=draw(contacts),
+        contact_pair=np.array([[k, -1 - k] for k in range(contacts)], dtype=np.int64).reshape(-1, 2),
+        contact_point=draw((contacts, 2)),
+        contact_normal=draw((contacts, 2)),
+        contact_impulse=draw((contacts, 2)),
+        retired_time=np.array([math.nan] * bodies),
+        missed_time=draw(1),
+        missed_pair=np.array([[0, 1]]),
+        info={"status": "ok", "reason": None, "audited": True, **info},
+    )
+
+
+def equal(a: Trajectory, b: Trajectory) -> bool:
+    """Tell whether two trajectories are the same to the bit, types of their arrays too."""
+    same = all(
+        getattr(a, key).dtype == getattr(b, key).dtype
+        and getattr(a, key).shape == getattr(b, key).shape
+        and getattr(a, key).tobytes() == getattr(b, key).tobytes()
+        for key in ARRAYS
+    )
+    return same and a.info == b.info
+
+
+@pytest.mark.parametrize("shape", [(4, 3, 2), (1, 0, 0), (0, 0, 0), (2, 1, 0)])
+def test_trajectory_saved_and_loaded_is_the_same_to_the_bit(tmp_path: Path, shape: tuple[int, int, int]) -> None:
+    before = trajectory(*shape, scene='title = "é"\n', energy_start=0.1, versions={"numpy": np.__version__})
+    path = before.save(tmp_path / "run.npz")
+    assert path == tmp_path / "run.npz"
+    assert equal(Trajectory.load(path), before)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["run.npz"]
+
+
+def test_special_numbers_survive(tmp_path: Path) -> None:
+    before = trajectory()
+    before.position[:] = np.resize([math.nan, math.inf, -math.inf, -0.0, 5e-324, 1.7e308], before.position.shape)
+    assert equal(Trajectory.load(before.save(tmp_path / "run.npz")), before)
+
+
+def test_stored_arrays_bear_the_names_of_the_attributes(tmp_path: Path) -> None:
+    with np.load(trajectory().save(str(tmp_path / "run.npz")), allow_pickle=False) as stored:
+        assert set(stored.files) == {*ARRAYS, "info"}
+        assert stored["position"].shape == (4, 3, 2)
+
+
+def test_name_of_the_file_is_kept_as_it_is(tmp_path: Path) -> None:
+    for name in ("run", "run.tmp", "a b.é.npz", ".hidden"):
+        path = trajectory().save(tmp_path / name)
+        assert path.name == name
+        assert path.exists()
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_saving_again_replaces(tmp_path: Path) -> None:
+    path = tmp_path / "run.npz"
+    trajectory(4).save(path)
+    trajectory(9).save(path)
+    assert len(Trajectory.load(path).time) == 9
+
+
+class Interrupted(BaseException):
+    """Stands for Ctrl+C."""
+
+
+@pytest.mark.parametrize("error", [OSError("disk full"), Interrupted(), MemoryError()])
+def test_failing_write_leaves_neither_file_nor_temporary(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    def half(stream: Any, **arrays: Any) -> None:
+        stream.write(b"half a file")
+        raise error
+
+    monkeypatch.setattr(np, "savez_compressed", half)
+    with pytest.raises(type(error)):
+        trajectory().save(tmp_path / "run.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failing_write_keeps_what_was_there(tmp_path: Path) -> None:
+    path = trajectory().save(tmp_path / "run.npz")
+    before = path.read_bytes()
+    with pytest.raises(TypeError):
+        trajectory(9, reason=object()).save(path)  # no JSON value
+    assert path.read_bytes() == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["run.npz"]
+
+
+def test_failing_rename_leaves_no_temporary(tmp_path: Path) -> None:
+    (tmp_path / "run.npz").mkdir()
+    with pytest.raises(OSError, match="run.npz"):
+        trajectory().save(tmp_path / "run.npz")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["run.npz"]
+
+
+def test_writing_into_a_folder_that_is_not_there_fails(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        trajectory().save(tmp_path / "none" / "run.npz")
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00" * 100, b"PK\x03\x04", b"title = 'x'", b"\x93NUMPY\x01\x00"])
+def test_file_that_is_no_archive_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "run.npz"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match="is no stored run"):
+        Trajectory.load(path)
+
+
+def test_other_arrays_are_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", time=np.zeros(3))
+    with pytest.raises(ValueError, match="it has no angle"):
+        Trajectory.load(tmp_path / "run.npz")
+    np.save(tmp_path / "one.npy", np.zeros(3))
+    with pytest.raises(ValueError, match="is no stored run"):
+        Trajectory.load(tmp_path / "one.npy")
+
+
+def test_arrays_of_objects_are_refused_unpickled(tmp_path: Path) -> None:
+    arrays = {key: np.zeros(1) for key in ARRAYS} | {"info": np.asarray("{}"), "time": np.array([{}], dtype=object)}
+    np.savez(tmp_path / "run.npz", allow_pickle=True, **arrays)
+    with pytest.raises(ValueError, match="is no stored run"):
+        Trajectory.load(tmp_path / "run.npz")
+
+
+def test_info_that_is_no_json_is_refused(tmp_path: Path) -> None:
+    arrays: dict[str, Any] = {key: np.zeros(1) for key in ARRAYS}
+    np.savez(tmp_path / "run.npz", **arrays, info=np.asarray("{"))
+    with pytest.raises(ValueError, match="is no stored run"):
+        Trajectory.load(tmp_path / "run.npz")
+
+
+def test_missing_file_says_so(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        Trajectory.load(tmp_path / "none.npz")
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.randoms(use_true_random=False), st.integers(0, 1))
+def test_damaged_file_is_refused_or_read(tmp_path: Path, chance: random.Random, cut: int) -> None:
+    path = trajectory().save(tmp_path / "run.npz")
+    content = bytearray(path.read_bytes())
+    if cut:
+        del content[chance.randrange(len(content)) :]
+    else:
+        for _ in range(chance.randrange(1, 4)):
+            content[chance.randrange(len(content))] = chance.randrange(256)
+    path.write_bytes(content)
+    try:
+        assert isinstance(Trajectory.load(path), Trajectory)
+    except ValueError as error:
+        assert "is no stored run" in str(error)
+
+
+def test_number_finds_a_body_by_name() -> None:
+    assert trajectory().number("bödy 1 🎱") == 1
+    with pytest.raises(KeyError):
+        trajectory().number("bödy")
+
+
+def test_status_reason_and_missed_contacts_are_those_of_the_run() -> None:
+    done = trajectory(status="diverged", reason="too fast")
+    assert (done.status, done.reason, done.missed_contacts) == ("diverged", "too fast", 1)
+    assert trajectory().reason is None
+    assert trajectory(audited=False).missed_contacts is None
+
+
+def test_contacts_are_rows() -> None:
+    run = trajectory(contacts=2)
+    contacts = Contacts(run.contact_time, run.contact_pair, run.contact_point, run.contact_normal, run.contact_impulse)
+    rows = list(contacts)
+    assert len(contacts) == len(rows) == 2
+    assert rows[1] == ContactEvent(
+        time=float(run.contact_time[1]),
+        pair=(1, -2),
+        point=(float(run.contact_point[1, 0]), float(run.contact_point[1, 1])),
+        normal=(float(run.contact_normal[1, 0]), float(run.contact_normal[1, 1])),
+        impulse=(float(run.contact_impulse[1, 0]), float(run.contact_impulse[1, 1])),
+    )
+    assert [type(value) for value in (rows[1].time, *rows[1].pair)] == [float, int, int]
+
+
+def test_no_contacts_are_empty_arrays_of_the_same_kinds() -> None:
+    none = Contacts.none()
+    assert len(none) == 0
+    assert list(none) == []
+    assert none.time.shape == (0,)
+    assert none.pair.shape == none.point.shape == none.normal.shape == none.impulse.shape == (0, 2)
+    assert none.pair.dtype == np.int64
