@@ -19,7 +19,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Frame:
-    """The state of N bodies at one time, in scene order."""
+    """The state of N bodies at one time, in scene order. The arrays cannot be written to."""
 
     time: float
     """s"""
@@ -33,6 +33,11 @@ class Frame:
     """(N,) rad/s"""
     present: BoolArray
     """(N,) false once removed or retired: the body then stays where it was, with no velocity"""
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays, which frames may share."""
+        for array in (self.position, self.velocity, self.angle, self.angular_velocity, self.present):
+            array.flags.writeable = False
 
 
 class ContactEvent(NamedTuple):

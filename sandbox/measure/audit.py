@@ -33,11 +33,11 @@ class Audit:
 
     Within a substep, in which every centre moves along a straight line, a pair that can meet is missed when
 
-    1. it jumps: its relative displacement is at least `JUMP` (0.1 %) of its contact distance. One that moves less
+    1. it jumps: its relative displacement is at least `JUMP` (1 %) of its contact distance. One that moves less
        cannot be through before it is looked at;
     2. it is clear at the start: no deeper than half the tolerance, and not in contact at the end of the last
        substep;
-    3. it is deep somewhere on the way: by more than `TOLERANCE` (1e-6) of its contact distance;
+    3. it is deep somewhere on the way: by more than `TOLERANCE` (1e-4) of its contact distance;
     4. the engine did not see it in time: the pair is not in contact at the end, or is but no longer approaches
        there, its closest approach lying behind.
 
@@ -49,8 +49,8 @@ class Audit:
 
     So a passage counts once: a pair that is through or still inside is not clear, or moves away.
 
-    Limits: motion is taken to be straight, as in pymunk, with no rotation, which circles do not feel. The cost
-    grows with (bodies that jump) × (segments and planes); among balls with the pairs that are near.
+    Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
+    planes), and among balls with the pairs that are near.
     """
 
     def __init__(self, scene: Scene, bodies: Bodies | None = None) -> None:
@@ -143,15 +143,16 @@ class Audit:
             move = end - start
             move *= move
             length2 = move[..., 0] + move[..., 1]
-            fast = np.asarray(length2 >= self._least2)
+        fast = length2 >= self._least2
         if fast.any():
+            lost = ~(length2 < FAR**2)
             when, who = np.nonzero(fast)
-            lost = ~((np.abs(start[when, who]) < FAR) & (np.abs(end[when, who]) < FAR)).all(axis=1)
+            lost[when, who] |= (np.abs(start[when, who]) > FAR).any(axis=1)
             if lost.any():
-                when, who = when[lost], who[lost]
-                start[when, who] = end[when, who] = np.nan
-                fast[when, who] = False
-            nearing = 2 * float(np.sqrt(np.max(length2, where=length2 < np.inf, initial=0.0)))
+                start[lost] = end[lost] = np.nan
+                length2[lost] = 0.0
+                fast &= ~lost
+            nearing = 2 * float(np.sqrt(length2.max()))
             found = self._balls(start, end, fast, nearing), self._fixed(start, end, fast)
             when = np.concatenate([when for when, _ in found])
             pairs = np.concatenate([pairs for _, pairs in found])

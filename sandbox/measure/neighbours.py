@@ -1,8 +1,8 @@
 """Neighbours: the pairs of balls that may meet in a substep, kept from one substep to the next.
 
 A Verlet list: it holds every pair within a skin of contact, and stays complete for all bodies that have moved
-less than half the skin since. The few that moved farther, such as a bullet, are held against all others in
-rows; when those have cost as much as a list does, it is built anew.
+less than half the skin since. The few that moved farther are listed again, against all others in rows, with a
+skin of their own if they are as fast as a bullet; when they are many, the whole list is built anew.
 Source: L. Verlet, Computer "experiments" on classical fluids I, Phys. Rev. 159 (1967), 98.
 """
 
@@ -20,6 +20,8 @@ LASTING = 32.0
 """Substeps for which a list is meant to last, as far as half its skin then stays within a radius."""
 LEAST_SKIN = 0.1
 """Half the skin is at least this part of the typical radius: thin lists save nothing more."""
+ROUNDING = 1e-9
+"""Reaches are taken longer by this part, far above rounding (1e-16), so that it hides no pair."""
 CELL_SHARE = 4.5
 """Of the candidates in a body's nine cells, each pair is met once."""
 
@@ -43,7 +45,8 @@ class Neighbours:
         self._typical = float(np.median(radius[self._party])) if len(self._party) else 0.0
         self._few = BUILDING_EACH + BUILDING // max(len(self._party), 1)
         self._anchor = np.full((len(radius), 2), np.inf)
-        self._half_skin = self._typical
+        self._skin = self._typical
+        self._half_skin = np.full(len(radius), self._typical)
         self._first = self._second = np.empty(0, np.int64)
 
     def encounters(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> Encounters:
@@ -58,71 +61,62 @@ class Neighbours:
             Substeps, and of each pair the lower and the higher number, (K,) each; nothing twice.
         """
         strays = self._strays(start, end)
-        count = np.count_nonzero(strays)
-        if count > self._few:
+        if np.count_nonzero(strays) > self._few:
             usual = self._usual(start[0], end[0])
             skin = min(max(LASTING * usual, LEAST_SKIN * self._typical), self._typical)
             lasting = max(1, int(skin / usual)) if usual > 0 else len(start)
             if lasting < len(start):
                 early = self.encounters(start[:lasting], end[:lasting], fast[:lasting])
                 when, first, second = self.encounters(start[lasting:], end[lasting:], fast[lasting:])
-                return _joined([early, (when + lasting, first, second)])
-            self._build(start[0], skin if skin >= usual else None)
-        elif count:
-            self._renew(start[0], strays)
-        if count:
+                late = when + lasting, first, second
+                when, first, second = map(np.concatenate, zip(early, late, strict=True))
+                return when, first, second
+            if usual > skin:
+                return self._swept(start[0], end[0], fast[0])
+            self._build(start[0], skin)
             strays = self._strays(start, end)
+        if strays.any():
+            self._renew(start, end, np.flatnonzero(strays))
         ever = fast.any(axis=0)
-        listed = ever[self._first] | ever[self._second]
-        astray = bool(strays.any())
-        if astray:
-            listed &= ~(strays[self._first] | strays[self._second])
+        listed = np.flatnonzero(ever[self._first] | ever[self._second])
         first, second = self._first[listed], self._second[listed]
         when, at = np.nonzero(fast[:, first] | fast[:, second])
-        found = [(when, first[at], second[at])]
-        if astray:
-            for step in np.flatnonzero(fast.any(axis=1)).tolist():
-                first, second = self._swept(start[step], end[step], fast[step], strays)
-                found.append((np.full(len(first), step), first, second))
-        return _joined(found)
+        return when, first[at], second[at]
 
     def _strays(self, start: FloatArray, end: FloatArray) -> BoolArray:
-        """Return who left its half of the skin in any of the substeps, (N,)."""
-        # Of the box around its places, the corner that is farthest from its anchor.
-        low = np.minimum(start.min(axis=0), end.min(axis=0)) - self._anchor
-        high = np.maximum(start.max(axis=0), end.max(axis=0)) - self._anchor
-        far = np.maximum(high, -low)
-        far *= far
-        distance2 = far[:, 0] + far[:, 1]
+        """Return who leaves its half of the common skin in any of the substeps, or had one of its own, (N,)."""
         gone = np.isnan(start[0, :, 0])
-        return self._member & ~(distance2 <= self._half_skin**2) & ~gone
+        home = (_farthest(start, end, self._anchor) <= self._skin) & (self._half_skin <= self._skin)
+        return self._member & ~gone & ~home
 
     def _whole(self, start: FloatArray, end: FloatArray) -> IntArray:
         """Return the numbers of those who are there before and after."""
         return self._party[np.isfinite(start[self._party] + end[self._party]).all(axis=1)]
 
-    def _swept(self, start: FloatArray, end: FloatArray, fast: BoolArray, strays: BoolArray) -> Pairs:
-        """Return the pairs with a stray that may meet on their way: by the circles around their paths."""
+    def _swept(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> Encounters:
+        """Return the pairs that may meet in one substep: by the circles around their paths."""
+        self._anchor[:] = np.inf
+        self._first = self._second = np.empty(0, np.int64)
         party = self._whole(start, end)
-        here, there = start[party], end[party]
-        move = there - here
-        reach = self._radius[party] + 0.5 * np.sqrt((move * move).sum(axis=1)) * (1 + 1e-9)  # rounding, 1e-16
-        middle = here + 0.5 * move
-        which = np.flatnonzero(strays[party])
-        close = self._close(middle, reach) if len(which) > self._few else _in_rows(which, middle, reach)
-        first, second = self._numbered(party, close, fast)
-        keep = strays[first] | strays[second]
-        return first[keep], second[keep]
+        here, move = start[party], end[party] - start[party]
+        reach = self._radius[party] + 0.5 * np.sqrt((move * move).sum(axis=1)) * (1 + ROUNDING)
+        first, second = self._numbered(party, self._close(here + 0.5 * move, reach), fast)
+        return np.zeros_like(first), first, second
 
-    def _renew(self, place: FloatArray, strays: BoolArray) -> None:
-        """Take strays back into the list, where they are now."""
-        self._anchor[strays] = place[strays]
+    def _renew(self, start: FloatArray, end: FloatArray, strays: IntArray) -> None:
+        """Take strays back into the list, where they are now, with a skin that holds them for these substeps."""
+        self._anchor[strays] = start[0, strays]
+        here = start[0, strays]
+        first, last = (np.where(np.isnan(way), here, way) for way in (start[:, strays], end[:, strays]))
+        self._half_skin[strays] = np.maximum(_farthest(first, last, here), self._skin)
         party = self._party[np.isfinite(self._anchor[self._party]).all(axis=1)]
-        reach = self._radius[party] + self._half_skin * (1 + 1e-9)  # the skin ends in rounding, 1e-16
-        rows = np.flatnonzero(strays[party])
+        reach = self._radius[party] + self._half_skin[party] * (1 + ROUNDING)
+        astray = np.zeros_like(self._member)
+        astray[strays] = True
+        rows = np.flatnonzero(astray[party])
         everyone = np.ones_like(self._member)
         first, second = self._numbered(party, _in_rows(rows, self._anchor[party], reach), everyone)
-        keep = ~(strays[self._first] | strays[self._second])
+        keep = ~(astray[self._first] | astray[self._second])
         self._first = np.concatenate((self._first[keep], first))
         self._second = np.concatenate((self._second[keep], second))
 
@@ -132,16 +126,13 @@ class Neighbours:
         jump = np.sort(np.sqrt(((end[party] - start[party]) ** 2).sum(axis=1)))
         return float(jump[max(len(jump) - 1 - self._few // 2, len(jump) // 2)]) if len(jump) else 0.0
 
-    def _build(self, place: FloatArray, half_skin: float | None) -> None:
-        """List the pairs within a skin, or none, where bodies move too far for any list to last."""
-        self._anchor[:] = np.inf
-        self._first = self._second = np.empty(0, np.int64)
-        if half_skin is None:
-            return
-        self._half_skin = half_skin
+    def _build(self, place: FloatArray, skin: float) -> None:
+        """List the pairs that are less than two half skins from contact."""
+        self._skin = skin
+        self._half_skin[:] = skin
+        self._anchor[:] = place
         party = self._whole(place, place)
-        self._anchor[party] = place[party]
-        reach = self._radius[party] + half_skin * (1 + 1e-9)  # the skin ends in rounding, 1e-16
+        reach = self._radius[party] + skin * (1 + ROUNDING)
         everyone = np.ones_like(self._member)
         self._first, self._second = self._numbered(party, self._close(place[party], reach), everyone)
 
@@ -187,6 +178,10 @@ def _in_rows(rows: IntArray, centre: FloatArray, reach: FloatArray) -> Iterator[
         yield i[once], j[once]
 
 
-def _joined(found: list[Encounters]) -> Encounters:
-    when, first, second = (np.concatenate(column) for column in zip(*found, strict=True))
-    return when, first, second
+def _farthest(start: FloatArray, end: FloatArray, anchor: FloatArray) -> FloatArray:
+    """Return how far (N,) bodies get from their anchors in B substeps, at most: to corners of boxes."""
+    low = np.minimum(start.min(axis=0), end.min(axis=0)) - anchor
+    high = np.maximum(start.max(axis=0), end.max(axis=0)) - anchor
+    far = np.maximum(high, -low)
+    far *= far
+    return np.asarray(np.sqrt(far[:, 0] + far[:, 1]))

@@ -45,8 +45,9 @@ class Paths:
 
     def some(self, which: IntArray) -> Self:
         """Return some of them."""
-        columns = (self.when, self.who, self.start, self.end, self.radius)
-        return type(self)(*(column[which] for column in columns))
+        return type(self)(
+            self.when[which], self.who[which], self.start[which], self.end[which], self.radius[which]
+        )
 
 
 @dataclass(frozen=True, eq=False)

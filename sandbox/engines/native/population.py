@@ -52,6 +52,11 @@ class Population:
         """(N,) which bodies are there and not fixed."""
         return self.present & ~self.bodies.fixed
 
+    @property
+    def turns(self) -> bool:
+        """Whether some angle may change."""
+        return self.free.turns or len(self.meeting) > 0
+
     def number(self, name: str) -> int:
         """Return the number of a body that is there.
 
@@ -99,13 +104,14 @@ class Population:
         flying = meet.free[numbers]
         # What contacts cannot turn gets no moment in the space; in flight it keeps it, for the torques of actions.
         turned = np.where(meet.turnable, bodies.moment, math.inf)
+        state = self.position, self.velocity, self.angle, self.angular_velocity
         for half, chosen, moment in (
             (self.free, numbers[flying & ~bodies.fixed[numbers]], bodies.moment),
             (self.meeting, numbers[~flying], turned),
         ):
-            state = self.position, self.velocity, self.angle, self.angular_velocity
             position, velocity, angle, spin = (array[chosen] for array in state)
             half.join(chosen, bodies, position, velocity, angle, spin, moment[chosen])
+        self.free.live_in(*state)
 
     def change(self, scene: Scene) -> None:
         """Go on with a scene that differs in air, gravity or coefficients alone."""

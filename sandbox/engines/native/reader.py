@@ -4,7 +4,8 @@ import numpy as np
 import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 
-from sandbox.trajectory import BoolArray, FloatArray, IntArray
+from sandbox.engines.native.ids import IdTable
+from sandbox.trajectory import FloatArray, IntArray
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 STATE_WIDTH = 6  # x, y, angle, vx, vy, ω: in the order of pymunk's flags
@@ -36,22 +37,16 @@ class Reader:
     def __init__(self, space: pymunk.Space) -> None:
         self._space = space
         self._bodies, self._arbiters, self._forces = Buffer(), Buffer(), Buffer()
-        self._base = 0
-        self._number_of: IntArray = np.empty(0, np.int64)
-        self._moves: BoolArray = np.empty(0, np.bool_)
+        self._number_of = IdTable({})
+        self._moving: IntArray = np.empty(0, np.int64)
         self._moved, self._first, self._all = True, True, 0
         self._rows: IntArray = np.empty(0, np.int64)
         self._numbers: IntArray = np.empty(0, np.int64)
 
     def assign(self, moving: dict[int, int], still: dict[int, int]) -> None:
         """Say which number each body's id stands for: of those that move, and of the static ones."""
-        both = moving | still
-        ids = np.fromiter(both, np.int64, len(both))
-        self._base = int(ids.min()) if len(ids) else 0
-        size = int(ids.max()) - self._base + 1 if len(ids) else 0
-        self._number_of, self._moves = np.zeros(size, np.int64), np.zeros(size, np.bool_)
-        self._number_of[ids - self._base] = np.fromiter(both.values(), np.int64, len(both))
-        self._moves[np.fromiter(moving, np.int64, len(moving)) - self._base] = True
+        self._number_of = IdTable(moving | still)
+        self._moving = np.array(sorted(moving), dtype=np.int64)
         self._moved = True
 
     def state(self) -> tuple[IntArray, FloatArray]:
@@ -74,9 +69,9 @@ class Reader:
         """Find out by their ids which row is which body. The order holds until bodies come or go."""
         self._bodies.clear()
         get_space_bodies(self._space, BodyFields.BODY_ID, self._bodies)
-        ids = np.frombuffer(self._bodies.int_buf(), np.int64) - self._base
-        self._rows = np.flatnonzero(self._moves[ids])
-        self._numbers = self._number_of[ids[self._rows]]
+        ids = np.frombuffer(self._bodies.int_buf(), np.int64)
+        self._rows = np.flatnonzero(np.isin(ids, self._moving))
+        self._numbers = self._number_of.numbers(ids[self._rows])
         self._first = np.array_equal(self._rows, np.arange(len(self._rows)))  # static bodies come last
         self._all = len(ids)
         self._moved = False
@@ -99,5 +94,5 @@ class Reader:
         live = words[:, 2] > 0  # a parted contact is remembered for a while, with no points
         if not live.all():
             words, table = words[live], table[live]
-        a, b = self._number_of[words[:, 0] - self._base], self._number_of[words[:, 1] - self._base]
+        a, b = self._number_of.numbers(words[:, 0]), self._number_of.numbers(words[:, 1])
         return a, b, table[:, 0:2], table[:, 2:4], (table[:, 4:6] + table[:, 6:8]) * 0.5

@@ -36,6 +36,7 @@ class NativeSimulation:
         self._ledger: ContactLedger | None = None
         self._observer: Observer | None = None
         self._retired: dict[int, float] = {}
+        self._still: tuple[FloatArray, FloatArray] | None = None  # angles and spins, which frames share if they can
 
     @property
     def time(self) -> float:
@@ -99,6 +100,7 @@ class NativeSimulation:
             ActionError: it cannot be done. Nothing has changed then.
         """
         self._check_running()
+        self._still = None
         leaving = perform(action, self._population)
         if leaving is not None:
             self._take_out(leaving)
@@ -106,9 +108,13 @@ class NativeSimulation:
     def frame(self) -> Frame:
         """Return the present state."""
         population = self._population
-        position, velocity, angle, angular_velocity = (array.copy() for array in self._state())
+        position, velocity, angle, angular_velocity = self._state()
+        position, velocity = position.copy(), velocity.copy()
         if self._settings.half_kick:
             velocity[population.moving] -= population.ahead
+        if population.turns or self._still is None:
+            self._still = angle.copy(), angular_velocity.copy()
+        angle, angular_velocity = self._still
         return Frame(self.time, position, velocity, angle, angular_velocity, population.present.copy())
 
     def contacts(self) -> Contacts:
@@ -185,5 +191,6 @@ class NativeSimulation:
             self._take_out(number)
 
     def _take_out(self, number: int) -> None:
+        self._still = None
         self._population.take_out(number)
         self._retired[number] = self.time

@@ -1,0 +1,172 @@
+"""Free flight: closed forms to rounding, and bit for bit what pymunk itself does."""
+
+import math
+
+import numpy as np
+import pymunk
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sandbox.engines.registry import start
+from sandbox.scene.file import from_document
+
+EPS = np.finfo(float).eps
+
+
+def scene(balls: list[dict[str, object]], world: dict[str, object], **solver: object):
+    return from_document({"world": world, "solver": solver, "ball": balls})
+
+
+coordinates = st.floats(-1e6, 1e6)
+speeds = st.floats(-1e4, 1e4)
+
+
+@given(
+    st.lists(st.tuples(coordinates, coordinates, speeds, speeds, st.floats(-50, 50)), min_size=1, max_size=5),
+    st.tuples(st.floats(-100, 100), st.floats(-100, 100)),
+    st.floats(1e-5, 0.5),
+    st.integers(1, 4),
+)
+def test_bodies_that_meet_nothing_fly_bit_for_bit_as_in_pymunk(states, gravity, dt, substeps):
+    balls = [
+        {"position": [x, y], "velocity": [vx, vy], "angular_velocity": w, "radius": 1.0, "collides": "none"}
+        for x, y, vx, vy, w in states
+    ]
+    simulation = start(scene(balls, {"gravity": list(gravity)}, dt=dt, substeps=substeps))
+    assert simulation.flying == len(states)
+
+    space = pymunk.Space()
+    space.gravity = gravity
+    bodies = []
+    for x, y, vx, vy, w in states:
+        body = pymunk.Body(1.0, 0.5)
+        body.position, body.velocity, body.angular_velocity = (x, y), (vx, vy), w
+        space.add(body)
+        bodies.append(body)
+
+    for _ in range(20):
+        simulation.step()
+        for _ in range(substeps):
+            space.step(dt / substeps)
+    frame = simulation.frame()
+    assert np.array_equal(frame.position, [tuple(body.position) for body in bodies])
+    assert np.array_equal(frame.velocity, [tuple(body.velocity) for body in bodies])
+    assert np.array_equal(frame.angle, [body.angle for body in bodies])
+    assert np.array_equal(frame.angular_velocity, [body.angular_velocity for body in bodies])
+
+
+@given(st.floats(1e-3, 0.1), st.integers(1, 200), st.floats(-20, 20))
+def test_euler_leads_by_half_g_h_t(dt, steps, speed):
+    simulation = start(scene([{"position": [0, 10], "velocity": [0, speed], "radius": 1}], {"gravity": [0, -9.81]}, dt=dt))
+    for _ in range(steps):
+        simulation.step()
+    time, y = steps * dt, float(simulation.frame().position[0, 1])
+    exact = 10 + speed * time - 0.5 * 9.81 * time**2
+    # The scheme's error is +g·h·T/2 exactly; the rest is rounding, of at most a few ulp of the largest term a step.
+    scale = 10 + abs(speed) * time + 9.81 * time**2
+    assert y - exact == pytest.approx(0.5 * 9.81 * dt * time, abs=4 * steps * EPS * scale)
+
+
+@given(st.floats(1e-3, 0.1), st.integers(1, 200), st.tuples(st.floats(-20, 20), st.floats(-20, 20)))
+def test_half_kick_is_exact_to_rounding(dt, steps, velocity):
+    world = {"gravity": [1.5, -9.81]}
+    ball = {"position": [3, 10], "velocity": list(velocity), "radius": 1}
+    simulation = start(scene([ball], world, dt=dt, half_kick=True))
+    assert np.array_equal(simulation.frame().velocity[0], velocity) or np.allclose(
+        simulation.frame().velocity[0],
+        velocity,
+        rtol=0,
+        atol=64 * EPS * (20 + 9.81 * dt),  # g·h/2 is added and taken off again
+    )
+    for _ in range(steps):
+        simulation.step()
+    time, frame = steps * dt, simulation.frame()
+    g, v = np.asarray(world["gravity"]), np.asarray(velocity)
+    scale = 10 + 20 * time + 9.81 * time**2
+    # A rounding or two of the largest term, each step.
+    assert np.allclose(frame.position[0], [3, 10] + v * time + 0.5 * g * time**2, rtol=0, atol=4 * steps * EPS * scale)
+    assert np.allclose(frame.velocity[0], v + g * time, rtol=0, atol=4 * steps * EPS * (20 + 9.81 * time))
+
+
+@given(st.floats(0.01, 50), st.floats(1e-3, 0.5), st.tuples(st.floats(-20, 20), st.floats(-20, 20)))
+def test_linear_drag_is_exact_in_velocity(k, dt, wind):
+    world = {"gravity": [0, -9.81], "linear_drag": k, "wind": list(wind)}
+    simulation = start(scene([{"position": [0, 0], "velocity": [30, 40], "radius": 1}], world, dt=dt))
+    for _ in range(50):
+        simulation.step()
+    time = 50 * dt
+    terminal = np.asarray(wind) + np.array([0, -9.81]) / k
+    exact = terminal + (np.array([30, 40]) - terminal) * math.exp(-k * time)
+    # Each of the 50 steps rounds sums of the size of the largest velocity there is.
+    scale = 60 + float(np.abs(terminal).max())
+    assert np.allclose(simulation.frame().velocity[0], exact, rtol=0, atol=50 * 8 * EPS * scale)
+
+
+@pytest.mark.parametrize(("linear", "quadratic"), [(0.2, 0.0), (0.0, 0.01), (0.1, 0.02)])
+def test_drag_converges_in_first_order(linear, quadratic):
+    from scipy.integrate import solve_ivp
+
+    gravity, wind = np.array([0, -9.81]), np.array([-8.0, 0.0])
+
+    def slope(_, state):
+        u = state[2:] - wind
+        return np.concatenate((state[2:], gravity - (linear + quadratic * np.hypot(*u)) * u))
+
+    start_state = [0, 0, 35, 35]
+    oracle = solve_ivp(slope, (0, 4), start_state, method="DOP853", rtol=1e-12, atol=1e-12).y[:2, -1]
+    world = {
+        "gravity": [0, -9.81],
+        "linear_drag": linear,
+        "quadratic_drag": quadratic,
+        "wind": [-8, 0],
+        "duration": 4,
+    }
+    steps = np.array([0.04, 0.02, 0.01, 0.005])
+    errors = []
+    for dt in steps:
+        simulation = start(scene([{"position": [0, 0], "velocity": [35, 35], "radius": 1}], world, dt=float(dt)))
+        for _ in range(round(4 / dt)):
+            simulation.step()
+        errors.append(np.hypot(*(simulation.frame().position[0] - oracle)))
+    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert order == pytest.approx(1.0, abs=0.2)  # the project's band for a fitted order
+
+
+@pytest.mark.parametrize("drag", [{"linear_drag": 1e9}, {"quadratic_drag": 1e9}, {"quadratic_drag": 3.0}])
+def test_drag_is_stable_however_strong(drag):
+    world = {"gravity": [0, -9.81], **drag}
+    simulation = start(scene([{"position": [0, 0], "velocity": [1e3, 0], "radius": 1}], world, dt=10.0))
+    fastest = 1e3
+    for _ in range(100):
+        simulation.step()
+        speed = float(np.hypot(*simulation.frame().velocity[0]))
+        # Slower and slower, down to the terminal velocity at most.
+        assert speed <= max(fastest, 9.81 / drag.get("linear_drag", 1e-9) + 2 * math.sqrt(9.81 / 1.0))
+        fastest = max(speed, 1e-3)
+
+
+def test_the_two_halves_obey_one_rule_with_drag_and_force():
+    """A ball in the space that never touches anything goes bit for bit as one outside of it."""
+    from sandbox.action import Force
+
+    world = {"gravity": [0.3, -9.81], "linear_drag": 0.7, "quadratic_drag": 0.05, "wind": [3, -1]}
+    alike = {"velocity": [3.0, 12.0], "radius": 0.1, "mass": 0.37}
+    document = {
+        "world": world,
+        "solver": {"dt": 0.01},
+        "ball": [
+            {"name": "free", "position": [0, 0], "collides": "none", **alike},
+            {"name": "meeting", "position": [0, 0], **alike},
+        ],
+        "plane": [{"point": [0, -900], "normal": [0, 1]}],
+    }
+    simulation = start(from_document(document))
+    assert simulation.flying == 1
+    for name in ("free", "meeting"):
+        simulation.apply(Force(time=0, body=name, force=(0.11, -0.07)))
+    for _ in range(300):
+        simulation.step()
+    frame = simulation.frame()
+    assert np.array_equal(frame.position[0], frame.position[1])
+    assert np.array_equal(frame.velocity[0], frame.velocity[1])

@@ -1,0 +1,234 @@
+"""Benchmarks: what this project claims about speed, as ratios against a peer in the same run.
+
+    python tools/bench.py [NAME…] [--json] [--repeats N]
+
+Ours and the peer take turns, after a warm-up, so that a noisy machine meets both; the ratio is that of the medians.
+A row is one entry of BENCHES. Times are seconds unless the unit says otherwise.
+"""
+
+import argparse
+import json
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import peers
+
+from sandbox.engines.registry import start
+from sandbox.measure.run import run
+from sandbox.measure.versions import machine, versions
+from sandbox.scene.file import load
+from sandbox.scene.model import Scene
+from sandbox.scene.shipped import find
+
+Timed = Callable[[], float]
+"""Does the work once and returns what it took."""
+
+
+class Bench(NamedTuple):
+    """A row: ours, the peer, and what is claimed."""
+
+    name: str
+    about: str
+    ours: Callable[[], Timed]
+    peer: Callable[[], Timed]
+    target: float | None = None
+    """the ratio, or for `above` the seconds, that may not be exceeded"""
+    unit: str = "s"
+    above: bool = False
+    """Ours is what exceeds the peer, not its whole."""
+
+
+def timed(work: Callable[[], object]) -> float:
+    """Return the seconds that a piece of work takes."""
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+def scene(name: str, *overrides: str) -> Scene:
+    """Return a shipped scene."""
+    return load(find(name), overrides)
+
+
+def running(which: Scene, audit: bool = True) -> Timed:
+    """Time a whole recorded run."""
+    return lambda: timed(lambda: run(which, audit=audit))
+
+
+def stepping(which: Scene, steps: int, record: bool = True, contacts: bool = True, turning: bool = False) -> Timed:
+    """Time some steps, from the start, of a simulation that is set up before."""
+
+    def work() -> float:
+        simulation = start(which)
+        if contacts:
+            simulation.contacts()
+        if turning:
+            peers.give_moments(simulation, which)
+
+        def go() -> None:
+            for _ in range(steps):
+                simulation.step()
+                if record:
+                    simulation.frame()
+
+        return timed(go)
+
+    return work
+
+
+def command(*arguments: str) -> Timed:
+    """Time a Python process from start to end."""
+    line = [sys.executable, *arguments]
+    return lambda: timed(lambda: subprocess.run(line, check=True, capture_output=True))
+
+
+SPARKS = ("world.duration=1.0", "solver.record_every=1")
+PILE = scene("benchmark/pile")
+SETTLED = scene("benchmark/pile", "world.duration=1.0")
+FOUNTAIN = "grid.ball.collides="
+
+BENCHES = (
+    Bench(
+        "pile",
+        "sandbox.run on the 1,000-ball pile, audited / a hand-written pymunk loop that records the same arrays",
+        lambda: running(PILE),
+        lambda: peers.pile_loop(PILE),
+        1.05,
+    ),
+    Bench(
+        "pile-unaudited",
+        "the same without the audit of missed contacts / the same loop",
+        lambda: running(PILE, audit=False),
+        lambda: peers.pile_loop(PILE),
+    ),
+    Bench(
+        "particles",
+        "100,000 collision-free particles, stepped and read / 100,000 pymunk bodies without shapes, stepped and read",
+        lambda: stepping(scene("particles/fireworks_100k", *SPARKS), 30, contacts=False),
+        lambda: peers.bodies_without_shapes(100_000, 30),
+        1 / 20,
+    ),
+    Bench(
+        "particles-copy",
+        "a step of those, not read / copying the bytes that it reads and writes",
+        lambda: stepping(scene("particles/fireworks_100k", *SPARKS), 100, record=False, contacts=False),
+        lambda: peers.copying(100_000 * 4 * 8, 100),
+    ),
+    Bench(
+        "omit-space",
+        "1,000 balls that meet nothing, outside of the space / the same, made to meet each other, in it",
+        lambda: stepping(scene("benchmark/pile", FOUNTAIN + "none"), 120, contacts=False),
+        lambda: stepping(scene("benchmark/pile"), 120, contacts=False),
+    ),
+    Bench(
+        "omit-ball-ball",
+        "1,000 balls that meet only the box / that meet each other too",
+        lambda: stepping(scene("benchmark/pile", FOUNTAIN + "fixed"), 120, contacts=False),
+        lambda: stepping(scene("benchmark/pile"), 120, contacts=False),
+    ),
+    Bench(
+        "omit-contacts",
+        "the pile, contacts not asked for / recorded",
+        lambda: stepping(SETTLED, 120, contacts=False),
+        lambda: stepping(SETTLED, 120),
+    ),
+    Bench(
+        "omit-rotation",
+        "225 frictionless balls, which nothing can turn, without a moment / with one",
+        lambda: stepping(scene("benchmark/gas"), 400, contacts=False),
+        lambda: stepping(scene("benchmark/gas"), 400, contacts=False, turning=True),
+    ),
+    Bench(
+        "check-start",
+        "`sandbox check bounce` above a bare interpreter / the bare interpreter",
+        lambda: command("-m", "sandbox", "check", "bounce"),
+        lambda: command("-c", "pass"),
+        0.35,
+        above=True,
+    ),
+    Bench(
+        "help-start",
+        "`sandbox --help` above a bare interpreter / the bare interpreter",
+        lambda: command("-m", "sandbox", "--help"),
+        lambda: command("-c", "pass"),
+        0.12,
+        above=True,
+    ),
+)
+
+
+def measure(bench: Bench, repeats: int) -> dict[str, object]:
+    """Time ours and the peer in turns and return the row."""
+    ours, peer = bench.ours(), bench.peer()
+    ours(), peer()
+    mine, theirs = [], []
+    for _ in range(repeats):
+        mine.append(ours())
+        theirs.append(peer())
+    own, other = statistics.median(mine), statistics.median(theirs)
+    claimed = own - other if bench.above else own / other
+    return {
+        "name": bench.name,
+        "about": bench.about,
+        "ours": own - other if bench.above else own,
+        "peer": other,
+        "unit": f"{bench.unit} above" if bench.above else bench.unit,
+        "ratio": (own - other) / other if bench.above else own / other,
+        "target": bench.target,
+        "met": None if bench.target is None else claimed <= bench.target,
+        "repeats": repeats,
+        "ours_min": min(mine) - min(theirs) if bench.above else min(mine),
+        "peer_min": min(theirs),
+        "spread": max(theirs) / min(theirs) - 1.0,
+    }
+
+
+def main() -> int:
+    """Run the benches named, or all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(bench.name for bench in BENCHES))
+    parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    parser.add_argument("--repeats", type=int, default=7, metavar="N")
+    arguments = parser.parse_args()
+    unknown = set(arguments.names) - {bench.name for bench in BENCHES}
+    if unknown or arguments.repeats < 1:
+        parser.error(f"no bench {', '.join(sorted(unknown))}" if unknown else "--repeats is 1 or more")
+
+    rows = []
+    if not arguments.json:
+        print(f"{datetime.now(UTC):%Y-%m-%d}", *(f"{k} {v}" for k, v in {**machine(), **versions()}.items()), sep=" · ")
+    for bench in BENCHES:
+        if arguments.names and bench.name not in arguments.names:
+            continue
+        row = measure(bench, arguments.repeats)
+        rows.append(row)
+        if not arguments.json:
+            print(told(row), flush=True)
+    if arguments.json:
+        date = f"{datetime.now(UTC):%Y-%m-%d}"
+        print(json.dumps({"machine": {**machine(), "date": date}, "versions": versions(), "rows": rows}))
+    return 0
+
+
+def told(row: dict[str, object]) -> str:
+    """Return a row as two lines."""
+    verdict = {None: "", True: ", met", False: ", MISSED"}[row["met"]]
+    goal = "" if row["target"] is None else f"   target <= {row['target']:.3g}{verdict}"
+    figure = f"{row['ours']:.3f} s above" if row["unit"] == "s above" else f"{row['ratio']:.3f} ×"
+    return (
+        f"{row['name']:<16}{figure:>14}{goal}   (median {row['ours']:.4g} / {row['peer']:.4g} s, minimum "
+        f"{row['ours_min']:.4g} / {row['peer_min']:.4g} s, {row['repeats']} repeats, peer's spread {row['spread']:.0%})\n"
+        f"{'':<16}{row['about']}"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
