@@ -4,7 +4,7 @@ import json
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 from uuid import uuid4
@@ -117,7 +117,7 @@ class Trajectory:
     missed_pair: IntArray
     """(M, 2) who should have touched, numbered as in `contact_pair`"""
     info: Mapping[str, Any] = field(default_factory=dict)
-    """What was run and how it went: scene (TOML), engine, settings, actions, seed, status, reason, steps, seconds,
+    """What was run and how it went: scene (as a document), engine, settings, actions, seed, status, reason, steps, seconds,
     energy_start, energy_end, audited, versions."""
 
     @property
@@ -147,6 +147,11 @@ class Trajectory:
             raise KeyError(name)
         return int(found[0])
 
+    def at(self, frames: list[int]) -> Self:
+        """Return the trajectory with only some of its frames, by their numbers."""
+        keys = ("time", "position", "velocity", "angle", "angular_velocity")
+        return replace(self, **{key: getattr(self, key)[frames] for key in keys})
+
     def save(self, path: str | Path) -> Path:
         """Write the arrays as one compressed `.npz`, to a temporary name first: never half a file."""
         path = Path(path)
@@ -167,14 +172,16 @@ class Trajectory:
         """Read what `save` wrote.
 
         Raises:
-            ValueError: the file is no stored trajectory.
+            OSError: the file cannot be opened.
+            ValueError: it is no stored trajectory, or damaged.
         """
-        try:
-            with Path(path).open("rb") as stream, np.lib.npyio.NpzFile(stream, allow_pickle=False) as arrays:
-                missing = {f.name for f in fields(cls)} - set(arrays.files)
-                if missing:
-                    raise ValueError(f"it has no {', '.join(sorted(missing))}")
-                values = {f.name: arrays[f.name] for f in fields(cls)}
-            return cls(**{**values, "info": json.loads(str(values["info"]))})
-        except (ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-            raise ValueError(f"{path} is no stored run: {error}") from None
+        with Path(path).open("rb") as stream:
+            try:
+                with np.lib.npyio.NpzFile(stream, allow_pickle=False) as arrays:
+                    missing = {f.name for f in fields(cls)} - set(arrays.files)
+                    if missing:
+                        raise ValueError(f"it has no {', '.join(sorted(missing))}")
+                    values = {f.name: arrays[f.name] for f in fields(cls)}
+                return cls(**{**values, "info": json.loads(str(values["info"]))})
+            except (ValueError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+                raise ValueError(f"{path} is no stored run: {error}") from None

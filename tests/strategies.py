@@ -220,7 +220,7 @@ class Rendered:
 
     def _fill(self) -> None:
         """Write blank lines and comments, some of them traps."""
-        traps = ["", "   ", "# [[ball]]", "# radius = 1", '# """', "# '", "#\u2028]", "# ]\x85}", "\t# name = \"x"]
+        traps = ["", "   ", "# [[ball]]", "# radius = 1", '# """', "# '", "#\u2028]", "# ]\x85}", '\t# name = "x']
         for _ in range(self._chance.choice((0, 0, 1, 2))):
             self._write(self._chance.choice(traps) + "\n")
 

@@ -82,7 +82,8 @@ def test_value_set_keeps_its_type() -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        {"time": -1e-9}, {"time": 1.1e9}, {"time": True}, {"time": "0"}, {"time": math.nan}, {"time": math.inf}, {"time": None},
+        {"time": -1e-9}, {"time": 1.1e9}, {"time": True}, {"time": "0"}, {"time": math.nan}, {"time": math.inf},
+        {"time": None},
         {"kind": "kick"}, {"kind": None}, {"zzz": 1}, {"kind": ["set"]},
     ],
 )  # fmt: skip
@@ -102,7 +103,8 @@ def test_action_without_one_of_its_values_is_refused(good: dict[str, Any]) -> No
     ("kind", "change"),
     [
         (0, {"impulse": [1]}), (0, {"impulse": [1, 2, 3]}), (0, {"impulse": [1e43, 0]}), (0, {"impulse": ["1", 0]}),
-        (0, {"impulse": [math.nan, 0]}), (0, {"angular": True}), (0, {"body": ""}), (0, {"body": "a\nb"}), (0, {"body": 1}),
+        (0, {"impulse": [math.nan, 0]}), (0, {"angular": True}), (0, {"body": ""}), (0, {"body": "a\nb"}),
+        (0, {"body": 1}),
         (0, {"body": "x" * 201}), (1, {"force": [0, -1e43]}), (1, {"torque": math.inf}), (2, {"position": [1.1e16, 0]}),
         (2, {"velocity": [1e12, 1e12]}), (2, {"velocity": [math.nan, 0]}), (3, {"ball": {"radius": 1}}),
         (3, {"ball": {"position": [0, 0], "radius": -1}}), (3, {"ball": {"position": [0, 0], "radius": 1, "x": 1}}),

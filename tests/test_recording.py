@@ -72,7 +72,8 @@ def test_recording_that_cannot_be_read_is_a_fault(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "null", "[]", "3", "{", "{}", '{"format": 2}', "[" * 100_000, "1" * 5000, '{"format": "1"}', "nan", "\x00"]
+    "text",
+    ["", "null", "[]", "3", "{", "{}", '{"format": 2}', "[" * 100_000, "1" * 5000, '{"format": "1"}', "nan", "\x00"],
 )
 def test_text_that_is_no_recording_is_a_fault(text: str) -> None:
     assert paths(text) == [""]

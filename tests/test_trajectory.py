@@ -114,7 +114,7 @@ def test_failing_write_keeps_what_was_there(tmp_path: Path) -> None:
 
 def test_failing_rename_leaves_no_temporary(tmp_path: Path) -> None:
     (tmp_path / "run.npz").mkdir()
-    with pytest.raises(OSError, match="run.npz"):
+    with pytest.raises(OSError, match=r"run\.npz"):
         trajectory().save(tmp_path / "run.npz")
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.npz"]
 

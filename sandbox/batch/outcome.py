@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from sandbox.batch.plan import Job
-from sandbox.batch.store import Store, run_id
+from sandbox.batch.store import Store, StoreError, run_id
 from sandbox.engines.registry import engine as engine_named
 from sandbox.measure.run import Progress, run
 from sandbox.measure.versions import versions
@@ -25,8 +25,8 @@ class Outcome:
     repeated: bool
     """It was in the store already, and was not run again."""
 
-    def row(self) -> dict[str, Any]:
-        """Return the run as one JSON object; figures that are not finite are null."""
+    def row(self, final: bool = True) -> dict[str, Any]:
+        """Return the run as one JSON object, with or without the final state; figures that are not finite are null."""
         run, info = self.trajectory, self.trajectory.info
         seconds, steps = info["seconds"], info["steps"]
         simulated = float(run.time[-1]) if len(run.time) else 0.0
@@ -50,8 +50,9 @@ class Outcome:
             "retired": {
                 str(name): time for name, time in zip(run.names, run.retired_time.tolist(), strict=True) if time == time
             },
-            "final": self._final(),
+            **({"final": self._final()} if final else {}),
             "path": None if self.path is None else str(self.path),
+            "repeated": self.repeated,
         }
 
     def _final(self) -> dict[str, Any]:
@@ -86,7 +87,7 @@ def execute(job: Job, store: Store | None = None, progress: Progress | None = No
 
     Raises:
         TooLargeError: the frames would not fit into memory.
-        StoreError: the store cannot be used.
+        StoreError: the store cannot be used, or what it holds of this run cannot be read.
     """
     engine = engine_named(job.engine)
     settings = job.scene.solver
@@ -96,7 +97,10 @@ def execute(job: Job, store: Store | None = None, progress: Progress | None = No
     found = store.find(number) if store is not None else None
     if store is not None and found is not None:
         file = store.file(found)
-        return Outcome(job, number, Trajectory.load(file), file, repeated=True)
+        try:
+            return Outcome(job, number, Trajectory.load(file), file, repeated=True)
+        except (ValueError, OSError) as error:
+            raise StoreError(f"{error}; remove the file, and the run is made again") from None
     trajectory = run(job.scene, job.engine, actions=job.actions, audit=audit, progress=progress)
     path = store.file(store.add(trajectory, number)) if store is not None else None
     return Outcome(job, number, trajectory, path, repeated=False)

@@ -8,6 +8,7 @@ from itertools import product
 from typing import Any
 
 from sandbox.scene.address import AddressError, parse_assignment, parse_value, split_assignment
+from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import Override, load
 from sandbox.scene.model import Scene
 
@@ -42,7 +43,7 @@ def plan(
         seeds: how many, from 1 on; without, each scene's own.
 
     Raises:
-        SceneError: a scene has faults, as it stands or with a value set.
+        SceneError: scenes have faults, as they stand or with a value set; all of them are told, each once.
         AddressError: a sweep cannot be understood.
     """
     axes: list[list[Override]] = [[(key, value) for value in values] for key, values in map(parse_sweep, sweeps)]
@@ -50,17 +51,25 @@ def plan(
         axes.append([("world.seed", seed) for seed in range(1, seeds + 1)])
     if math.prod(len(axis) for axis in axes) > MOST_POINTS:
         raise AddressError(f"the sweeps multiply to more than {MOST_POINTS:,} runs")
-    return [
-        Job(label, scene, engine)
-        for label, path in scenes
-        for point in product(*axes)
-        for scene in (load(path, (*overrides, *point)),)
-        for engine in engines
-    ]
+    jobs: list[Job] = []
+    faults: dict[Fault, None] = {}
+    for label, path in scenes:
+        for point in product(*axes):
+            try:
+                scene = load(path, (*overrides, *point))
+            except SceneError as error:
+                faults |= dict.fromkeys(error.faults)
+                continue
+            jobs += [Job(label, scene, engine) for engine in engines]
+    if faults:
+        raise SceneError(tuple(faults))
+    return jobs
 
 
 def parse_sweep(text: str) -> tuple[str, list[Any]]:
     """Read `KEY=A,B,C` or `KEY=LOW:HIGH:N[:log]` into the key and its values.
+
+    Between whole ends, what is whole stays an integer: `solver.substeps=1:8:4:log` is 1, 2, 4, 8.
 
     Raises:
         AddressError: it is neither.
@@ -77,6 +86,7 @@ def parse_sweep(text: str) -> tuple[str, list[Any]]:
 
 
 def _range(text: str, parts: list[str]) -> Iterator[float]:
+    whole = all(part.strip().removeprefix("-").isdecimal() for part in parts[:2])
     try:
         low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
     except ValueError:
@@ -84,16 +94,17 @@ def _range(text: str, parts: list[str]) -> Iterator[float]:
     log = len(parts) == 4
     if log and parts[3] != "log":
         raise AddressError(f"{text!r}: {parts[3]!r} is unknown; KEY=LOW:HIGH:N:log spaces by equal factors")
-    if not (1 <= count <= MOST_POINTS and math.isfinite(low) and math.isfinite(high)):
+    if not (1 <= count <= MOST_POINTS and math.isfinite(high - low)):
         raise AddressError(f"{text!r}: a range has finite ends and 1 to {MOST_POINTS:,} values")
-    if log and not 0.0 < low <= high:
+    if log and not (0.0 < low <= high and math.isfinite(high / low)):
         raise AddressError(f"{text!r}: equal factors need 0 < LOW <= HIGH")
     for k in range(count):
         share = k / (count - 1) if count > 1 else 0.0
+        value = low * (high / low) ** share if log else low + (high - low) * share
         if k and k == count - 1:
-            yield high  # not a rounding beside it
-        else:
-            yield low * (high / low) ** share if log else low + (high - low) * share
+            value = high  # not a rounding beside it
+        near = round(value) if whole else 0
+        yield near if whole and abs(value - near) <= 1e-12 * abs(value) else value  # powers and sums round
 
 
 def _split(values: str) -> list[str]:

@@ -10,7 +10,6 @@ import math
 import re
 import sqlite3
 import tempfile
-import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields
@@ -255,7 +254,7 @@ class Store:
 
 def _row(trajectory: Trajectory, run: str) -> StoredRun:
     info = trajectory.info
-    scene = tomllib.loads(info["scene"])
+    scene = info["scene"]
     return StoredRun(
         id=run,
         scene_hash=_hash(scene),

@@ -1,13 +1,15 @@
 """`sandbox check`: validate scenes, print the bill of physics, who can run them, and what would go wrong."""
 
 import math
+import shutil
+import sys
 from typing import Any
 
 import click
 
 from sandbox.cli.reading import fault_rows, paths_of, print_json
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.forecast import largest_safe_dt, warnings
+from sandbox.measure.forecast import at_most, largest_safe_dt, warnings
 from sandbox.scene.demands import Item, bill
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import load
@@ -46,7 +48,7 @@ def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, 
 
 def _faulty(name: str, error: SceneError) -> dict[str, Any]:
     faults = fault_rows(error.faults)
-    return {"scene": name, "ok": False, "faults": faults, "demands": [], "engines": {}, "warnings": []}
+    return {"scene": name, "title": None, "ok": False, "faults": faults, "demands": [], "engines": {}, "warnings": []}
 
 
 def _checked(name: str, scene: Scene) -> tuple[dict[str, Any], tuple[Item, ...]]:
@@ -77,9 +79,21 @@ def _print(name: str, scene: Scene, document: dict[str, Any], items: tuple[Item,
             mark = click.style("on ", fg="green", bold=True) if item.on else click.style("off", dim=True)
             click.echo(f"  {mark}  {item.demand:<12} {item.why}")
         for engine, verdict in document["engines"].items():
-            click.echo(f"  engine {engine}: {'; '.join(verdict['missing']) or 'models all of it'}")
+            _tell(f"engine {engine}: {'; '.join(verdict['missing']) or 'models all of it'}")
         safe = document["safe_dt"]
-        say = "at any dt nothing can tunnel" if safe is None else f"nothing can tunnel up to dt = {safe:.4g} s"
-        click.echo(f"  {say}; the scene's is {scene.solver.dt:g} s")
+        say = "at any dt nothing can tunnel" if safe is None else f"nothing can tunnel up to dt = {at_most(safe)} s"
+        _tell(f"{say}; the scene's is {scene.solver.dt:g} s")
     for warning in document["warnings"]:
-        click.echo(f"{'' if not quiet else name + ': '}{'  ' if not quiet else ''}warning: {warning['message']}")
+        if quiet:
+            click.echo(f"{name}: warning: {warning['message']}")
+        else:
+            _tell(f"warning: {warning['message']}")
+
+
+def _tell(text: str) -> None:
+    """Print one item, folded between words on a terminal; elsewhere an item is a line."""
+    if sys.stdout.isatty():
+        width = shutil.get_terminal_size().columns
+        click.echo(click.wrap_text(text, width, initial_indent="  ", subsequent_indent="    "))
+    else:
+        click.echo(f"  {text}")

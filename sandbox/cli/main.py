@@ -69,8 +69,8 @@ def call(arguments: list[str] | None = None) -> int:
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         return 130
-    except BrokenPipeError:
-        # The reader has gone, as `| head` does; leave nothing to flush at exit.
+    except (BrokenPipeError, SystemExit):
+        # The reader has gone, as `| head` does, and click and rich answer by an exit; leave nothing to flush.
         sys.stdout = None
         return 0
     return status if isinstance(status, int) else 0

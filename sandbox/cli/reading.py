@@ -1,19 +1,14 @@
 """Reading what a user names: scenes and engines. What is wrong becomes lines, and exit status 2."""
 
 import json
-from collections.abc import Sequence
-from typing import Any, NoReturn
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 import click
 
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.shipped import UnknownSceneError, find
-
-
-class InputError(click.ClickException):
-    """Wrong input: one line a fault on standard error, exit status 2."""
-
-    exit_code = 2
 
 
 def paths_of(names: Sequence[str]) -> list[tuple[str, str]]:
@@ -33,6 +28,23 @@ def paths_of(names: Sequence[str]) -> list[tuple[str, str]]:
     return found
 
 
+@contextmanager
+def gathering(faults: list[Fault], place: str = "", also: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Add what is wrong to a list of faults and go on, so that all are told at once.
+
+    Args:
+        faults: the list.
+        place: what the user typed wrongly, such as `--engine`, where it is no scene.
+        also: what is such a fault, besides a `SceneError`.
+    """
+    try:
+        yield
+    except SceneError as error:
+        faults += error.faults
+    except also as error:
+        faults.append(Fault(place, None, "", str(error)))
+
+
 def fault_rows(faults: Sequence[Fault]) -> list[dict[str, Any]]:
     """Return faults as JSON objects."""
     return [{"file": f.file, "line": f.line, "path": f.path, "message": f.message} for f in faults]
@@ -41,8 +53,3 @@ def fault_rows(faults: Sequence[Fault]) -> list[dict[str, Any]]:
 def print_json(document: Any) -> None:
     """Print the one document that `--json` puts on standard output."""
     click.echo(json.dumps(document, ensure_ascii=False, allow_nan=False))
-
-
-def leave(status: int) -> NoReturn:
-    """End the command with an exit status, all having been said."""
-    raise click.exceptions.Exit(status)

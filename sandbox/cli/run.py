@@ -10,13 +10,14 @@ import click
 from sandbox.batch.outcome import Outcome, execute
 from sandbox.batch.plan import Job, plan
 from sandbox.batch.store import Store, StoreError
-from sandbox.cli.reading import InputError, fault_rows, paths_of, print_json
+from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json
+from sandbox.cli.table import Row, print_runs
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import engine as engine_named
-from sandbox.measure.recorder import TooLargeError
+from sandbox.measure.recorder import TooLargeError, require_memory
 from sandbox.measure.run import Progress
 from sandbox.scene.address import AddressError
-from sandbox.scene.faults import SceneError
+from sandbox.scene.faults import Fault, SceneError
 
 
 @click.command(name="run")
@@ -45,71 +46,110 @@ def command(
     quiet: bool,
 ) -> int:
     """Run scenes headless and tell how they went. SCENES are files, or names of shipped scenes."""
-    try:
-        names = list(dict.fromkeys(name.strip() for name in engines.split(",")))
-        for name in names:
+    faults: list[Fault] = []
+    names = list(dict.fromkeys(name.strip() for name in engines.split(",")))
+    for name in names:
+        with gathering(faults, "--engine", (UnknownEngineError,)):
             engine_named(name)
-        jobs = plan(paths_of(scenes), names, overrides, sweeps, seeds)
-        if plot is not None:
-            _check_plot(plot, bodies, jobs)
-        store = Store(out) if out is not None else None
-    except SceneError as error:
+    found: list[tuple[str, str]] = []
+    for scene in scenes:
+        with gathering(faults):
+            found += paths_of([scene])
+    jobs: list[Job] = []
+    with gathering(faults, "--sweep", (AddressError,)):
+        jobs = plan(found, names, overrides, sweeps, seeds)
+    if not faults:
+        with gathering(faults):
+            _check_drawing(plot, bodies, jobs)
+            _check_memory(jobs)
+    store = None
+    if out is not None and not faults:
+        with gathering(faults, "--out", (StoreError,)):
+            store = Store(out)
+    if faults:
+        for fault in faults:
+            click.echo(str(fault), err=True)
         if as_json:
-            print_json({"runs": [], "faults": fault_rows(error.faults)})
-        click.echo(str(error), err=True)
+            print_json({"runs": [], "faults": fault_rows(faults)})
         return 2
-    except (UnknownEngineError, AddressError, StoreError, ValueError) as error:
-        raise InputError(str(error)) from None
 
-    outcomes: list[Outcome] = []
     status = 0
+    rows: list[Row] = []
+    drawn: Outcome | None = None
     try:
         with _progress(jobs, quiet or as_json) as told:
             for job, progress in zip(jobs, told, strict=True):
-                outcomes.append(execute(job, store, progress, audit))
+                outcome = execute(job, store, progress, audit)
+                rows.append(outcome.row(final=as_json))
+                drawn = outcome if plot is not None else None  # else its arrays are let go
     except KeyboardInterrupt:
         status = 130
-        click.echo(f"interrupted: {len(outcomes)} of {len(jobs)} runs are finished and kept", err=True)
-    except TooLargeError as error:
+        click.echo(f"interrupted: {len(rows)} of {len(jobs)} runs are finished and kept", err=True)
+    except (TooLargeError, StoreError) as error:
         status = 2
-        click.echo(f"{jobs[len(outcomes)].label}: {error}", err=True)
-    except StoreError as error:
-        status = 2
-        click.echo(str(error), err=True)
+        click.echo(f"{jobs[len(rows)].label}: {error}", err=True)
     finally:
         if store is not None:
             store.close()
 
-    for outcome in outcomes:
-        if outcome.trajectory.status != "ok":
+    for row in rows:
+        if row["status"] != "ok":
             status = status or 1
-            click.echo(f"{outcome.job.label}: {outcome.trajectory.status}: {outcome.trajectory.reason}", err=True)
+            click.echo(f"{row['scene']}: {row['status']}: {row['reason']}", err=True)
     if as_json:
-        print_json({"runs": [outcome.row() for outcome in outcomes]})
-    elif not quiet and outcomes:
-        from sandbox.cli.table import print_runs
-
-        print_runs(outcomes)
-    if plot is not None and outcomes and len(outcomes[0].trajectory.time):
+        print_json({"runs": rows})
+    elif not quiet and rows:
+        print_runs(rows)
+        if out is not None:
+            click.echo(f"stored: {out}")
+    if plot is not None and drawn is not None and len(drawn.trajectory.time):
         from sandbox.report.plots import plot_run
 
-        plot_run(outcomes[0].trajectory, jobs[0].scene, plot, list(bodies) or None)
+        try:
+            plot_run(drawn.trajectory, jobs[0].scene, plot, list(bodies) or None)
+        except OSError as error:
+            click.echo(f"--plot: {plot}: {error.strerror or error}", err=True)
+            return status or 2
         if not quiet and not as_json:
             click.echo(f"drawn: {plot}")
     return status
 
 
-def _check_plot(plot: Path, bodies: tuple[str, ...], jobs: list[Job]) -> None:
+def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) -> None:
     """Refuse before the run what could not be drawn after it."""
-    if len(jobs) != 1:
-        raise ValueError(f"--plot draws one run, but this makes {len(jobs)}")
-    if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise ValueError(f"--plot {plot}: the name ends in .png, .svg or .pdf")
-    if not plot.absolute().parent.is_dir():
-        raise ValueError(f"--plot {plot}: there is no folder {plot.parent}")
-    unknown = [name for name in bodies if name not in jobs[0].scene.bodies.names]
-    if unknown:
-        raise ValueError(f"--body: no body is named {', '.join(map(repr, unknown))}")
+    faults: list[Fault] = []
+
+    def fault(option: str, message: str) -> None:
+        faults.append(Fault(option, None, "", message))
+
+    if plot is None and bodies:
+        fault("--body", "says what is drawn, but nothing is; give --plot FILE too")
+    if plot is not None:
+        if len(jobs) != 1:
+            fault("--plot", f"draws one run, but this makes {len(jobs)}")
+        if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
+            fault("--plot", f"{plot}: the name ends in .png, .svg or .pdf")
+        if not plot.absolute().parent.is_dir():
+            fault("--plot", f"{plot}: there is no folder {plot.parent}")
+        elif plot.is_dir():
+            fault("--plot", f"{plot}: is a folder")
+        unknown = [name for name in bodies if name not in jobs[0].scene.bodies.names]
+        if unknown:
+            fault("--body", f"no body is named {', '.join(map(repr, unknown))}")
+    if faults:
+        raise SceneError(faults)
+
+
+def _check_memory(jobs: list[Job]) -> None:
+    """Refuse all runs where one would not fit, rather than find out after the others."""
+    faults = []
+    for job in jobs:
+        try:
+            require_memory(job.scene, job.scene.solver, len(job.scene.bodies))
+        except TooLargeError as error:
+            faults.append(Fault(job.label, None, "solver.record_every", str(error)))
+    if faults:
+        raise SceneError(tuple(dict.fromkeys(faults)))
 
 
 @contextmanager

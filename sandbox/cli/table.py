@@ -4,24 +4,28 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
-from sandbox.batch.outcome import Outcome
+Row = dict[str, Any]
+"""A run as `--json` tells of it."""
 
 WIDE = 200
 """Columns where the output is no terminal: rows are for reading by line then, and must not be folded."""
 
 
-def print_runs(outcomes: Sequence[Outcome]) -> None:
-    """Print a row for each run."""
-    rows = [outcome.row() for outcome in outcomes]
+def print_runs(rows: Sequence[Row]) -> None:
+    """Print a line for each run."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
     differing = [key for key in rows[0]["settings"] if key != "dt" and _differs(rows, key)]
     seeds = len({row["seed"] for row in rows}) > 1
+    scenes = len({row["scene"] for row in rows}) > 1
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("scene", overflow="fold", min_width=8)
+    # One scene stands above its runs, where a long path takes no room from the figures.
+    title = None if scenes else Text(rows[0]["scene"], style="bold")
+    table = Table(box=None, pad_edge=False, header_style="bold", title=title, title_justify="left")
+    if scenes:
+        table.add_column("scene", overflow="fold", min_width=8)
     table.add_column("engine", no_wrap=True)
     for head in ("dt", *differing, *(["seed"] if seeds else [])):
         table.add_column(head, justify="right", no_wrap=True)
@@ -29,12 +33,12 @@ def print_runs(outcomes: Sequence[Outcome]) -> None:
     for head in ("× real", "energy, J", "contacts", "missed"):
         table.add_column(head, justify="right", no_wrap=True)
 
-    for outcome, row in zip(outcomes, rows, strict=True):
+    for row in rows:
         status = Text(row["status"], style="green" if row["status"] == "ok" else "bold red")
-        if outcome.repeated:
+        if row["repeated"]:
             status.append(" stored", style="dim")
         table.add_row(
-            Text(row["scene"]),
+            *([Text(row["scene"])] if scenes else []),
             row["engine"],
             f"{row['settings']['dt']:.4g}",
             *(_setting(row["settings"][key]) for key in differing),
@@ -42,18 +46,24 @@ def print_runs(outcomes: Sequence[Outcome]) -> None:
             status,
             _figure(row["realtime_factor"], 3),
             f"{_figure(row['energy_start'])} → {_figure(row['energy_end'])}",
-            f"{row['contacts']:,}",
-            "?" if row["missed_contacts"] is None else f"{row['missed_contacts']:,}",
+            *(("–", "–") if row["status"] == "refused" else (f"{row['contacts']:,}", _missed(row["missed_contacts"]))),
         )
-    Console(width=None if sys.stdout.isatty() else WIDE).print(table)
+    console = Console(width=None if sys.stdout.isatty() else WIDE)
+    # Too narrow a terminal wraps lines by itself, which loses nothing; a table made to fit it would.
+    console.width = max(console.width, Console(width=10_000).measure(table).minimum)
+    console.print(table)
 
 
-def _differs(rows: Sequence[dict[str, Any]], key: str) -> bool:
+def _differs(rows: Sequence[Row], key: str) -> bool:
     """Tell whether a setting differs between runs of one scene; between scenes an engine's own choices do anyway."""
     values: dict[str, set[str]] = {}
     for row in rows:
         values.setdefault(row["scene"], set()).add(str(row["settings"][key]))
     return any(len(each) > 1 for each in values.values())
+
+
+def _missed(count: int | None) -> str:
+    return "?" if count is None else f"{count:,}"
 
 
 def _setting(value: object) -> str:

@@ -33,11 +33,11 @@ class Audit:
 
     Within a substep, in which every centre moves along a straight line, a pair that can meet is missed when
 
-    1. it jumps: its relative displacement is at least `JUMP` (1 %) of its contact distance. One that moves less
+    1. it jumps: its relative displacement is at least `JUMP` (7 %) of its contact distance. One that moves less
        cannot be through before it is looked at;
     2. it is clear at the start: no deeper than half the tolerance, and not in contact at the end of the last
        substep;
-    3. it is deep somewhere on the way: by more than `TOLERANCE` (1e-4) of its contact distance;
+    3. it is deep somewhere on the way: by more than `TOLERANCE` (0.5 %) of its contact distance;
     4. the engine did not see it in time: the pair is not in contact at the end, or is but no longer approaches
        there, its closest approach lying behind.
 

@@ -8,6 +8,7 @@ radius and half the thing's thickness, or for two balls both radii and their rel
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from decimal import ROUND_FLOOR, Context
 
 import numpy as np
 
@@ -25,6 +26,10 @@ ANOTHER = "another ball"
 
 COARSE = 1e-3
 """Share of a radius that the rounding of positions may take."""
+
+
+ROUNDING = 1e-9
+"""Relative: a limit exceeded by less counts as kept."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,8 @@ class Passage:
 
     def odds(self, h: float) -> float:
         """Return the chance of a miss at a substep h, for a random phase."""
-        return max(0.0, 1.0 - self.reach / (self.speed * h)) if self.speed > 0 else 0.0
+        way = self.speed * h
+        return 1.0 - self.reach / way if way > self.reach else 0.0
 
 
 def warnings(scene: Scene, settings: Settings | None = None) -> list[Warning]:
@@ -69,16 +75,22 @@ def largest_safe_dt(scene: Scene, settings: Settings | None = None) -> float:
     return min((p.safe_h for p in passages(scene)), default=math.inf) * settings.substeps
 
 
+def at_most(limit: float) -> str:
+    """Write a limit with three digits, rounded down: what is typed from it must stay within, but for rounding."""
+    return f"{float(Context(prec=3, rounding=ROUND_FLOOR).create_decimal(limit * (1.0 + ROUNDING))):g}"
+
+
 def _warnings(scene: Scene, settings: Settings) -> Iterator[Warning]:
     meet = meetings(scene)
     for passage in passages(scene, meet):
         odds = passage.odds(settings.h)
-        if odds > 0.0:
+        if odds > ROUNDING:
             safe = passage.safe_h * settings.substeps
             way = passage.speed * settings.h
+            thing = passage.thing if passage.thing == ANOTHER else repr(passage.thing)
             message = (
-                f"{passage.ball!r} can close on {passage.thing!r} at up to {passage.speed:.4g} m/s, {way:.3g} m a "
-                f"substep, and pass through unseen: odds up to {odds:.0%}; dt <= {safe:.3g} s would be safe"
+                f"{passage.ball!r} can close on {thing} at up to {passage.speed:.4g} m/s, {way:.3g} m a substep, "
+                f"and pass through unseen: odds up to {100 * odds:.3g} %; dt <= {at_most(safe)} s would be safe"
             )
             figures: dict[str, float | int | str] = {
                 "ball": passage.ball,
@@ -126,7 +138,7 @@ def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
     found = []
 
     def worst(reach: FloatArray, speeds: FloatArray, thing: str) -> None:
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):  # at rest, or as good as: never
             k = int(np.argmin(reach / speeds))
         found.append(Passage(bodies.names[movers[k]], thing, float(speeds[k]), float(reach[k])))
 

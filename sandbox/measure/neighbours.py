@@ -77,7 +77,7 @@ class Neighbours:
             strays = self._strays(start, end)
         if strays.any():
             self._renew(start, end, np.flatnonzero(strays))
-        ever = fast.any(axis=0)
+        ever: BoolArray = np.asarray(fast.any(axis=0))
         listed = np.flatnonzero(ever[self._first] | ever[self._second])
         first, second = self._first[listed], self._second[listed]
         when, at = np.nonzero(fast[:, first] | fast[:, second])

@@ -45,9 +45,7 @@ class Paths:
 
     def some(self, which: IntArray) -> Self:
         """Return some of them."""
-        return type(self)(
-            self.when[which], self.who[which], self.start[which], self.end[which], self.radius[which]
-        )
+        return type(self)(self.when[which], self.who[which], self.start[which], self.end[which], self.radius[which])
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,8 @@ def frame_count(scene: Scene, settings: Settings) -> tuple[int, float]:
     """
     steps = scene.world.duration / settings.dt
     whole = round(steps)
-    if abs(steps - whole) <= 1e-9 * max(whole, 1):
-        return max(whole, 1), 0.0
+    if abs(steps - whole) <= 1e-9 * whole:
+        return whole, 0.0
     return math.floor(steps), steps - math.floor(steps)
 
 
@@ -42,6 +42,34 @@ def free_memory() -> int:
     return 4 * 2**30
 
 
+def kept_frames(steps: int, part: float, every: int) -> int:
+    """Return how many frames a run keeps: the first, every n-th, and the last."""
+    return 1 + steps // every + (part > 0.0 or steps % every > 0)
+
+
+def require_memory(scene: Scene, settings: Settings, bodies: int) -> int:
+    """Return how many frames a run keeps, having made sure that they fit into memory.
+
+    Raises:
+        TooLargeError: they do not; it names a `record_every` that would fit, where one does.
+    """
+    steps, part = frame_count(scene, settings)
+    kept = kept_frames(steps, part, settings.record_every)
+    each, free = max(bodies, 1) * BYTES_PER_BODY, int(free_memory() * SHARE)
+    fitting = free // each
+    if kept <= fitting:
+        return kept
+    count = "1 body" if bodies == 1 else f"{bodies:,} bodies"
+    remedy = (
+        f"solver.record_every = {steps // (fitting - 1) + 1} would fit (it is {settings.record_every})"
+        if fitting > 1
+        else "not even the first and the last fit; use fewer bodies"
+    )
+    raise TooLargeError(
+        f"{kept:,} frames of {count} take {kept * each / 1e9:.3g} GB, but {free / 1e9:.3g} GB can be used; {remedy}"
+    )
+
+
 class Recorder:
     """The kept frames of a run: every n-th, and the last."""
 
@@ -51,19 +79,10 @@ class Recorder:
         Raises:
             TooLargeError: the frames would not fit.
         """
-        steps, part = frame_count(scene, settings)
+        kept = require_memory(scene, settings, bodies)
         self._every = settings.record_every
-        ends_between = part > 0.0 or steps % self._every > 0
-        kept = 1 + steps // self._every + ends_between
-        need, free = kept * bodies * BYTES_PER_BODY, free_memory() * SHARE
-        if need > free:
-            fits = math.ceil(self._every * need / free)
-            raise TooLargeError(
-                f"{kept:,} frames of {bodies:,} bodies take {need / 1e9:.3g} GB, but {free / 1e9:.3g} GB can be "
-                f"used; solver.record_every = {fits} would fit (it is {self._every})"
-            )
         self._count = 0
-        self.steps, self.part = steps, part
+        self.steps, self.part = frame_count(scene, settings)
         self.time: FloatArray = np.empty(kept)
         # A body that is not there yet is nan.
         self.position, self.velocity = (np.full((kept, bodies, 2), np.nan) for _ in range(2))
@@ -72,6 +91,11 @@ class Recorder:
     def wants(self, step: int, last: bool) -> bool:
         """Tell whether the frame after so many steps is kept."""
         return last or step % self._every == 0
+
+    def keep_as_it_is(self, frame: Frame) -> None:
+        """Keep a frame where a run ends early, unless it is the one kept last."""
+        if frame.time != self.time[self._count - 1]:
+            self.keep(frame, frame.time)
 
     def keep(self, frame: Frame, time: float) -> None:
         """Keep a frame, as of a time."""

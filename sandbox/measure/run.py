@@ -15,7 +15,7 @@ from sandbox.measure.energy import energies
 from sandbox.measure.recorder import Recorder
 from sandbox.measure.versions import versions
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.file import dumps
+from sandbox.scene.file import to_document
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, FloatArray, IntArray, Trajectory
@@ -80,14 +80,14 @@ def run(
     outcome = {"status": status, "reason": reason, "steps": steps, "seconds": seconds, "audited": audit}
     info = _info(scene, engine, resolved, actions, **outcome)
     trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, missed, info)
-    total = energies(trajectory, scene, bodies=bodies).total
+    total = energies(trajectory.at([0, -1]), scene, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     return trajectory
 
 
 def _info(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, ...], **outcome: Any) -> dict[str, Any]:
     return {
-        "scene": dumps(scene),
+        "scene": to_document(scene),
         "engine": engine,
         "settings": settings.model_dump(mode="json"),
         "actions": actions_to_json(actions),
@@ -179,9 +179,7 @@ def _drive(
     recorder.keep(simulation.frame(), 0.0)
     try:
         for step in range(steps):
-            while due < len(actions) and actions[due].time <= (step + 1e-9) * dt:
-                simulation.apply(actions[due])
-                due += 1
+            due = _act(simulation, actions, due, (step + 1e-9) * dt)
             simulation.step()
             last = step + 1 == steps and part == 0.0
             if recorder.wants(step + 1, last):
@@ -191,13 +189,25 @@ def _drive(
                 progress((step + 1) / (steps + part))
         step = steps
         if part > 0.0:
+            _act(simulation, actions, due, (steps + 1e-9) * dt)
             simulation.finish(part)
             recorder.keep(simulation.frame(), scene.world.duration)
     except Divergence as divergence:
         status, reason = "diverged", str(divergence)
         recorder.keep(simulation.frame(), divergence.time)
-    except (ActionError, Exhaustion) as error:
+    except ActionError as error:
+        status, reason = "failed", f"at {step * dt:g} s: {error}"
+        recorder.keep_as_it_is(simulation.frame())
+    except Exhaustion as error:  # within a step: there is no frame of it
         status, reason = "failed", f"at {step * dt:g} s: {error}"
     if progress is not None:
         progress(1.0)
     return status, reason, step, simulation.contacts()
+
+
+def _act(simulation: Simulation, actions: tuple[Action, ...], due: int, now: float) -> int:
+    """Apply the actions from number `due` on whose time has come; return the number of the next."""
+    while due < len(actions) and actions[due].time <= now:
+        simulation.apply(actions[due])
+        due += 1
+    return due

@@ -134,7 +134,7 @@ def _read(path: str | Path) -> str:
 
 def _only_seems_short(details: Any) -> bool:
     """Tell whether an array is long enough; pydantic counts only the elements that have no faults of their own."""
-    return details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]
+    return bool(details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"])
 
 
 def _syntax_fault(file: str, text: str, error: tomllib.TOMLDecodeError) -> Fault:

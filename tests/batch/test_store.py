@@ -14,7 +14,7 @@ import pytest
 
 from sandbox.action import Remove
 from sandbox.batch.store import VERSION, Store, StoredRun, StoreError, run_id
-from sandbox.scene.file import dumps, loads
+from sandbox.scene.file import to_document, loads
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
@@ -42,7 +42,7 @@ def a_run(**info: object) -> Trajectory:
         missed_time=np.array([0.0]),
         missed_pair=np.array([[0, -1]]),
         info={
-            "scene": dumps(SCENE),
+            "scene": to_document(SCENE),
             "engine": "pymunk",
             "settings": SCENE.solver.model_dump(mode="json"),
             "seed": 7,
@@ -321,5 +321,5 @@ def test_scene_hash_depends_on_the_scene_alone(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
         one = store.add(a_run(), ID)
         same = store.add(a_run(engine="box2d", seed=8), OTHER)
-        third = store.add(replace(a_run(), info={**a_run().info, "scene": dumps(other)}), OTHER[::-1])
+        third = store.add(replace(a_run(), info={**a_run().info, "scene": to_document(other)}), OTHER[::-1])
     assert one.scene_hash == same.scene_hash != third.scene_hash

@@ -13,7 +13,13 @@ from sandbox.scene.address import AddressError, assign, parse_assignment, parse_
 DOCUMENT: dict[str, Any] = {
     "title": "t",
     "world": {"gravity": [0.0, -9.81]},
-    "ball": [{"name": "cue", "mass": 1.0}, {"name": "8 ball"}, {"mass": 3.0}, {"name": "a.b"}, {"name": "0", "mass": 9}],
+    "ball": [
+        {"name": "cue", "mass": 1.0},
+        {"name": "8 ball"},
+        {"mass": 3.0},
+        {"name": "a.b"},
+        {"name": "0", "mass": 9},
+    ],
     "wall": [{"points": [[0, 0], [1, 1]]}],
 }
 
@@ -21,8 +27,8 @@ DOCUMENT: dict[str, Any] = {
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("1", 1), ("-1.5e3", -1500.0), ("true", True), ("false", False), ("[1, 0]", [1, 0]), ('"1"', "1"), ("'x y'", "x y"),
-        ("{a = 1}", {"a": 1}), ("[[0, 1], [2, 3]]", [[0, 1], [2, 3]]), ("1979-05-27", datetime.date(1979, 5, 27)),
+        ("1", 1), ("-1.5e3", -1500.0), ("true", True), ("false", False), ("[1, 0]", [1, 0]), ('"1"', "1"), 
+        ("'x y'", "x y"), ("{a = 1}", {"a": 1}), ("[[0, 1], [2, 3]]", [[0, 1], [2, 3]]), ("1979-05-27", datetime.date(1979, 5, 27)),
         ("leapfrog", "leapfrog"), ("two words", "two words"), ("", ""), ("1 2", "1 2"), ("1\nx = 2", "1\nx = 2"),
         ("1\nvalue = 2", "1\nvalue = 2"), ("0x1F", 31), ("inf", float("inf")), ("a = b", "a = b"), ("[1,", "[1,"),
         ("True", "True"), ("9" * 5000, "9" * 5000), ("[" * 10_000, "[" * 10_000), ("1_000", 1000), (".5", ".5"),
@@ -77,7 +83,8 @@ def test_assignment_without_key_or_equals_is_refused(text: str) -> None:
         ("title", ("title",)), ("world.gravity", ("world", "gravity")), ("world.gravity.1", ("world", "gravity", 1)),
         ("world.seed", ("world", "seed")), ("solver.dt", ("solver", "dt")), ("ball.cue.mass", ("ball", 0, "mass")),
         ('ball."8 ball".mass', ("ball", 1, "mass")), ("ball.2.mass", ("ball", 2, "mass")),
-        ("ball.'a.b'.mass", ("ball", 3, "mass")), ("ball.0.mass", ("ball", 4, "mass")), ("wall.0.points.1.0", ("wall", 0, "points", 1, 0)),
+        ("ball.'a.b'.mass", ("ball", 3, "mass")), ("ball.0.mass", ("ball", 4, "mass")),
+        ("wall.0.points.1.0", ("wall", 0, "points", 1, 0)),
         ("ball.1", ("ball", 1)), ("wall", ("wall",)), ("wall.0", ("wall", 0)),
     ],
 )  # fmt: skip
@@ -98,7 +105,8 @@ def test_value_is_set_where_the_path_leads_and_nowhere_else(path: str, location:
     ("path", "words"),
     [
         ("ball.none.mass", "names: cue, 8 ball, a.b, 0; numbers: 0 to 4"), ("ball.5.mass", "no element '5'"),
-        ("ball.-1.mass", "no element '-1'"), ("wall.x.points", "names: none; numbers: 0 to 0"), ("title.x", "single value"),
+        ("ball.-1.mass", "no element '-1'"), ("wall.x.points", "names: none; numbers: 0 to 0"),
+        ("title.x", "single value"),
         ("world.gravity.2", "no element '2'"), ("world.gravity.0.x", "single value"), ("a.b.c", "no a"),
         ("world.x.y", "no world.x"), ("ball.cue.x.y", "no ball.cue.x"), ("ball." + "9" * 5000, "no element"),
         ("ball.\u00b2.mass", "no element"), ("ball.1e0.mass", "no element"),
@@ -132,4 +140,8 @@ def test_any_path_is_followed_or_refused(path: str, value: int) -> None:
 def test_element_of_any_name_is_reached_in_quotes(name: str) -> None:
     quote = "'" if '"' in name else '"'
     key, value = parse_assignment(f"ball.{quote}{name}{quote}.mass=2")
-    assert assign({"ball": [{"name": "other"}, {"name": name}]}, key, value)[1] == ("ball", int(name != "other"), "mass")
+    assert assign({"ball": [{"name": "other"}, {"name": name}]}, key, value)[1] == (
+        "ball",
+        int(name != "other"),
+        "mass",
+    )

@@ -114,14 +114,14 @@ def sound(kind: str) -> dict[str, Any]:
     if kind == "plane":
         document["plane"] = [{"point": [0.0, 0.0], "normal": [0.0, 1.0]}]
     if kind in ("grid", "scatter", "emitter"):  # alone, so that a million bodies are not one too many
-        document = {key: value for key, value in document.items() if key not in ("ball", "grid", "scatter", "emitter")} | {
-            kind: document[kind]
-        }
+        document = {
+            key: value for key, value in document.items() if key not in ("ball", "grid", "scatter", "emitter")
+        } | {kind: document[kind]}
         document[kind][0]["collides"] = "none"
     return document
 
 
-def put(document: dict[str, Any], kind: str, path: str, value: float) -> dict[str, Any]:
+def put(document: dict[str, Any], kind: str, path: str, value: Any) -> dict[str, Any]:
     """Return the document with a value set in the first element of a kind."""
     here: Any = document[kind][0] if isinstance(document[kind], list) else document[kind]
     *way, last = (int(key) if key.isdecimal() else key for key in path.split("."))
@@ -173,9 +173,9 @@ def test_duration_zero_is_refused_and_the_least_taken() -> None:
 
 @pytest.mark.parametrize("kind", ["ball", "grid", "scatter"])
 def test_speed_is_bounded_as_a_length_not_by_component(kind: str) -> None:
-    from_document(put(sound(kind), kind, "velocity", [6e11, 8e11]))  # type: ignore[arg-type] # a 3-4-5 triangle
+    from_document(put(sound(kind), kind, "velocity", [6e11, 8e11]))  # a 3-4-5 triangle
     with pytest.raises(SceneError, match="speed"):
-        from_document(put(sound(kind), kind, "velocity", [8e11, 8e11]))  # type: ignore[arg-type]
+        from_document(put(sound(kind), kind, "velocity", [8e11, 8e11]))
 
 
 def test_mass_from_density_is_bounded_like_a_stated_one() -> None:

@@ -49,7 +49,10 @@ def test_pair_names_declared_materials() -> None:
     materials = [{"name": "a"}, {"name": "b"}]
     from_document({"material": materials, "pair": [{"between": ["a", "b"]}, {"between": ["a", "a"]}]})
     only({"material": materials, "pair": [{"between": ["a", "c"]}]}, "pair[0].between[1]", "declared are: a, b")
-    assert [path for path, _ in faults({"pair": [{"between": ["c", "d"]}]})] == ["pair[0].between[0]", "pair[0].between[1]"]
+    assert [path for path, _ in faults({"pair": [{"between": ["c", "d"]}]})] == [
+        "pair[0].between[0]",
+        "pair[0].between[1]",
+    ]
 
 
 @pytest.mark.parametrize("again", [["a", "b"], ["b", "a"]])
@@ -142,7 +145,11 @@ def test_centre_less_than_a_kilometre_behind_a_plane_is_taken(depth: float, norm
 @pytest.mark.parametrize("normal", [[0, 1], [0, 1e-50], [0, 3e50]])
 def test_centre_deeper_behind_a_plane_is_refused(normal: list[float]) -> None:
     plane = {"name": "ground", "point": [5, 2], "normal": normal}
-    only({"plane": [plane], "ball": [{**BALL, "position": [0, 2 - 1000.1]}]}, "ball[0].position", "1000.1 m behind the plane 'ground'")
+    only(
+        {"plane": [plane], "ball": [{**BALL, "position": [0, 2 - 1000.1]}]},
+        "ball[0].position",
+        "1000.1 m behind the plane 'ground'",
+    )
     from_document({"plane": [plane], "ball": [{**BALL, "position": [0, -2000], "collides": "none"}]})
 
 

@@ -48,11 +48,21 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.BALL_POST, False, {"ball": [GHOST], "post": [POST]}, "nothing can meet"),
     (Demand.BALL_POST, False, {"ball": [BALL]}, "no post"),
     (Demand.RESTITUTION, True, {"ball": [{**BALL, "restitution": 0.75}, BALL]}, "up to 0.75"),
-    (Demand.RESTITUTION, False, {"ball": [{**BALL, "restitution": 0.75}, {**BALL, "restitution": 0}]}, "0 for every pair"),
+    (
+        Demand.RESTITUTION,
+        False,
+        {"ball": [{**BALL, "restitution": 0.75}, {**BALL, "restitution": 0}]},
+        "0 for every pair",
+    ),
     (Demand.RESTITUTION, False, {"ball": [{**BALL, "restitution": 0.75}, GHOST]}, "nothing can meet"),
     (Demand.FRICTION, True, {"ball": [{**BALL, "friction": 0.75}, {**BALL, "friction": 2}]}, "up to 1.5"),
     (Demand.FRICTION, False, {"ball": [BALL, BALL]}, "0 for every pair"),
-    (Demand.FRICTION, False, {"ball": [{**GHOST, "friction": 1}], "plane": [{**PLANE, "friction": 1}]}, "nothing can meet"),
+    (
+        Demand.FRICTION,
+        False,
+        {"ball": [{**GHOST, "friction": 1}], "plane": [{**PLANE, "friction": 1}]},
+        "nothing can meet",
+    ),
     (Demand.BOUNDS, True, {"world": {"bounds": [[-1, -1], [1, 1]]}, "ball": [BALL]}, "given"),
     (Demand.BOUNDS, False, {"ball": [BALL]}, "no bounds"),
 ]

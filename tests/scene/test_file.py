@@ -15,7 +15,9 @@ from sandbox.scene.file import dumps, from_document, load, loads, to_document
 from sandbox.scene.model import Scene
 
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
-KEYS = sorted({field.alias or name for name, field in Scene.model_fields.items()} | {"x", "", "name", "radius", "count"})
+KEYS = sorted(
+    {field.alias or name for name, field in Scene.model_fields.items()} | {"x", "", "name", "radius", "count"}
+)
 
 
 def check_faults(error: SceneError, file: str, lines: int) -> None:
@@ -62,9 +64,29 @@ def test_any_text_gives_a_scene_or_a_scene_error(text: str) -> None:
             [f"[[{key}]]\n" for key in KEYS if key]
             + [f"[{key}]\n" for key in KEYS if key]
             + ["position = [0, 0]\n", "radius = 1\n", "name = 'a'\n", "material = 'm'\n", "between = ['m', 'm']\n"]
-            + ["points = [[0, 0], [1, 1]]\n", "point = [0, 1]\n", "normal = [0, 0]\n", "count = 9\n", "lower = [0, 0]\n"]
-            + ["upper = [1, 1]\n", "velocity = [\n1e13,\n0]\n", "radius = 'x'\n", "# [[ball]]\n", "dt = 0\n", "seed = -1\n"]
-            + ["velocity_min = [1, 1]\n", "velocity_max = [0, 0]\n", "columns = 2\n", "spacing = [0, 0]\n", "\n", "x = 1\n"]
+            + [
+                "points = [[0, 0], [1, 1]]\n",
+                "point = [0, 1]\n",
+                "normal = [0, 0]\n",
+                "count = 9\n",
+                "lower = [0, 0]\n",
+            ]
+            + [
+                "upper = [1, 1]\n",
+                "velocity = [\n1e13,\n0]\n",
+                "radius = 'x'\n",
+                "# [[ball]]\n",
+                "dt = 0\n",
+                "seed = -1\n",
+            ]
+            + [
+                "velocity_min = [1, 1]\n",
+                "velocity_max = [0, 0]\n",
+                "columns = 2\n",
+                "spacing = [0, 0]\n",
+                "\n",
+                "x = 1\n",
+            ]
             + ["bounds = [[0, 0], [0, 1]]\n", "origin = [2, 2]\n", "mass = 1\n", "density = 1\n", "fixed = true\n"]
         ),
         max_size=25,
@@ -242,7 +264,8 @@ def test_override_can_mend_a_fault_of_the_file() -> None:
 
 
 @pytest.mark.parametrize(
-    "override", ["solver.dt", "=1", "nowhere.x.y=1", "ball.none.mass=1", "ball.9.mass=1", "solver.dt.x=1", "title.x=1", ""]
+    "override",
+    ["solver.dt", "=1", "nowhere.x.y=1", "ball.none.mass=1", "ball.9.mass=1", "solver.dt.x=1", "title.x=1", ""],
 )
 def test_override_that_leads_nowhere_is_a_fault(override: str) -> None:
     with pytest.raises(SceneError, match="--set"):

@@ -40,7 +40,9 @@ def clusters(draw: st.DrawFn) -> tuple[Places, float]:
     x, y = draw(st.tuples(*[st.floats(-1e16, 1e16) | st.sampled_from([0.0, 1e16, -1e16, 2.0**52 * reach])] * 2))
     step = st.floats(-3, 3) | st.sampled_from([-1.0, 0.0, 0.999999999, 1.0, 2.0])
     places = draw(st.lists(st.tuples(step, step), max_size=25))
-    return [(float(np.clip(x + a * reach, -1e16, 1e16)), float(np.clip(y + b * reach, -1e16, 1e16))) for a, b in places], reach
+    return [
+        (float(np.clip(x + a * reach, -1e16, 1e16)), float(np.clip(y + b * reach, -1e16, 1e16))) for a, b in places
+    ], reach
 
 
 @given(st.lists(st.tuples(*[st.floats(-1e16, 1e16)] * 2), max_size=25), st.floats(1e-9, 1e9))

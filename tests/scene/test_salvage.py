@@ -37,7 +37,10 @@ def expect(text: str, wanted: Iterable[str]) -> None:
         ("[[material]]\nname = 'm'\nrestitution = 2\n", "material.m.restitution"),
         ("[[grid]]\norigin = [0, 0]\ncolumns = 0\nspacing = [1, 1]\nradius = 0.1\n", "grid[0].columns"),
         ("[[scatter]]\ncount = 0\nlower = [0, 0]\nupper = [1, 1]\nradius = 0.1\n", "scatter[0].count"),
-        ("[[emitter]]\nposition = [0, 0]\ncount = 1\nvelocity_min = [0, 0]\nvelocity_max = 0\n", "emitter[0].velocity_max"),
+        (
+            "[[emitter]]\nposition = [0, 0]\ncount = 1\nvelocity_min = [0, 0]\nvelocity_max = 0\n",
+            "emitter[0].velocity_max",
+        ),
         ("[[ball]]\nradius = 1\n", "ball[1].position"),
         ("[zzz]\nx = 1\n", "zzz"),
         ("[[bal]]\nx = 1\n", "bal"),
@@ -53,7 +56,9 @@ def test_faulty_value_before_any_table_does_not_hide_a_fault_elsewhere() -> None
 
 def test_several_faulty_values_of_one_element_are_all_reported() -> None:
     text = "[[ball]]\nposition = 'x'\nradius = -1\nmass = -1\nname = ''\nzzz = 1\n"
-    expect(LOST + text, ["ball[0].material", *(f"ball[1].{key}" for key in ("position", "radius", "mass", "name", "zzz"))])
+    expect(
+        LOST + text, ["ball[0].material", *(f"ball[1].{key}" for key in ("position", "radius", "mass", "name", "zzz"))]
+    )
 
 
 def test_element_with_a_faulty_value_is_not_accused_of_what_follows_from_it() -> None:
@@ -64,7 +69,12 @@ def test_element_with_a_faulty_value_is_not_accused_of_what_follows_from_it() ->
 
 @pytest.mark.parametrize(
     "broken",
-    ["[[materal]]\nname = 'lost'\n", "[[materials]]\nname = 'lost'\n", "[[material]]\nnam = 'lost'\n", "[material]\nname='x'"],
+    [
+        "[[materal]]\nname = 'lost'\n",
+        "[[materials]]\nname = 'lost'\n",
+        "[[material]]\nnam = 'lost'\n",
+        "[material]\nname='x'",
+    ],
 )
 def test_material_that_is_only_misspelt_is_not_called_missing_too(broken: str) -> None:
     assert "ball[0].material" not in paths(LOST + broken)

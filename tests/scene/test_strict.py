@@ -46,7 +46,9 @@ def test_text_of_the_wrong_kind_is_refused(key: str, value: str) -> None:
     assert (4, f"ball[0].{key}") in refused(f"{BALL}{key} = {value}\n")
 
 
-@pytest.mark.parametrize("value", ["3", "[1]", "[1, 2, 3]", "[]", '"1, 2"', '["1", 2]', "[true, 1]", "[[0, 0]]", "{x=1}"])
+@pytest.mark.parametrize(
+    "value", ["3", "[1]", "[1, 2, 3]", "[]", '"1, 2"', '["1", 2]', "[true, 1]", "[[0, 0]]", "{x=1}"]
+)
 def test_vector_of_the_wrong_kind_is_refused(value: str) -> None:
     for line, path in refused(f"{BALL}velocity = {value}\n"):
         assert line == 4
@@ -121,7 +123,14 @@ def test_missing_keys_are_all_named() -> None:
 )
 @pytest.mark.parametrize(
     "document",
-    [{"title": None}, {"world": None}, {"ball": None}, {"ball": [None]}, {"pair": [{"between": ["a", None]}]}, {"x": None}],
+    [
+        {"title": None},
+        {"world": None},
+        {"ball": None},
+        {"ball": [None]},
+        {"pair": [{"between": ["a", None]}]},
+        {"x": None},
+    ],
 )
 def test_dates_are_refused_everywhere(document: dict[str, Any], value: object) -> None:
     def dated(here: Any) -> Any:

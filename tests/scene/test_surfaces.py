@@ -25,7 +25,15 @@ def of_two(a: dict[str, Any], b: dict[str, Any], **more: Any) -> tuple[float, fl
 
 @pytest.mark.parametrize(
     ("a", "b", "mixed"),
-    [(None, None, 0.0), (0.5, None, 0.5), (None, 0.5, 0.5), (0.5, 0.25, 0.125), (0.0, None, 0.0), (0.0, 0.9, 0.0), (1.0, 0.3, 0.3)],
+    [
+        (None, None, 0.0),
+        (0.5, None, 0.5),
+        (None, 0.5, 0.5),
+        (0.5, 0.25, 0.125),
+        (0.0, None, 0.0),
+        (0.0, 0.9, 0.0),
+        (1.0, 0.3, 0.3),
+    ],
 )
 def test_figures_mix_by_the_rule(a: float | None, b: float | None, mixed: float) -> None:
     assert mix(a, b) == mixed

@@ -1,14 +1,18 @@
-"""ContactLedger: one row for each contact, from arbiters that pymunk shows anew after every substep."""
+"""ContactLedger: one row for each contact, from arbiters that pymunk shows anew after every substep.
+
+Vectors are complex numbers, x + iy, until they leave.
+"""
 
 import numpy as np
 
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.native.memory import PartedMemory
+from sandbox.engines.native.reader import ComplexArray, Touching
 from sandbox.engines.native.rows import RowTable
-from sandbox.trajectory import BoolArray, Contacts, FloatArray, IntArray
+from sandbox.trajectory import Contacts, FloatArray, IntArray
 
 MAX_ROWS = 20_000_000
-"""Rows kept before a run is stopped: 1.6 GB."""
+"""Rows kept before a run is stopped: 1.4 GB."""
 
 
 class ContactLedger:
@@ -24,79 +28,62 @@ class ContactLedger:
         """
         self._things, self._joints = things, joints
         self._rows = RowTable()
+        self._memory = PartedMemory(persistence)
         self._count = 0
         self._time: FloatArray = np.empty(256)
         self._pair: IntArray = np.empty((256, 2), np.int64)
-        self._vectors: FloatArray = np.empty((256, 6))  # point, normal, impulse
+        self._place: ComplexArray = np.empty((256, 2), np.complex128)  # point, normal
+        self._impulse: ComplexArray = np.empty(256, np.complex128)
         self._row: IntArray = np.empty(0, np.int64)  # of what touches now
-        self._memory = PartedMemory(persistence)
-        self._last = np.empty((0, 2)), np.empty((0, 2))  # impulses and normals, as pymunk reported them
+        self._reported: tuple[ComplexArray, ComplexArray] = (self._impulse[:0], self._impulse[:0])
 
-    def record(
-        self, time: float, a: IntArray, b: IntArray, impulse: FloatArray, normal: FloatArray, point: FloatArray
-    ) -> None:
-        """Enter what touches at a time.
-
-        Args:
-            time: s.
-            a: (K,) one of each pair's bodies; fixed things are negative.
-            b: (K,) the other.
-            impulse: (K, 2) that `a` got in the last substep, N·s.
-            normal: (K, 2) from `a` to `b`.
-            point: (K, 2) m.
-        """
+    def record(self, time: float, now: Touching) -> None:
+        """Enter what touches at a time, s."""
         self._memory.forget_and_advance()
-        if not len(a) and not len(self._row):
+        if not len(now.a) and not len(self._row):
             return
-        swapped = (a < 0) | ((b >= 0) & (b < a))
-        first, second = np.where(swapped, b, a), np.where(swapped, a, b)
-        # Fixed things, −1 − k, become 0 … F − 1, and bodies follow them: small whole numbers for the table.
+        swapped = (now.a < 0) | ((now.b >= 0) & (now.b < now.a))
+        first, second = np.where(swapped, now.b, now.a), np.where(swapped, now.a, now.b)
         before = self._rows.key
-        row, new, gone = self._rows.find(first, second + self._things)
+        # Fixed things, −1 − k, become 0 … F − 1, and bodies follow them: small whole numbers for the table.
+        row, new, gone = self._rows.find(first + self._things, second + self._things)
         if gone.any():
-            self._memory.part(before[gone], *(array[gone] for array in self._last))
-        impulse, normal = impulse.copy(), normal.copy()
-        self._last = impulse.copy(), normal
+            self._memory.part(before[gone], *(each[gone] for each in self._reported))
+        self._reported = now.impulse, now.normal
+
+        sign = swapped * 2.0 - 1.0
+        given = now.impulse * sign  # by the first to the second
         if len(new):
-            impulse[new] -= self._memory.excess(self._rows.key[new], normal[new])
+            given[new] -= sign[new] * self._memory.excess(self._rows.key[new], now.normal[new])
             leader, group = new, np.arange(len(new))
             if self._joints:
                 _, at, group = np.unique(self._rows.key[new], return_index=True, return_inverse=True)
                 leader, group = new[at], group.reshape(-1)
             row[new] = self._count + group
-            self._open(time, first[leader], second[leader], point[leader], normal[leader], swapped[leader])
+            rows = self._opened(len(leader))
+            self._time[rows] = time
+            self._pair[rows, 0], self._pair[rows, 1] = first[leader], second[leader]
+            self._place[rows, 0], self._place[rows, 1] = now.point[leader], -sign[leader] * now.normal[leader]
         self._rows.keep(row)
         self._row = row
-        given = np.where(swapped[:, None], impulse, -impulse)  # by the first to the second
         if self._joints:
-            np.add.at(self._vectors[:, 4:6], row, given)
+            np.add.at(self._impulse, row, given)
         else:
-            self._vectors[row, 4:6] += given
+            self._impulse[row] += given
 
-    def _open(
-        self,
-        time: float,
-        first: IntArray,
-        second: IntArray,
-        point: FloatArray,
-        normal: FloatArray,
-        swapped: BoolArray,
-    ) -> None:
-        end = self._count + len(first)
+    def _opened(self, more: int) -> slice:
+        """Return so many new rows, their impulse 0."""
+        end = self._count + more
         if end > MAX_ROWS:
             raise Exhaustion(f"more than {MAX_ROWS:,} contacts in one run")
         if end > len(self._time):
             size = max(2 * len(self._time), end)
-            self._time = np.resize(self._time, size)
-            self._pair = np.resize(self._pair, (size, 2))
-            self._vectors = np.resize(self._vectors, (size, 6))
+            self._time, self._impulse = np.resize(self._time, size), np.resize(self._impulse, size)
+            self._pair, self._place = np.resize(self._pair, (size, 2)), np.resize(self._place, (size, 2))
         rows = slice(self._count, end)
-        self._time[rows] = time
-        self._pair[rows] = np.column_stack((first, second))
-        self._vectors[rows, 0:2] = point
-        self._vectors[rows, 2:4] = np.where(swapped[:, None], -normal, normal)
-        self._vectors[rows, 4:6] = 0.0
+        self._impulse[rows] = 0.0
         self._count = end
+        return rows
 
     def pairs(self) -> IntArray:
         """Return the pairs (K, 2) that touched when last recorded."""
@@ -105,14 +92,18 @@ class ContactLedger:
     def take(self) -> Contacts:
         """Return the contacts that were open since the last call, and forget those that have ended."""
         n = self._count
-        point, normal, impulse = (self._vectors[:n, k : k + 2].copy() for k in (0, 2, 4))
-        taken = Contacts(self._time[:n].copy(), self._pair[:n].copy(), point, normal, impulse)
+        vectors = (self._place[:n, 0], self._place[:n, 1], self._impulse[:n])
+        taken = Contacts(self._time[:n].copy(), self._pair[:n].copy(), *(_plain(vector) for vector in vectors))
         lasting = np.unique(self._row)
         self._row = np.searchsorted(lasting, self._row)
         self._rows.keep(self._row)
-        self._count = len(lasting)
-        self._time[: self._count] = taken.time[lasting]
-        self._pair[: self._count] = taken.pair[lasting]
-        self._vectors[: self._count] = self._vectors[lasting]
-        self._vectors[: self._count, 4:6] = 0.0
+        self._count = count = len(lasting)
+        self._time[:count], self._pair[:count] = taken.time[lasting], taken.pair[lasting]
+        self._place[:count] = self._place[lasting]
+        self._impulse[:count] = 0.0
         return taken
+
+
+def _plain(vector: ComplexArray) -> FloatArray:
+    """Return complex numbers (K,) as rows (K, 2)."""
+    return np.array(vector, np.complex128, order="C").view(np.float64).reshape(-1, 2)

@@ -78,23 +78,29 @@ class MeetingBodies:
         order = np.arange(len(numbers))
         if len(numbers) > MANY:
             order = np.random.Generator(np.random.PCG64(0)).permutation(len(numbers))
-        for k in order.tolist():
-            number = int(numbers[k])
-            fixed = bool(bodies.fixed[number])
-            kind = pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC
-            body = pymunk.Body(float(bodies.mass[number]), float(moment[k]), body_type=kind)
-            body.position = float(position[k, 0]), float(position[k, 1])
-            body.angle = float(angle[k])
-            if not fixed:
-                body.velocity = float(velocity[k, 0]), float(velocity[k, 1])
-                body.angular_velocity = float(angular_velocity[k])
-                self._moving += 1
-            shape = pymunk.Circle(body, float(bodies.radius[number]))
-            shape.filter = category(fixed, bodies.elements[bodies.element[number]].collides)
-            self._setter.dress(shape, int(self._surface_of[number]))
-            self._space.add(body, shape)
-            self._members[number] = Member(body, shape)
+        states = np.column_stack((position, angle, velocity, angular_velocity, bodies.mass[numbers], moment))
+        for number, state in zip(numbers[order].tolist(), states[order].tolist(), strict=True):
+            self._add(number, bodies, state)
         self._register()
+
+    def _add(self, number: int, bodies: Bodies, state: list[float]) -> None:
+        """Add a body with its state: x, y, angle, vx, vy, ω, mass, moment."""
+        x, y, angle, vx, vy, spin, mass, moment = state
+        fixed = bool(bodies.fixed[number])
+        body = pymunk.Body(mass, moment, body_type=pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC)
+        body.position = x, y
+        if angle:
+            body.angle = angle
+        if not fixed:
+            body.velocity = vx, vy
+            if spin:
+                body.angular_velocity = spin
+            self._moving += 1
+        shape = pymunk.Circle(body, float(bodies.radius[number]))
+        shape.filter = category(fixed, bodies.elements[bodies.element[number]].collides)
+        self._setter.dress(shape, int(self._surface_of[number]))
+        self._space.add(body, shape)
+        self._members[number] = Member(body, shape)
 
     def _add_fixed(self, bodies: Bodies) -> None:
         """Add the fixed things, once there is something to meet them."""
@@ -185,9 +191,10 @@ class MeetingBodies:
         """Write the present state into arrays in scene order."""
         if not self._moving:
             return
-        numbers, state = self._read()
-        position[numbers], velocity[numbers] = state[:, 0:2], state[:, 3:5]
-        angle[numbers], angular_velocity[numbers] = state[:, 2], state[:, 5]
+        _, state = self._read()
+        at = self._reader.slots
+        position[at], velocity[at] = state[:, 0:2], state[:, 3:5]
+        angle[at], angular_velocity[at] = state[:, 2], state[:, 5]
 
     def touching(self) -> Touching:
         """Return who touches whom now, and how (`Reader.touching`)."""

@@ -8,7 +8,8 @@ of momentum, to rounding.
 
 import numpy as np
 
-from sandbox.trajectory import FloatArray, IntArray
+from sandbox.engines.native.reader import ComplexArray
+from sandbox.trajectory import IntArray
 
 
 class PartedMemory:
@@ -17,7 +18,7 @@ class PartedMemory:
     def __init__(self, persistence: int) -> None:
         self._persistence = persistence
         self._moment = 0
-        self._parted: dict[int, tuple[int, float, float]] = {}
+        self._parted: dict[int, tuple[int, complex]] = {}
 
     def forget_and_advance(self) -> None:
         """Go on to the next substep."""
@@ -28,23 +29,21 @@ class PartedMemory:
                 break
             del self._parted[key]
 
-    def part(self, key: IntArray, impulse: FloatArray, normal: FloatArray) -> None:
+    def part(self, key: IntArray, impulse: ComplexArray, normal: ComplexArray) -> None:
         """Remember pairs that touched in the last substep, and do not now.
 
         Args:
             key: (K,) of the pairs.
-            impulse: (K, 2) on the first of each, as pymunk reported it, N·s.
-            normal: (K, 2) from the first to the second.
+            impulse: (K,) on the first of each, as pymunk reported it, N·s.
+            normal: (K,) from the first to the second.
         """
-        along = -(impulse * normal).sum(axis=1)
-        across = -(normal[:, 0] * impulse[:, 1] - normal[:, 1] * impulse[:, 0])
-        for each, n, t in zip(key.tolist(), along.tolist(), across.tolist(), strict=True):
+        # pymunk accumulates along the normal and across it: the impulse turned back by the normal.
+        accumulated = -impulse * normal.conj()
+        for each, value in zip(key.tolist(), accumulated.tolist(), strict=True):
             self._parted.pop(each, None)  # so that the dict stays in the order of parting
-            self._parted[each] = self._moment - 1, n, t
+            self._parted[each] = self._moment - 1, value
 
-    def excess(self, key: IntArray, normal: FloatArray) -> FloatArray:
-        """Return what pymunk reports too much (K, 2), on the first of pairs that have just met, N·s."""
-        known = [self._parted.pop(each, (0, 0.0, 0.0)) for each in key.tolist()]
-        along, across = (np.asarray([entry[k] for entry in known]) for k in (1, 2))
-        x, y = normal[:, 0], normal[:, 1]
-        return -np.column_stack((x * along - y * across, y * along + x * across))
+    def excess(self, key: IntArray, normal: ComplexArray) -> ComplexArray:
+        """Return what pymunk reports too much (K,), on the first of pairs that have just met, N·s."""
+        known = [self._parted.pop(each, (0, 0j))[1] for each in key.tolist()]
+        return -normal * np.asarray(known, np.complex128)

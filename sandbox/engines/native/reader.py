@@ -1,11 +1,16 @@
 """Reader: the state of a space in one call a frame, through pymunk.batch and one reused buffer."""
 
+from typing import NamedTuple
+
 import numpy as np
+import numpy.typing as npt
 import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 
 from sandbox.engines.native.ids import IdTable
 from sandbox.trajectory import FloatArray, IntArray
+
+ComplexArray = npt.NDArray[np.complex128]
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 STATE_WIDTH = 6  # x, y, angle, vx, vy, ω: in the order of pymunk's flags
@@ -21,10 +26,22 @@ TOUCH = (
 )
 
 
-Touching = tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]
-"""Bodies a and b (K,) by number; the impulse on a (K, 2), N·s; the normal (K, 2) from a to b; the point (K, 2), m."""
+class Touching(NamedTuple):
+    """What touches at the end of a substep, K arbiters. Vectors are complex numbers, x + iy: one look each."""
 
-NOTHING: Touching = np.empty(0, np.int64), np.empty(0, np.int64), *(np.empty((0, 2)) for _ in range(3))
+    a: IntArray
+    """(K,) one body of each pair, by number"""
+    b: IntArray
+    """(K,) the other"""
+    impulse: ComplexArray
+    """(K,) on a, N·s"""
+    normal: ComplexArray
+    """(K,) from a to b"""
+    point: ComplexArray
+    """(K,) midway in the overlap, m"""
+
+
+NOTHING = Touching(np.empty(0, np.int64), np.empty(0, np.int64), *(np.empty(0, np.complex128) for _ in range(3)))
 
 
 class Reader:
@@ -42,6 +59,8 @@ class Reader:
         self._moved, self._first, self._all = True, True, 0
         self._rows: IntArray = np.empty(0, np.int64)
         self._numbers: IntArray = np.empty(0, np.int64)
+        self.slots: slice | IntArray = self._numbers
+        """Where in scene order the rows of `state` belong; a slice where that is possible, which is faster."""
 
     def assign(self, moving: dict[int, int], still: dict[int, int]) -> None:
         """Say which number each body's id stands for: of those that move, and of the static ones."""
@@ -74,6 +93,9 @@ class Reader:
         self._numbers = self._number_of.numbers(ids[self._rows])
         self._first = np.array_equal(self._rows, np.arange(len(self._rows)))  # static bodies come last
         self._all = len(ids)
+        first = int(self._numbers[0]) if len(self._numbers) else 0
+        consecutive = np.array_equal(self._numbers, np.arange(first, first + len(self._numbers)))
+        self.slots = slice(first, first + len(self._numbers)) if consecutive else self._numbers
         self._moved = False
 
     def push(self, force: FloatArray) -> None:
@@ -84,15 +106,14 @@ class Reader:
         set_space_bodies(self._space, BodyFields.FORCE, self._forces)
 
     def touching(self) -> Touching:
-        """Return what touches now, points midway in the overlap. Valid until the next call."""
+        """Return what touches now, as arrays of their own."""
         self._arbiters.clear()
         get_space_arbiters(self._space, TOUCH, self._arbiters)
         words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
         if not len(words):
             return NOTHING
-        table = np.frombuffer(self._arbiters.float_buf()).reshape(-1, 8)
-        live = words[:, 2] > 0  # a parted contact is remembered for a while, with no points
-        if not live.all():
-            words, table = words[live], table[live]
-        a, b = self._number_of.numbers(words[:, 0]), self._number_of.numbers(words[:, 1])
-        return a, b, table[:, 0:2], table[:, 2:4], (table[:, 4:6] + table[:, 6:8]) * 0.5
+        # A parted contact is remembered for a while, with no points.
+        live = np.flatnonzero(words[:, 2])
+        a, b = (self._number_of.numbers(words[:, k].take(live)) for k in (0, 1))
+        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128).reshape(-1, 4).take(live, axis=0)
+        return Touching(a, b, vectors[:, 0], vectors[:, 1], (vectors[:, 2] + vectors[:, 3]) * 0.5)

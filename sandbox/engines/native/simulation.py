@@ -164,7 +164,7 @@ class NativeSimulation:
 
     def _record(self, time: float) -> None:
         if self._ledger is not None and len(self._population.meeting):
-            self._ledger.record(time, *self._population.meeting.touching())
+            self._ledger.record(time, self._population.meeting.touching())
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the present arrays in scene order; they belong to the population."""

@@ -6,6 +6,7 @@ tells by its bodies alone who touched.
 
 import math
 from collections.abc import Iterator
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -46,6 +47,7 @@ def gravity_of(scene: Scene) -> tuple[float, float]:
     return (0.0, 0.0) if dragged else scene.world.gravity
 
 
+@cache
 def category(fixed: bool, collides: Collides) -> pymunk.ShapeFilter:
     """Return the filter of a ball."""
     if fixed:
