@@ -46,7 +46,7 @@ def test_recording_written_and_read_again_is_equal() -> None:
     assert Recording.from_json(RECORDING.to_json()) == RECORDING
 
 
-@given(strategies.scenes(), actions(), strategies.numbers(0, 1e9), st.none() | st.text(max_size=9))
+@given(strategies.scenes(), actions(), st.floats(0, 1e9), st.none() | st.text(max_size=9))
 def test_any_recording_written_and_read_again_is_equal(
     scene: Scene, done: tuple[Action, ...], duration: float, state_hash: str | None
 ) -> None:

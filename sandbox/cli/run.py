@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from sandbox.batch.outcome import Outcome, execute
-from sandbox.batch.plan import Job, plan
+from sandbox.batch.plan import Job, parse_sweep, plan
 from sandbox.batch.store import Store, StoreError
 from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json
 from sandbox.cli.table import Row, print_runs
@@ -55,9 +55,14 @@ def command(
     for scene in scenes:
         with gathering(faults):
             found += paths_of([scene])
+    sound: list[str] = []
+    for sweep in sweeps:
+        with gathering(faults, "--sweep", (AddressError,)):
+            parse_sweep(sweep)
+            sound.append(sweep)
     jobs: list[Job] = []
     with gathering(faults, "--sweep", (AddressError,)):
-        jobs = plan(found, names, overrides, sweeps, seeds)
+        jobs = plan(found, names, overrides, sound, seeds)
     if not faults:
         with gathering(faults):
             _check_drawing(plot, bodies, jobs)

@@ -177,7 +177,7 @@ def test_plane_is_missed_only_deeper_than_its_backing_or_unseen():
     assert step(scene, [(0.0, -BACKING + 1)], seen) == []
     assert step(scene, [(0.0, -BACKING - 1)], seen) == [[0, -1]]
     assert step(scene, [(0.0, -3 * BACKING)]) == [[0, -1]]
-    assert step(scene, [(0.0, 0.0999)]) == [[0, -1]]
+    assert step(scene, [(0.0, 0.1 * (1 - 2 * TOLERANCE))]) == [[0, -1]]
     assert step(scene, [(0.0, 0.1)]) == []
 
 

@@ -1,0 +1,253 @@
+"""`sandbox run`: what it prints, its JSON, its exit status."""
+
+from pathlib import Path
+
+import pytest
+from calling import DIVERGING, DROP, FAULTY, json_of, lines_of, process, written
+
+from sandbox.trajectory import Trajectory
+
+KEYS = {
+    "id": str,
+    "scene": str,
+    "engine": str,
+    "settings": dict,
+    "seed": int,
+    "status": str,
+    "seconds": float,
+    "steps": int,
+    "steps_per_second": float,
+    "realtime_factor": float,
+    "energy_start": float,
+    "energy_end": float,
+    "contacts": int,
+    "missed_contacts": int,
+    "final": dict,
+}
+"""of a run that went well and was not stored; `reason` and `path` are null then"""
+
+
+def test_json_has_every_key_with_its_type(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, document, err = json_of(capfd, "run", scene)
+    assert (status, err, list(document)) == (0, [], ["runs"])
+    (row,) = document["runs"]
+    assert {key: type(row[key]) for key in KEYS} == KEYS
+    assert (row["scene"], row["title"], row["engine"], row["status"]) == (scene, "Drop", "pymunk", "ok")
+    assert (row["reason"], row["path"], row["seed"], row["steps"]) == (None, None, 0, 50)
+    assert row["settings"]["dt"] == 0.01
+    assert row["energy_start"] == 10.0  # m·g·y, y = 1 m
+    assert (row["contacts"], row["missed_contacts"]) == (1, 0)
+    assert row["steps_per_second"] == pytest.approx(50 / row["seconds"])
+    assert row["realtime_factor"] == pytest.approx(0.5 / row["seconds"])
+    final = row["final"]["a"]
+    assert set(final) == {"position", "velocity", "angle", "angular_velocity"}
+    assert [len(final["position"]), len(final["velocity"])] == [2, 2]
+    assert (final["angle"], final["angular_velocity"]) == (0.0, 0.0)
+
+
+def test_settings_tell_every_choice_as_it_was_made(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    _, document, _ = json_of(capfd, "run", written(tmp_path), "--set", "solver.substeps=3")
+    settings = document["runs"][0]["settings"]
+    assert (settings["substeps"], settings["iterations"], settings["integrator"]) == (3, 10, "explicit_euler")
+    assert settings["slop"] == pytest.approx(0.005)  # a hundredth of the smallest radius
+
+
+def test_without_audit_the_misses_are_unknown(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    _, with_audit, _ = json_of(capfd, "run", scene)
+    _, without, _ = json_of(capfd, "run", scene, "--no-audit")
+    assert without["runs"][0]["missed_contacts"] is None
+    assert without["runs"][0]["final"] == with_audit["runs"][0]["final"]
+    assert lines_of(capfd, "run", scene, "--no-audit")[1][-1].split()[-1] == "?"
+
+
+def test_bullet_that_tunnels_is_counted(capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, _ = json_of(capfd, "run", "bullet")
+    assert (status, document["runs"][0]["missed_contacts"]) == (0, 1)
+
+
+@pytest.mark.parametrize("name", ["tutorial/bounce", "bounce"])
+def test_shipped_scene_is_found_from_anywhere(
+    name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, document, _ = json_of(capfd, "run", name, "--set", "world.duration=0.01")
+    assert (status, document["runs"][0]["scene"], document["runs"][0]["title"]) == (0, name, "Bounce")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_process_in_another_folder_finds_both_kinds_of_scene(tmp_path: Path) -> None:
+    written(tmp_path)
+    done = process("run", "drop.toml", "bounce", "--set", "world.duration=0.01", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert [line.split()[0] for line in done.stdout.splitlines()] == ["scene", "drop.toml", "bounce"]
+
+
+def test_several_scenes_sweeps_and_seeds_multiply(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    first, second = written(tmp_path), written(tmp_path, name="other.toml")
+    status, document, _ = json_of(
+        capfd, "run", first, second, "--sweep", "solver.dt=0.01,0.02", "--sweep", "solver.substeps=1:2:2", "--seeds", "2"
+    )
+    rows = [(r["scene"], r["settings"]["dt"], r["settings"]["substeps"], r["seed"]) for r in document["runs"]]
+    assert status == 0
+    assert rows == [(s, dt, n, seed) for s in (first, second) for dt in (0.01, 0.02) for n in (1, 2) for seed in (1, 2)]
+    assert len({r["id"] for r in document["runs"]}) == 8  # the two files say the same, so they are the same runs
+
+
+def test_engines_may_be_listed_and_count_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, _ = json_of(capfd, "run", written(tmp_path), "--engines", "pymunk, pymunk")
+    assert (status, [row["engine"] for row in document["runs"]]) == (0, ["pymunk"])
+
+
+def test_refused_run_is_told_with_its_reason(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, document, err = json_of(capfd, "run", scene, "--set", "solver.integrator=rk4")
+    (row,) = document["runs"]
+    assert (status, row["status"], row["final"], row["steps"]) == (1, "refused", {}, 0)
+    assert row["reason"].startswith("pymunk refuses: integrator 'rk4' is not a choice it has")
+    unknown = ("energy_start", "energy_end", "steps_per_second", "realtime_factor", "missed_contacts", "path")
+    assert [row[key] for key in unknown] == [None] * 6
+    assert err == [f"{scene}: refused: {row['reason']}"]
+
+
+def test_one_refused_of_several_runs_leaves_the_others(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, _ = json_of(
+        capfd, "run", written(tmp_path), "--sweep", "solver.integrator=rk4,explicit_euler"
+    )
+    assert (status, [row["status"] for row in document["runs"]]) == (1, ["refused", "ok"])
+
+
+def test_diverging_run_keeps_its_data(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, document, err = json_of(capfd, "run", scene, *DIVERGING, "--out", str(tmp_path / "runs"))
+    (row,) = document["runs"]
+    assert (status, row["status"]) == (1, "diverged")
+    assert err == [f"{scene}: diverged: {row['reason']}"]
+    run = Trajectory.load(row["path"])
+    assert (run.status, run.reason) == ("diverged", row["reason"])
+    assert 1 < len(run.time) < 101
+    assert f"at {run.time[-1]:g} s: 'a' " in row["reason"]
+    assert row["final"]["a"]["position"] == run.position[-1, 0].tolist()
+
+
+def test_faulty_scenes_are_told_all_at_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    bad, worse = written(tmp_path, FAULTY, "bad.toml"), written(tmp_path, FAULTY, "worse.toml")
+    arguments = ("run", bad, worse, "nowhere", "--engine", "none", "--sweep", "dt")
+    status, document, err = json_of(capfd, *arguments)
+    assert (status, document["runs"]) == (2, [])
+    told = [(f["file"], f["line"], f["path"]) for f in document["faults"]]
+    assert told == [
+        ("--engine", None, ""),
+        ("nowhere", None, ""),
+        ("--sweep", None, ""),
+        *((file, line, path) for file in (bad, worse) for line, path in ((3, "ball.a.position[1]"), (4, "ball.a.radius"))),
+    ]
+    assert len(err) == len(told)
+    assert err[3].startswith(f"{bad}:3: ball.a.position[1]: ")
+    assert lines_of(capfd, *arguments) == (2, [], err)
+
+
+def test_fault_of_several_points_of_a_sweep_is_told_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, out, err = lines_of(capfd, "run", scene, "--sweep", "solver.dt=-1,0.01,0", "--seeds", "3")
+    assert (status, out) == (2, [])
+    assert [line.split(" is ")[0] for line in err] == [f"{scene}: solver.dt (set): {value}" for value in (-1, 0)]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (("--engine", "none"), "--engine: no engine 'none'; engines: pymunk"),
+        (("--engines", "pymunk,"), "--engine: no engine ''; engines: pymunk"),
+        (("--nonsense",), "sandbox run: No such option '--nonsense'."),
+        (("--seeds", "0"), "sandbox run: Invalid value for '--seeds': 0 is not in the range 1<=x<=1000000."),
+        (("--sweep", "solver.dt=1:2:0"), "--sweep: 'solver.dt=1:2:0': a range has finite ends and 1 to 1,000,000 values"),
+        (("--plot", "x.gif"), "--plot: x.gif: the name ends in .png, .svg or .pdf"),
+        (("--plot", "nowhere/x.png"), "--plot: nowhere/x.png: there is no folder nowhere"),
+        (("--plot", "x.png", "--seeds", "2"), "--plot: draws one run, but this makes 2"),
+        (("--plot", "x.png", "--body", "b"), "--body: no body is named 'b'"),
+        (("--body", "a"), "--body: says what is drawn, but nothing is; give --plot FILE too"),
+        (("--out", "drop.toml"), "--out: drop.toml: is or lies in a file; runs are stored in a folder"),
+    ],
+)
+def test_wrong_option_is_one_line_and_nothing_is_written(
+    arguments: tuple[str, ...],
+    line: str,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path)
+    assert lines_of(capfd, "run", "drop.toml", *arguments) == (2, [], [line])
+    assert [path.name for path in tmp_path.iterdir()] == ["drop.toml"]
+
+
+@pytest.mark.parametrize("value", ["solver.dt", "=3", "solver=3", "ball.b.mass=2", "solver.zzz=1", "title=\x00"])
+def test_wrong_setting_is_a_fault_of_the_scene(value: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, document, err = json_of(capfd, "run", scene, "--set", value)
+    assert (status, len(document["faults"])) == (2, 1)
+    assert document["faults"][0]["file"] == scene
+    assert len(err) == 1
+    assert err[0].startswith(f"{scene}: ")
+
+
+def test_run_that_would_not_fit_is_refused_before_any_other_runs(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    sparks = '[world]\nduration = 1.0\n[[emitter]]\nposition = [0, 0]\ncount = 10000\nvelocity_min = [0, 0]\nvelocity_max = [1, 1]\n'
+    scene = written(tmp_path, sparks)
+    arguments = ("run", "bounce", scene, "--set", "solver.dt=1e-9", "--set", "world.duration=1.0")
+    status, document, err = json_of(capfd, *arguments, "--out", str(tmp_path / "runs"))
+    assert (status, document["runs"]) == (2, [])
+    fault = document["faults"][-1]
+    assert (fault["file"], fault["path"]) == (scene, "solver.record_every")
+    assert "1,000,000,001 frames of 10,000 bodies take 4.8e+05 GB" in fault["message"]
+    assert len(err) == len(document["faults"])
+    assert not (tmp_path / "runs").exists()
+
+
+def test_quiet_says_nothing_where_all_went_well(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert lines_of(capfd, "run", written(tmp_path), "--quiet") == (0, [], [])
+
+
+def test_table_has_columns_for_what_differs(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    _, out, _ = lines_of(capfd, "run", scene, "--sweep", "solver.iterations=5,10")
+    assert out[0].strip() == scene
+    assert out[1].split("  ")[0] == "engine"
+    assert out[1].split() == "engine dt iterations status × real energy, J contacts missed".split()
+    assert [line.split()[2] for line in out[2:]] == ["5", "10"]
+
+
+def test_table_of_several_scenes_names_each(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    paths = [written(tmp_path, name=f"{'long ' * 12}{k}.toml") for k in range(2)]
+    _, out, _ = lines_of(capfd, "run", *paths)
+    assert out[0].split()[0] == "scene"
+    text = "".join("".join(line.split()) for line in out)  # long names are folded
+    assert "long1.toml" in text
+    assert len([line for line in out if " ok " in line]) == 2
+
+
+def test_plot_is_drawn_and_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene, plot = written(tmp_path), tmp_path / "run.svg"
+    status, out, err = lines_of(capfd, "run", scene, "--plot", str(plot), "--body", "a")
+    assert (status, out[-1], err) == (0, f"drawn: {plot}", [])
+    assert "<svg" in plot.read_text(encoding="utf-8")
+    status, document, _ = json_of(capfd, "run", scene, "--plot", str(tmp_path / "again.svg"))
+    assert (status, len(document["runs"])) == (0, 1)
+    assert (tmp_path / "again.svg").exists()
+
+
+def test_plot_that_cannot_be_written_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    plot = tmp_path / ("x" * 300 + ".svg")  # longer than any file's name may be
+    status, _, err = lines_of(capfd, "run", written(tmp_path), "--plot", str(plot))
+    assert (status, err) == (2, [f"--plot: {plot}: File name too long"])
+
+
+def test_names_in_any_script_come_out_as_they_are(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path, DROP.replace('"a"', '"[b] ✂ a/b"').replace("Drop", "Ünïted [bold]x"))
+    _, document, _ = json_of(capfd, "run", scene)
+    assert (document["runs"][0]["title"], list(document["runs"][0]["final"])) == ("Ünïted [bold]x", ["[b] ✂ a/b"])
