@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sandbox.measure.neighbours import Neighbours
+from sandbox.measure.audit.neighbours import Neighbours
 
 
 def everything(i, j):

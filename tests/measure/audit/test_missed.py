@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.measure.audit import Audit
-from sandbox.measure.sweep import CLEAR, DEEP, JUMP, TOLERANCE
+from sandbox.measure.audit.sweep import CLEAR, DEEP, JUMP, TOLERANCE
 from sandbox.scene.model import Ball, Emitter, Plane, Post, Scene, Wall
 from sandbox.scene.part import BACKING
 

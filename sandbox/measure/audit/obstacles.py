@@ -6,8 +6,8 @@ from typing import Self
 
 import numpy as np
 
-from sandbox.measure.looks import Looks
-from sandbox.measure.sweep import (
+from sandbox.measure.audit.looks import Looks
+from sandbox.measure.audit.sweep import (
     CLEAR,
     DEEP,
     JUMP,

@@ -1,6 +1,6 @@
 import numpy as np
 
-from sandbox.measure.looks import Looks
+from sandbox.measure.audit.looks import Looks
 
 PAIRS = np.array([[3, 7], [0, -1], [999_999, -1_000_000], [5, 6]])
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.measure.sweep import (
+from sandbox.measure.audit.sweep import (
     CLEAR,
     DEEP,
     JUMP,

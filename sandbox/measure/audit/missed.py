@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from sandbox.measure.looks import Looks
-from sandbox.measure.neighbours import Neighbours
-from sandbox.measure.obstacles import Obstacles, Paths
-from sandbox.measure.sweep import CLEAR, DEEP, JUMP, approaching, closest_to_origin, dot
+from sandbox.measure.audit.looks import Looks
+from sandbox.measure.audit.neighbours import Neighbours
+from sandbox.measure.audit.obstacles import Obstacles, Paths
+from sandbox.measure.audit.sweep import CLEAR, DEEP, JUMP, approaching, closest_to_origin, dot
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
