@@ -3,6 +3,7 @@
 import json
 import math
 import random
+from functools import cache
 from typing import Any
 
 from hypothesis import strategies as st
@@ -14,6 +15,7 @@ from sandbox.scene.model import Scene
 Document = dict[str, Any]
 
 
+@cache
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
     """Floats within bounds, and whole numbers as TOML integers."""
     floats = st.floats(low, high, allow_nan=False, allow_infinity=False)
@@ -21,6 +23,7 @@ def numbers(low: float, high: float) -> st.SearchStrategy[float]:
     return floats | st.integers(first, last) if first <= last else floats
 
 
+@cache
 def names() -> st.SearchStrategy[str]:
     """Names of bodies and materials: any text without control characters; none that looks like a default name."""
     letters = st.characters(exclude_categories=["Cc", "Cs", "Zl", "Zp"], exclude_characters="-")
@@ -29,11 +32,13 @@ def names() -> st.SearchStrategy[str]:
     )
 
 
+@cache
 def pairs(low: float, high: float) -> st.SearchStrategy[list[float]]:
     """Arrays of two numbers."""
     return st.lists(numbers(low, high), min_size=2, max_size=2)
 
 
+@cache
 def _coefficients() -> Document:
     return {
         "restitution": numbers(0, 1),
@@ -41,16 +46,21 @@ def _coefficients() -> Document:
     }
 
 
+@cache
+def _colours() -> st.SearchStrategy[str]:
+    return st.from_regex("#[0-9a-fA-F]{6}", fullmatch=True)
+
+
 @st.composite
 def _elements(draw: st.DrawFn, required: Document, optional: Document, materials: list[str]) -> Document:
-    optional = {**optional, **_coefficients(), "colour": st.from_regex("#[0-9a-fA-F]{6}", fullmatch=True)}
+    optional = {**optional, **_coefficients(), "colour": _colours()}
     if materials:
         optional["material"] = st.sampled_from(materials)
     return dict(draw(st.fixed_dictionaries(required, optional=optional)))
 
 
 @st.composite
-def documents(draw: st.DrawFn, most: int = 3) -> Document:
+def documents(draw: st.DrawFn, most: int = 2) -> Document:
     """Sound scene documents of up to `most` elements of each kind.
 
     With planes everything stays within some hundred metres, so that nothing starts deep behind one; without, places
@@ -59,7 +69,10 @@ def documents(draw: st.DrawFn, most: int = 3) -> Document:
     document: Document = draw(
         st.fixed_dictionaries({}, optional={"title": st.text(max_size=20), "about": st.text(max_size=40)})
     )
-    listed = lambda one: draw(st.lists(one, max_size=most))  # noqa: E731, a name for a word used ten times
+
+    def listed(one: st.SearchStrategy[Document]) -> list[Document]:
+        return draw(st.lists(one, max_size=most))
+
     materials = draw(st.lists(names(), unique=True, max_size=3))
     document["material"] = [
         {"name": name, **draw(st.fixed_dictionaries({}, optional=_coefficients()))} for name in materials
@@ -176,7 +189,7 @@ def _unless_none() -> Any:
     return lambda name: object() if name is None else name
 
 
-def scenes(most: int = 3) -> st.SearchStrategy[Scene]:
+def scenes(most: int = 2) -> st.SearchStrategy[Scene]:
     """Sound scenes."""
     return documents(most).map(from_document)
 

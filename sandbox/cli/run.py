@@ -134,10 +134,13 @@ def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) 
             fault("--plot", f"draws one run, but this makes {len(jobs)}")
         if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
             fault("--plot", f"{plot}: the name ends in .png, .svg or .pdf")
-        if not plot.absolute().parent.is_dir():
-            fault("--plot", f"{plot}: there is no folder {plot.parent}")
-        elif plot.is_dir():
-            fault("--plot", f"{plot}: is a folder")
+        try:
+            if not plot.absolute().parent.is_dir():
+                fault("--plot", f"{plot}: there is no folder {plot.parent}")
+            elif plot.is_dir():
+                fault("--plot", f"{plot}: is a folder")
+        except OSError as error:  # such as a name longer than any file's
+            fault("--plot", f"{plot}: {error.strerror or error}")
         unknown = [name for name in bodies if name not in jobs[0].scene.bodies.names]
         if unknown:
             fault("--body", f"no body is named {', '.join(map(repr, unknown))}")

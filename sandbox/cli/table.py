@@ -10,6 +10,9 @@ Row = dict[str, Any]
 WIDE = 200
 """Columns where the output is no terminal: rows are for reading by line then, and must not be folded."""
 
+SHORTEST_NAME = 8
+"""Columns within which a scene's name is folded where there is little room."""
+
 
 def print_runs(rows: Sequence[Row]) -> None:
     """Print a line for each run."""
@@ -22,10 +25,9 @@ def print_runs(rows: Sequence[Row]) -> None:
     scenes = len({row["scene"] for row in rows}) > 1
 
     # One scene stands above its runs, where a long path takes no room from the figures.
-    title = None if scenes else Text(rows[0]["scene"], style="bold")
-    table = Table(box=None, pad_edge=False, header_style="bold", title=title, title_justify="left")
+    table = Table(box=None, pad_edge=False, header_style="bold")
     if scenes:
-        table.add_column("scene", overflow="fold", min_width=8)
+        table.add_column("scene", overflow="fold", min_width=SHORTEST_NAME)
     table.add_column("engine", no_wrap=True)
     for head in ("dt", *differing, *(["seed"] if seeds else [])):
         table.add_column(head, justify="right", no_wrap=True)
@@ -49,8 +51,11 @@ def print_runs(rows: Sequence[Row]) -> None:
             *(("–", "–") if row["status"] == "refused" else (f"{row['contacts']:,}", _missed(row["missed_contacts"]))),
         )
     console = Console(width=None if sys.stdout.isatty() else WIDE)
-    # Too narrow a terminal wraps lines by itself, which loses nothing; a table made to fit it would.
-    console.width = max(console.width, Console(width=10_000).measure(table).minimum)
+    # Too narrow a terminal wraps lines by itself, which loses nothing; a table made to fit it would. Only names fold.
+    spare = max(Text(row["scene"]).cell_len for row in rows) - SHORTEST_NAME if scenes else 0
+    console.width = max(console.width, Console(width=10_000).measure(table).maximum - max(spare, 0))
+    if not scenes:
+        console.print(Text(rows[0]["scene"]), soft_wrap=True)
     console.print(table)
 
 

@@ -202,7 +202,14 @@ def _drive(
         status, reason = "failed", f"at {step * dt:g} s: {error}"
     if progress is not None:
         progress(1.0)
-    return status, reason, step, simulation.contacts()
+    return status, reason, step, _by_pair(simulation.contacts())
+
+
+def _by_pair(contacts: Contacts) -> Contacts:
+    """Return contacts of one moment in the order of their pairs; an engine may find them in any."""
+    order = np.lexsort((contacts.pair[:, 1], contacts.pair[:, 0], contacts.time))
+    vectors = (each[order] for each in (contacts.point, contacts.normal, contacts.impulse))
+    return Contacts(contacts.time[order], contacts.pair[order], *vectors)
 
 
 def _act(simulation: Simulation, actions: tuple[Action, ...], due: int, now: float) -> int:

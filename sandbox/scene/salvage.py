@@ -28,6 +28,13 @@ HARMLESS: dict[str, Any] = {
 }
 """A value for each key that must be there, standing in for a faulty one."""
 
+ALOOF: dict[str, dict[str, Any]] = {
+    "plane": {"point": [0.0, -1e16], "normal": [0.0, 1.0]},
+    "world": {"duration": 1e-6},
+    **{kind: {"collides": "none"} for kind in ("ball", "grid", "scatter", "emitter")},
+}
+"""What else a table with a fault is given, so that it makes nothing around it look wrong."""
+
 _TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - {"title", "about"}
 
 
@@ -64,6 +71,8 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
         if len(location) <= depth or not isinstance(holder, dict):
             return []
         holder.pop(location[depth], None)
+        if "duration" not in holder:
+            holder.update(ALOOF.get(str(location[0]), {}))
         touched.add(location[:depth])
         for name, field in model_at(location[:depth]).model_fields.items():
             if field.is_required() and name not in holder and name in HARMLESS:
@@ -72,4 +81,4 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
         scene = read_model(document)
     except ValueError:
         return []
-    return [f for f in crosscheck(scene) if not any(f[0][: len(t)] == t for t in touched)]
+    return [f for f in crosscheck(scene) if touched.isdisjoint((f[0][:1], f[0][:2]))]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import strategies
-from hypothesis import given
+from hypothesis import given, settings
 
 from sandbox.scene.bodies import mass_of
 from sandbox.scene.file import loads
@@ -92,6 +92,13 @@ def test_joined_fixed_body_has_no_velocity() -> None:
     assert more.velocity[-1].tolist() == [0, 0]
 
 
+def test_fixed_ball_has_no_motion_however_it_came_about() -> None:
+    ball = Ball(position=(0.0, 0.0), velocity=(2.0, 3.0), angular_velocity=4.0, radius=1.0, fixed=True)
+    bodies = Scene(balls=(ball,)).bodies  # no file would be let through with it
+    assert not bodies.velocity.any()
+    assert not bodies.angular_velocity.any()
+
+
 def test_scene_without_bodies_has_empty_arrays() -> None:
     bodies = Scene().bodies
     assert len(bodies) == 0
@@ -119,6 +126,7 @@ def test_fixed_things_are_numbered_planes_walls_posts() -> None:
     assert scene.fixed == (*scene.planes, *scene.walls, *scene.posts)
 
 
+@settings(max_examples=25)
 @given(strategies.scenes())
 def test_arrays_of_any_scene_agree_in_shape_and_are_finite(scene: Scene) -> None:
     bodies = scene.bodies

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 import strategies
-from hypothesis import given
+from hypothesis import given, settings
 
 from sandbox.scene.demands import Demand, Item, bill, demands
 from sandbox.scene.file import from_document
@@ -81,6 +81,7 @@ def test_cases_show_every_demand_on_and_off() -> None:
     assert {(demand, on) for demand, on, _, _ in CASES} == {(demand, on) for demand in Demand for on in (True, False)}
 
 
+@settings(max_examples=25)
 @given(strategies.scenes())
 def test_bill_lists_every_demand_once_with_a_reason(scene: Scene) -> None:
     items = bill(scene)

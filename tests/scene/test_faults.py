@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 import strategies
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.scene.faults import Fault, Lines, SceneError, path_of
@@ -19,6 +19,7 @@ def test_line_found_is_the_line_where_the_key_is(said: tuple[strategies.Document
     assert {location: lines.find(location) for location in rendered.lines} == rendered.lines
 
 
+@settings(max_examples=25)
 @given(strategies.rendered(), st.integers(), st.text(min_size=1))
 def test_line_of_what_is_not_there_is_the_line_of_the_table_around_it(
     said: tuple[strategies.Document, strategies.Rendered], index: int, key: str

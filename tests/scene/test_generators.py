@@ -60,6 +60,18 @@ def test_scatter_stays_in_its_box_without_overlap() -> None:
     assert apart[np.triu_indices(200, 1)].min() >= 0.2
 
 
+def test_scatter_draws_the_later_ball_of_an_overlap_again() -> None:
+    scatter = SCATTER.model_copy(update={"radius": 0.3})
+    first = np.random.Generator(np.random.PCG64([3, 1, 0])).random((200, 2)) * [10.0, 20.0] + [-5.0, 0.0]
+    position, _ = expand(scatter, 3, 0)
+    kept = (position == first).all(axis=1)
+    assert kept[0]
+    assert 20 < kept.sum() < 200
+    apart = np.hypot(*(first[:, None] - first[None]).transpose(2, 0, 1))
+    crowded = np.triu(apart < 0.6, 1).any(axis=0)  # overlaps an earlier one
+    assert np.array_equal(kept & crowded, np.zeros(200, dtype=bool))
+
+
 @given(
     st.integers(0, 2**63 - 1),
     st.integers(1, 40),

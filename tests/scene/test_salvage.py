@@ -80,6 +80,37 @@ def test_material_that_is_only_misspelt_is_not_called_missing_too(broken: str) -
     assert "ball[0].material" not in paths(LOST + broken)
 
 
+@pytest.mark.parametrize(
+    ("text", "path"),
+    [
+        (
+            "[[plane]]\npoint = [0, 'x']\nnormal = [0, 1]\n[[ball]]\nposition = [0, -5000]\nradius = 1\n",
+            "plane[0].point[1]",
+        ),
+        (
+            "[[plane]]\npoint = [0, -9000]\nnormal = 'x'\n[[ball]]\nposition = [0, -9999]\nradius = 1\n",
+            "plane[0].normal",
+        ),
+        ("[world]\nduration = -1\n[solver]\ndt = 1e-9\n", "world.duration"),
+        ("[world]\nduration = 1e9\n[solver]\ndt = -1\n", "solver.dt"),
+        ("[[wall]]\npoints = 3\nclosed = true\n", "wall[0].points"),
+        ("[[scatter]]\ncount = 9\nlower = 'x'\nupper = [-5, -5]\nradius = 1\n", "scatter[0].lower"),
+        ("[[grid]]\norigin = [0, 0]\ncolumns = 999\nspacing = 0\nradius = 99\n", "grid[0].spacing"),
+    ],
+)
+def test_stand_in_for_a_faulty_value_makes_nothing_else_look_wrong(text: str, path: str) -> None:
+    expect(text, [path])
+
+
+def test_faulty_world_does_not_hide_too_many_steps() -> None:
+    expect(f"{BALL}[world]\nseed = -1\nduration = 1e9\n[solver]\ndt = 0.01\n", ["world.seed", "solver.dt"])
+
+
+def test_stand_ins_in_one_spot_are_no_crowd() -> None:
+    grid = "[[grid]]\norigin = [0, 0]\ncolumns = 400\nspacing = [3, 0]\nradius = 1\n"
+    expect(grid + "[[ball]]\nposition = 'x'\nradius = 1\n" * 400, [f"ball[{k}].position" for k in range(400)])
+
+
 def test_table_of_the_wrong_kind_is_reported_alone() -> None:
     expect(f"world = 3\n{BALL}", ["world"])
     expect("[ball]\nposition = [0, 0]\nradius = 1\nmaterial = 'lost'\n", ["ball"])

@@ -1,0 +1,113 @@
+"""Outcomes: a run made or found, and its row."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sandbox.action import Force, Remove, Spawn
+from sandbox.batch.outcome import execute
+from sandbox.batch.plan import Job
+from sandbox.batch.store import Store, StoreError
+from sandbox.engines.registry import UnknownEngineError
+from sandbox.scene.file import loads
+from sandbox.scene.model import Ball
+
+SCENE = loads("""
+title = "Two"
+[world]
+gravity = [0.0, -10.0]
+duration = 0.1
+seed = 3
+[[ball]]
+name = "a"
+position = [0, 0]
+radius = 1
+[[ball]]
+name = "b"
+position = [5, 0]
+radius = 1
+""")
+JOB = Job("label", SCENE, "pymunk")
+
+
+def test_row_tells_of_the_run() -> None:
+    outcome = execute(JOB)
+    row, run = outcome.row(), outcome.trajectory
+    assert json.loads(json.dumps(row, allow_nan=False)) == row
+    assert (row["id"], row["scene"], row["title"], row["seed"]) == (outcome.id, "label", "Two", 3)
+    assert (row["status"], row["reason"], row["steps"], row["path"], row["repeated"]) == ("ok", None, 10, None, False)
+    assert row["seconds"] > 0
+    assert row["realtime_factor"] == pytest.approx(0.1 / row["seconds"])
+    assert row["settings"] == run.info["settings"]
+    assert row["final"]["b"]["position"] == run.position[-1, 1].tolist()
+    assert row["final"]["b"]["velocity"] == run.velocity[-1, 1].tolist()
+    assert {**row, "final": None} == {**outcome.row(final=False), "final": None}
+    assert "final" not in outcome.row(final=False)
+
+
+def test_run_is_made_once_and_then_read(tmp_path: Path) -> None:
+    told: list[float] = []
+    with Store(tmp_path) as store:
+        made = execute(JOB, store, told.append)
+        assert told[-1] == 1.0
+        told.clear()
+        found = execute(JOB, store, told.append)
+        assert told == []
+    assert (made.repeated, found.repeated, made.id, made.path) == (False, True, found.id, found.path)
+    assert made.path == tmp_path / f"{made.id}.npz"
+    assert np.array_equal(made.trajectory.position, found.trajectory.position)
+    assert {**found.row(), "repeated": False} == made.row()
+
+
+def test_id_depends_on_actions_seed_and_resolved_settings() -> None:
+    action = Remove(time=0.05, body="a")
+    plain = execute(JOB).id
+    assert execute(replace(JOB, label="other")).id == plain
+    assert execute(replace(JOB, actions=(action,))).id != plain
+    stated = SCENE.model_copy(update={"solver": SCENE.solver.replace(slop=0.01)})  # what the engine takes anyway
+    assert execute(replace(JOB, scene=stated)).id == plain
+    other = SCENE.model_copy(update={"solver": SCENE.solver.replace(slop=0.02)})
+    assert execute(replace(JOB, scene=other)).id != plain
+
+
+def test_what_is_gone_is_told_and_what_is_not_finite_is_null() -> None:
+    actions = (
+        Remove(time=0.05, body="a"),
+        Spawn(time=0.05, ball=Ball(name="c", position=(9.0, 9.0), radius=1.0)),
+        Force(time=0.05, body="b", force=(1e42, 0.0)),
+    )
+    row = execute(replace(JOB, actions=actions)).row()
+    assert (row["status"], row["retired"]) == ("diverged", {"a": 0.05})
+    assert list(row["final"]) == ["a", "b", "c"]
+    json.dumps(row, allow_nan=False)
+
+
+def test_refused_job_has_no_final_state(tmp_path: Path) -> None:
+    scene = SCENE.model_copy(update={"solver": SCENE.solver.replace(integrator="rk4")})
+    with Store(tmp_path) as store:
+        outcome = execute(replace(JOB, scene=scene), store)
+        again = execute(replace(JOB, scene=scene), store)
+    row = outcome.row()
+    assert (row["status"], row["final"], row["realtime_factor"], row["missed_contacts"]) == ("refused", {}, None, None)
+    assert again.repeated
+    assert again.row()["reason"] == row["reason"]
+
+
+def test_unknown_engine_is_an_error() -> None:
+    with pytest.raises(UnknownEngineError, match="no engine 'none'"):
+        execute(replace(JOB, engine="none"))
+
+
+def test_damaged_arrays_are_a_fault_of_the_store(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        path = execute(JOB, store).path
+        assert path is not None
+        path.write_bytes(b"damaged")
+        with pytest.raises(StoreError, match="remove the file, and the run is made again"):
+            execute(JOB, store)
+        path.unlink()
+        assert not execute(JOB, store).repeated
+        assert len(store.rows()) == 1

@@ -1,0 +1,99 @@
+"""`sandbox check`: faults, demands, engines, warnings."""
+
+from pathlib import Path
+
+import pytest
+from calling import DROP, FAULTY, json_of, lines_of, written
+
+from sandbox.engines.registry import ENGINES
+
+
+def test_json_of_a_sound_scene_has_every_key(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, document, err = json_of(capfd, "check", scene)
+    assert (status, err) == (0, [])
+    assert {"scene", "title", "ok", "faults", "demands", "engines", "warnings"} <= set(document)
+    assert (document["scene"], document["title"], document["ok"]) == (scene, "Drop", True)
+    assert (document["faults"], document["warnings"]) == ([], [])
+    assert sorted(document["demands"]) == ["ball-plane", "gravity", "restitution", "translation"]
+    assert document["engines"] == {name: {"ok": True, "missing": []} for name in ENGINES}
+
+
+def test_json_of_a_faulty_scene_tells_every_fault_with_its_place(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene = written(tmp_path, FAULTY)
+    status, document, err = json_of(capfd, "check", scene)
+    assert (status, err) == (2, [])
+    assert (document["scene"], document["title"], document["ok"]) == (scene, None, False)
+    assert (document["demands"], document["engines"], document["warnings"]) == ([], {}, [])
+    assert all(set(fault) == {"file", "line", "path", "message"} for fault in document["faults"])
+    told = [(fault["file"], fault["line"], fault["path"]) for fault in document["faults"]]
+    assert told == [(scene, 3, "ball.a.position[1]"), (scene, 4, "ball.a.radius")]
+    status, out, lines = lines_of(capfd, "check", scene)
+    assert (status, out) == (2, [])
+    assert lines == [f"{scene}:{f['line']}: {f['path']}: {f['message']}" for f in document["faults"]]
+
+
+def test_fault_without_a_line_has_null(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    _, document, _ = json_of(capfd, "check", "nowhere")
+    assert (document["faults"][0]["file"], document["faults"][0]["line"]) == ("nowhere", None)
+
+
+def test_several_scenes_are_a_list_and_the_worst_decides(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    good, bad = written(tmp_path), written(tmp_path, FAULTY, "bad.toml")
+    status, document, _ = json_of(capfd, "check", good, bad, "nowhere")
+    assert (status, list(document)) == (2, ["scenes"])
+    assert [(each["scene"], each["ok"]) for each in document["scenes"]] == [
+        (good, True),
+        (bad, False),
+        ("nowhere", False),
+    ]
+    status, document, _ = json_of(capfd, "check", good, good)
+    assert (status, len(document["scenes"])) == (0, 2)
+
+
+def test_scene_that_no_engine_can_run_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, document, _ = json_of(capfd, "check", scene, "--set", "solver.detection=penalty_is_none")
+    assert (status, document["ok"]) == (2, False)
+    status, document, _ = json_of(capfd, "check", scene, "--set", "solver.response=penalty")
+    assert (status, document["ok"], document["faults"]) == (1, True, [])
+    verdict = document["engines"]["pymunk"]
+    assert verdict == {"ok": False, "missing": ["response 'penalty' is not a choice it has (only 'impulse')"]}
+
+
+def test_warning_carries_kind_message_and_figures(capfd: pytest.CaptureFixture[str]) -> None:
+    _, document, _ = json_of(capfd, "check", "bullet")
+    (warning,) = document["warnings"]
+    assert warning["kind"] == "tunnelling"
+    assert warning["odds"] == pytest.approx(0.8, abs=1e-12)  # 1 − 0.02/(100·0.001), but for rounding
+    assert warning["message"].endswith("odds up to 80 %; dt <= 0.0002 s would be safe")
+    assert document["safe_dt"] == pytest.approx(0.0002, rel=1e-12)  # a quotient's rounding
+    _, document, _ = json_of(capfd, "check", "bullet", "--set", "solver.dt=0.0002")
+    assert document["warnings"] == []
+
+
+def test_scene_where_nothing_can_tunnel_has_no_safe_dt(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    _, document, _ = json_of(capfd, "check", "tutorial/fireworks")
+    assert document["safe_dt"] is None
+    still = written(tmp_path, DROP.replace("[0.0, -10.0]", "[0.0, 0.0]") + "velocity = [0.0, 1e-320]\n")
+    status, document, err = json_of(capfd, "check", still)  # so slow that quotients overflow
+    assert (status, document["safe_dt"], err) == (0, None, [])
+
+
+def test_bill_is_printed_a_line_each(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, out, err = lines_of(capfd, "check", scene)
+    assert (status, out[0], err) == (0, f"{scene}: Drop", [])
+    marks = {line.split()[1]: line.split()[0] for line in out[1:12]}
+    assert (marks["gravity"], marks["drag"], marks["rotation"]) == ("on", "off", "off")
+    assert out[12] == "  engine pymunk: models all of it"
+    assert len(out) == 14
+
+
+def test_quiet_tells_only_what_is_wrong(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert lines_of(capfd, "check", written(tmp_path), "--quiet") == (0, [], [])
+    status, out, err = lines_of(capfd, "check", "bullet", "--quiet")
+    assert (status, len(out), err) == (0, 1, [])
+    assert out[0].startswith("bullet: warning: 'bullet' can close on 'wall' at up to 100 m/s, 0.1 m a substep")

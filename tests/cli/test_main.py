@@ -1,0 +1,148 @@
+"""The command line as a whole: help, wrong use, what it loads, and how it ends."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from calling import json_of, lines_of, process, written
+
+from sandbox.cli.main import COMMANDS
+from sandbox.engines.registry import ENGINES
+from sandbox.scene.shipped import shipped
+
+
+def test_commands_are_those_promised() -> None:
+    assert list(COMMANDS) == ["run", "check", "scenes", "engines", "schema"]
+
+
+@pytest.mark.parametrize("command", [None, *COMMANDS])
+def test_help_of_every_command(command: str | None, capfd: pytest.CaptureFixture[str]) -> None:
+    words = [] if command is None else [command]
+    status, out, err = lines_of(capfd, *words, "--help")
+    assert (status, err) == (0, [])
+    assert out[0].startswith(f"Usage: {' '.join(['sandbox', *words])} ")
+    assert lines_of(capfd, *words, "-h") == (0, out, [])
+    assert max(map(len, out)) <= 80
+
+
+def test_help_names_every_command_and_flag(capfd: pytest.CaptureFixture[str]) -> None:
+    text = "\n".join(lines_of(capfd, "--help")[1])
+    assert all(f"\n  {command} " in text for command in COMMANDS)
+    text = "\n".join(lines_of(capfd, "run", "--help")[1])
+    flags = "--engine --engines --set --sweep --seeds --out --plot --body --audit --no-audit --json --quiet"
+    assert [flag for flag in flags.split() if flag not in text] == []
+
+
+def test_help_and_version_work_as_a_process() -> None:
+    done = process("--help")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("Usage: sandbox ")
+    done = process("--version")
+    assert (done.returncode, done.stdout.split()[0]) == (0, "sandbox,")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "place", "word"),
+    [
+        (("nonsense",), "sandbox", "'nonsense'"),
+        (("--nonsense",), "sandbox", "--nonsense"),
+        (("run",), "sandbox run", "SCENES"),
+        (("check",), "sandbox check", "SCENES"),
+        (("run", "bounce", "--nonsense"), "sandbox run", "--nonsense"),
+        (("check", "bounce", "--nonsense"), "sandbox check", "--nonsense"),
+        (("scenes", "bounce"), "sandbox scenes", "bounce"),
+        (("run", "bounce", "--out"), "sandbox", "--out"),
+        (("run", "bounce", "--seeds", "x"), "sandbox run", "'x'"),
+        (("run", "bounce", "--seeds", "0"), "sandbox run", "--seeds"),
+    ],
+)
+def test_wrong_use_is_one_line(
+    arguments: tuple[str, ...], place: str, word: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    status, out, err = lines_of(capfd, *arguments)
+    assert (status, out, len(err)) == (2, [], 1)
+    assert err[0].startswith(f"{place}: ")
+    assert word in err[0]  # the rest is click's to word
+
+
+def test_no_command_shows_the_help_and_is_wrong_use(capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd)
+    assert (status, out) == (2, [])
+    assert err[0].startswith("Usage: sandbox ")
+
+
+def test_scenes_are_listed_a_line_each(capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "scenes")
+    names = [scene.name for scene in shipped()]
+    assert (status, [line.split()[0] for line in out], err) == (0, names, [])
+    status, document, _ = json_of(capfd, "scenes")
+    assert (status, [scene["name"] for scene in document["scenes"]]) == (0, names)
+    assert all(scene["title"] and scene["about"] for scene in document["scenes"])
+
+
+def test_engines_are_listed_a_line_each(capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "engines")
+    assert (status, [line.split()[0] for line in out], err) == (0, list(ENGINES), [])
+    status, document, _ = json_of(capfd, "engines")
+    assert (status, [engine["name"] for engine in document["engines"]]) == (0, list(ENGINES))
+    assert "ball-plane" in document["engines"][0]["models"]
+
+
+@pytest.mark.parametrize("flags", [(), ("--json",)])
+def test_schema_is_the_one_beside_the_scenes(flags: tuple[str, ...], capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "schema", *flags)
+    committed = shipped()[0].path.parents[1] / "scene.schema.json"
+    assert (status, err) == (0, [])
+    assert json.loads("\n".join(out)) == json.loads(committed.read_text(encoding="utf-8"))
+
+
+LOADED = """
+import sys
+from sandbox.cli.main import call
+status = call(sys.argv[2:])
+heavy = [name for name in sys.argv[1].split(",") if name in sys.modules]
+print(status, *heavy, file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "unneeded"),
+    [
+        (("--help",), "numpy,pydantic,pymunk,matplotlib,rich"),
+        (("scenes",), "numpy,pydantic,pymunk,matplotlib,rich"),
+        (("check", "bounce"), "pymunk,matplotlib,rich,sqlite3,tomlkit"),
+        (("schema",), "numpy,pymunk,matplotlib,rich"),
+        (("engines",), "pymunk,matplotlib,rich"),
+        (("run", "bounce", "--set", "world.duration=0.01", "--json"), "matplotlib,rich,pygame"),
+    ],
+)
+def test_command_loads_nothing_that_it_does_not_need(arguments: tuple[str, ...], unneeded: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, unneeded, *arguments], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert done.stderr == "0\n"
+
+
+@pytest.mark.parametrize(
+    "arguments", [("scenes",), ("schema",), ("check", "pile"), ("run", "drop.toml"), ("run", "drop.toml", "--json")]
+)
+def test_reader_that_has_gone_is_no_fault(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    written(tmp_path)
+    reader, writer = os.pipe()
+    os.close(reader)  # whatever is written meets a closed pipe, as behind `| head` that has seen enough
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "sandbox", *arguments],
+            stdout=writer,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=tmp_path,
+            timeout=120,
+            check=False,
+        )
+    finally:
+        os.close(writer)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -1,0 +1,99 @@
+"""The public interface: what `import sandbox` offers, and what it costs."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sandbox
+
+NAMES = [
+    "ENGINES",
+    "Contacts",
+    "Fault",
+    "Frame",
+    "Recording",
+    "Scene",
+    "SceneError",
+    "Settings",
+    "Trajectory",
+    "demands",
+    "dumps",
+    "load",
+    "loads",
+    "run",
+    "start",
+]
+
+TEXT = '[world]\nduration = 0.1\n[[ball]]\nname = "a"\nposition = [0, 0]\nvelocity = [1, 0]\nradius = 1\n'
+
+
+def test_names_are_those_promised() -> None:
+    assert sandbox.__all__ == NAMES
+    assert dir(sandbox) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_name_is_importable_and_documented(name: str) -> None:
+    value = getattr(sandbox, name)
+    assert value is getattr(sandbox, name)
+    if name != "ENGINES":
+        assert value.__name__ == name
+        assert value.__doc__
+
+
+def test_star_brings_all_of_them() -> None:
+    brought: dict[str, object] = {}
+    exec("from sandbox import *", brought)
+    assert set(NAMES) <= set(brought)
+
+
+def test_other_names_are_not_there() -> None:
+    with pytest.raises(AttributeError, match=r"^module 'sandbox' has no attribute 'nonsense'$"):
+        sandbox.nonsense  # noqa: B018, the point of the test
+    assert not hasattr(sandbox, "__path_to_nowhere__")
+
+
+def test_scene_is_loaded_run_saved_and_read_again(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(TEXT)
+    scene = sandbox.load(path)
+    assert scene == sandbox.loads(TEXT) == sandbox.loads(sandbox.dumps(scene))
+    run = sandbox.run(scene, engine="pymunk", dt=0.05)
+    assert (run.status, run.time.tolist(), run.missed_contacts) == ("ok", [0.0, 0.05, 0.1], 0)
+    assert run.position[-1, run.number("a"), 0] == pytest.approx(0.1, rel=1e-15)  # two roundings
+    read = sandbox.Trajectory.load(run.save(tmp_path / "run.npz"))
+    assert (read.position == run.position).all()
+
+
+def test_simulation_is_stepped_by_hand() -> None:
+    simulation = sandbox.start(sandbox.loads(TEXT), "pymunk")
+    assert simulation.time == 0.0
+    simulation.step()
+    frame = simulation.frame()
+    assert isinstance(frame, sandbox.Frame)
+    assert (frame.time, frame.position.tolist(), frame.velocity.tolist()) == (0.01, [[0.01, 0.0]], [[1.0, 0.0]])
+    assert (frame.angle.tolist(), frame.angular_velocity.tolist()) == ([0.0], [0.0])
+    assert len(simulation.contacts()) == 0
+    simulation.close()
+
+
+def test_scene_error_carries_its_faults() -> None:
+    with pytest.raises(sandbox.SceneError) as caught:
+        sandbox.loads("[[ball]]\nradius = -1\nposition = [0, 0]\n", "x.toml")
+    (fault,) = caught.value.faults
+    assert isinstance(fault, sandbox.Fault)
+    assert (fault.file, fault.line, fault.path) == ("x.toml", 2, "ball[0].radius")
+
+
+def test_import_loads_nothing_heavy() -> None:
+    code = "import sys, sandbox; print([n for n in ('numpy', 'pydantic', 'pymunk', 'click') if n in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+def test_run_works_without_assertions() -> None:
+    code = f"import sandbox; print(sandbox.run(sandbox.loads({TEXT!r})).status)"
+    done = subprocess.run([sys.executable, "-O", "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    assert done.stdout == "ok\n"
