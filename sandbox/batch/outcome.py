@@ -1,10 +1,12 @@
 """Outcomes: runs made, or found in the store, and the row that tells of each."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sandbox.batch.interrupt import uninterrupted
 from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError, run_id
 from sandbox.engines.registry import engine as engine_named
@@ -82,8 +84,21 @@ def _number(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def execute(job: Job, store: Store | None = None, progress: Progress | None = None, audit: bool = True) -> Outcome:
+def execute(
+    job: Job,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    audit: bool = True,
+    done: Callable[[Outcome], None] | None = None,
+) -> Outcome:
     """Make a run, and store it where there is a store; one that is stored already is read, not repeated.
+
+    Args:
+        job: what to run.
+        store: where to look it up and put it.
+        progress: who is told how far it is.
+        audit: count the contacts that the engine misses.
+        done: who is told of the outcome, with no interrupt between storing and telling.
 
     Raises:
         TooLargeError: the frames would not fit into memory.
@@ -98,9 +113,16 @@ def execute(job: Job, store: Store | None = None, progress: Progress | None = No
     if store is not None and found is not None:
         file = store.file(found)
         try:
-            return Outcome(job, number, Trajectory.load(file), file, repeated=True)
+            outcome = Outcome(job, number, Trajectory.load(file), file, repeated=True)
         except (ValueError, OSError) as error:
             raise StoreError(f"{error}; remove the file, and the run is made again") from None
+        if done is not None:
+            done(outcome)
+        return outcome
     trajectory = run(job.scene, job.engine, actions=job.actions, audit=audit, progress=progress)
-    path = store.file(store.add(trajectory, number)) if store is not None else None
-    return Outcome(job, number, trajectory, path, repeated=False)
+    with uninterrupted():
+        path = store.file(store.add(trajectory, number)) if store is not None else None
+        outcome = Outcome(job, number, trajectory, path, repeated=False)
+        if done is not None:
+            done(outcome)
+    return outcome

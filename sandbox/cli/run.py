@@ -84,8 +84,7 @@ def command(
     try:
         with _progress(jobs, quiet or as_json) as told:
             for job, progress in zip(jobs, told, strict=True):
-                outcome = execute(job, store, progress, audit)
-                rows.append(outcome.row(final=as_json))
+                outcome = execute(job, store, progress, audit, lambda made: rows.append(made.row(final=as_json)))
                 drawn = outcome if plot is not None else None  # else its arrays are let go
     except KeyboardInterrupt:
         status = 130

@@ -12,12 +12,13 @@ from decimal import ROUND_FLOOR, Context
 
 import numpy as np
 
-from sandbox.scene.crosscheck import count_overlaps, height_above
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.crosscheck import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps, height_above
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Plane, Post, Scene, Wall
 from sandbox.scene.part import BACKING
 from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray
+from sandbox.trajectory import BoolArray, FloatArray
 
 ENOUGH_ITERATIONS = 5
 """With fewer, bouncing groups gain energy: measured on a break shot, 2.4 times after one iteration."""
@@ -104,9 +105,11 @@ def _warnings(scene: Scene, settings: Settings) -> Iterator[Warning]:
     bodies = scene.bodies
     colliders = ~meet.free & ~bodies.fixed
     if meet.ball_ball:
-        overlaps = count_overlaps(bodies.position[colliders], bodies.radius[colliders])
+        among = _meet_each_other(bodies) & colliders
+        most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(among.sum())  # a scene with more is refused
+        overlaps = count_overlaps(bodies.position[among], bodies.radius[among], most)
         if overlaps:
-            message = f"{overlaps:,} pairs of balls overlap at the start; the engine will push them apart"
+            message = f"{overlaps:,} pair(s) of balls overlap at the start; the engine will push them apart"
             yield Warning("overlap", message, {"pairs": overlaps})
         if settings.iterations < ENOUGH_ITERATIONS and meet.restitution > 0:
             message = (
@@ -144,13 +147,18 @@ def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
 
     for thing, name in zip(scene.fixed, scene.fixed_names, strict=True):
         worst(radius + _half_depth(thing), speed, name)
-    among = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element[movers]]
+    among = _meet_each_other(bodies)[movers]
     fixed = np.flatnonzero(bodies.fixed & ~meet.free)
     if meet.ball_ball and len(fixed):
         worst(radius + float(bodies.radius[fixed].min()), speed, bodies.names[fixed[bodies.radius[fixed].argmin()]])
     if meet.ball_ball and int(among.sum()) > 1:
         worst(radius[among] + float(radius[among].min()), speed[among] + float(speed[among].max()), ANOTHER)
     return found
+
+
+def _meet_each_other(bodies: Bodies) -> BoolArray:
+    """Return which bodies can meet their like, (N,)."""
+    return np.asarray([e.collides == "all" for e in bodies.elements], dtype=np.bool_)[bodies.element]
 
 
 def _half_depth(thing: Plane | Wall | Post) -> float:

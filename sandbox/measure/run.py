@@ -12,11 +12,12 @@ from sandbox.engines.registry import engine as engine_named
 from sandbox.engines.registry import start
 from sandbox.measure.audit import Audit
 from sandbox.measure.energy import energies
-from sandbox.measure.recorder import Recorder
+from sandbox.measure.recorder import Recorder, TooLargeError
 from sandbox.measure.versions import versions
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.file import to_document
 from sandbox.scene.model import Scene
+from sandbox.scene.part import MAX_STEPS
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, FloatArray, IntArray, Trajectory
 
@@ -52,11 +53,13 @@ def run(
 
     Raises:
         UnknownEngineError: no engine has that name.
-        TooLargeError: the frames would not fit into memory.
+        TooLargeError: the frames would not fit into memory, or the steps are more than a run may have.
         pydantic.ValidationError: a setting is wrong.
     """
     chosen = engine_named(engine)
     wanted = scene.solver.replace(**settings) if settings else scene.solver
+    if scene.world.duration / wanted.h > MAX_STEPS:
+        raise TooLargeError(f"{scene.world.duration / wanted.h:.3g} steps a run; at most {MAX_STEPS:g}")
     actions = in_order(tuple(actions))
     try:
         simulation = start(scene, engine, wanted)

@@ -18,6 +18,8 @@ Found = tuple[Location, str]
 MAX_SURFACES = 256
 MAX_OVERLAPS, MAX_OVERLAPS_EACH = 10_000, 10
 """Overlapping pairs that a scene may start with: this many, and so many more for every body."""
+MAX_PASSING = 1_000_000
+"""The same for balls that pass through each other, whose pairs an engine still looks at: a second a step or so."""
 OVERLAP_BUDGET = 50_000_000
 """Candidate pairs looked at before the search for overlaps is given up; a few seconds."""
 SHORTEST = 1e-9
@@ -189,13 +191,23 @@ def _starts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
             yield (*location, key), message
 
     movers = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
-    overlaps = count_overlaps(bodies.position[movers], bodies.radius[movers])
     most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(movers.sum())
+    overlaps = count_overlaps(bodies.position[movers], bodies.radius[movers], most)
+    location = max(elements, key=lambda e: _population(e[1]))[0] if elements else ()
     if overlaps > most:
-        location = max(elements, key=lambda e: _population(e[1]))[0]
         message = (
             f"the scene starts with {overlaps:,} or more overlapping pairs of balls; at most {most:,} can be solved. "
             'Spread them, or let them pass through each other with collides = "none" or "fixed"'
+        )
+        yield location, message
+        return
+    passing = touches & ~bodies.fixed
+    most = max(most, MAX_PASSING)
+    if passing.sum() > movers.sum() and count_overlaps(bodies.position[passing], bodies.radius[passing], most) > most:
+        message = (
+            f"the scene starts with more than {most:,} overlapping pairs of balls; that they pass through each other "
+            'has to be found out again at every step. Spread them, use fewer, or let them meet nothing with '
+            'collides = "none"'
         )
         yield location, message
 
@@ -219,11 +231,10 @@ def height_above(plane: Plane, position: FloatArray) -> FloatArray:
     return np.asarray((position - np.asarray(plane.point)) @ normal)
 
 
-def count_overlaps(position: FloatArray, radius: FloatArray) -> int:
-    """Count overlapping pairs, stopping early once far too many are found or the budget is spent."""
+def count_overlaps(position: FloatArray, radius: FloatArray, enough: int) -> int:
+    """Count overlapping pairs, stopping early once more than enough are found or the budget is spent."""
     if len(radius) < 2:
         return 0
-    enough = MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(radius)
     overlaps = looked_at = 0
     for i, j in near_pairs(position, 2.0 * float(radius.max())):
         overlaps += int((np.hypot(*(position[i] - position[j]).T) < radius[i] + radius[j]).sum())

@@ -29,23 +29,27 @@ def perform(action: Action, population: Population) -> int | None:
     Raises:
         ActionError: it cannot be done. Nothing has changed then.
     """
+    number: int | None = None
     match action:
         case Impulse():
             _kick(action, population)
         case Force():
-            number, half = population.mover(action.body)
-            if action.torque and not math.isfinite(half.moment(number)):
-                half.give_moment(number, float(population.bodies.moment[number]))
-            half.push(number, np.asarray(action.force), action.torque)
+            pushed, half = population.mover(action.body)
+            if action.torque and not math.isfinite(half.moment(pushed)):
+                half.give_moment(pushed, float(population.bodies.moment[pushed]))
+            half.push(pushed, np.asarray(action.force), action.torque)
         case Move():
             _move(action, population)
         case Spawn():
             population.add(action.ball)
         case Remove():
-            return population.number(action.body)
+            number = population.number(action.body)
         case SetParameter():
             _set(action, population)
-    return None
+        case _:
+            raise ActionError(f"{action!r} is no action")
+    population.changed()
+    return number
 
 
 def _kick(action: Impulse, population: Population) -> None:
@@ -66,9 +70,12 @@ def _move(action: Move, population: Population) -> None:
     if fixed and action.velocity not in (None, (0.0, 0.0)):
         raise ActionError(f"{action.body!r} is fixed; it can be put elsewhere, but has no velocity")
     element = population.bodies.elements[population.bodies.element[number]]
-    population.check_place(action.position, element.radius, element.collides != "none")
+    population.check_place(action.position, element.radius, element.collides)
+    population.refresh()
     population.position[number] = action.position
-    half = population.free if number in population.free.numbers else population.meeting
+    half = population.half_of(number)
+    if half is None:
+        return
     half.set_position(number, np.asarray(action.position))
     if action.velocity is not None and not fixed:
         half.set_velocity(number, np.asarray(action.velocity) + population.ahead)

@@ -6,6 +6,8 @@ factors exist, the pairs that stay wrong are listed, and set contact by contact.
 
 import math
 
+import numpy as np
+
 from sandbox.trajectory import BoolArray, FloatArray
 
 TOLERANCE = 2.0**-51
@@ -32,13 +34,9 @@ def factors(wanted: FloatArray, touching: BoolArray, stated: list[float | None])
 
 def wrong_pairs(wanted: FloatArray, touching: BoolArray, factor: list[float]) -> list[tuple[int, int]]:
     """Return the pairs that can meet and whose product of factors is not the wanted coefficient."""
-    size = len(factor)
-    return [
-        (a, b)
-        for a in range(size)
-        for b in range(a, size)
-        if touching[a, b] and abs(factor[a] * factor[b] - wanted[a, b]) > TOLERANCE * wanted[a, b]
-    ]
+    off = np.abs(np.outer(factor, factor) - wanted) > TOLERANCE * wanted
+    rows, columns = np.nonzero(np.triu(off & touching))
+    return list(zip(rows.tolist(), columns.tolist(), strict=True))
 
 
 def _solved(wanted: FloatArray, touching: BoolArray) -> list[float]:

@@ -66,6 +66,8 @@ class FreeFlight:
     def leave(self, numbers: IntArray) -> None:
         """Take bodies out."""
         stay = ~np.isin(self.numbers, numbers)
+        if stay.all():
+            return
         for name in ("numbers", "position", "velocity", "angle", "angular_velocity"):
             setattr(self, name, getattr(self, name)[stay])
         for name in ("_mass", "_moment", "_force", "_torque"):

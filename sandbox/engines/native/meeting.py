@@ -8,7 +8,7 @@ import pymunk
 
 from sandbox.engines.native.drag import acceleration
 from sandbox.engines.native.limits import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.native.reader import Reader, Touching
+from sandbox.engines.native.reader import NOTHING, Reader, Touching
 from sandbox.engines.native.space import (
     SurfaceSetter,
     category,
@@ -24,7 +24,7 @@ from sandbox.scene.settings import Settings
 from sandbox.trajectory import FloatArray, IntArray
 
 MANY = 5_000
-"""Bodies from which on they are added shuffled: pymunk's tree takes 30 s for 40,000 in a sorted line."""
+"""Shapes from which on they are added shuffled: pymunk's tree takes 30 s for 40,000 in a sorted line."""
 
 
 class Member(NamedTuple):
@@ -75,9 +75,7 @@ class MeetingBodies:
             return
         if not self._fixed:
             self._add_fixed(bodies)
-        order = np.arange(len(numbers))
-        if len(numbers) > MANY:
-            order = np.random.Generator(np.random.PCG64(0)).permutation(len(numbers))
+        order = np.asarray(_order(len(numbers)))
         states = np.column_stack((position, angle, velocity, angular_velocity, bodies.mass[numbers], moment))
         for number, state in zip(numbers[order].tolist(), states[order].tolist(), strict=True):
             self._add(number, bodies, state)
@@ -108,14 +106,18 @@ class MeetingBodies:
         centre, reach = reach_of(self._scene, starts, speeds)
         if self._scene.planes:
             self._middle[0:2], self._reach = centre, reach
+        every: list[pymunk.Shape] = []
         for thing, surface in zip(self._scene.fixed, self._surface_of_fixed.tolist(), strict=True):
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
             shapes = list(fixed_shapes(thing, body, centre, reach))
             for shape in shapes:
                 shape.filter = category(True, "all")
                 self._setter.dress(shape, surface)
-            self._space.add(body, *shapes)
+            self._space.add(body)
             self._fixed.append((body, shapes))
+            every += shapes
+        for k in _order(len(every)):
+            self._space.add(every[k])
         where = min(self._reach, FARTHEST)
         self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
 
@@ -128,6 +130,8 @@ class MeetingBodies:
 
     def leave(self, numbers: IntArray) -> None:
         """Take bodies out."""
+        if not len(numbers):
+            return
         for number in numbers.tolist():
             member = self._members.pop(number)
             self._moving -= member.moves
@@ -198,7 +202,7 @@ class MeetingBodies:
 
     def touching(self) -> Touching:
         """Return who touches whom now, and how (`Reader.touching`)."""
-        return self._reader.touching()
+        return self._reader.touching() if self._moving else NOTHING
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a body that is not finite or beyond all bounds, and what is the matter; else None."""
@@ -212,6 +216,18 @@ class MeetingBodies:
         if not np.isfinite(state[worst]).all() or self._reach > FARTHEST:
             return int(numbers[worst]), BEYOND
         return int(numbers[worst]), f"is more than {self._reach:g} m out, where pymunk's half-planes end"
+
+    def holds(self, number: int) -> bool:
+        """Tell whether a body is in the space."""
+        return number in self._members
+
+    def movers(self) -> list[int]:
+        """Return the numbers of the bodies that are not fixed."""
+        return [number for number, member in self._members.items() if member.moves]
+
+    def reaches(self, place: FloatArray) -> bool:
+        """Tell whether planes are planes at a place; so they are until there are some."""
+        return bool((np.abs(place - self._middle[0:2]) <= self._reach).all())
 
     def moment(self, number: int) -> float:
         """Return a body's moment of inertia, kg·m²; infinite where nothing in the scene can turn it."""
@@ -244,3 +260,10 @@ class MeetingBodies:
         """Give a body an angular velocity, rad/s."""
         self._members[number].body.angular_velocity = spin
         self._state = None
+
+
+def _order(count: int) -> list[int]:
+    """Return the order in which to add so many shapes to a space."""
+    if count <= MANY:
+        return list(range(count))
+    return np.random.Generator(np.random.PCG64(0)).permutation(count).tolist()

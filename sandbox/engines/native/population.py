@@ -13,14 +13,18 @@ from sandbox.action import ActionError
 from sandbox.engines.native.free import FreeFlight
 from sandbox.engines.native.meeting import MeetingBodies
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Ball, Scene, default_name
+from sandbox.scene.crosscheck import MAX_SURFACES, crosscheck
+from sandbox.scene.meetings import Meetings, meetings
+from sandbox.scene.model import Ball, Collides, Scene, default_name
 from sandbox.scene.part import BACKING, MAX_BODIES
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 CROWD = 100
-"""Balls that may be put on one spot: pymunk takes minutes to part a thousand."""
+"""Balls that a ball may be put into: pymunk takes minutes to part a thousand on one spot."""
+
+SWARM = 1000
+"""The same for balls that pass through each other, of which pymunk still looks at every pair."""
 
 
 class Population:
@@ -82,13 +86,20 @@ class Population:
             raise ActionError(f"{name!r} is fixed; nothing can move it")
         return number, self.free if number in self.free.numbers else self.meeting
 
+    def half_of(self, number: int) -> FreeFlight | MeetingBodies | None:
+        """Return the half that holds a body; none holds a fixed one that nothing can meet."""
+        if number in self.free.numbers:
+            return self.free
+        return self.meeting if self.meeting.holds(number) else None
+
     def changed(self) -> None:
         """Note that the halves have moved on from the arrays."""
         self._fresh = self.ended
 
     def end(self) -> None:
-        """Let the arrays stand as they are, for good."""
-        self.ended = self._fresh = True
+        """Let the arrays stand as they now are, for good."""
+        self.refresh()
+        self.ended = True
 
     def refresh(self) -> None:
         """Bring the arrays in scene order up to date."""
@@ -114,38 +125,50 @@ class Population:
         self.free.live_in(*state)
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs in air, gravity or coefficients alone."""
+        """Go on with a scene that differs in air, gravity or coefficients alone.
+
+        Raises:
+            ActionError: it asks for what the settings or the engine cannot go on with.
+        """
+        if self._half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
+            raise ActionError("drag cannot come up in a run that was started with half_kick, which knows none")
+        spawned = self.bodies.elements[len(self.scene.bodies.elements) :]
+        bodies = replace(self.bodies, elements=(*scene.bodies.elements, *spawned))
+        meet = _meetings(scene, bodies)
         self.refresh()
         self.velocity[self.moving] -= self.ahead
-        spawned = self.bodies.elements[len(self.scene.bodies.elements) :]
-        self.scene = scene
-        self.bodies = replace(self.bodies, elements=(*scene.bodies.elements, *spawned))
+        self.scene, self.bodies, self._meet = scene, bodies, meet
         self.velocity[self.moving] += self.ahead
         if self._half_kick:
-            for number in np.flatnonzero(self.moving).tolist():
-                self.mover(self.bodies.names[number])[1].set_velocity(number, self.velocity[number])
+            self.free.velocity[:] = self.velocity[self.free.numbers]
+            for number in self.meeting.movers():
+                self.meeting.set_velocity(number, self.velocity[number])
         self.free.world = scene.world
         self.free.forces_changed()
-        self._meet = meetings(scene, self.bodies)
-        self.meeting.renew(scene, self._meet)
+        self.meeting.renew(scene, meet)
 
     def add(self, ball: Ball) -> int:
         """Add a ball and return its number.
 
         Raises:
-            ActionError: its name is taken, its material unknown, or its place is no place.
+            ActionError: its name is taken, it would be a fault in the scene's file, or its place is no place.
         """
         name = ball.name or default_name("spawned", len(self.bodies))
         if name in self.bodies.names or name in self.scene.fixed_names:
             raise ActionError(f"a body or fixed thing is called {name!r} already")
-        if ball.material is not None and ball.material not in {m.name for m in self.scene.materials}:
-            raise ActionError(f"no material is named {ball.material!r}")
         if len(self.bodies) >= MAX_BODIES:
             raise ActionError(f"the scene holds {MAX_BODIES:,} bodies already")
-        self.check_place(ball.position, ball.radius, ball.collides != "none")
+        scene = self.scene
+        alone = Scene(world=scene.world, materials=scene.materials, pairs=scene.pairs, balls=(ball,))
+        faults = crosscheck(alone)
+        if faults:
+            raise ActionError("; ".join(message for _, message in faults))
+        self.check_place(ball.position, ball.radius, ball.collides)
+        bodies = self.bodies.joined_by(ball, name)
+        meet = _meetings(scene, bodies)
         self.refresh()
         number = len(self.bodies)
-        self.bodies = self.bodies.joined_by(ball, name)
+        self.bodies, self._meet = bodies, meet
         ahead = np.zeros(2) if ball.fixed else self.ahead
         self.position = np.vstack((self.position, self.bodies.position[-1:]))
         self.velocity = np.vstack((self.velocity, self.bodies.velocity[-1:] + ahead))
@@ -153,36 +176,41 @@ class Population:
         self.angular_velocity = np.append(self.angular_velocity, self.bodies.angular_velocity[-1])
         self.present = np.append(self.present, True)
 
-        self._meet = meetings(self.scene, self.bodies)
-        self.meeting.renew(self.scene, self._meet)
-        awoken = self.free.numbers[~self._meet.free[self.free.numbers]]
-        self._promote(awoken)
+        self.meeting.renew(scene, meet)
+        out = [n for n in np.flatnonzero(self.present & ~meet.free).tolist() if not self.meeting.holds(n)]
+        self._promote(np.asarray([n for n in out if n != number], np.int64))
         self._place(np.asarray([number]))
         return number
 
     def _promote(self, numbers: IntArray) -> None:
-        steady = {n: self.free.steady(n) for n in numbers.tolist()}
+        """Let bodies that so far met nothing join the space."""
+        if not len(numbers):
+            return
+        flying = numbers[np.isin(numbers, self.free.numbers)]
+        steady = {n: self.free.steady(n) for n in flying.tolist()}
         self.free.leave(numbers)
         self._place(numbers)
         for number, (force, torque) in steady.items():
+            if torque:
+                self.meeting.give_moment(number, float(self.bodies.moment[number]))
             if force.any() or torque:
                 self.meeting.push(number, force, torque)
 
-    def take_out(self, number: int) -> None:
-        """Remove a body. It stays where it is in the arrays, with no velocity."""
+    def take_out(self, numbers: IntArray) -> None:
+        """Remove bodies. They stay where they are in the arrays, with no velocity."""
         self.refresh()
-        half = self.free if number in self.free.numbers else self.meeting
-        half.leave(np.asarray([number]))
-        self.present[number] = False
-        self.velocity[number], self.angular_velocity[number] = 0.0, 0.0
+        self.free.leave(numbers)
+        self.meeting.leave(np.asarray([n for n in numbers.tolist() if self.meeting.holds(n)], np.int64))
+        self.present[numbers] = False
+        self.velocity[numbers], self.angular_velocity[numbers] = 0.0, 0.0
 
-    def check_place(self, position: tuple[float, float], radius: float, touches: bool) -> None:
+    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
         """Refuse a place that an engine cannot start from.
 
         Raises:
-            ActionError: it lies too deep behind a plane, or on a spot that is crowded already.
+            ActionError: it lies too deep behind a plane, out of reach, or in a crowd.
         """
-        if not touches:
+        if collides == "none":
             return
         place = np.asarray(position)
         for plane, name in zip(self.scene.planes, self.scene.fixed_names, strict=False):
@@ -191,6 +219,24 @@ class Population:
             if depth > BACKING:
                 raise ActionError(f"{depth:g} m behind the plane {name!r}; at most {BACKING:g}")
         self.refresh()
-        near = np.abs(self.position - place).max(axis=1, initial=0.0) < 0.01 * radius
-        if int((near & self.present).sum()) >= CROWD:
-            raise ActionError(f"{CROWD} bodies are on that spot already")
+        if not self.meeting.reaches(place):
+            raise ActionError(f"{position} m is out of reach: pymunk's half-planes end before it")
+        near = np.hypot(*(self.position - place).T) < self.bodies.radius + radius
+        into = self.bodies.element[near & self.present]
+        how = [self.bodies.elements[element].collides for element in into.tolist()]
+        if collides == "all" and how.count("all") >= CROWD:
+            raise ActionError(f"it would overlap {how.count('all')} bodies; pymunk parts {CROWD} at most")
+        if len(how) - how.count("none") >= SWARM:
+            raise ActionError(f"it would overlap {len(how) - how.count('none')} bodies; at most {SWARM}")
+
+
+def _meetings(scene: Scene, bodies: Bodies) -> Meetings:
+    """Derive what can meet what.
+
+    Raises:
+        ActionError: there are more different surfaces than a scene may have.
+    """
+    meet = meetings(scene, bodies)
+    if len(meet.surfaces.surfaces) > MAX_SURFACES:
+        raise ActionError(f"more than {MAX_SURFACES} different surfaces; share materials between balls")
+    return meet

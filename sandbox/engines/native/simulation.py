@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import NoReturn
 
 import numpy as np
 
@@ -11,10 +12,11 @@ from sandbox.engines.contract import Divergence, Observer
 from sandbox.engines.native.acting import perform
 from sandbox.engines.native.contacts import ContactLedger
 from sandbox.engines.native.population import Population
+from sandbox.engines.native.turn import Turn
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
-from sandbox.trajectory import Contacts, FloatArray, Frame
+from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
 
 
 class NativeSimulation:
@@ -31,12 +33,17 @@ class NativeSimulation:
     def __init__(self, scene: Scene, settings: Settings) -> None:
         self._settings = settings
         self._population = Population(scene, settings)
+        self._turn = Turn()
         self._steps = 0
         self._part = 0.0
         self._ledger: ContactLedger | None = None
         self._observer: Observer | None = None
         self._retired: dict[int, float] = {}
         self._still: tuple[FloatArray, FloatArray] | None = None  # angles and spins, which frames share if they can
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied or pickled: in contact a copied space goes on differently, and says nothing."""
+        raise TypeError("a running simulation cannot be copied; start its scene again and repeat its actions")
 
     @property
     def time(self) -> float:
@@ -69,28 +76,41 @@ class NativeSimulation:
         Raises:
             Divergence: a body is no longer finite, or beyond all bounds. The state can still be read.
         """
-        self._check_running()
-        for k in range(self._settings.substeps):
-            self._substep(k)
-        self._steps += 1
-        self._guard()
-        self._retire()
+        with self._turn:
+            self._check_running()
+            for k in range(self._settings.substeps):
+                self._substep(k)
+            self._steps += 1
+            self._guard()
+            self._retire()
 
     def finish(self, part: float) -> None:
         """Advance by a last part of dt, 0 < part < 1.
 
         Whole substeps first. The state within the substep that is cut is interpolated, which for positions is
         the scheme's own path.
+
+        Raises:
+            Divergence: as `step`.
+            ValueError: there is no such part.
         """
-        self._check_running()
+        if not 0.0 < part < 1.0:
+            raise ValueError(f"a last part of {part} steps; it is more than 0 and less than 1")
+        with self._turn:
+            self._check_running()
+            self._finish(part)
+
+    def _finish(self, part: float) -> None:
         whole, rest = divmod(part * self._settings.substeps, 1.0)
         for k in range(int(whole)):
             self._substep(k)
         before = [array.copy() for array in self._state()]
         self._substep(int(whole))
+        self._part = part
+        self._guard()
         for now, old in zip(self._state(), before, strict=True):
             now[...] = old + (now - old) * rest
-        self._part = part
+        self._retire()
         self._population.end()
 
     def apply(self, action: Action) -> None:
@@ -99,11 +119,12 @@ class NativeSimulation:
         Raises:
             ActionError: it cannot be done. Nothing has changed then.
         """
-        self._check_running()
-        self._still = None
-        leaving = perform(action, self._population)
-        if leaving is not None:
-            self._take_out(leaving)
+        with self._turn:
+            self._check_running()
+            self._still = None
+            leaving = perform(action, self._population)
+            if leaving is not None:
+                self._take_out(np.asarray([leaving]))
 
     def frame(self) -> Frame:
         """Return the present state."""
@@ -163,7 +184,7 @@ class NativeSimulation:
                 self._observer(start, before, self._state()[0], self._ledger.pairs())
 
     def _record(self, time: float) -> None:
-        if self._ledger is not None and len(self._population.meeting):
+        if self._ledger is not None:
             self._ledger.record(time, self._population.meeting.touching())
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -177,6 +198,7 @@ class NativeSimulation:
         for half in (self._population.free, self._population.meeting):
             beyond = half.beyond()
             if beyond is not None:
+                self._population.end()
                 number, what = beyond
                 raise Divergence(self.time, self.bodies.names[number], what)
 
@@ -187,10 +209,10 @@ class NativeSimulation:
             return
         position = self._state()[0]
         outside = ((position < bounds[0]) | (position > bounds[1])).any(axis=1) & self._population.moving
-        for number in np.flatnonzero(outside).tolist():
-            self._take_out(number)
+        if outside.any():
+            self._take_out(np.flatnonzero(outside))
 
-    def _take_out(self, number: int) -> None:
+    def _take_out(self, numbers: IntArray) -> None:
         self._still = None
-        self._population.take_out(number)
-        self._retired[number] = self.time
+        self._population.take_out(numbers)
+        self._retired |= dict.fromkeys(numbers.tolist(), self.time)
