@@ -9,8 +9,9 @@ from typing import Any, Self
 from pydantic import ValidationError
 
 from sandbox.action import Action, ActionError, actions_from_json, actions_to_json
+from sandbox.scene.document import to_document
 from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import from_document, to_document
+from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 

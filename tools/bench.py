@@ -224,7 +224,8 @@ def told(row: dict[str, object]) -> str:
     figure = f"{row['ours']:.3f} s above" if row["unit"] == "s above" else f"{row['ratio']:.3f} ×"
     return (
         f"{row['name']:<16}{figure:>14}{goal}   (median {row['ours']:.4g} / {row['peer']:.4g} s, minimum "
-        f"{row['ours_min']:.4g} / {row['peer_min']:.4g} s, {row['repeats']} repeats, peer's spread {row['spread']:.0%})\n"
+        f"{row['ours_min']:.4g} / {row['peer_min']:.4g} s, {row['repeats']} repeats, "
+        f"peer's spread {row['spread']:.0%})\n"
         f"{'':<16}{row['about']}"
     )
 

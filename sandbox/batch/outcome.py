@@ -9,7 +9,7 @@ from typing import Any
 from sandbox.batch.interrupt import uninterrupted
 from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError, run_id
-from sandbox.engines.registry import engine as engine_named
+from sandbox.engines.registry import engine_named
 from sandbox.measure.run import Progress, run
 from sandbox.measure.versions import versions
 from sandbox.trajectory import Trajectory

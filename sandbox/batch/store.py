@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import Self
 
 from sandbox.action import Action, actions_to_json
-from sandbox.scene.file import to_document
+from sandbox.scene.document import to_document
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory

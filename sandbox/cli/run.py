@@ -12,8 +12,7 @@ from sandbox.batch.plan import Job, parse_sweep, plan
 from sandbox.batch.store import Store, StoreError
 from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json
 from sandbox.cli.table import Row, print_runs
-from sandbox.engines.registry import UnknownEngineError
-from sandbox.engines.registry import engine as engine_named
+from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.recorder import TooLargeError, require_memory
 from sandbox.measure.run import Progress
 from sandbox.scene.address import AddressError

@@ -14,7 +14,7 @@ class UnknownEngineError(ValueError):
     """No engine has that name."""
 
 
-def engine(name: str) -> Engine:
+def engine_named(name: str) -> Engine:
     """Return an engine by name.
 
     Raises:
@@ -32,7 +32,7 @@ def able(scene: Scene, settings: Settings | None = None) -> tuple[str, ...]:
     return tuple(name for name, each in ENGINES.items() if not each.missing(scene, settings))
 
 
-def start(scene: Scene, engine_name: str = "pymunk", settings: Settings | None = None) -> Simulation:
+def start(scene: Scene, engine: str = "pymunk", settings: Settings | None = None) -> Simulation:
     """Start a scene on an engine.
 
     Raises:
@@ -40,8 +40,8 @@ def start(scene: Scene, engine_name: str = "pymunk", settings: Settings | None =
         Refusal: the engine lacks something, with the engines that do not.
     """
     settings = scene.solver if settings is None else settings
-    chosen = engine(engine_name)
+    chosen = engine_named(engine)
     missing = chosen.missing(scene, settings)
     if missing:
-        raise Refusal(engine_name, missing, able(scene, settings))
+        raise Refusal(engine, missing, able(scene, settings))
     return chosen.start(scene, settings)

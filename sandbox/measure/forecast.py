@@ -8,17 +8,16 @@ radius and half the thing's thickness, or for two balls both radii and their rel
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from decimal import ROUND_FLOOR, Context
 
 import numpy as np
 
-from sandbox.scene.bodies import Bodies
+from sandbox.scene.bodies import Bodies, BoolArray
 from sandbox.scene.crosscheck import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps, height_above
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Plane, Post, Scene, Wall
+from sandbox.scene.near import FloatArray
 from sandbox.scene.part import BACKING
 from sandbox.scene.settings import Settings
-from sandbox.trajectory import BoolArray, FloatArray
 
 ENOUGH_ITERATIONS = 5
 """With fewer, bouncing groups gain energy: measured on a break shot, 2.4 times after one iteration."""
@@ -78,6 +77,8 @@ def largest_safe_dt(scene: Scene, settings: Settings | None = None) -> float:
 
 def at_most(limit: float) -> str:
     """Write a limit with three digits, rounded down: what is typed from it must stay within, but for rounding."""
+    from decimal import ROUND_FLOOR, Context  # at 5 ms, for those alone who are warned
+
     return f"{float(Context(prec=3, rounding=ROUND_FLOOR).create_decimal(limit * (1.0 + ROUNDING))):g}"
 
 

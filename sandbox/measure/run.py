@@ -8,14 +8,13 @@ import numpy as np
 
 from sandbox.action import Action, ActionError, Spawn, actions_to_json, in_order
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
-from sandbox.engines.registry import engine as engine_named
-from sandbox.engines.registry import start
+from sandbox.engines.registry import engine_named, start
 from sandbox.measure.audit import Audit
 from sandbox.measure.energy import energies
 from sandbox.measure.recorder import Recorder, TooLargeError
 from sandbox.measure.versions import versions
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.file import to_document
+from sandbox.scene.document import to_document
 from sandbox.scene.model import Scene
 from sandbox.scene.part import MAX_STEPS
 from sandbox.scene.settings import Settings

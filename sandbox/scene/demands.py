@@ -63,14 +63,15 @@ def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
     yield Demand.ROTATION, bool(spinning or turned), why
 
     gravity = world.gravity != (0.0, 0.0)
-    yield Demand.GRAVITY, gravity, f"{world.gravity} m/s²" if gravity else "world.gravity is zero"
+    yield Demand.GRAVITY, gravity, f"{list(world.gravity)} m/s²" if gravity else "world.gravity is zero"
 
     drag = world.linear_drag > 0 or world.quadratic_drag > 0
     why = f"linear {world.linear_drag:g} 1/s, quadratic {world.quadratic_drag:g} 1/m"
     yield Demand.DRAG, drag, why if drag else "no drag is stated"
 
     free = int((meet.free & ~bodies.fixed).sum())
-    why = "balls can meet" if meet.ball_ball else f"no two balls can meet; {free} of {moving} can meet nothing"
+    alone = f"; {free:,} of {moving:,} can meet nothing at all" if free else ""
+    why = f"{'balls' if meet.ball_ball else 'no two balls'} can meet{alone}"
     yield Demand.BALL_BALL, meet.ball_ball, why
 
     for demand, kind, things in (
@@ -79,8 +80,9 @@ def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
         (Demand.BALL_POST, Post, scene.posts),
     ):
         word = kind.__name__.lower()
-        why = f"{len(things)} {word}s, but nothing can meet them" if things else f"no {word}"
-        yield demand, meet.ball_fixed[kind], f"{len(things)} {word}(s)" if meet.ball_fixed[kind] else why
+        why = "nothing that moves can meet one" if things else f"no {word}"
+        count = _count(len(things), word, f"{word}s", "")
+        yield demand, meet.ball_fixed[kind], count if meet.ball_fixed[kind] else why
 
     touch = bool(meet.touching.any())
     for demand, most in ((Demand.RESTITUTION, meet.restitution), (Demand.FRICTION, meet.friction)):

@@ -14,10 +14,9 @@ from pydantic import ValidationError
 
 from sandbox.scene.address import AddressError, assign, parse_assignment
 from sandbox.scene.crosscheck import crosscheck
-from sandbox.scene.explain import explain
+from sandbox.scene.document import read_model, to_document
 from sandbox.scene.faults import Fault, Lines, Location, SceneError, path_of
 from sandbox.scene.model import Scene
-from sandbox.scene.salvage import crosscheck_the_rest, read_model
 
 MAX_BYTES = 256 * 2**20
 
@@ -86,6 +85,9 @@ def from_document(
     try:
         scene = read_model(document)
     except ValidationError as error:
+        from sandbox.scene.explain import explain  # only faults need these
+        from sandbox.scene.salvage import crosscheck_the_rest
+
         errors = [e for e in error.errors(include_url=False) if not _only_seems_short(e)]
         found = [explain(details) for details in errors]
         found += crosscheck_the_rest(document, [tuple(details["loc"]) for details in errors])
@@ -110,12 +112,6 @@ def dumps(scene: Scene) -> str:
     import tomlkit
 
     return tomlkit.dumps(to_document(scene))
-
-
-def to_document(scene: Scene) -> dict[str, Any]:
-    """Return a scene as nested dicts and lists, defaults left out."""
-    document = scene.model_dump(mode="json", by_alias=True, exclude_defaults=True)
-    return document or {"title": scene.title}
 
 
 def _read(path: str | Path) -> str:

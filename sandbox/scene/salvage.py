@@ -2,11 +2,11 @@
 
 import copy
 import difflib
-import json
 from collections.abc import Iterable
 from typing import Any
 
 from sandbox.scene.crosscheck import Found, crosscheck
+from sandbox.scene.document import read_model
 from sandbox.scene.explain import model_at
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene
@@ -36,18 +36,6 @@ ALOOF: dict[str, dict[str, Any]] = {
 """What else a table with a fault is given, so that it makes nothing around it look wrong."""
 
 _TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - {"title", "about"}
-
-
-def read_model(document: dict[str, Any]) -> Scene:
-    """Validate a scene document as a file holds it: by the keys of the file alone, dates being nothing of ours.
-
-    Raises:
-        pydantic.ValidationError: parts have faults.
-        ValueError: a number is too large to be written.
-        RecursionError: the document is nested too deeply.
-    """
-    text = json.dumps(document, default=lambda value: {"a date or time": str(value)})
-    return Scene.model_validate_json(text, by_alias=True, by_name=False)
 
 
 def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> list[Found]:

@@ -14,7 +14,8 @@ import pytest
 
 from sandbox.action import Remove
 from sandbox.batch.store import VERSION, Store, StoredRun, StoreError, run_id
-from sandbox.scene.file import dumps, loads, to_document
+from sandbox.scene.document import to_document
+from sandbox.scene.file import dumps, loads
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 

@@ -58,7 +58,9 @@ def test_bodies_that_meet_nothing_fly_bit_for_bit_as_in_pymunk(states, gravity, 
 
 @given(st.floats(1e-3, 0.1), st.integers(1, 200), st.floats(-20, 20))
 def test_euler_leads_by_half_g_h_t(dt, steps, speed):
-    simulation = start(scene([{"position": [0, 10], "velocity": [0, speed], "radius": 1}], {"gravity": [0, -9.81]}, dt=dt))
+    simulation = start(
+        scene([{"position": [0, 10], "velocity": [0, speed], "radius": 1}], {"gravity": [0, -9.81]}, dt=dt)
+    )
     for _ in range(steps):
         simulation.step()
     time, y = steps * dt, float(simulation.frame().position[0, 1])

@@ -76,7 +76,7 @@ def test_a_moment_left_out_changes_nothing_where_normals_are_exact():
 
 
 def test_a_moment_left_out_takes_away_rounding_noise_of_oblique_contacts():
-    """pymunk rounds lever arms, so oblique frictionless contacts turn bodies by some 1e-13 rad/s.
+    """Pymunk rounds lever arms, so oblique frictionless contacts turn bodies by some 1e-13 rad/s.
 
     Left out, that noise is gone: the spin is exactly 0. Positions then differ in their last bits, and in a gas
     those grow; so here is no bit-identity, but agreement to rounding while it is young.

@@ -10,8 +10,9 @@ import strategies
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from sandbox.scene.document import to_document
 from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, load, loads, to_document
+from sandbox.scene.file import dumps, from_document, load, loads
 from sandbox.scene.model import Scene
 
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"

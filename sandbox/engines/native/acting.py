@@ -19,8 +19,9 @@ from sandbox.action import (
 )
 from sandbox.engines.native.population import Population
 from sandbox.scene.address import AddressError, assign
+from sandbox.scene.document import to_document
 from sandbox.scene.faults import SceneError
-from sandbox.scene.file import from_document, to_document
+from sandbox.scene.file import from_document
 
 
 def perform(action: Action, population: Population) -> int | None:
@@ -34,10 +35,7 @@ def perform(action: Action, population: Population) -> int | None:
         case Impulse():
             _kick(action, population)
         case Force():
-            pushed, half = population.mover(action.body)
-            if action.torque and not math.isfinite(half.moment(pushed)):
-                half.give_moment(pushed, float(population.bodies.moment[pushed]))
-            half.push(pushed, np.asarray(action.force), action.torque)
+            _push(action, population)
         case Move():
             _move(action, population)
         case Spawn():
@@ -62,6 +60,16 @@ def _kick(action: Impulse, population: Population) -> None:
     half.set_velocity(number, velocity)
     if action.angular:
         half.set_spin(number, spin)
+
+
+def _push(action: Force, population: Population) -> None:
+    number, half = population.mover(action.body)
+    mass, moment = float(population.bodies.mass[number]), float(population.bodies.moment[number])
+    speed_limit(math.hypot(*action.force) / mass * population.h, f"one step under the force on {action.body!r}")
+    speed_limit(abs(action.torque) / moment * population.h, f"one step under the torque on {action.body!r}")
+    if action.torque and not math.isfinite(half.moment(number)):
+        half.give_moment(number, moment)
+    half.push(number, np.asarray(action.force), action.torque)
 
 
 def _move(action: Move, population: Population) -> None:

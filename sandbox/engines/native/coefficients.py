@@ -34,7 +34,8 @@ def factors(wanted: FloatArray, touching: BoolArray, stated: list[float | None])
 
 def wrong_pairs(wanted: FloatArray, touching: BoolArray, factor: list[float]) -> list[tuple[int, int]]:
     """Return the pairs that can meet and whose product of factors is not the wanted coefficient."""
-    off = np.abs(np.outer(factor, factor) - wanted) > TOLERANCE * wanted
+    with np.errstate(over="ignore"):  # of a factor that is the quotient by a tiny one; it is wrong then
+        off = np.abs(np.outer(factor, factor) - wanted) > TOLERANCE * wanted
     rows, columns = np.nonzero(np.triu(off & touching))
     return list(zip(rows.tolist(), columns.tolist(), strict=True))
 
@@ -57,8 +58,10 @@ def _solved(wanted: FloatArray, touching: BoolArray) -> list[float]:
             base = factor[a]
             for b in range(size):
                 if factor[b] is None and touching[a, b] and not touching[b, b] and base:
-                    factor[b] = float(wanted[a, b]) / base
-                    queue.append(b)
+                    quotient = float(wanted[a, b]) / base
+                    if math.isfinite(quotient):
+                        factor[b] = quotient
+                        queue.append(b)
     return [0.0 if value is None else value for value in factor]
 
 

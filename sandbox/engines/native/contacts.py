@@ -39,6 +39,8 @@ class ContactLedger:
 
     def record(self, time: float, now: Touching) -> None:
         """Enter what touches at a time, s."""
+        if self._joints and len(now.a) > 1:
+            now = _ordered(now)
         self._memory.forget_and_advance()
         if not len(now.a) and not len(self._row):
             return
@@ -54,6 +56,8 @@ class ContactLedger:
         sign = swapped * 2.0 - 1.0
         given = now.impulse * sign  # by the first to the second
         if len(new):
+            # pymunk lists arbiters by the addresses of shapes: without an order of our own, no two runs agree.
+            new = new[np.argsort(self._rows.key[new], kind="stable")]
             given[new] -= sign[new] * self._memory.excess(self._rows.key[new], now.normal[new])
             leader, group = new, np.arange(len(new))
             if self._joints:
@@ -102,6 +106,12 @@ class ContactLedger:
         self._place[:count] = self._place[lasting]
         self._impulse[:count] = 0.0
         return taken
+
+
+def _ordered(now: Touching) -> Touching:
+    """Return arbiters by pair, and those of one pair by place: which one opens a row must not be chance."""
+    order = np.lexsort((now.point.imag, now.point.real, now.b, now.a))
+    return Touching(now.a[order], now.b[order], now.impulse[order], now.normal[order], now.point[order])
 
 
 def _plain(vector: ComplexArray) -> FloatArray:

@@ -266,4 +266,4 @@ def _order(count: int) -> list[int]:
     """Return the order in which to add so many shapes to a space."""
     if count <= MANY:
         return list(range(count))
-    return np.random.Generator(np.random.PCG64(0)).permutation(count).tolist()
+    return list(map(int, np.random.Generator(np.random.PCG64(0)).permutation(count)))

@@ -38,6 +38,7 @@ class Population:
         self.present: BoolArray = np.ones(len(self.bodies), dtype=np.bool_)
         self.ended = False
         self._fresh = True
+        self.h = settings.h
         self._half_kick = 0.5 * settings.h if settings.half_kick else 0.0
         self.velocity[~self.bodies.fixed] += self.ahead
         self.free = FreeFlight(scene.world, settings.h)

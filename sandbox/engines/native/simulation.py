@@ -105,7 +105,7 @@ class NativeSimulation:
         for k in range(int(whole)):
             self._substep(k)
         before = [array.copy() for array in self._state()]
-        self._substep(int(whole))
+        self._substep(int(whole), look=False)  # its contacts lie beyond the end
         self._part = part
         self._guard()
         for now, old in zip(self._state(), before, strict=True):
@@ -170,7 +170,7 @@ class NativeSimulation:
         if self._population.ended:
             raise RuntimeError("the simulation has ended; it can be read, but not go on")
 
-    def _substep(self, k: int) -> None:
+    def _substep(self, k: int, look: bool = True) -> None:
         """Advance by h, the k-th time in this step: both halves apart, as they never meet."""
         population, h = self._population, self._settings.h
         start = self.time + k * h
@@ -178,7 +178,7 @@ class NativeSimulation:
         population.free.step()
         population.meeting.step()
         population.changed()
-        if self._ledger is not None:
+        if self._ledger is not None and look:
             self._record(start + h)
             if self._observer is not None and before is not None:
                 self._observer(start, before, self._state()[0], self._ledger.pairs())

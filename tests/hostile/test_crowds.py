@@ -1,0 +1,177 @@
+"""Crowds: what takes pymunk minutes, or for ever, if it is let. Each ends in a reason, or in a few seconds."""
+
+import pytest
+from ordeal import WAYS, endure
+
+
+@WAYS
+@pytest.mark.parametrize("count", [1_000, 1_000_000])
+def test_balls_in_one_spot_are_refused(count: int, flags: tuple[str, ...]) -> None:
+    code = f"""
+grid = {{"origin": [0, 0], "columns": 1000, "rows": {count} // 1000, "spacing": [0, 0], "radius": 1}}
+emitter = {{"position": [0, 0], "count": {count}, "velocity_min": [0, 0], "velocity_max": [0, 0]}}
+say([
+    outcome(from_document, {{"grid": [grid]}}),
+    outcome(from_document, {{"grid": [grid], "ball": [{{"position": [1e9, 0], "radius": 1e8}}]}}),
+    outcome(from_document, {{"emitter": [{{**emitter, "collides": "all"}}]}}),
+    outcome(lambda: steps(start(from_document({{"emitter": [emitter]}})), 3)),
+])
+"""
+    assert endure(code, flags) == ["SceneError", "SceneError", "SceneError", "done"]
+
+
+@WAYS
+def test_balls_that_pass_through_each_other_in_one_spot_are_refused_beyond_a_thousand(flags: tuple[str, ...]) -> None:
+    """Pymunk looks at every pair of them: 3,000 take two seconds a step, 30,000 all memory there is."""
+    code = """
+def attempt(count):
+    plane = {"point": [0, -5], "normal": [0, 1]}
+    burst = {"position": [0, 0], "count": count, "velocity_min": [-9, 1], "velocity_max": [9, 9], "collides": "fixed"}
+    steps(start(from_document({"plane": [plane], "emitter": [burst]})), 3)
+say([outcome(attempt, count) for count in (1_000, 3_000, 1_000_000)])
+"""
+    assert endure(code, flags) == ["done", "SceneError", "SceneError"]
+
+
+@WAYS
+def test_crowd_hidden_behind_a_giant_is_refused(flags: tuple[str, ...]) -> None:
+    """A giant makes all balls its neighbours, of which there are too many to look at every pair."""
+    code = """
+spread = {"origin": [0, 0], "columns": 200, "rows": 100, "spacing": [1, 1], "radius": 0.1}
+spot = {"origin": [1000, 0], "columns": 2000, "spacing": [0, 0], "radius": 0.1}
+giant = {"position": [1e6, 0], "radius": 1e4}
+say([outcome(from_document, {"grid": [spread, spot], "ball": [giant]}),
+     outcome(from_document, {"grid": [spread], "ball": [giant]})])
+"""
+    assert endure(code, flags) == ["SceneError", "done"]
+
+
+@WAYS
+@pytest.mark.parametrize("spread", [0.0, 0.5])
+def test_spawning_hundreds_into_one_spot_is_refused_at_a_hundred(spread: float, flags: tuple[str, ...]) -> None:
+    code = f"""
+simulation = start(from_document({{"ball": [{{"position": [0, 0], "radius": 1}}]}}))
+place = np.random.default_rng(1).uniform(-{spread}, {spread}, (700, 2)).tolist()
+found = [outcome(simulation.apply, Spawn(time=0, ball=Ball(position=tuple(at), radius=1.0))) for at in place]
+bodies = len(simulation.bodies)
+steps(simulation, 3)
+for k in range(2, bodies + 1):
+    simulation.apply(Remove(time=0, body=f"spawned-{{k}}"))
+simulation.step()
+say([bodies, found.count("done"), found.count("ActionError"), int(simulation.frame().present.sum()), survey(simulation)])
+"""
+    assert endure(code, flags) == [100, 99, 601, 1, True]
+
+
+@WAYS
+def test_moving_hundreds_onto_one_spot_is_refused_at_a_hundred(flags: tuple[str, ...]) -> None:
+    code = """
+grid = {"name": "g", "origin": [0, 9], "columns": 300, "spacing": [3, 0], "radius": 1}
+simulation = start(from_document({"grid": [grid]}))
+moves = [Move(time=0, body=f"g-{k + 1}", position=(0.0, 0.0)) for k in range(300)]
+found = [outcome(simulation.apply, move) for move in moves]
+steps(simulation, 3)
+say([found.count("done"), found.count("ActionError"), survey(simulation)])
+"""
+    assert endure(code, flags) == [100, 200, True]
+
+
+@WAYS
+def test_many_coincident_bodies_are_removed_and_retired_and_freed(flags: tuple[str, ...]) -> None:
+    code = """
+def burst(bounds, speed):
+    return start(from_document({
+        "world": {} if bounds is None else {"bounds": bounds},
+        "plane": [{"point": [0, -5], "normal": [0, 1]}],
+        "grid": [{"name": "g", "origin": [0, 0], "columns": 1_000, "spacing": [0, 0], "radius": 1,
+                  "velocity": [speed, 0], "collides": "fixed"}],
+    }))
+removed = burst(None, 0.0)
+removed.step()
+for k in range(1_000):
+    removed.apply(Remove(time=0, body=f"g-{k + 1}"))
+steps(removed, 2)
+retired = burst([[-1, -1], [1, 1]], 1e6)
+steps(retired, 2)
+burst(None, 0.0).step()
+say([len(removed.retired), len(retired.retired)])
+"""
+    assert endure(code, flags) == [1_000, 1_000]
+
+
+@WAYS
+def test_a_hundred_thousand_particles_leave_the_bounds_at_once(flags: tuple[str, ...]) -> None:
+    code = """
+burst = {"position": [0, 0], "count": 100_000, "velocity_min": [200, 200], "velocity_max": [300, 300]}
+simulation = start(from_document({"world": {"bounds": [[-1, -1], [1, 1]]}, "emitter": [burst]}))
+steps(simulation, 3)
+frame = simulation.frame()
+say([len(simulation.retired), bool(frame.present.any()), bool(frame.velocity.any()), survey(simulation)])
+"""
+    assert endure(code, flags) == [100_000, False, False, True]
+
+
+@WAYS
+def test_forty_thousand_balls_in_a_sorted_line_are_added(flags: tuple[str, ...]) -> None:
+    """In that order pymunk's tree takes half a minute for them; shuffled, a second or two."""
+    code = """
+simulation = start(from_document({
+    "grid": [{"origin": [0, 0], "columns": 40_000, "spacing": [3, 0], "radius": 1}],
+}))
+simulation.step()
+say(len(simulation.frame().position))
+"""
+    assert endure(code, flags) == 40_000
+
+
+@WAYS
+@pytest.mark.parametrize("shape", ["line", "spiral", "spot"])
+def test_wall_of_a_hundred_thousand_points_is_added(shape: str, flags: tuple[str, ...]) -> None:
+    """As a line it is sorted, which pymunk's tree takes minutes for unless it is shuffled."""
+    code = f"""
+turn = np.arange(100_000) * 1e-3
+points = {{
+    "line": np.column_stack((turn, 0 * turn)),
+    "spiral": np.column_stack((turn * np.cos(turn), turn * np.sin(turn))),
+    "spot": np.column_stack((1e-6 * (np.arange(100_000) % 2), 0 * turn)),
+}}[{shape!r}]
+simulation = start(from_document({{
+    "wall": [{{"points": points.tolist(), "restitution": 0.5}}],
+    "ball": [{{"position": [50, 0.3], "velocity": [0, -5], "radius": 0.1}}],
+}}))
+simulation.contacts()
+steps(simulation, 10)
+say([survey(simulation), len(simulation.contacts())])
+"""
+    finite, contacts = endure(code, flags)
+    assert finite
+    assert contacts == (1 if shape == "line" else 0)
+
+
+@WAYS
+def test_too_many_points_too_many_bodies_and_too_many_surfaces_are_refused(flags: tuple[str, ...]) -> None:
+    code = """
+line = [[k * 0.001, 0] for k in range(100_001)]
+emitter = {"position": [0, 0], "count": 1_000_000, "velocity_min": [0, 0], "velocity_max": [1, 1]}
+ball = {"position": [0, 0], "radius": 1}
+simulation = start(from_document({"ball": [ball]}))
+spawns = [
+    Spawn(time=0, ball=Ball(position=(3.0 * k, 9.0), radius=1.0, restitution=k / 1000, friction=k / 7))
+    for k in range(260)
+]
+found = [outcome(simulation.apply, spawn) for spawn in spawns]
+simulation.step()
+full = start(from_document({"emitter": [emitter]}))
+say([
+    outcome(from_document, {"wall": [{"points": line}]}),
+    outcome(from_document, {"emitter": [emitter], "ball": [ball]}),
+    outcome(from_document, {"ball": [{**ball, "position": [3 * k, 0], "friction": k / 7} for k in range(300)]}),
+    outcome(full.apply, Spawn(time=0, ball=Ball(position=(0.0, 0.0), radius=1.0))),
+    found.count("done"), found.count("ActionError"), survey(simulation),
+])
+"""
+    *refused, done, errors, finite = endure(code, flags)
+    assert refused == ["SceneError", "SceneError", "SceneError", "ActionError"]
+    assert done == 255  # with the surface of the first ball, 256
+    assert errors == 5
+    assert finite
