@@ -11,6 +11,7 @@ from sandbox.scene.generators import GeneratorError, size
 from sandbox.scene.model import Disc, Emitter, Generator, Grid, Plane, Scatter, Scene, Surfaced
 from sandbox.scene.near import FloatArray, IntArray, near_pairs
 from sandbox.scene.part import BACKING, MAX_BODIES, MAX_POSITION, MAX_SPEED, MAX_STEPS
+from sandbox.scene.repeats import repeats
 from sandbox.scene.surfaces import surfaces_of
 
 Found = tuple[Location, str]
@@ -29,7 +30,7 @@ SHORTEST = 1e-9
 def crosscheck(scene: Scene) -> list[Found]:
     """Return every fault that lies between the parts of a scene; none means that it can be run."""
     materials, generators = list(_materials(scene)), list(_generators(scene))
-    found = [*materials, *_masses(scene), *_fixed(scene), *generators, *_world(scene)]
+    found = [*materials, *_masses(scene), *_fixed(scene), *repeats(scene), *generators, *_world(scene)]
     if generators:
         return found  # what follows counts on being able to lay the bodies out
     try:

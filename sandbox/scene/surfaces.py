@@ -52,7 +52,6 @@ def surfaces_of(scene: Scene, bodies: Bodies) -> Surfaces:
         KeyError: a thing names a material that the scene does not declare.
     """
     materials = {m.name: m for m in scene.materials}
-    pairs = {frozenset(p.between): p for p in scene.pairs}
     paired = {name for p in scene.pairs for name in p.between}
     numbers: dict[Surface, int] = {}
 
@@ -65,18 +64,23 @@ def surfaces_of(scene: Scene, bodies: Bodies) -> Surfaces:
         kept = thing.material if thing.material in paired else None
         return numbers.setdefault(Surface(kept, restitution, friction), len(numbers))
 
-    def coefficients(a: Surface, b: Surface) -> tuple[float, float]:
-        restitution, friction = mix(a.restitution, b.restitution), mix(a.friction, b.friction)
-        if a.material is not None and b.material is not None:
-            pair = pairs.get(frozenset((a.material, b.material)))
-            if pair is not None:
-                restitution = restitution if pair.restitution is None else pair.restitution
-                friction = friction if pair.friction is None else pair.friction
-        return restitution, friction
-
     of_element = np.asarray([number(e) for e in bodies.elements], dtype=np.int64)
     of_fixed = np.asarray([number(f) for f in scene.fixed], dtype=np.int64)
     surfaces = tuple(numbers)
-    both = np.asarray([[coefficients(a, b) for b in surfaces] for a in surfaces], dtype=np.float64)
-    both = both.reshape(len(surfaces), len(surfaces), 2)
-    return Surfaces(surfaces, of_element[bodies.element], of_fixed, both[..., 0], both[..., 1])
+    restitution, friction = _mixed([s.restitution for s in surfaces]), _mixed([s.friction for s in surfaces])
+    bearers: dict[str | None, list[int]] = {}
+    for number, surface in enumerate(surfaces):
+        bearers.setdefault(surface.material, []).append(number)
+    for pair in scene.pairs:
+        first, second = (bearers.get(name, []) for name in pair.between)
+        for table, stated in ((restitution, pair.restitution), (friction, pair.friction)):
+            if stated is not None:
+                table[np.ix_(first, second)] = table[np.ix_(second, first)] = stated
+    return Surfaces(surfaces, of_element[bodies.element], of_fixed, restitution, friction)
+
+
+def _mixed(stated: list[float | None]) -> FloatArray:
+    """Return `mix` of every two of S figures, (S, S)."""
+    known = np.asarray([figure is not None for figure in stated], dtype=np.bool_)
+    figures = np.asarray([1.0 if figure is None else figure for figure in stated], dtype=np.float64)
+    return np.where(np.logical_or.outer(known, known), np.outer(figures, figures), 0.0)

@@ -339,12 +339,13 @@ def test_run_tells_everything_that_it_was() -> None:
 
 
 def test_diverging_run_keeps_what_it_has() -> None:
-    push = Force(time=0.3, body="a", force=(1e42, 0.0))
-    result = run(flight(1.0, 0.1, every=2), actions=[push])
-    assert (result.status, result.info["steps"]) == ("diverged", 3)
-    assert result.reason == "at 0.4 s: 'a' is not finite, or beyond all bounds"
-    assert result.time == pytest.approx([0.0, 0.2, 0.4], rel=1e-15)  # k·dt
-    assert result.velocity[-1, 0, 0] == pytest.approx(5e40)  # 1e42 N / 2 kg · 0.1 s
+    # 9.5e11 m/s a step: just allowed, and beyond all bounds with the eleventh.
+    push = Force(time=0.3, body="a", force=(1.9e13, 0.0))
+    result = run(flight(2.0, 0.1, every=2), actions=[push])
+    assert (result.status, result.info["steps"]) == ("diverged", 13)
+    assert result.reason == "at 1.4 s: 'a' is not finite, or beyond all bounds"
+    assert result.time == pytest.approx(np.arange(8) * 0.2, rel=1e-15)  # k·dt
+    assert result.velocity[-1, 0, 0] == pytest.approx(11 * 9.5e11)
     assert result.info["energy_start"] == 0.0
 
 

@@ -1,0 +1,55 @@
+"""Repeats: fixed things that stand in one place many times over.
+
+A tree of bounding boxes, which most engines have, cannot part boxes that are equal: adding n of them takes n² steps.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise
+
+from sandbox.scene.faults import Location
+from sandbox.scene.model import Plane, Scene, Wall
+
+MAX_REPEATS = 5_000
+"""Equal shapes; half a second."""
+
+Key = tuple[float | str, ...]
+
+
+def repeats(scene: Scene) -> list[tuple[Location, str]]:
+    """Return a fault for every fixed thing that is one too many of its like."""
+    found: list[tuple[Location, str]] = []
+    seen: Counter[Key] = Counter()
+    for location, key in _shapes(scene):
+        seen[key] += 1
+        if seen[key] == MAX_REPEATS + 1:
+            found.append((location, f"this is in one place more than {MAX_REPEATS:,} times; state it once"))
+    return found
+
+
+def _shapes(scene: Scene) -> Iterator[tuple[Location, Key]]:
+    for k, plane in enumerate(scene.planes):
+        yield ("plane", k), _plane(plane)
+    for k, wall in enumerate(scene.walls):
+        for n, segment in enumerate(_segments(wall)):
+            yield ("wall", k, "points", n), segment
+    for k, post in enumerate(scene.posts):
+        yield ("post", k), ("disc", *post.position, post.radius)
+    for k, ball in enumerate(scene.balls):
+        if ball.fixed and ball.collides != "none":
+            yield ("ball", k), ("disc", *ball.position, ball.radius)
+
+
+def _plane(plane: Plane) -> Key:
+    """Return a plane's direction and its distance from the origin: its point may be any of its points."""
+    length = math.hypot(*plane.normal)
+    x, y = (component / length for component in plane.normal) if length > 0 else plane.normal
+    return "plane", round(x, 9), round(y, 9), round(x * plane.point[0] + y * plane.point[1], 9)
+
+
+def _segments(wall: Wall) -> Iterator[Key]:
+    ends = (*wall.points, wall.points[0]) if wall.closed else wall.points
+    for a, b in pairwise(ends):
+        low, high = sorted((a, b))
+        yield "segment", *low, *high, wall.thickness
