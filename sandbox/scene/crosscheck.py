@@ -12,7 +12,7 @@ from sandbox.scene.model import Disc, Emitter, Generator, Grid, Plane, Scatter, 
 from sandbox.scene.near import FloatArray, IntArray, near_pairs
 from sandbox.scene.part import BACKING, MAX_BODIES, MAX_POSITION, MAX_SPEED, MAX_STEPS
 from sandbox.scene.repeats import repeats
-from sandbox.scene.surfaces import surfaces_of
+from sandbox.scene.surfaces import numbered
 
 Found = tuple[Location, str]
 
@@ -152,8 +152,7 @@ def _taken(name: str) -> str:
 
 
 def _surfaces(scene: Scene, bodies: Bodies) -> Iterator[Found]:
-    distinct = {(s.material, s.restitution, s.friction) for s in (*bodies.elements, *scene.fixed)}
-    if len(distinct) > MAX_SURFACES and len(surfaces_of(scene, bodies).surfaces) > MAX_SURFACES:
+    if len(numbered(scene, (*bodies.elements, *scene.fixed))[0]) > MAX_SURFACES:
         yield (), f"more than {MAX_SURFACES} different surfaces; share materials between balls"
 
 

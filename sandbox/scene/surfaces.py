@@ -5,6 +5,7 @@ listed, `mix` holds: a figure stated on one side of a contact holds for it, on b
 rule), on neither it is 0. A figure stated on a shape outranks its material's.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -51,22 +52,9 @@ def surfaces_of(scene: Scene, bodies: Bodies) -> Surfaces:
     Raises:
         KeyError: a thing names a material that the scene does not declare.
     """
-    materials = {m.name: m for m in scene.materials}
-    paired = {name for p in scene.pairs for name in p.between}
-    numbers: dict[Surface, int] = {}
-
-    def number(thing: Surfaced) -> int:
-        material = None if thing.material is None else materials[thing.material]
-        restitution, friction = thing.restitution, thing.friction
-        if material is not None:
-            restitution = material.restitution if restitution is None else restitution
-            friction = material.friction if friction is None else friction
-        kept = thing.material if thing.material in paired else None
-        return numbers.setdefault(Surface(kept, restitution, friction), len(numbers))
-
-    of_element = np.asarray([number(e) for e in bodies.elements], dtype=np.int64)
-    of_fixed = np.asarray([number(f) for f in scene.fixed], dtype=np.int64)
-    surfaces = tuple(numbers)
+    surfaces, of_element = numbered(scene, bodies.elements)
+    more, of_fixed = numbered(scene, scene.fixed, surfaces)
+    surfaces = (*surfaces, *more)
     restitution, friction = _mixed([s.restitution for s in surfaces]), _mixed([s.friction for s in surfaces])
     bearers: dict[str | None, list[int]] = {}
     for number, surface in enumerate(surfaces):
@@ -79,8 +67,32 @@ def surfaces_of(scene: Scene, bodies: Bodies) -> Surfaces:
     return Surfaces(surfaces, of_element[bodies.element], of_fixed, restitution, friction)
 
 
+def numbered(
+    scene: Scene, things: Sequence[Surfaced], known: tuple[Surface, ...] = ()
+) -> tuple[tuple[Surface, ...], IntArray]:
+    """Return the distinct surfaces of things that are not known yet, and the number of each thing's, known first.
+
+    Raises:
+        KeyError: a thing names a material that the scene does not declare.
+    """
+    materials = {m.name: m for m in scene.materials}
+    paired = {name for p in scene.pairs for name in p.between}
+    numbers = {surface: k for k, surface in enumerate(known)}
+
+    def number(thing: Surfaced) -> int:
+        material = None if thing.material is None else materials[thing.material]
+        restitution, friction = thing.restitution, thing.friction
+        if material is not None:
+            restitution = material.restitution if restitution is None else restitution
+            friction = material.friction if friction is None else friction
+        kept = thing.material if thing.material in paired else None
+        return numbers.setdefault(Surface(kept, restitution, friction), len(numbers))
+
+    of_thing = np.asarray([number(thing) for thing in things], dtype=np.int64)
+    return tuple(numbers)[len(known) :], of_thing
+
+
 def _mixed(stated: list[float | None]) -> FloatArray:
     """Return `mix` of every two of S figures, (S, S)."""
-    known = np.asarray([figure is not None for figure in stated], dtype=np.bool_)
-    figures = np.asarray([1.0 if figure is None else figure for figure in stated], dtype=np.float64)
-    return np.where(np.logical_or.outer(known, known), np.outer(figures, figures), 0.0)
+    table = np.asarray([[mix(a, b) for b in stated] for a in stated], dtype=np.float64)
+    return table.reshape(len(stated), len(stated))

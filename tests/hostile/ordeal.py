@@ -51,6 +51,11 @@ def say(value):
 WAYS = pytest.mark.parametrize("flags", [(), ("-O",)], ids=["plain", "optimised"])
 """`python -O` leaves out every assert, pymunk's own among them."""
 
+HEAVY = pytest.mark.parametrize(
+    "flags", [(), pytest.param(("-O",), marks=pytest.mark.slow)], ids=["plain", "optimised"]
+)
+"""The same for what takes some seconds."""
+
 
 def endure(code: str, flags: tuple[str, ...] = (), timeout: float = 60.0) -> Any:
     """Run code after `PRELUDE` and return what it says.

@@ -199,12 +199,10 @@ whole["solver"]["dt"] = 10
 scene = from_document(whole)
 say([
     outcome(run, scene, dt=1e-9, record_every=10**9), outcome(run, scene, substeps=1000, record_every=10**9),
-    outcome(from_document, whole, overrides=["solver.dt=1e-3"]), outcome(run, scene, dt=1.0),
+    outcome(from_document, whole, overrides=["solver.dt=1e-3"]),
 ])
 """
-    found = endure(SCENE + code, flags)
-    assert found[:3] == ["TooLargeError", "TooLargeError", "SceneError"]
-    assert found[3] == "TooLargeError"  # 1e9 frames of two balls
+    assert endure(SCENE + code, flags) == ["TooLargeError", "TooLargeError", "SceneError"]
 
 
 @WAYS
