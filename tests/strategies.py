@@ -15,6 +15,10 @@ from sandbox.scene.model import Scene
 Document = dict[str, Any]
 
 
+NAMEABLE = ("plane", "wall", "post", "ball", "grid", "scatter", "emitter")
+"""Keys of a document whose elements have names."""
+
+
 @cache
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
     """Floats within bounds, and whole numbers as TOML integers."""
@@ -25,11 +29,11 @@ def numbers(low: float, high: float) -> st.SearchStrategy[float]:
 
 @cache
 def names() -> st.SearchStrategy[str]:
-    """Names of bodies and materials: any text without control characters; none that looks like a default name."""
+    """Names of bodies and materials: any text without control characters; none that leads to a default name."""
     letters = st.characters(exclude_categories=["Cc", "Cs", "Zl", "Zp"], exclude_characters="-")
     return st.sampled_from(["cue", "8 ball", "a.b", "it's", 'say "hi"', "[x]", "#1", "=", "0"]) | st.text(
         letters, min_size=1, max_size=12
-    )
+    ).filter(lambda name: name not in NAMEABLE)  # a grid called "wall" has a ball "wall-1", as a first wall is called
 
 
 @cache
@@ -134,8 +138,7 @@ def documents(draw: st.DrawFn, most: int = 2) -> Document:
     }
     document["emitter"] = listed(_elements(emitter, {**disc, **spin, **heavy}, materials))
 
-    nameable = ("plane", "wall", "post", "ball", "grid", "scatter", "emitter")
-    things = [thing for kind in nameable for thing in document[kind]]
+    things = [thing for kind in NAMEABLE for thing in document[kind]]
     called = draw(st.lists(st.none() | names(), min_size=len(things), max_size=len(things), unique_by=_unless_none()))
     for thing, name in zip(things, called, strict=True):
         if name is not None:

@@ -14,7 +14,7 @@ README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
 BAD = """\
 title = "Bad"
-
+about = "Three faults"
 [world]
 duraton = 3
 
@@ -23,10 +23,8 @@ name = "a"
 position = [0.0, 1.0]
 radius = -1
 
-[[ball]]
+
 material = "rubbr"
-position = [5.0, 1.0]
-radius = 1
 """
 
 
@@ -52,8 +50,7 @@ def test_faults_read_as_shown():
     with pytest.raises(SceneError) as error:
         loads(BAD, "bad.toml")
     shown = re.findall(r"^bad\.toml:.*$", README, re.MULTILINE)
-    said = [re.sub(r":\d+:", ":", str(fault)) for fault in error.value.faults]
-    assert [re.sub(r":\d+:", ":", line).replace("ball.a.material", "ball[1].material") for line in shown] == said
+    assert shown == [str(fault) for fault in error.value.faults]
 
 
 def test_shown_commands_are_sound():

@@ -39,6 +39,7 @@ class Outcome:
             "engine": self.job.engine,
             "settings": info["settings"],
             "seed": info["seed"],
+            "set": dict(self.job.point),
             "status": run.status,
             "reason": run.reason,
             "seconds": _number(seconds),

@@ -24,6 +24,8 @@ class Job:
     scene: Scene
     engine: str
     actions: tuple[Any, ...] = ()
+    point: tuple[tuple[str, Any], ...] = ()
+    """the swept keys and this run's values"""
 
 
 def plan(
@@ -46,7 +48,7 @@ def plan(
         SceneError: scenes have faults, as they stand or with a value set; all of them are told, each once.
         AddressError: a sweep cannot be understood.
     """
-    axes: list[list[Override]] = [[(key, value) for value in values] for key, values in map(parse_sweep, sweeps)]
+    axes: list[list[tuple[str, Any]]] = [[(key, value) for value in values] for key, values in map(parse_sweep, sweeps)]
     if seeds is not None:
         axes.append([("world.seed", seed) for seed in range(1, seeds + 1)])
     if math.prod(len(axis) for axis in axes) > MOST_POINTS:
@@ -60,7 +62,7 @@ def plan(
             except SceneError as error:
                 faults |= dict.fromkeys(error.faults)
                 continue
-            jobs += [Job(label, scene, engine) for engine in engines]
+            jobs += [Job(label, scene, engine, point=point) for engine in engines]
     if faults:
         raise SceneError(tuple(faults))
     return jobs

@@ -20,6 +20,7 @@ def print_runs(rows: Sequence[Row]) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    swept = [key for key in rows[0]["set"] if key != "world.seed" and not key.startswith("solver.")]
     differing = [key for key in rows[0]["settings"] if key != "dt" and _differs(rows, key)]
     seeds = len({row["seed"] for row in rows}) > 1
     scenes = len({row["scene"] for row in rows}) > 1
@@ -29,7 +30,7 @@ def print_runs(rows: Sequence[Row]) -> None:
     if scenes:
         table.add_column("scene", overflow="fold", min_width=SHORTEST_NAME)
     table.add_column("engine", no_wrap=True)
-    for head in ("dt", *differing, *(["seed"] if seeds else [])):
+    for head in ("dt", *swept, *differing, *(["seed"] if seeds else [])):
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("status", no_wrap=True)
     for head in ("× real", "energy, J", "contacts", "missed"):
@@ -43,11 +44,12 @@ def print_runs(rows: Sequence[Row]) -> None:
             *([Text(row["scene"])] if scenes else []),
             row["engine"],
             f"{row['settings']['dt']:.4g}",
+            *(_setting(row["set"][key]) for key in swept),
             *(_setting(row["settings"][key]) for key in differing),
             *([str(row["seed"])] if seeds else []),
             status,
             _figure(row["realtime_factor"], 3),
-            f"{_figure(row['energy_start'])} → {_figure(row['energy_end'])}",
+            "–" if row["energy_start"] is None else f"{_figure(row['energy_start'])} → {_figure(row['energy_end'])}",
             *(("–", "–") if row["status"] == "refused" else (f"{row['contacts']:,}", _missed(row["missed_contacts"]))),
         )
     console = Console(width=None if sys.stdout.isatty() else WIDE)

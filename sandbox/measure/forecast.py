@@ -84,6 +84,12 @@ def at_most(limit: float) -> str:
 
 def _warnings(scene: Scene, settings: Settings) -> Iterator[Warning]:
     meet = meetings(scene)
+    if settings.dt > scene.world.duration * (1.0 + ROUNDING):
+        message = (
+            f"dt, {settings.dt:g} s, is longer than the run, {scene.world.duration:g} s: its end is a part of one "
+            "step, in which no contact is found"
+        )
+        yield Warning("duration", message, {"dt": settings.dt, "duration": scene.world.duration})
     for passage in passages(scene, meet):
         odds = passage.odds(settings.h)
         if odds > ROUNDING:

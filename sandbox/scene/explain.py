@@ -16,7 +16,7 @@ _EXPECTED = {
     "finite_number": "a finite number",
     "bool_type": "true or false",
     "string_type": "text in quotes",
-    "tuple_type": "an array (and a table that may stand several times is headed [[…]])",
+    "tuple_type": "an array, such as [0.0, 1.0]",
     "model_type": "a table",
     "model_attributes_type": "a table",
     "greater_than": "greater than {gt:g}",
@@ -45,6 +45,10 @@ def explain(details: Any) -> tuple[Location, str]:
         return location, str(context["error"])
     if kind == "string_pattern_mismatch":
         expected = "text '#rrggbb'" if location[-1] == "colour" else "text without control characters"
+    elif kind == "tuple_type" and len(location) == 1:
+        expected = f"tables, each headed [[{location[0]}]]"
+    elif kind in ("too_short", "too_long") and location[-1] != "points":
+        expected = f"an array of {context.get('max_length', context.get('min_length'))}"
     elif kind in _EXPECTED:
         expected = _EXPECTED[kind].format(**context)
     else:

@@ -38,11 +38,15 @@ ALOOF: dict[str, dict[str, Any]] = {
 _TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - {"title", "about"}
 
 
+OF_THEIR_OWN = {("material",), ("name",), ("between",)}
+"""Keys that no stand-in touches: what the cross-check says of them holds for an element with other faults too."""
+
+
 def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> list[Found]:
     """Cross-check a document whose values at `wrong` are faulty.
 
     Those are left out, or given a harmless value where one must be there; what the cross-check then says of the
-    elements they belong to does not count. Nothing is found where too much is wrong to tell.
+    elements they belong to does not count, but for keys of their own. Nothing is found where too much is wrong to tell.
     """
     document = copy.deepcopy(document)
     touched: set[Location] = set()
@@ -69,4 +73,4 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
         scene = read_model(document)
     except ValueError:
         return []
-    return [f for f in crosscheck(scene) if touched.isdisjoint((f[0][:1], f[0][:2]))]
+    return [f for f in crosscheck(scene) if touched.isdisjoint((f[0][:1], f[0][:2])) or f[0][2:3] in OF_THEIR_OWN]

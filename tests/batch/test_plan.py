@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from sandbox.batch.plan import MOST_POINTS, parse_sweep, plan
 from sandbox.scene.address import AddressError
 from sandbox.scene.faults import SceneError
+from sandbox.scene.shipped import find
 
 BALL = '[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 1\n'
 
@@ -173,3 +174,10 @@ def test_too_many_runs_are_refused_before_any_is_laid_out(scene: tuple[str, str]
     sweeps = ["solver.dt=0.1:1:1001", "ball.a.mass=1:2:1000"]
     with pytest.raises(AddressError, match="multiply to more than 1,000,000 runs"):
         plan([scene], ["pymunk"], sweeps=sweeps)
+
+
+def test_jobs_tell_the_swept_values() -> None:
+    jobs = plan([("bounce", str(find("bounce")))], ["pymunk"], sweeps=["ball.ball.restitution=0,1"], seeds=2)
+    assert [dict(job.point) for job in jobs] == [
+        {"ball.ball.restitution": e, "world.seed": seed} for e in (0, 1) for seed in (1, 2)
+    ]

@@ -76,7 +76,8 @@ CASES: dict[str, tuple[str, str]] = {
         "done",
     ),
     "both drags and a wind of 1e12": (
-        '{"world": {**down, "linear_drag": 1e9, "quadratic_drag": 1e9, "wind": [-1e12, 0]}, "ball": [ball(0), ball(9)]}',
+        '{"world": {**down, "linear_drag": 1e9, "quadratic_drag": 1e9, "wind": [-1e12, 0]}, '
+        '"ball": [ball(0), ball(9)]}',
         "done",
     ),
     "dt of 10": (

@@ -206,3 +206,9 @@ def test_limit_that_is_short_stays_as_it_is() -> None:
     assert [at_most(x) for x in (0.0002, 0.1 + 0.2, 0.00019999999999999998, 101.0, 1e-9)] == [
         "0.0002", "0.3", "0.0002", "101", "1e-09",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("dt", "warned"), [(1.0, False), (1.1, True)])
+def test_step_longer_than_the_run_is_warned_of(dt: float, warned: bool) -> None:
+    text = f"[world]\nduration = 1.0\n[solver]\ndt = {dt}\n[[ball]]\nposition = [0.0, 0.0]\nradius = 1.0\n"
+    assert ["duration" in w.kind for w in warnings(loads(text))] == [True] * warned

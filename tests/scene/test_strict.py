@@ -93,7 +93,7 @@ def test_names_of_the_model_are_no_keys_of_a_file(plural: str) -> None:
 
 @pytest.mark.parametrize("kind", ["ball", "plane", "wall", "post", "material", "pair", "grid", "scatter", "emitter"])
 def test_single_table_where_several_may_stand_says_so(kind: str) -> None:
-    with pytest.raises(SceneError, match=r"\[\[…\]\]") as caught:
+    with pytest.raises(SceneError, match=rf"\[\[{kind}\]\]") as caught:
         loads(f"title = 't'\n[{kind}]\nname = 'x'\n")
     assert [(fault.line, fault.path) for fault in caught.value.faults] == [(2, kind)]
 
