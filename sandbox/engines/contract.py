@@ -75,6 +75,10 @@ class Simulation(Protocol):
         """Advance by a last part of dt, 0 < part < 1, where a run's duration is no multiple of dt.
 
         No step can follow.
+
+        Raises:
+            Divergence: as `step`.
+            ValueError: there is no such part.
         """
 
     def apply(self, action: Action) -> None:
