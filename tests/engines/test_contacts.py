@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sandbox.engines.native.rows import RowTable
 from sandbox.engines.registry import start
+from sandbox.engines.rows import RowTable
 from sandbox.scene.file import from_document, load
 from sandbox.scene.shipped import find
 

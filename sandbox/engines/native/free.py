@@ -6,8 +6,8 @@ order and with its roundings, so the result is bit-identical; only the loop over
 
 import numpy as np
 
+from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
 from sandbox.engines.native.drag import acceleration
-from sandbox.engines.native.limits import BEYOND, FARTHEST, FASTEST
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import World
 from sandbox.scene.near import FloatArray, IntArray

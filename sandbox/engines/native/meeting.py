@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 import pymunk
 
+from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
 from sandbox.engines.native.drag import acceleration
-from sandbox.engines.native.limits import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.native.reader import NOTHING, Reader, Touching
+from sandbox.engines.native.reader import Reader
 from sandbox.engines.native.space import (
     SurfaceSetter,
     category,
@@ -17,6 +17,7 @@ from sandbox.engines.native.space import (
     new_space,
     reach_of,
 )
+from sandbox.engines.touching import NOTHING, Touching
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene

@@ -8,7 +8,7 @@ of momentum, to rounding.
 
 import numpy as np
 
-from sandbox.engines.native.reader import ComplexArray
+from sandbox.engines.touching import ComplexArray
 from sandbox.trajectory import IntArray
 
 

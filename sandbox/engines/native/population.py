@@ -13,10 +13,10 @@ from sandbox.action import ActionError
 from sandbox.engines.native.free import FreeFlight
 from sandbox.engines.native.meeting import MeetingBodies
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.crosscheck import MAX_SURFACES, crosscheck
+from sandbox.scene.crosscheck import MAX_SURFACES
 from sandbox.scene.meetings import Meetings, meetings
-from sandbox.scene.model import Ball, Collides, Scene, default_name
-from sandbox.scene.part import BACKING, MAX_BODIES
+from sandbox.scene.model import Ball, Collides, Scene
+from sandbox.scene.part import BACKING
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
@@ -75,17 +75,6 @@ class Population:
         if not self.present[number]:
             raise ActionError(f"{name!r} is no longer there")
         return number
-
-    def mover(self, name: str) -> tuple[int, FreeFlight | MeetingBodies]:
-        """Return a body that can move, and the half that moves it.
-
-        Raises:
-            ActionError: there is none of that name, or it is fixed.
-        """
-        number = self.number(name)
-        if self.bodies.fixed[number]:
-            raise ActionError(f"{name!r} is fixed; nothing can move it")
-        return number, self.free if number in self.free.numbers else self.meeting
 
     def half_of(self, number: int) -> FreeFlight | MeetingBodies | None:
         """Return the half that holds a body; none holds a fixed one that nothing can meet."""
@@ -148,23 +137,44 @@ class Population:
         self.free.forces_changed()
         self.meeting.renew(scene, meet)
 
-    def add(self, ball: Ball) -> int:
+    def motion(self, number: int) -> tuple[FloatArray, float]:
+        """Return a body's velocity (2,), m/s, and angular velocity, rad/s."""
+        self.refresh()
+        return self.velocity[number] - self.ahead, float(self.angular_velocity[number])
+
+    def set_velocity(self, number: int, velocity: FloatArray) -> None:
+        """Give a body a velocity, m/s."""
+        self._home(number).set_velocity(number, velocity + self.ahead)
+
+    def set_spin(self, number: int, spin: float) -> None:
+        """Give a body an angular velocity, rad/s."""
+        self._home(number).set_spin(number, spin)
+
+    def push(self, number: int, force: FloatArray, torque: float) -> None:
+        """Let a steady force (N) and torque (N·m) act on a body from now on."""
+        half = self._home(number)
+        if torque and not math.isfinite(half.moment(number)):
+            half.give_moment(number, float(self.bodies.moment[number]))
+        half.push(number, force, torque)
+
+    def put(self, number: int, position: FloatArray) -> None:
+        """Put a body somewhere, m."""
+        self.refresh()
+        self.position[number] = position
+        half = self.half_of(number)
+        if half is not None:
+            half.set_position(number, position)
+
+    def _home(self, number: int) -> FreeFlight | MeetingBodies:
+        return self.free if number in self.free.numbers else self.meeting
+
+    def add(self, ball: Ball, name: str) -> int:
         """Add a ball and return its number.
 
         Raises:
-            ActionError: its name is taken, it would be a fault in the scene's file, or its place is no place.
+            ActionError: it makes more surfaces than a scene may have.
         """
-        name = ball.name or default_name("spawned", len(self.bodies))
-        if name in self.bodies.names or name in self.scene.fixed_names:
-            raise ActionError(f"a body or fixed thing is called {name!r} already")
-        if len(self.bodies) >= MAX_BODIES:
-            raise ActionError(f"the scene holds {MAX_BODIES:,} bodies already")
         scene = self.scene
-        alone = Scene(world=scene.world, materials=scene.materials, pairs=scene.pairs, balls=(ball,))
-        faults = crosscheck(alone)
-        if faults:
-            raise ActionError("; ".join(message for _, message in faults))
-        self.check_place(ball.position, ball.radius, ball.collides)
         bodies = self.bodies.joined_by(ball, name)
         meet = _meetings(scene, bodies)
         self.refresh()

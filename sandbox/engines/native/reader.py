@@ -1,16 +1,12 @@
 """Reader: the state of a space in one call a frame, through pymunk.batch and one reused buffer."""
 
-from typing import NamedTuple
-
 import numpy as np
-import numpy.typing as npt
 import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 
 from sandbox.engines.native.ids import IdTable
+from sandbox.engines.touching import NOTHING, Touching
 from sandbox.trajectory import FloatArray, IntArray
-
-ComplexArray = npt.NDArray[np.complex128]
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 STATE_WIDTH = 6  # x, y, angle, vx, vy, ω: in the order of pymunk's flags
@@ -24,24 +20,6 @@ TOUCH = (
     | ArbiterFields.POINT_A_1
     | ArbiterFields.POINT_B_1
 )
-
-
-class Touching(NamedTuple):
-    """What touches at the end of a substep, K arbiters. Vectors are complex numbers, x + iy: one look each."""
-
-    a: IntArray
-    """(K,) one body of each pair, by number"""
-    b: IntArray
-    """(K,) the other"""
-    impulse: ComplexArray
-    """(K,) on a, N·s"""
-    normal: ComplexArray
-    """(K,) from a to b"""
-    point: ComplexArray
-    """(K,) midway in the overlap, m"""
-
-
-NOTHING = Touching(np.empty(0, np.int64), np.empty(0, np.int64), *(np.empty(0, np.complex128) for _ in range(3)))
 
 
 class Reader:

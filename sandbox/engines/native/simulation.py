@@ -8,11 +8,12 @@ from typing import NoReturn
 import numpy as np
 
 from sandbox.action import Action
+from sandbox.engines.acting import perform
 from sandbox.engines.contract import Divergence, Observer
-from sandbox.engines.native.acting import perform
-from sandbox.engines.native.contacts import ContactLedger
+from sandbox.engines.ledger import ContactLedger
+from sandbox.engines.native.memory import PartedMemory
 from sandbox.engines.native.population import Population
-from sandbox.engines.native.turn import Turn
+from sandbox.engines.turn import Turn
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -123,6 +124,7 @@ class NativeSimulation:
             self._check_running()
             self._still = None
             leaving = perform(action, self._population)
+            self._population.changed()
             if leaving is not None:
                 self._take_out(np.asarray([leaving]))
 
@@ -142,9 +144,8 @@ class NativeSimulation:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
             meeting = self._population.meeting
-            self._ledger = ContactLedger(
-                len(self._population.scene.fixed), meeting.joints, self._settings.persistence or 1
-            )
+            memory = PartedMemory(self._settings.persistence or 1)
+            self._ledger = ContactLedger(len(self._population.scene.fixed), meeting.joints, memory)
             self._record(self.time)
         return self._ledger.take()
 

@@ -1,34 +1,48 @@
-"""ContactLedger: one row for each contact, from arbiters that pymunk shows anew after every substep.
+"""ContactLedger: one row for each contact, from what a fixed-step engine finds anew after every substep.
 
 Vectors are complex numbers, x + iy, until they leave.
 """
 
+from typing import Protocol
+
 import numpy as np
 
 from sandbox.engines.contract import Exhaustion
-from sandbox.engines.native.memory import PartedMemory
-from sandbox.engines.native.reader import ComplexArray, Touching
-from sandbox.engines.native.rows import RowTable
+from sandbox.engines.rows import RowTable
+from sandbox.engines.touching import ComplexArray, Touching
 from sandbox.trajectory import Contacts, FloatArray, IntArray
 
 MAX_ROWS = 20_000_000
 """Rows kept before a run is stopped: 1.4 GB."""
 
 
+class ImpulseMemory(Protocol):
+    """What an engine remembers of contacts that have parted, and reports again when they touch once more."""
+
+    def forget_and_advance(self) -> None:
+        """Go on to the next substep."""
+
+    def part(self, key: IntArray, impulse: ComplexArray, normal: ComplexArray) -> None:
+        """Remember (K,) pairs that touched in the last substep, and do not now."""
+
+    def excess(self, key: IntArray, normal: ComplexArray) -> ComplexArray:
+        """Return what is reported too much (K,), on the first of pairs that have just met, N·s."""
+
+
 class ContactLedger:
     """Contacts since the last `take`. One that lasts is one row, its impulse summed."""
 
-    def __init__(self, things: int, joints: bool, persistence: int) -> None:
+    def __init__(self, things: int, joints: bool, memory: ImpulseMemory | None = None) -> None:
         """Start empty.
 
         Args:
             things: how many fixed things there are.
-            joints: whether a pair can show as several arbiters, as a ball in the corner of a polyline does.
-            persistence: substeps for which pymunk remembers a parted contact.
+            joints: whether a pair can show several times at once, as a ball in the corner of a polyline does.
+            memory: what the engine still remembers of parted contacts, where it does.
         """
         self._things, self._joints = things, joints
         self._rows = RowTable()
-        self._memory = PartedMemory(persistence)
+        self._memory = memory
         self._count = 0
         self._time: FloatArray = np.empty(256)
         self._pair: IntArray = np.empty((256, 2), np.int64)
@@ -41,7 +55,8 @@ class ContactLedger:
         """Enter what touches at a time, s."""
         if self._joints and len(now.a) > 1:
             now = _ordered(now)
-        self._memory.forget_and_advance()
+        if self._memory is not None:
+            self._memory.forget_and_advance()
         if not len(now.a) and not len(self._row):
             return
         swapped = (now.a < 0) | ((now.b >= 0) & (now.b < now.a))
@@ -49,16 +64,17 @@ class ContactLedger:
         before = self._rows.key
         # Fixed things, −1 − k, become 0 … F − 1, and bodies follow them: small whole numbers for the table.
         row, new, gone = self._rows.find(first + self._things, second + self._things)
-        if gone.any():
+        if self._memory is not None and gone.any():
             self._memory.part(before[gone], *(each[gone] for each in self._reported))
         self._reported = now.impulse, now.normal
 
         sign = swapped * 2.0 - 1.0
         given = now.impulse * sign  # by the first to the second
         if len(new):
-            # pymunk lists arbiters by the addresses of shapes: without an order of our own, no two runs agree.
+            # An engine may list contacts by addresses: without an order of our own, no two runs would agree.
             new = new[np.argsort(self._rows.key[new], kind="stable")]
-            given[new] -= sign[new] * self._memory.excess(self._rows.key[new], now.normal[new])
+            if self._memory is not None:
+                given[new] -= sign[new] * self._memory.excess(self._rows.key[new], now.normal[new])
             leader, group = new, np.arange(len(new))
             if self._joints:
                 _, at, group = np.unique(self._rows.key[new], return_index=True, return_inverse=True)
@@ -109,7 +125,7 @@ class ContactLedger:
 
 
 def _ordered(now: Touching) -> Touching:
-    """Return arbiters by pair, and those of one pair by place: which one opens a row must not be chance."""
+    """Return contacts by pair, and those of one pair by place: which one opens a row must not be chance."""
     order = np.lexsort((now.point.imag, now.point.real, now.b, now.a))
     return Touching(now.a[order], now.b[order], now.impulse[order], now.normal[order], now.point[order])
 

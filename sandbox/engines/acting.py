@@ -1,0 +1,183 @@
+"""Acting: what each action does to the bodies of a running scene. Everything is checked before anything changes."""
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from sandbox.action import (
+    SETTABLE,
+    Action,
+    ActionError,
+    Force,
+    Impulse,
+    Move,
+    Remove,
+    SetParameter,
+    Spawn,
+    is_settable,
+    speed_limit,
+)
+from sandbox.scene.address import AddressError, assign
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.crosscheck import crosscheck
+from sandbox.scene.document import to_document
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Ball, Collides, Scene, default_name
+from sandbox.scene.part import MAX_BODIES
+from sandbox.trajectory import FloatArray
+
+
+class Cast(Protocol):
+    """The bodies of a running scene, as an engine keeps them."""
+
+    @property
+    def scene(self) -> Scene:
+        """What runs, with all that was set since."""
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies by number; spawned ones at the end."""
+
+    @property
+    def h(self) -> float:
+        """The substep, s."""
+
+    def number(self, name: str) -> int:
+        """Return the number of a body that is there.
+
+        Raises:
+            ActionError: there is none of that name.
+        """
+
+    def motion(self, number: int) -> tuple[FloatArray, float]:
+        """Return a body's velocity (2,), m/s, and angular velocity, rad/s."""
+
+    def set_velocity(self, number: int, velocity: FloatArray) -> None:
+        """Give a body a velocity, m/s."""
+
+    def set_spin(self, number: int, spin: float) -> None:
+        """Give a body an angular velocity, rad/s."""
+
+    def push(self, number: int, force: FloatArray, torque: float) -> None:
+        """Let a steady force, N, and torque, N·m, act on a body from now on.
+
+        Raises:
+            ActionError: the engine models no such force.
+        """
+
+    def put(self, number: int, position: FloatArray) -> None:
+        """Put a body somewhere, m."""
+
+    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
+        """Refuse a place that the engine cannot start from.
+
+        Raises:
+            ActionError: it is one.
+        """
+
+    def change(self, scene: Scene) -> None:
+        """Go on with a scene that differs in air, gravity or coefficients alone.
+
+        Raises:
+            ActionError: it asks for what the settings or the engine cannot go on with.
+        """
+
+    def add(self, ball: Ball, name: str) -> int:
+        """Add a ball that was checked, and return its number.
+
+        Raises:
+            ActionError: the engine cannot.
+        """
+
+
+def perform(action: Action, cast: Cast) -> int | None:
+    """Do what an action says; return the number of a body that is to be taken out, if any.
+
+    Raises:
+        ActionError: it cannot be done. Nothing has changed then.
+    """
+    match action:
+        case Impulse():
+            _kick(action, cast)
+        case Force():
+            _push(action, cast)
+        case Move():
+            _move(action, cast)
+        case Spawn():
+            _spawn(action, cast)
+        case Remove():
+            return cast.number(action.body)
+        case SetParameter():
+            _set(action, cast)
+        case _:
+            raise ActionError(f"{action!r} is no action")
+    return None
+
+
+def _mover(name: str, cast: Cast) -> int:
+    number = cast.number(name)
+    if cast.bodies.fixed[number]:
+        raise ActionError(f"{name!r} is fixed; nothing can move it")
+    return number
+
+
+def _kick(action: Impulse, cast: Cast) -> None:
+    number = _mover(action.body, cast)
+    velocity, spin = cast.motion(number)
+    velocity = velocity + np.asarray(action.impulse) / cast.bodies.mass[number]
+    spin += float(action.angular / cast.bodies.moment[number])
+    speed_limit(float(np.hypot(*velocity)), f"the impulse on {action.body!r}")
+    speed_limit(abs(spin), f"the angular impulse on {action.body!r}")
+    cast.set_velocity(number, velocity)
+    if action.angular:
+        cast.set_spin(number, spin)
+
+
+def _push(action: Force, cast: Cast) -> None:
+    number = _mover(action.body, cast)
+    mass, moment = float(cast.bodies.mass[number]), float(cast.bodies.moment[number])
+    speed_limit(math.hypot(*action.force) / mass * cast.h, f"one step under the force on {action.body!r}")
+    speed_limit(abs(action.torque) / moment * cast.h, f"one step under the torque on {action.body!r}")
+    cast.push(number, np.asarray(action.force), action.torque)
+
+
+def _move(action: Move, cast: Cast) -> None:
+    number = cast.number(action.body)
+    fixed = bool(cast.bodies.fixed[number])
+    if fixed and action.velocity not in (None, (0.0, 0.0)):
+        raise ActionError(f"{action.body!r} is fixed; it can be put elsewhere, but has no velocity")
+    element = cast.bodies.elements[cast.bodies.element[number]]
+    cast.check_place(action.position, element.radius, element.collides)
+    cast.put(number, np.asarray(action.position))
+    if action.velocity is not None and not fixed:
+        cast.set_velocity(number, np.asarray(action.velocity))
+
+
+def _spawn(action: Spawn, cast: Cast) -> None:
+    scene, ball = cast.scene, action.ball
+    name = ball.name or default_name("spawned", len(cast.bodies))
+    if name in cast.bodies.names or name in scene.fixed_names:
+        raise ActionError(f"a body or fixed thing is called {name!r} already")
+    if len(cast.bodies) >= MAX_BODIES:
+        raise ActionError(f"the scene holds {MAX_BODIES:,} bodies already")
+    alone = Scene(world=scene.world, materials=scene.materials, pairs=scene.pairs, balls=(ball,))
+    faults = crosscheck(alone)
+    if faults:
+        raise ActionError("; ".join(message for _, message in faults))
+    cast.check_place(ball.position, ball.radius, ball.collides)
+    cast.add(ball, name)
+
+
+def _set(action: SetParameter, cast: Cast) -> None:
+    if not is_settable(action.path):
+        raise ActionError(f"{action.path!r} cannot be changed while a scene runs; what can: {SETTABLE}")
+    try:
+        document, _ = assign(to_document(cast.scene), action.path, action.value)
+        scene = from_document(document)
+    except AddressError as error:
+        raise ActionError(str(error)) from None
+    except SceneError as error:
+        raise ActionError("; ".join(f"{f.path}: {f.message}" for f in error.faults)) from None
+    cast.change(scene)
