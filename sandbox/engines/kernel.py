@@ -1,0 +1,106 @@
+"""Kernel: a plain function over arrays and floats, compiled by numba where the `fast` extra is installed.
+
+    @kernel
+    def advance(position, velocity, h): ...
+
+With and without numba the answers are the same, bit for bit: no fast-math, no fused multiply-add, and kernels use
+only operations that IEEE 754 rounds correctly (+ − × ÷ √), or the C library's own functions.
+
+Compiled code is kept on disk, in a folder of its own for each state of these sources: numba itself would go on using
+what it compiled of a function whose callee in another file has changed since.
+"""
+
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from functools import cache
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+try:
+    import numba
+    from numba.core import event
+
+    COMPILED = not getattr(numba.config, "DISABLE_JIT", 0)
+except ImportError:
+    COMPILED = False
+"""Whether kernels are compiled. NUMBA_DISABLE_JIT=1 in the environment runs them as plain Python."""
+
+LARGE = 100
+"""Bodies from which on it is worth saying that kernels run uncompiled."""
+
+
+def kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Return a function compiled at its first call, or as it is where numba is not installed."""
+    if not COMPILED:
+        return function
+    config: Any = numba.config
+    theirs, folder = config.CACHE_DIR, cache_folder()
+    config.CACHE_DIR = str(folder) if folder is not None else theirs
+    try:
+        compiled: Callable[P, R] = numba.njit(cache=folder is not None, error_model="numpy")(function)
+    finally:
+        config.CACHE_DIR = theirs
+    return compiled
+
+
+@cache
+def cache_folder() -> Path | None:
+    """Return the folder for compiled code of just these sources, or None where none can be written.
+
+    Folders of former states of the sources are removed.
+    """
+    stamp = blake2b(f"{sys.version} {numba.__version__}".encode(), digest_size=8)
+    here = Path(__file__).resolve().parent
+    for file in sorted(here.rglob("*.py")):
+        status = file.stat()
+        stamp.update(f"{file} {status.st_mtime_ns} {status.st_size}".encode())
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    for home in (here / "__pycache__", user / "sandbox2d"):
+        folder = home / f"kernels-{stamp.hexdigest()}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if not os.access(folder, os.W_OK):
+                continue
+        except OSError:
+            continue
+        for old in home.glob("kernels-*"):
+            if old != folder:
+                shutil.rmtree(old, ignore_errors=True)  # another process may be removing it too
+        return folder
+    return None
+
+
+@cache
+def say(text: str) -> None:
+    """Tell whoever watches, on standard error, once."""
+    if sys.stderr is not None:
+        sys.stderr.write(f"{text}\n")
+        sys.stderr.flush()
+
+
+def tell_if_slow(bodies: int) -> None:
+    """Say so where a large scene runs on kernels that are not compiled."""
+    if not COMPILED and bodies >= LARGE:
+        say(f"{bodies:,} bodies without compiled kernels will be slow: pip install 'sandbox2d[fast]'")
+
+
+if COMPILED:
+
+    class _Announcer(event.Listener):
+        """Says once that something is being compiled: the first use takes seconds, later ones find it on disk."""
+
+        def on_start(self, event: Any) -> None:
+            dispatcher = event.data.get("dispatcher")
+            if getattr(dispatcher, "__module__", "").startswith(__package__):
+                say("compiling the solver's kernels: some seconds, this once")
+
+        def on_end(self, event: Any) -> None:
+            """Nothing is said then."""
+
+    event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]  # numba's own

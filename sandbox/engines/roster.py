@@ -1,0 +1,177 @@
+"""Roster: the bodies of a running scene as arrays in scene order, for the engines written by hand."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from sandbox.action import ActionError
+from sandbox.engines.fixtures import Fixtures, fixtures_of
+from sandbox.engines.limits import FARTHEST, FASTEST
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.crosscheck import MAX_SURFACES
+from sandbox.scene.meetings import Meetings, meetings
+from sandbox.scene.model import Ball, Collides, Scene
+from sandbox.scene.part import BACKING
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+NOTHING, FIXED, ALL = 0, 1, 2
+"""What a body can meet, as `Roster.meets` holds it: by `collides`, and nothing at all once it is gone."""
+
+_MEETS: dict[Collides, int] = {"none": NOTHING, "fixed": FIXED, "all": ALL}
+
+
+class Roster:
+    """Who is in a running scene, where, how fast, and what each can meet. Engines advance the arrays in place."""
+
+    def __init__(self, scene: Scene, h: float) -> None:
+        self.scene, self.h = scene, h
+        self.fixtures: Fixtures = fixtures_of(scene)
+        bodies = scene.bodies
+        self.position: FloatArray = bodies.position.copy()
+        self.velocity: FloatArray = bodies.velocity.copy()
+        self.angle: FloatArray = bodies.angle.copy()
+        self.angular_velocity: FloatArray = bodies.angular_velocity.copy()
+        self.present: BoolArray = np.ones(len(bodies), dtype=np.bool_)
+        self.force: FloatArray = np.zeros((len(bodies), 2))
+        """(N, 2) N, steady, by actions"""
+        self.torque: FloatArray = np.zeros(len(bodies))
+        """(N,) N·m, steady, by actions"""
+        self._retired: dict[int, float] = {}
+        self._twisted: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
+        self._assume(scene, bodies, meetings(scene, bodies))
+
+    def _assume(self, scene: Scene, bodies: Bodies, meet: Meetings) -> None:
+        """Derive what follows from who there is and what they are made of."""
+        if len(meet.surfaces.surfaces) > MAX_SURFACES:
+            raise ActionError(f"more than {MAX_SURFACES} different surfaces; share materials between balls")
+        self.scene, self.bodies, self.meet = scene, bodies, meet
+        surfaces = meet.surfaces
+        self.radius: FloatArray = bodies.radius
+        self.surface: IntArray = surfaces.of_body
+        self.fixed_surface: IntArray = surfaces.of_fixed
+        self.restitution: FloatArray = surfaces.restitution
+        self.friction: FloatArray = surfaces.friction
+        kinds = np.asarray([_MEETS[element.collides] for element in bodies.elements], dtype=np.int64)
+        self.meets: IntArray = np.where(self.present, kinds[bodies.element], NOTHING)
+        """(N,) `NOTHING`, `FIXED` (planes, walls, posts, fixed balls) or `ALL`"""
+        moves = self.moving
+        self.inverse_mass: FloatArray = np.where(moves, 1.0 / bodies.mass, 0.0)
+        # What nothing can rub gets no moment: its spin stays as it is, bit for bit.
+        turns = moves & (meet.turnable | self._twisted)
+        self.inverse_moment: FloatArray = np.where(turns, 1.0 / bodies.moment, 0.0)
+
+    @property
+    def moving(self) -> BoolArray:
+        """(N,) which bodies are there and not fixed."""
+        return self.present & ~self.bodies.fixed
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """When each body that is no longer there was gone: number → s."""
+        return MappingProxyType(self._retired)
+
+    def number(self, name: str) -> int:
+        """Return the number of a body that is there.
+
+        Raises:
+            ActionError: there is none of that name.
+        """
+        try:
+            number = self.bodies.names.index(name)
+        except ValueError:
+            raise ActionError(f"no body is named {name!r}") from None
+        if not self.present[number]:
+            raise ActionError(f"{name!r} is no longer there")
+        return number
+
+    def motion(self, number: int) -> tuple[FloatArray, float]:
+        """Return a body's velocity (2,), m/s, and angular velocity, rad/s."""
+        return self.velocity[number].copy(), float(self.angular_velocity[number])
+
+    def set_velocity(self, number: int, velocity: FloatArray) -> None:
+        """Give a body a velocity, m/s."""
+        self.velocity[number] = velocity
+
+    def set_spin(self, number: int, spin: float) -> None:
+        """Give a body an angular velocity, rad/s."""
+        self.angular_velocity[number] = spin
+
+    def push(self, number: int, force: FloatArray, torque: float) -> None:
+        """Let a steady force (N) and torque (N·m) act on a body from now on."""
+        self.force[number], self.torque[number] = force, torque
+        if torque and not self._twisted[number]:
+            self._twisted[number] = True
+            self._assume(self.scene, self.bodies, self.meet)
+
+    def put(self, number: int, position: FloatArray) -> None:
+        """Put a body somewhere, m."""
+        self.position[number] = position
+
+    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:  # noqa: ARG002
+        """Refuse a place deep behind a plane.
+
+        Raises:
+            ActionError: it is one.
+        """
+        if collides == "none":
+            return
+        for (px, py, nx, ny), thing in zip(self.fixtures.planes, self.fixtures.plane_thing, strict=True):
+            depth = (px - position[0]) * nx + (py - position[1]) * ny
+            if depth > BACKING:
+                name = self.scene.fixed_names[thing]
+                raise ActionError(f"{depth:g} m behind the plane {name!r}; at most {BACKING:g}")
+
+    def change(self, scene: Scene) -> None:
+        """Go on with a scene that differs in air, gravity or coefficients alone.
+
+        Raises:
+            ActionError: it has more surfaces than a scene may have.
+        """
+        spawned = self.bodies.elements[len(self.scene.bodies.elements) :]
+        bodies = replace(self.bodies, elements=(*scene.bodies.elements, *spawned))
+        self._assume(scene, bodies, meetings(scene, bodies))
+
+    def add(self, ball: Ball, name: str) -> int:
+        """Add a ball that was checked, and return its number.
+
+        Raises:
+            ActionError: it makes more surfaces than a scene may have.
+        """
+        bodies = self.bodies.joined_by(ball, name)
+        meet = meetings(self.scene, bodies)
+        if len(meet.surfaces.surfaces) > MAX_SURFACES:
+            raise ActionError(f"more than {MAX_SURFACES} different surfaces; share materials between balls")
+        self.position = np.vstack((self.position, bodies.position[-1:]))
+        self.velocity = np.vstack((self.velocity, bodies.velocity[-1:]))
+        self.angle = np.append(self.angle, bodies.angle[-1])
+        self.angular_velocity = np.append(self.angular_velocity, bodies.angular_velocity[-1])
+        self.present = np.append(self.present, True)
+        self.force, self.torque = np.vstack((self.force, np.zeros((1, 2)))), np.append(self.torque, 0.0)
+        self._twisted = np.append(self._twisted, False)
+        self._assume(self.scene, bodies, meet)
+        return len(bodies) - 1
+
+    def take_out(self, numbers: IntArray, time: float) -> None:
+        """Remove bodies at a time, s. They stay where they are in the arrays, with no velocity."""
+        self.present[numbers] = False
+        self.velocity[numbers], self.angular_velocity[numbers] = 0.0, 0.0
+        self.force[numbers], self.torque[numbers] = 0.0, 0.0
+        self._retired |= dict.fromkeys(numbers.tolist(), time)
+        self._assume(self.scene, self.bodies, self.meet)
+
+    def outside(self) -> IntArray:
+        """Return the moving bodies whose centres have left world.bounds, (K,)."""
+        bounds = self.scene.world.bounds
+        if bounds is None:
+            return np.empty(0, np.int64)
+        out = ((self.position < bounds[0]) | (self.position > bounds[1])).any(axis=1)
+        return np.flatnonzero(out & self.moving)
+
+    def beyond(self) -> int | None:
+        """Return a body that is not finite, or beyond all bounds; else None."""
+        with np.errstate(over="ignore"):
+            good = (np.hypot(*self.position.T) <= FARTHEST) & (np.hypot(*self.velocity.T) <= FASTEST)
+            good &= np.isfinite(self.angular_velocity) & np.isfinite(self.angle)
+        return None if good.all() else int(np.argmin(good))
