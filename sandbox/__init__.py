@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sandbox.engines.registry import ENGINES, start
+    from sandbox.measure.compare import compare
     from sandbox.measure.run import run
     from sandbox.recording import Recording
     from sandbox.scene.demands import demands
@@ -33,6 +34,7 @@ __all__ = [
     "SceneError",
     "Settings",
     "Trajectory",
+    "compare",
     "demands",
     "dumps",
     "load",
@@ -51,6 +53,7 @@ _HOMES = {
     "SceneError": "sandbox.scene.faults",
     "Settings": "sandbox.scene.settings",
     "Trajectory": "sandbox.trajectory",
+    "compare": "sandbox.measure.compare",
     "demands": "sandbox.scene.demands",
     "dumps": "sandbox.scene.file",
     "load": "sandbox.scene.file",

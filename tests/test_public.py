@@ -18,6 +18,7 @@ NAMES = [
     "SceneError",
     "Settings",
     "Trajectory",
+    "compare",
     "demands",
     "dumps",
     "load",

@@ -8,7 +8,8 @@ import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies
 
 from sandbox.engines.contract import Simulation
-from sandbox.engines.native.engine import BIAS, PERSISTENCE, SLOP_PER_RADIUS
+from sandbox.engines.native.engine import PERSISTENCE
+from sandbox.engines.overlap import BIAS, SLOP_PER_RADIUS
 from sandbox.scene.model import Scene
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY

@@ -14,6 +14,7 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 COMMANDS = {
     "run": "run scenes headless and tell how they went",
     "check": "check scenes: faults, what they demand, who can run them, what would go wrong",
+    "compare": "one scene on several engines, against the best known truth",
     "scenes": "list the scenes that ship",
     "engines": "list the engines",
     "schema": "print the JSON Schema of a scene file",

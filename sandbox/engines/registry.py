@@ -2,11 +2,13 @@
 
 from sandbox.engines.contract import Engine, Refusal, Simulation
 from sandbox.engines.native.engine import PymunkEngine
+from sandbox.engines.reference.engine import ReferenceEngine
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
 ENGINES: dict[str, Engine] = {
     "pymunk": PymunkEngine(),
+    "reference": ReferenceEngine(),
 }
 
 

@@ -189,7 +189,36 @@ def _flying(trajectory: Trajectory, scene: Scene, bodies: Bodies, number: int) -
     return ClosedForm(position, velocity, valid)
 
 
-def _bouncing(trajectory: Trajectory, scene: Scene, bodies: Bodies, number: int) -> ClosedForm | None:
+class Bouncing(NamedTuple):
+    """A ball that bounces straight on the one plane there is, and what its formula needs."""
+
+    start: FloatArray
+    """(2,) m"""
+    along: FloatArray
+    """(2,) m/s along the plane, which nothing changes"""
+    normal: FloatArray
+    """(2,) of the plane, of length 1"""
+    height: float
+    """above contact at time 0, m"""
+    speed: float
+    """away from the plane at time 0, m/s"""
+    gravity: float
+    """towards the plane, m/s²"""
+    restitution: float
+
+    def at(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return positions and velocities, (T, 2) each, at T times."""
+        above, rising = bounces(time, self.height, self.speed, self.gravity, self.restitution)
+        position = self.start + (above - self.height)[:, None] * self.normal + time[:, None] * self.along
+        return position, rising[:, None] * self.normal + self.along
+
+
+def bouncing(scene: Scene, bodies: Bodies, number: int) -> Bouncing | None:
+    """Return the bouncing of a body, as long as it meets nothing but the plane; None where it is no such case.
+
+    The scene has one plane, gravity is square to it or 0, there is no drag, and nothing rubs: friction is 0, or
+    the ball neither spins nor moves along the plane.
+    """
     world, collides = scene.world, bodies.elements[bodies.element[number]].collides
     if len(scene.planes) != 1 or world.linear_drag > 0 or world.quadratic_drag > 0 or collides == "none":
         return None
@@ -209,15 +238,17 @@ def _bouncing(trajectory: Trajectory, scene: Scene, bodies: Bodies, number: int)
     gap = float((start - np.asarray(scene.planes[0].point)) @ normal - bodies.radius[number])
     if gap < -TOUCH:
         return None
-    height, speed = max(gap, 0.0), float(velocity @ normal)
-    above, rising = bounces(trajectory.time, height, speed, down, float(surfaces.restitution[sides]))
-    along = velocity - speed * normal
+    speed = float(velocity @ normal)
+    restitution = float(surfaces.restitution[sides])
+    return Bouncing(start, velocity - speed * normal, normal, max(gap, 0.0), speed, down, restitution)
+
+
+def _bouncing(trajectory: Trajectory, scene: Scene, bodies: Bodies, number: int) -> ClosedForm | None:
+    form = bouncing(scene, bodies, number)
+    if form is None:
+        return None
     until = min(_first_contact(trajectory, number, besides=-1), _retired(trajectory, number))
-    return ClosedForm(
-        position=start + (above - height)[:, None] * normal + trajectory.time[:, None] * along,
-        velocity=rising[:, None] * normal + along,
-        valid=trajectory.time < until,
-    )
+    return ClosedForm(*form.at(trajectory.time), valid=trajectory.time < until)
 
 
 def _first_contact(trajectory: Trajectory, number: int, besides: int | None = None) -> float:

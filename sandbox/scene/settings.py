@@ -30,6 +30,10 @@ class Settings(Part):
     """The share of an overlap that still remains one second later."""
     persistence: Annotated[int, Field(ge=1, le=1000)] | None = None
     """Substeps for which a parted contact's impulses are remembered, to warm-start the next touch."""
+    stiffness: Annotated[float, Field(gt=0, le=1e30)] | None = None
+    """Of penalty springs, N/m."""
+    damping: Annotated[float, Field(ge=0, le=10)] | None = None
+    """Of penalty springs, as a part of the critical; else each pair's follows from its restitution."""
     half_kick: bool = False
     """Start half a kick ahead (v + g·h/2), so that uniformly accelerated free motion is exact."""
     integrator: Integrator | None = None

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from sandbox.engines.overlap import BIAS, slop_of
 from sandbox.scene.demands import Demand, demands
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -14,12 +13,6 @@ if TYPE_CHECKING:
 
 PYMUNK_WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
 """The one word of each choice that describes what pymunk does."""
-
-SLOP_PER_RADIUS = 0.01
-"""pymunk's own slop, 0.1, is in length units: a ball of 5 cm would rest 10 cm deep in the floor."""
-
-BIAS = (1.0 - 0.1) ** 60
-"""pymunk's own: a tenth of an overlap is corrected in 1/60 s."""
 
 PERSISTENCE = 3
 """pymunk's own."""
@@ -45,6 +38,11 @@ class PymunkEngine:
             stated = getattr(settings, key)
             if stated not in (None, word):
                 lacks.append(f"{key} {stated!r} is not a choice it has (only {word!r})")
+        lacks += [
+            f"{key} is a figure of penalty springs, which it has not"
+            for key in ("stiffness", "damping")
+            if getattr(settings, key) is not None
+        ]
         if settings.broad_phase is not None:
             lacks.append(f"broad_phase {settings.broad_phase!r} is not a choice it has (it has its own tree)")
         if settings.half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
@@ -53,10 +51,7 @@ class PymunkEngine:
 
     def resolve(self, scene: Scene, settings: Settings) -> Settings:
         """Return the settings with slop, bias, persistence and pymunk's own words filled in."""
-        bodies = scene.bodies
-        touching = np.asarray([e.collides != "none" for e in bodies.elements], dtype=bool)[bodies.element]
-        smallest = float(bodies.radius[touching].min()) if touching.any() else 1.0
-        own = {"slop": SLOP_PER_RADIUS * smallest, "bias": BIAS, "persistence": PERSISTENCE, **PYMUNK_WORDS}
+        own = {"slop": slop_of(scene), "bias": BIAS, "persistence": PERSISTENCE, **PYMUNK_WORDS}
         return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
 
     def start(self, scene: Scene, settings: Settings | None = None) -> "NativeSimulation":

@@ -1,0 +1,128 @@
+"""`sandbox compare`: one scene on several engines, scored against the best known truth."""
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from uuid import uuid4
+
+import click
+
+from sandbox.cli.comparison_table import print_comparison
+from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json
+from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.measure.compare import Comparison, compare
+from sandbox.measure.compare.comparing import Told
+from sandbox.measure.recorder import TooLargeError
+from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.file import load
+from sandbox.scene.model import Scene
+
+
+@click.command(name="compare")
+@click.argument("scene")
+@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="which engine(s); by default all")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="M",
+    help="position error that is too much, m; by default 1 % of the smallest ball's radius",
+)
+@click.option("--why", is_flag=True, help="rerun with one knob changed at a time, and say which one matters")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write plots and comparison.json")
+@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
+@click.option("--quiet", is_flag=True, help="no table, no progress")
+def command(
+    scene: str,
+    engines: str | None,
+    overrides: tuple[str, ...],
+    tolerance: float | None,
+    why: bool,
+    out: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Run a scene on several engines and score each against the best known truth. SCENE is a file or a shipped one."""
+    faults: list[Fault] = []
+    names = None if engines is None else list(dict.fromkeys(name.strip() for name in engines.split(",")))
+    for name in names or ():
+        with gathering(faults, "--engine", (UnknownEngineError,)):
+            engine_named(name)
+    read: Scene | None = None
+    with gathering(faults):
+        read = load(paths_of([scene])[0][1], overrides)
+    with gathering(faults, "--tolerance", (ValueError,)):
+        if tolerance == float("inf") or tolerance != tolerance:
+            raise ValueError(f"{tolerance} m; a tolerance is finite")
+    with gathering(faults, "--out", (OSError,)):
+        _check_folder(out)
+
+    comparison: Comparison | None = None
+    if read is not None and not faults:
+        with gathering(faults, scene, (TooLargeError,)), _telling(quiet or as_json) as told:
+            comparison = compare(read, names, tolerance=tolerance, why=why, told=told)
+    if comparison is None:
+        for fault in faults:
+            click.echo(str(fault), err=True)
+        if as_json:
+            print_json({"scene": scene, "truth": None, "engines": [], "faults": fault_rows(faults)})
+        return 2
+
+    status = 0
+    for row in comparison.rows:
+        if row.status != "ok" and (row.status != "refused" or names is not None):
+            status = 1
+            what = row.reason if row.status == "refused" else f"{row.engine} {row.status}: {row.reason}"
+            click.echo(f"{scene}: {what}", err=True)
+    document = comparison.document(scene)
+    if as_json:
+        print_json(document)
+    elif not quiet:
+        print_comparison(scene, comparison, why, refusals=names is None)
+    if out is not None:
+        try:
+            _write(comparison, document, out)
+        except OSError as error:
+            click.echo(f"--out: {out}: {error.strerror or error}", err=True)
+            return 2
+        if not quiet and not as_json:
+            click.echo(f"written: {out}")
+    return status
+
+
+def _check_folder(out: Path | None) -> None:
+    """Refuse before the runs what could not be written after them."""
+    if out is None:
+        return
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SceneError([Fault("--out", None, "", f"{out}: {error.strerror or error}")]) from None
+
+
+def _write(comparison: Comparison, document: dict[str, object], out: Path) -> None:
+    """Write the plots and the document into a folder, each to a temporary name first."""
+    from sandbox.report.comparison import plot_comparison
+
+    plot_comparison(comparison, out)
+    temporary = out / f".{uuid4().hex}.tmp"
+    try:
+        temporary.write_text(json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1), encoding="utf-8")
+        temporary.replace(out / "comparison.json")
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _telling(silent: bool) -> Iterator[Told | None]:
+    """Yield who says what is being done: a line that comes and goes on a terminal, nobody elsewhere."""
+    if silent or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    with Console(stderr=True).status("") as line:
+        yield lambda what: line.update(Text(what))

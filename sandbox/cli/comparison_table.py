@@ -1,0 +1,110 @@
+"""The table that `sandbox compare` prints: a row an engine, and what its figures mean below."""
+
+import sys
+from collections.abc import Sequence
+
+import click
+
+from sandbox.cli.table import WIDE
+from sandbox.measure.compare import Comparison, Row
+from sandbox.measure.compare.alignment import Event
+
+MOST_NAMED = 5
+"""Missed and phantom contacts that are named of each engine; `--json` has more."""
+
+
+def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bool) -> None:
+    """Print the truth, a line for each engine, and below what there is to say of each.
+
+    Args:
+        scene: what it is called.
+        comparison: what to print.
+        why: whether to say which knob matters.
+        refusals: whether to say why an engine refuses.
+    """
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("engine", no_wrap=True)
+    table.add_column("dt", justify="right", no_wrap=True)
+    table.add_column("status", no_wrap=True)
+    for head in ("max error, m", "rms, m", "max, m/s", "diverges, s", "energy", "momentum", "contacts", "missed"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for head in ("phantom", "seconds"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for row in comparison.rows:
+        table.add_row(
+            row.engine,
+            f"{row.settings['dt']:.4g}",
+            Text(row.status, style="green" if row.status == "ok" else "bold red"),
+            _figure(row.score.max_position),
+            _figure(row.score.rms_position),
+            _figure(row.score.max_velocity),
+            _divergence(row),
+            _share(row.energy_drift),
+            _share(row.momentum_drift),
+            *(_count(row.count(kind)) for kind in ("matched", "missed", "phantom")),
+            _figure(row.seconds),
+        )
+    console = Console(width=None if sys.stdout.isatty() else WIDE)
+    console.width = max(console.width, Console(width=10_000).measure(table).maximum)
+    console.print(Text(f"{scene}: {comparison.scene.title}" if comparison.scene.title else scene), soft_wrap=True)
+    console.print(Text(comparison.sentence()), soft_wrap=True)
+    console.print(table)
+    for line in _below(comparison, why, refusals):
+        click.echo(line)
+
+
+def _below(comparison: Comparison, why: bool, refusals: bool) -> list[str]:
+    lines = []
+    for row in comparison.rows:
+        if refusals and row.status == "refused":
+            lines.append(str(row.reason))
+        for kind in ("missed", "phantom"):
+            events = [event for event in row.events or () if event.kind == kind]
+            if events:
+                lines.append(f"{row.engine}: {kind} {_named(events)}")
+        if why and row.status != "refused":
+            lines += _explained(row)
+    return lines
+
+
+def _named(events: Sequence[Event]) -> str:
+    named = [f"{' and '.join(event.between)} at {event.when:.4g} s" for event in events[:MOST_NAMED]]
+    more = len(events) - len(named)
+    return "; ".join(named) + (f"; and {more:,} more" if more else "")
+
+
+def _explained(row: Row) -> list[str]:
+    """Return the verdict, the knobs that were turned, and those that the engine refuses."""
+    if row.verdict is None:
+        return [f"{row.engine}: nothing to explain"]
+    turned = [f"{knob.knob} {_value(knob.value)}: ×{knob.ratio:.3g}" for knob in row.why if knob.ratio is not None]
+    failed = [f"{k.knob} {_value(k.value)}: {k.status}" for k in row.why if k.ratio is None and k.status != "refused"]
+    refused = [f"{knob.knob} {_value(knob.value)}" for knob in row.why if knob.status == "refused"]
+    lines = [row.verdict, f"  {', '.join([*turned, *failed])}"]
+    return [*lines, f"  refused: {', '.join(refused)}"] if refused else lines
+
+
+def _value(value: float | str) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _divergence(row: Row) -> str:
+    if row.first_divergence is not None:
+        return f"{row.first_divergence:.4g}"
+    return "–" if row.score.max_position is None else "never"
+
+
+def _figure(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g}"
+
+
+def _share(value: float | None) -> str:
+    return "–" if value is None else f"{value:+.2g}" if value else "0"
+
+
+def _count(value: int | None) -> str:
+    return "–" if value is None else f"{value:,}"

@@ -1,0 +1,34 @@
+"""Bisection: rewind, and halve the step until the moment of impact is found. The tutorial's example 5.
+
+A step that ends with a new overlap is taken back. The last time at which nothing overlaps yet is found by bisection,
+the impact resolved there, and the rest of the step begun anew. It finds when something was hit, not whether: who is
+through before the end of the step is not seen, as in discrete detection.
+"""
+
+from sandbox.engines.reference.detection.discrete import discrete
+from sandbox.engines.reference.detection.resting import MOST_IMPACTS, fresh, resting
+from sandbox.engines.reference.stage import Stage
+
+EPSILON = 1e-9
+"""How near to the impact bisection comes, as a part of the step: 30 halvings."""
+
+
+def bisect(stage: Stage, h: float) -> None:
+    """Advance from impact to impact, each to the last time at which nothing overlaps anew within EPSILON·h."""
+    left = h
+    for _ in range(MOST_IMPACTS):
+        rest = resting(stage, left)
+        clash = fresh(stage, stage.moved(left), rest)
+        if not clash.size:
+            break
+        low, high = 0.0, left
+        while high - low > EPSILON * h:
+            middle = 0.5 * (low + high)
+            found = fresh(stage, stage.moved(middle), rest)
+            if found.size:
+                clash, high = found, middle
+            else:
+                low = middle
+        stage.impact(stage.moved(low), clash, low)
+        left -= low
+    discrete(stage, left)

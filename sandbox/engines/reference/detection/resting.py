@@ -1,0 +1,40 @@
+"""Resting: the pairs whose touch is nothing new, so that no time of impact is looked for."""
+
+import numpy as np
+
+from sandbox.engines.reference.manifolds import Manifolds
+from sandbox.engines.reference.motion import State
+from sandbox.engines.reference.stage import Stage
+from sandbox.trajectory import BoolArray, IntArray
+
+NEAR = 1e-6
+"""A pair nearer than this part of its contact distance touches: far above what bisection leaves (1e-9 of a step)."""
+
+SLOW = 0.5
+"""What closes by less than this part of its contact distance in a step cannot pass unseen."""
+
+MOST_IMPACTS = 200
+"""Impacts that one substep resolves one by one; beyond, what is left of it is a discrete step. Balls that rattle
+between others in ever shorter time would else never end it."""
+
+
+def resting(stage: Stage, h: float) -> IntArray:
+    """Return the keys of pairs that touch already and close slowly, ascending: the discrete stage sees to them."""
+    x = stage.x
+    reach = NEAR * 2.0 * stage.finder.widest
+    contacts = stage.finder.manifolds(x[0], stage.finder.candidates(x[0], reach), reach)
+    distance = contacts.arm.sum(axis=1)
+    still = (contacts.separation <= NEAR * distance) & (stage.closing(contacts, x) * h < SLOW * distance)
+    return contacts.key[still]
+
+
+def fresh(stage: Stage, x: State, rest: IntArray) -> Manifolds:
+    """Return the contacts of a state that are new: overlapping, approaching, and none of the resting ones."""
+    contacts = stage.overlaps(x)
+    if not contacts.size:
+        return contacts
+    return contacts.of(_new(contacts, rest) & (stage.closing(contacts, x) > 0.0))
+
+
+def _new(contacts: Manifolds, rest: IntArray) -> BoolArray:
+    return np.asarray(~np.isin(contacts.key, rest, assume_unique=True))

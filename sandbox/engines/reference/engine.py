@@ -1,0 +1,104 @@
+"""ReferenceEngine: what the reference can model, and how its choices are filled in. Imports no solver until started."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sandbox.engines.overlap import BIAS, slop_of
+from sandbox.scene.demands import Demand, demands
+from sandbox.scene.meetings import meetings
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+if TYPE_CHECKING:
+    from sandbox.engines.reference.simulation import ReferenceSimulation
+
+WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
+"""What is chosen where nothing is stated: what pymunk does, and the tutorial."""
+
+FEW = 24
+"""Bodies up to which testing all pairs is quicker than sorting them."""
+
+ONE_SIZE = 8.0
+"""Ratio of radii up to which a uniform grid suits."""
+
+SPRING = 0.3
+"""ω·h of a penalty contact whose stiffness is left to the engine: ten substeps a contact."""
+
+
+@dataclass(frozen=True)
+class ReferenceEngine:
+    """Written by hand to be read: fixed step, every axis a table of interchangeable functions.
+
+    Integrator, broad phase, detection and response are chosen by settings. As explicit_euler, discrete and impulse it
+    is pymunk's scheme over again.
+    """
+
+    name: str = "reference"
+    about: str = "by hand, fixed step: integrators, broad phases, times of impact, impulses or penalty springs"
+    capabilities: frozenset[Demand] = frozenset(Demand)
+
+    def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
+        """Return what scene and settings ask for that the reference lacks."""
+        lacks = [f"it does not model {demand}" for demand in sorted(demands(scene) - self.capabilities)]
+        if settings.broad_phase == "oriented":
+            lacks.append("broad_phase 'oriented' needs polygons, which it does not model; 'grid' or 'sweep' suit balls")
+        if settings.half_kick:
+            lacks.append("half_kick is a remedy for pymunk's scheme; integrator 'velocity_verlet' has it built in")
+        if settings.persistence not in (None, 1):
+            lacks.append(f"persistence {settings.persistence}: it remembers contacts for 1 substep")
+        if settings.response == "penalty":
+            lacks += self._penalty_lacks(scene, settings)
+        else:
+            lacks += [
+                f"{key} is a figure of penalty springs; solver.response is not 'penalty'"
+                for key in ("stiffness", "damping")
+                if getattr(settings, key) is not None
+            ]
+        return tuple(lacks)
+
+    def _penalty_lacks(self, scene: Scene, settings: Settings) -> list[str]:
+        from sandbox.engines.reference.stability import unstable
+
+        lacks = [
+            f"{key} corrects overlap by impulses; penalty springs need theirs"
+            for key in ("slop", "bias", "persistence")
+            if getattr(settings, key) is not None
+        ]
+        if settings.detection in ("bisect", "swept"):
+            lacks.append(f"detection {settings.detection!r} leaves no overlap, which penalty springs act by")
+        reason = unstable(scene, self.resolve(scene, settings))
+        return lacks if reason is None else [*lacks, reason]
+
+    def resolve(self, scene: Scene, settings: Settings) -> Settings:
+        """Return the settings with every choice filled in."""
+        own: dict[str, object] = {**WORDS, "slop": slop_of(scene), "bias": BIAS, "persistence": 1}
+        if settings.response == "penalty":
+            from sandbox.engines.reference.stability import lightest
+
+            own["stiffness"] = lightest(scene) * (SPRING / settings.h) ** 2
+        own["broad_phase"] = _suitable(scene)
+        return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
+
+    def start(self, scene: Scene, settings: Settings | None = None) -> "ReferenceSimulation":
+        """Set a scene up.
+
+        Raises:
+            Refusal: the reference lacks something that is asked for.
+        """
+        from sandbox.engines.contract import Refusal
+        from sandbox.engines.reference.simulation import ReferenceSimulation
+
+        settings = scene.solver if settings is None else settings
+        missing = self.missing(scene, settings)
+        if missing:
+            raise Refusal(self.name, missing, ())
+        return ReferenceSimulation(scene, self.resolve(scene, settings))
+
+
+def _suitable(scene: Scene) -> str:
+    """Return the broad phase that suits a scene's balls."""
+    bodies = scene.bodies
+    radius = bodies.radius[~meetings(scene).free | bodies.fixed]
+    if len(radius) <= FEW:
+        return "all_pairs"
+    return "grid" if radius.max() <= ONE_SIZE * radius.min() else "sweep"

@@ -1,0 +1,156 @@
+"""Finder: broad phase, then narrow phase; from positions to manifolds."""
+
+from collections import Counter
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.engines.reference.broad_phase import BROAD_PHASES
+from sandbox.engines.reference.manifolds import KIND, Manifolds, meet_balls, meet_planes, meet_segments
+from sandbox.engines.reference.segments import SegmentBoxes, near_segments
+from sandbox.engines.reference.touch import first_touch
+from sandbox.engines.roster import NOTHING, Roster
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+
+class Candidates(NamedTuple):
+    """The pairs that the broad phases handed on, by ascending key. Every ball is a candidate for every plane."""
+
+    balls: IntArray
+    """(B,) keys of two balls"""
+    segments: IntArray
+    """(S,) keys of a ball and a segment"""
+
+
+class Finder:
+    """Finds contacts, in the order of their keys, whichever broad phase; counts the work."""
+
+    def __init__(self, roster: Roster, broad_phase: str) -> None:
+        self._roster, self._broad_phase = roster, BROAD_PHASES[broad_phase]
+        self._ball_keys, self._segment_keys = np.empty(64, np.int64), np.empty(64, np.int64)
+        self._out = _room_for(64)
+        self.work: Counter[str] = Counter(broad_tests=0, narrow_tests=0, contacts=0)
+        self.population_changed()
+
+    def population_changed(self) -> None:
+        """Work out anew who can meet what."""
+        roster = self._roster
+        self.able: BoolArray = roster.moving & (roster.meets > NOTHING)
+        self._moves: BoolArray = roster.moving
+        self._order: IntArray = np.arange(len(roster.position))
+        self._boxes = SegmentBoxes(roster.fixtures)
+        self._planes = len(roster.fixtures.planes) if self.able.any() else 0
+        self._plane_tests = self._planes * int(np.count_nonzero(self.able))
+        self.idle = not (roster.meet.ball_ball or self._planes or (len(self._boxes) and self.able.any()))
+        """Nothing can meet anything."""
+        touching = roster.radius[self.able]
+        self.widest = float(roster.radius[roster.meets > NOTHING].max(initial=0.0))
+        """m; the largest radius of what can touch anything"""
+        self.thinnest = float(touching.min()) if len(touching) and not self.idle else np.inf
+        """m; the smallest radius of what moves and can touch anything"""
+        self.use(roster.restitution)
+
+    def use(self, restitution: FloatArray) -> None:
+        """Enter figures of one's own (S, S) into the manifolds, in the place of restitution."""
+        self._tables = restitution, self._roster.friction
+
+    def candidates(self, position: FloatArray, margin: float = 0.0) -> Candidates:
+        """Return the pairs worth a look at (N, ≥ 2) positions, m: none nearer than the margin, m, is left out."""
+        roster, boxes = self._roster, self._boxes
+        none = self._ball_keys[:0]
+        if roster.meet.ball_ball:
+            self._ball_keys, balls = self._filled(
+                self._ball_keys,
+                lambda room: self._broad_phase(
+                    self._order, position, roster.radius, roster.meets, self._moves, margin, room
+                ),
+            )
+        if len(boxes):
+            self._segment_keys, segments = self._filled(
+                self._segment_keys,
+                lambda room: near_segments(
+                    position, roster.radius, self.able, boxes.box, boxes.index, boxes.widest, margin, room
+                ),
+            )
+        return Candidates(balls if roster.meet.ball_ball else none, segments if len(boxes) else none)
+
+    def _filled(self, room: IntArray, search: Callable[[IntArray], tuple[int, int]]) -> tuple[IntArray, IntArray]:
+        """Return what a search finds, sorted, and the room that it took: more where there was too little."""
+        found, tests = search(room)
+        if found > len(room):
+            room = np.empty(2 * found, np.int64)
+            found, tests = search(room)
+        self.work["broad_tests"] += tests
+        return room, np.sort(room[:found])
+
+    def manifolds(self, position: FloatArray, near: Candidates, reach: float = 0.0) -> Manifolds:
+        """Return the contacts among candidates: those nearer than `reach`, m; 0 for overlap alone.
+
+        They are good until the next look.
+        """
+        size = self._looked(position, near, reach)
+        if size > len(self._out.key):
+            self._out = _room_for(2 * size)
+            self._looked(position, near, reach)
+        self.work["narrow_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
+        self.work["contacts"] += size
+        return self._out.of(slice(0, size))
+
+    def _looked(self, position: FloatArray, near: Candidates, reach: float) -> int:
+        """Write the contacts as far as there is room; return how many there are."""
+        roster, fixtures, size = self._roster, self._roster.fixtures, 0
+        radius, surface, other = roster.radius, roster.surface, roster.fixed_surface
+        if len(near.balls):
+            size = meet_balls(near.balls, position, radius, surface, *self._tables, reach, self._out, size)
+        if self._planes:
+            things = fixtures.planes, fixtures.plane_thing, other
+            size = meet_planes(position, radius, self.able, surface, *things, *self._tables, reach, self._out, size)
+        if len(near.segments):
+            walls = fixtures.segments, fixtures.segment_thing, other
+            size = meet_segments(
+                near.segments, position, radius, surface, *walls, *self._tables, reach, self._out, size
+            )
+        return size
+
+    def farthest(self, start: FloatArray, end: FloatArray) -> float:
+        """Return the longest way, m, between two sets of (N, ≥ 2) centres, of those that can touch anything."""
+        way = (end - start)[self.able, :2]
+        return float(np.sqrt((way * way).sum(axis=1)).max(initial=0.0))
+
+    def first_touch(self, start: FloatArray, end: FloatArray, rest: IntArray) -> tuple[float, int]:
+        """Return the share of straight ways at which a pair first touches, and its key; −1 for none.
+
+        Pairs whose keys are in `rest`, ascending, are left out.
+        """
+        roster = self._roster
+        near = self.candidates(start, 2.0 * self.farthest(start, end))
+        self.work["narrow_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
+        planes, segments = roster.fixtures.planes, roster.fixtures.segments
+        share, key = first_touch(
+            start, end, roster.radius, self.able, near.balls, planes, near.segments, segments, rest
+        )  # fmt: skip
+        return float(share), int(key)
+
+    def only(self, position: FloatArray, key: int) -> Manifolds:
+        """Return the manifold of one pair, whether it overlaps or not."""
+        balls = np.array([key] if key >> KIND == 0 else [], np.int64)
+        segments = np.array([key - (2 << KIND)] if key >> KIND == 2 else [], np.int64)
+        contacts = self.manifolds(position, Candidates(balls, segments), np.inf)
+        return contacts.of(contacts.key == key)
+
+    def overlaps(self, position: FloatArray) -> Manifolds:
+        """Return all contacts at (N, ≥ 2) positions, m. They are good until the next look."""
+        return self.manifolds(position, self.candidates(position))
+
+
+def _room_for(size: int) -> Manifolds:
+    """Return unset manifolds."""
+    return Manifolds(
+        *(np.empty(size, np.int64) for _ in ("key", "first", "second")),
+        normal=np.empty((size, 2)),
+        separation=np.empty(size),
+        point=np.empty((size, 2)),
+        arm=np.empty((size, 2)),
+        coefficient=np.empty((size, 2)),
+    )

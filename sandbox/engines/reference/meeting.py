@@ -1,0 +1,25 @@
+"""Meeting: which pairs may touch at all, and the keys that number pairs."""
+
+from sandbox.engines.kernel import kernel
+from sandbox.engines.roster import ALL, FIXED
+
+FIRST = 30
+"""Bits below the first number in the key of a pair: a scene holds fewer bodies, and fewer segments, than 2³⁰."""
+SECOND = (1 << FIRST) - 1
+"""The bits of the second."""
+
+
+@kernel
+def pair_key(i: int, j: int) -> int:
+    """Return the key of a pair; keys ascend as pairs do."""
+    return (i << FIRST) + j
+
+
+@kernel
+def may_meet(meets_a: int, moves_a: bool, meets_b: int, moves_b: bool) -> bool:
+    """Tell whether two bodies can touch: both move and meet all, or one is fixed and the other meets what is fixed."""
+    if moves_a and moves_b:
+        return meets_a == ALL and meets_b == ALL
+    if moves_a:
+        return meets_a >= FIXED and meets_b == ALL
+    return moves_b and meets_b >= FIXED and meets_a == ALL

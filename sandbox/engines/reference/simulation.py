@@ -1,0 +1,194 @@
+"""ReferenceSimulation: a scene running on the hand-written solvers, one fixed step after the other."""
+
+import hashlib
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NoReturn
+
+import numpy as np
+
+from sandbox.action import Action
+from sandbox.engines.acting import perform
+from sandbox.engines.contract import Divergence, Observer
+from sandbox.engines.kernel import tell_if_slow
+from sandbox.engines.ledger import ContactLedger
+from sandbox.engines.limits import BEYOND
+from sandbox.engines.reference.detection import DETECTIONS
+from sandbox.engines.reference.manifolds import Manifolds
+from sandbox.engines.reference.motion import State
+from sandbox.engines.reference.stage import Stage
+from sandbox.engines.roster import Roster
+from sandbox.engines.touching import Touching
+from sandbox.engines.turn import Turn
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
+
+
+class ReferenceSimulation:
+    """A running scene. A substep reads as the tutorial's: apply forces, advance, detect and resolve."""
+
+    def __init__(self, scene: Scene, settings: Settings) -> None:
+        assert settings.detection is not None
+        self._settings = settings
+        self._roster = Roster(scene, settings.h)
+        self._stage = Stage(self._roster, settings)
+        self._advance = DETECTIONS[settings.detection]
+        self._turn = Turn()
+        self._steps, self._part, self._ended = 0, 0.0, False
+        self._ledger: ContactLedger | None = None
+        self._observer: Observer | None = None
+        tell_if_slow(len(scene.bodies))
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied or pickled, as every simulation does."""
+        raise TypeError("a running simulation cannot be copied; start its scene again and repeat its actions")
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return (self._steps + self._part) * self._settings.dt
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies by number, as they started; spawned ones join at the end."""
+        return self._roster.bodies
+
+    @property
+    def settings(self) -> Settings:
+        """The settings, with every choice filled in."""
+        return self._settings
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """When each body that is no longer there was gone: number → s."""
+        return self._roster.retired
+
+    @property
+    def work(self) -> Mapping[str, int]:
+        """What was done so far, without a clock: tests of the broad and narrow phases, contacts found."""
+        return MappingProxyType(self._stage.finder.work)
+
+    def step(self) -> None:
+        """Advance by one dt.
+
+        Raises:
+            Divergence: a body is no longer finite, or beyond all bounds. The state can still be read.
+            Exhaustion: a substep would have to be cut into too many pieces, or contacts outgrow memory.
+        """
+        with self._turn, np.errstate(all="ignore"):
+            self._check_running()
+            for k in range(self._settings.substeps):
+                self._substep(self._steps * self._settings.dt + k * self._settings.h, self._settings.h)
+            self._steps += 1
+            self._settle()
+
+    def finish(self, part: float) -> None:
+        """Advance by a last part of dt, 0 < part < 1: whole substeps, then one that is as long as is left.
+
+        Raises:
+            Divergence: as `step`.
+            ValueError: there is no such part.
+        """
+        if not 0.0 < part < 1.0:
+            raise ValueError(f"a last part of {part} steps; it is more than 0 and less than 1")
+        with self._turn, np.errstate(all="ignore"):
+            self._check_running()
+            whole, rest = divmod(part * self._settings.substeps, 1.0)
+            begin, h = self._steps * self._settings.dt, self._settings.h
+            for k in range(int(whole)):
+                self._substep(begin + k * h, h)
+            if rest > 0.0:
+                self._substep(begin + whole * h, rest * h)
+            self._part = part
+            self._settle()
+            self._ended = True
+
+    def _substep(self, time: float, h: float) -> None:
+        """Advance by h: apply forces, then advance, detect and resolve, in the chosen detection's way."""
+        self._stage.time = time
+        self._stage.apply_forces()
+        self._advance(self._stage, h)
+
+    def _settle(self) -> None:
+        """Write the state down, stop what is no longer finite and bounded, retire who has left world.bounds."""
+        self._stage.leave()
+        beyond = self._roster.beyond()
+        if beyond is not None:
+            self._ended = True
+            raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
+        outside = self._roster.outside()
+        if len(outside):
+            self._take_out(outside)
+
+    def _take_out(self, numbers: IntArray) -> None:
+        self._roster.take_out(numbers, self.time)
+        self._stage.enter()
+
+    def apply(self, action: Action) -> None:
+        """Do what an action says, now.
+
+        Raises:
+            ActionError: it cannot be done. Nothing has changed then.
+        """
+        with self._turn:
+            self._check_running()
+            leaving = perform(action, self._roster)
+            if leaving is not None:
+                self._take_out(np.asarray([leaving]))
+            self._stage.enter()
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+        r = self._roster
+        state = (each.copy() for each in (r.position, r.velocity, r.angle, r.angular_velocity, r.present))
+        return Frame(self.time, *state)
+
+    def contacts(self) -> Contacts:
+        """Return the contacts since the last call; the first call starts the recording."""
+        if self._ledger is None:
+            self._ledger = ContactLedger(len(self._roster.scene.fixed), joints=True)
+            self._stage.witness = self._witness
+            now = self._stage.overlaps(self._stage.x)
+            self._ledger.record(self.time, _touching(now, np.zeros((now.size, 2))))
+        return self._ledger.take()
+
+    def watch(self, observer: Observer) -> None:
+        """Have an observer called after every substep, and at every impact within one; this records contacts too."""
+        if self._ledger is None:
+            self.contacts()
+        self._observer = observer
+
+    def _witness(
+        self, start: float, end: float, before: State, after: State, contacts: Manifolds, impulse: FloatArray
+    ) -> None:
+        assert self._ledger is not None
+        self._ledger.record(end, _touching(contacts, impulse))
+        if self._observer is not None:
+            # The observer may keep what it is given: these arrays are never written to again.
+            self._observer(start, before[0, :, :2], after[0, :, :2], self._ledger.pairs())
+
+    def state_hash(self) -> str:
+        """Return a SHA-256 of time and every body's state."""
+        frame = self.frame()
+        digest = hashlib.sha256(np.float64(frame.time).tobytes())
+        for array in (frame.position, frame.velocity, frame.angle, frame.angular_velocity, frame.present):
+            digest.update(array.tobytes())
+        return digest.hexdigest()
+
+    def close(self) -> None:
+        """End the simulation."""
+        self._ended = True
+
+    def _check_running(self) -> None:
+        if self._ended:
+            raise RuntimeError("the simulation has ended; it can be read, but not go on")
+
+
+def _touching(contacts: Manifolds, impulse: FloatArray) -> Touching:
+    """Return contacts as the ledger takes them: complex numbers, the impulse on the first."""
+    normal = contacts.normal[:, 0] + 1j * contacts.normal[:, 1]
+    point = contacts.point[:, 0] + 1j * contacts.point[:, 1]
+    given = normal * (impulse[:, 0] + 1j * impulse[:, 1])
+    return Touching(contacts.first.copy(), contacts.second.copy(), -given, normal, point)

@@ -1,0 +1,136 @@
+"""Touch: when on its straight way a circle first touches something, in closed form.
+
+Each returns the share of the way, 0…1, or `NEVER`. Who touches already and approaches does so at 0; who moves away or
+along never does.
+"""
+
+import math
+
+from sandbox.engines.kernel import kernel
+from sandbox.engines.reference.manifolds import KIND
+from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+NEVER = 2.0
+"""More than any share of the way."""
+
+
+@kernel
+def touch_circle(x: float, y: float, mx: float, my: float, distance: float) -> float:
+    """Return when a point at (x, y) that moves by (mx, my) comes within a distance of the origin, m.
+
+    The discriminant is taken from the cross product, which keeps its digits in a graze: D = A·R² − (x × m)².
+    """
+    length2, along = mx * mx + my * my, x * mx + y * my
+    if along >= 0.0:
+        return NEVER
+    excess = x * x + y * y - distance * distance
+    if excess <= 0.0:
+        return 0.0
+    cross = x * my - y * mx
+    discriminant = length2 * distance * distance - cross * cross
+    if discriminant < 0.0:
+        return NEVER
+    share = excess / (-along + math.sqrt(discriminant))
+    return share if share <= 1.0 else NEVER
+
+
+@kernel
+def touch_line(gap: float, approach: float) -> float:
+    """Return when a gap, m, that shrinks by `approach`, m, over the whole way is closed."""
+    if approach <= 0.0:
+        return NEVER
+    share = max(gap, 0.0) / approach
+    return share if share <= 1.0 else NEVER
+
+
+@kernel
+def touch_segment(
+    x: float, y: float, mx: float, my: float, ax: float, ay: float, bx: float, by: float, distance: float
+) -> float:
+    """Return when a point at (x, y) that moves by (mx, my) comes within a distance of a segment, m."""
+    first = min(
+        touch_circle(x - ax, y - ay, mx, my, distance),
+        touch_circle(x - bx, y - by, mx, my, distance),
+    )
+    along_x, along_y = bx - ax, by - ay
+    length = math.sqrt(along_x * along_x + along_y * along_y)
+    if length == 0.0:
+        return first
+    along_x, along_y = along_x / length, along_y / length
+    side = along_x * (y - ay) - along_y * (x - ax)
+    rate = along_x * my - along_y * mx
+    if side < 0.0:
+        side, rate = -side, -rate
+    share = touch_line(side - distance, -rate)
+    if share < first:
+        place = (x + share * mx - ax) * along_x + (y + share * my - ay) * along_y
+        if 0.0 <= place <= length:
+            first = share
+    return first
+
+
+@kernel
+def _rests(rest: IntArray, key: int) -> bool:
+    low, high = 0, len(rest)
+    while low < high:
+        middle = (low + high) // 2
+        if rest[middle] < key:
+            low = middle + 1
+        else:
+            high = middle
+    return low < len(rest) and rest[low] == key
+
+
+@kernel
+def first_touch(
+    start: FloatArray,
+    end: FloatArray,
+    radius: FloatArray,
+    able: BoolArray,
+    balls: IntArray,
+    planes: FloatArray,
+    segment_keys: IntArray,
+    segments: FloatArray,
+    rest: IntArray,
+) -> tuple[float, int]:
+    """Return the share of the way, and the key, of the first touch among candidates; key −1 for none.
+
+    Args:
+        start: (N, ≥ 2) centres, m.
+        end: (N, ≥ 2) m.
+        radius: (N,) m.
+        able: (N,) who can touch planes.
+        balls: keys of two balls.
+        planes: (P, 4).
+        segment_keys: keys of a ball and a segment.
+        segments: (G, 5).
+        rest: keys, ascending, of pairs that are not looked at.
+    """
+    first, who = NEVER, -1
+    for k in range(len(balls)):
+        i, j = balls[k] >> FIRST, balls[k] & SECOND
+        x, y = start[j, 0] - start[i, 0], start[j, 1] - start[i, 1]
+        mx, my = end[j, 0] - end[i, 0] - x, end[j, 1] - end[i, 1] - y
+        share = touch_circle(x, y, mx, my, radius[i] + radius[j])
+        if share < first and not _rests(rest, balls[k]):
+            first, who = share, balls[k]
+    for i in range(len(start)):
+        if able[i]:
+            mx, my = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1]
+            for p in range(len(planes)):
+                nx, ny = planes[p, 2], planes[p, 3]
+                gap = (start[i, 0] - planes[p, 0]) * nx + (start[i, 1] - planes[p, 1]) * ny - radius[i]
+                share = touch_line(gap, -(mx * nx + my * ny))
+                key = (1 << KIND) + pair_key(i, p)
+                if share < first and not _rests(rest, key):
+                    first, who = share, key
+    for k in range(len(segment_keys)):
+        i, s = segment_keys[k] >> FIRST, segment_keys[k] & SECOND
+        x, y = start[i, 0], start[i, 1]
+        ax, ay, bx, by = segments[s, 0], segments[s, 1], segments[s, 2], segments[s, 3]
+        share = touch_segment(x, y, end[i, 0] - x, end[i, 1] - y, ax, ay, bx, by, radius[i] + segments[s, 4])
+        key = (2 << KIND) + segment_keys[k]
+        if share < first and not _rests(rest, key):
+            first, who = share, key
+    return first, who

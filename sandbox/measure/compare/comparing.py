@@ -1,0 +1,145 @@
+"""Comparing: one scene on several engines, each run, timed and scored."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sandbox.engines.registry import ENGINES, engine_named
+from sandbox.measure.compare.alignment import aligned
+from sandbox.measure.compare.comparison import Comparison, Row
+from sandbox.measure.compare.drift import energy_drift, momentum_drift
+from sandbox.measure.compare.errors import Score, errors
+from sandbox.measure.compare.truth import Truth, truth_of
+from sandbox.measure.compare.why import turned, verdict
+from sandbox.measure.recorder import require_memory
+from sandbox.measure.run import run
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Trajectory
+
+Told = Callable[[str], None]
+"""Called with what is being done now."""
+
+TOLERANCE = 0.01
+"""The share of the smallest moving ball's radius that is the tolerance where none is given."""
+WORTH_REPEATING = 5.0
+"""s: a run no longer than this is timed a second time, as the first may have compiled."""
+NEGLIGIBLE = 1e-6
+"""The share of the tolerance below which an error needs no explanation."""
+
+
+def compare(
+    scene: Scene,
+    engines: Sequence[str] | None = None,
+    *,
+    tolerance: float | None = None,
+    why: bool = False,
+    told: Told | None = None,
+    **settings: Any,
+) -> Comparison:
+    """Run a scene on several engines and hold each against the best known truth.
+
+    The truth is the scene's closed form, else `exact`, else a fixed step refined until it agrees with itself.
+    Errors, contacts and divergence count up to `trusted_until`, drifts of energy and momentum over the whole run.
+
+    Args:
+        scene: what to run.
+        engines: their names; by default all there are. One that cannot run the scene is a row that says why.
+        tolerance: of positions, m: beyond it a run has diverged from the truth. By default 1 % of the radius of
+            the smallest ball that moves.
+        why: rerun each engine that is off with one knob changed at a time, and say which one matters.
+        told: who is told what is being done.
+        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
+
+    Raises:
+        UnknownEngineError: no engine has one of the names.
+        TooLargeError: the frames of all runs would not fit into memory together.
+        ValueError: the tolerance is not positive and finite.
+        pydantic.ValidationError: a setting is wrong.
+    """
+    names = list(dict.fromkeys(ENGINES if engines is None else engines))
+    for name in names:
+        engine_named(name)
+    wanted = scene.solver.replace(**settings) if settings else scene.solver
+    tolerance = usual_tolerance(scene) if tolerance is None else tolerance
+    if not 0.0 < tolerance < math.inf:
+        raise ValueError(f"a tolerance of {tolerance} m; it is positive and finite")
+    # All runs are held at once: the engines', the truth, and while it is sought, two more.
+    require_memory(scene, wanted, len(scene.bodies) * (len(names) + 3))
+
+    say = told or _silent
+    say("the truth")
+    truth = truth_of(scene, wanted, tolerance)
+    rows, runs = [], {}
+    for name in names:
+        say(name)
+        found = timed(scene, name, wanted)
+        row = judged(scene, name, wanted, found, truth, tolerance)
+        if why and truth is not None and _is_off(row, tolerance):
+            say(f"{name}: why")
+            row = _explained(scene, row, wanted, truth)
+        rows.append(row)
+        if len(found.time):
+            runs[name] = found
+    return Comparison(scene, truth, tolerance, tuple(rows), runs)
+
+
+def usual_tolerance(scene: Scene) -> float:
+    """Return 1 % of the radius of the smallest ball that moves, m; where none does, 1 mm."""
+    bodies = scene.bodies
+    radius = bodies.radius[~bodies.fixed]
+    return TOLERANCE * float(radius.min()) if len(radius) else 1e-3
+
+
+def timed(scene: Scene, engine: str, settings: Settings) -> Trajectory:
+    """Run an engine; a short run twice, and its shorter time counts: the first may have compiled on the way."""
+    first = run(scene, engine, audit=False, **settings.model_dump())
+    if first.status == "refused" or first.info["seconds"] > WORTH_REPEATING:
+        return first
+    second = run(scene, engine, audit=False, **settings.model_dump())
+    return min(first, second, key=lambda each: float(each.info["seconds"]))
+
+
+def judged(
+    scene: Scene, engine: str, settings: Settings, found: Trajectory, truth: Truth | None, tolerance: float
+) -> Row:
+    """Score a run against the truth."""
+    seconds = None if found.status == "refused" else float(found.info["seconds"])
+    told = engine, found.status, found.reason, found.info["settings"]
+    if truth is None or found.status == "refused":
+        return Row(*told, Score(None, None, None, None), None, None, None, None, None, seconds)
+    until, whole = truth.trusted_until, truth.trusted_until == scene.world.duration
+    off = errors(found, truth.trajectory, ~scene.bodies.fixed)
+    first = off.first_above(tolerance, until)
+    if first is None and found.status == "diverged" and found.time[-1] <= until:
+        first = float(found.time[-1])
+    energy = energy_drift(found, scene, truth.trajectory, whole)
+    return Row(
+        *told,
+        score=off.until(until),
+        energy_drift=energy.share,
+        energy_against=energy.against,
+        momentum_drift=momentum_drift(found, scene),
+        first_divergence=first,
+        events=aligned(found, truth.trajectory, scene, settings.dt, tolerance, min(until, float(found.time[-1]))),
+        seconds=seconds,
+    )
+
+
+def _is_off(row: Row, tolerance: float) -> bool:
+    error = row.score.max_position
+    return error is not None and error > NEGLIGIBLE * tolerance and bool(np.isfinite(error))
+
+
+def _explained(scene: Scene, row: Row, settings: Settings, truth: Truth) -> Row:
+    before = row.score.max_position
+    assert before is not None
+    tried = turned(scene, row.engine, settings, truth.trajectory, truth.trusted_until, before)
+    return replace(row, why=tried, verdict=verdict(row.engine, tried, before))
+
+
+def _silent(_: str) -> None:
+    pass

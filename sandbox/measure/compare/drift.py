@@ -1,0 +1,72 @@
+"""Drift: energy and momentum that a run has gained or lost without a cause."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.measure.energy import energies
+from sandbox.measure.recorder import frame_count
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Trajectory
+
+
+class EnergyDrift(NamedTuple):
+    """A share of the energy that is in motion, and what it was counted against."""
+
+    share: float | None
+    against: str
+    """`truth` or `start`"""
+
+
+def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, trusted: bool) -> EnergyDrift:
+    """Return what total energy changed by over a whole run, as a share of the energy in motion.
+
+    Where the truth is trusted to the end, its change is taken off first, so that what impacts and drag rightly
+    take does not count; else the plain change against the start is left. The energy in motion is the largest
+    kinetic energy of any frame, the truth's where there is one: unlike the total, it does not depend on where
+    potential energy is 0. None where a run has no end to speak of, or energy changed with nothing in motion.
+    """
+    against = "truth" if trusted and truth is not None else "start"
+    if not len(run.time) or run.status != "ok":
+        return EnergyDrift(None, against)
+    own = energies(run, scene)
+    change, scale = float(own.total[-1] - own.total[0]), float(own.kinetic.max())
+    if truth is not None:
+        its = energies(truth, scene)
+        scale = float(its.kinetic.max())
+        if trusted:
+            change -= float(its.total[-1] - its.total[0])
+    return EnergyDrift(_share(change, scale), against)
+
+
+def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
+    """Return the momentum at the end that nothing explains, as a share of the largest sum of |m v| of any frame.
+
+    Explained are gravity, and the recorded impulses between bodies that move and things that do not. None with
+    drag, whose impulse is not recorded; where a body was retired, and took its momentum along; where the run
+    did not reach its end, or ended within a step, of whose contacts there is no record.
+    """
+    bodies, world = scene.bodies, scene.world
+    if run.status != "ok" or np.isfinite(run.retired_time).any():
+        return None
+    if frame_count(scene, Settings.model_validate(run.info["settings"]))[1] > 0.0:
+        return None
+    if world.linear_drag or world.quadratic_drag:
+        return None
+    mass = np.where(bodies.fixed, 0.0, bodies.mass)
+    explained = mass.sum() * np.asarray(world.gravity) * run.time[-1]
+    still = np.append(bodies.fixed, np.ones(len(scene.fixed), dtype=np.bool_))  # −1 − k counts from the end
+    first, second = (still[run.contact_pair[:, side]] for side in (0, 1))
+    explained = explained - run.contact_impulse[~first & second].sum(axis=0)
+    explained = explained + run.contact_impulse[first & ~second].sum(axis=0)
+    momentum = np.einsum("n,tnk->tk", mass, run.velocity[[0, -1]])
+    scale = max(float(np.hypot(*np.moveaxis(frame, 1, 0)) @ mass) for frame in run.velocity)
+    return _share(float(np.hypot(*(momentum[1] - momentum[0] - explained))), scale)
+
+
+def _share(change: float, scale: float) -> float | None:
+    if change == 0.0:
+        return 0.0
+    return change / scale if math.isfinite(change) and math.isfinite(scale) and scale > 0.0 else None

@@ -1,0 +1,82 @@
+"""Errors: how far a run is from the truth, frame by frame."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.measure.compare.runs import common_frames, there
+from sandbox.trajectory import BoolArray, FloatArray, Trajectory
+
+CHUNK = 2_000_000
+"""Frames × bodies worked on at once."""
+
+
+class Score(NamedTuple):
+    """Errors over all frames up to a time and all bodies that move; None where there is nothing to score."""
+
+    max_position: float | None
+    """m"""
+    rms_position: float | None
+    """m, root of the mean square over frames and bodies"""
+    max_velocity: float | None
+    """m/s"""
+    rms_velocity: float | None
+    """m/s"""
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Distances between a run and the truth at the K frames that they share, over the bodies both still have."""
+
+    time: FloatArray
+    """(K,) s"""
+    position: FloatArray
+    """(K,) the largest, m; inf where the run is no longer finite"""
+    velocity: FloatArray
+    """(K,) the largest, m/s"""
+    squares: FloatArray
+    """(2, K) sums of the squares of both over the bodies"""
+    count: FloatArray
+    """(K,) bodies compared"""
+
+    def until(self, end: float) -> Score:
+        """Score the frames up to a time, s, itself included."""
+        kept = self.time <= end
+        count = float(self.count[kept].sum())
+        if count == 0.0:
+            return Score(None, None, None, None)
+        position, velocity = np.sqrt(self.squares[:, kept].sum(axis=1) / count).tolist()
+        return Score(float(self.position[kept].max()), position, float(self.velocity[kept].max()), velocity)
+
+    def first_above(self, tolerance: float, end: float) -> float | None:
+        """Return the time of the first frame, up to `end`, whose position error exceeds a tolerance."""
+        above = (self.position > tolerance) & (self.time <= end)
+        return float(self.time[above.argmax()]) if above.any() else None
+
+
+def errors(run: Trajectory, truth: Trajectory, moving: BoolArray) -> Errors:
+    """Return the errors of a run against the truth.
+
+    Args:
+        run: of the same scene.
+        truth: its frames may lie elsewhere; only common ones are compared.
+        moving: (N,) the bodies that count.
+    """
+    mine, its = common_frames(run, truth)
+    size = len(mine)
+    largest, squares, count = np.zeros((2, size)), np.zeros((2, size)), np.zeros(size)
+    numbers = np.flatnonzero(moving)
+    step = max(1, CHUNK // max(1, len(numbers)))
+    for begin in range(0, size if len(numbers) else 0, step):
+        rows = slice(begin, begin + step)
+        both = (there(run, mine[rows]) & there(truth, its[rows]))[:, numbers]
+        count[rows] = both.sum(axis=1)
+        for k, name in enumerate(("position", "velocity")):
+            found, right = getattr(run, name)[mine[rows]], getattr(truth, name)[its[rows]]
+            # A diverged state has no finite distance: that is its error, not a fault.
+            with np.errstate(over="ignore", invalid="ignore"):
+                away = np.hypot(*np.moveaxis(found[:, numbers] - right[:, numbers], 2, 0))
+                away = np.where(both, np.where(np.isnan(away), np.inf, away), 0.0)
+                largest[k, rows], squares[k, rows] = away.max(axis=1), np.square(away).sum(axis=1)
+    return Errors(run.time[mine], largest[0], largest[1], squares, count)

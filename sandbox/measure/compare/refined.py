@@ -1,0 +1,117 @@
+"""Refined: a fixed step, halved until the answer stays the same."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import ValidationError
+
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.compare.horizon import agree_until
+from sandbox.measure.recorder import frame_count
+from sandbox.measure.run import run
+from sandbox.scene.model import Scene
+from sandbox.scene.part import MAX_STEPS
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Trajectory
+
+WORK = 5e6
+"""Bodies × steps that all halvings together may take."""
+HALVINGS = 8
+"""At most; the time step is 1/256 then."""
+AGREE = 0.1
+"""The share of the tolerance within which two successive answers agree."""
+ITERATIONS = 20
+"""At least; a truth should not hang on a contact solver that stops early."""
+SLOP = 0.01
+"""The share of the tolerance that may stay overlapped."""
+
+PREFERENCES: tuple[dict[str, object], ...] = (
+    {"integrator": "velocity_verlet", "detection": "swept"},
+    {"detection": "swept"},
+    {"integrator": "velocity_verlet"},
+    {"half_kick": True},
+    {},
+)
+"""The first that an engine has is taken: exact flight and impacts within a step agree sooner."""
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """The finest answer of an engine, and until when it agrees with the one before."""
+
+    engine: str
+    settings: Settings
+    halvings: int
+    trajectory: Trajectory
+    agrees_until: float
+    """s, within the tolerance itself"""
+    about: str
+    """why it was refined no further"""
+
+
+def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | None:
+    """Halve dt until two successive answers agree within `AGREE` of the tolerance, or the work becomes too much.
+
+    An answer in which contacts were missed agrees with nothing from the first of them on.
+
+    The reference is asked first, then every other engine with a step, in the order of the registry; of each, the
+    settings in the order of `PREFERENCES`. Frames stay where they were. None where no engine can run the scene.
+
+    Raises:
+        TooLargeError: the frames would not fit into memory.
+    """
+    names = sorted((name for name in ENGINES if name != "exact"), key=lambda name: name != "reference")
+    iterations = max(settings.iterations, ITERATIONS)
+    start = Settings(dt=settings.dt, record_every=settings.record_every, iterations=iterations, slop=SLOP * tolerance)
+    best: Refined | None = None
+    for name in names:
+        for preference in PREFERENCES:
+            wanted = start.replace(**preference)
+            if ENGINES[name].missing(scene, wanted):
+                continue
+            found = _halved(scene, name, wanted, tolerance)
+            if found is not None and (best is None or found.agrees_until > best.agrees_until):
+                best = found
+            if best is not None:
+                return best
+    return best
+
+
+def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> Refined | None:
+    """Refine one choice of settings; None where it does not even run to the end at first."""
+    coarse = run(scene, engine, audit=False, **settings.model_dump())
+    if coarse.status != "ok":
+        return None
+    work = each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
+    agrees, halvings, about = 0.0, 0, "its first halving would be too much work"
+    while halvings < HALVINGS:
+        each *= 2
+        if work + each > WORK:
+            about = "more halvings would be too much work"
+            break
+        finer = _half(settings)
+        if finer is None or scene.world.duration / finer.dt > MAX_STEPS:
+            about = "dt cannot be halved further"
+            break
+        fine = run(scene, engine, audit=True, **finer.model_dump())
+        if fine.status != "ok":
+            about = f"the next halving {fine.status}: {fine.reason}"
+            break
+        # Two that tunnel through the same wall agree as well.
+        missed = float(np.min(fine.missed_time, initial=np.inf))
+        close = min(agree_until(fine, coarse, scene, AGREE * tolerance), missed)
+        agrees = min(agree_until(fine, coarse, scene, tolerance), missed)
+        coarse, settings, halvings, work = fine, finer, halvings + 1, work + each
+        about = f"agrees with the halving before within {AGREE * tolerance:.2g} m"
+        if close == scene.world.duration:
+            break
+    else:
+        about = "it was halved no further"
+    return Refined(engine, settings, halvings, coarse, agrees, about)
+
+
+def _half(settings: Settings) -> Settings | None:
+    try:
+        return settings.replace(dt=settings.dt / 2.0, record_every=settings.record_every * 2)
+    except ValidationError:
+        return None
