@@ -5,7 +5,7 @@ import numpy as np
 from sandbox.scene.model import Scene
 
 SLOP_PER_RADIUS = 0.01
-"""Slop as a part of the smallest radius. pymunk's own, 0.1, is in length units: a ball of 5 cm would rest 10 cm deep."""
+"""Slop as a part of the smallest radius. pymunk's own is 0.1 length units: a ball of 5 cm would rest 10 cm deep."""
 
 BIAS = (1.0 - 0.1) ** 60
 """pymunk's own: a tenth of an overlap is corrected in 1/60 s."""

@@ -147,7 +147,9 @@ class Finder:
 def _room_for(size: int) -> Manifolds:
     """Return unset manifolds."""
     return Manifolds(
-        *(np.empty(size, np.int64) for _ in ("key", "first", "second")),
+        key=np.empty(size, np.int64),
+        first=np.empty(size, np.int64),
+        second=np.empty(size, np.int64),
         normal=np.empty((size, 2)),
         separation=np.empty(size),
         point=np.empty((size, 2)),

@@ -1,6 +1,6 @@
 """Manifolds: the contacts of one moment as arrays, from the candidates of the broad phase."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sandbox.engines.kernel import kernel
 from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key
@@ -38,7 +38,8 @@ class Manifolds(NamedTuple):
 
     def of(self, which: IntArray | BoolArray | slice) -> "Manifolds":
         """Return some of them."""
-        return Manifolds(*(column[which] for column in self))
+        columns: Any = (column[which] for column in self)
+        return Manifolds(*columns)
 
 
 @kernel

@@ -15,6 +15,9 @@ State: TypeAlias = FloatArray
 """(2, N, D) poses, m and rad, and rates, m/s and rad/s"""
 
 
+_ALL = np.ones((1, 1))
+
+
 class Inputs(NamedTuple):
     """u: all that acts on N bodies during one substep."""
 
@@ -26,8 +29,8 @@ class Inputs(NamedTuple):
     """1/m"""
     wind: tuple[float, float] = (0.0, 0.0)
     """m/s"""
-    mobile: FloatArray | None = None
-    """(N, 1) 1 for what air can brake, 0 for what is fixed or gone; needed with drag"""
+    mobile: FloatArray = _ALL
+    """(N, 1) or (1, 1): 1 for what air can brake, 0 for what is fixed or gone"""
     contacts: Callable[[State], FloatArray] | None = None
     """Penalty contacts: the acceleration (N, D) that they add in a state."""
 

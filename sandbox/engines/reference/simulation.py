@@ -142,8 +142,8 @@ class ReferenceSimulation:
     def frame(self) -> Frame:
         """Return the present state."""
         r = self._roster
-        state = (each.copy() for each in (r.position, r.velocity, r.angle, r.angular_velocity, r.present))
-        return Frame(self.time, *state)
+        position, velocity, angle, spin = (a.copy() for a in (r.position, r.velocity, r.angle, r.angular_velocity))
+        return Frame(self.time, position, velocity, angle, spin, r.present.copy())
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""

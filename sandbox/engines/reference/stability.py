@@ -3,7 +3,7 @@
 import numpy as np
 
 from sandbox.engines.reference.integrators import INTEGRATORS, amplification
-from sandbox.engines.reference.penalty import LEAST_RESTITUTION, damping_of
+from sandbox.engines.reference.springs import LEAST_RESTITUTION, damping_of
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings

@@ -36,6 +36,7 @@ class Stage:
     def __init__(self, roster: Roster, settings: Settings) -> None:
         assert settings.integrator and settings.broad_phase and settings.slop is not None and settings.bias is not None
         self._roster, self._settings = roster, settings
+        self._slop, self._bias = settings.slop, settings.bias
         self._integrator = INTEGRATORS[settings.integrator]
         self.finder = Finder(roster, settings.broad_phase)
         self.penalty = Penalty(roster, settings, self.finder) if settings.response == "penalty" else None
@@ -105,7 +106,7 @@ class Stage:
             return
         impulse = np.zeros((contacts.size, 2))
         if contacts.size:
-            roster, settings, share = self._roster, self._settings, self._integrator.share
+            share = self._integrator.share
             bounce = self._approach(contacts, self.x[1]) * contacts.coefficient[:, 0]
             remembered(contacts.key, *self._memory, impulse)
             kicked = moved[1].copy()
@@ -116,11 +117,11 @@ class Stage:
                 moved[0] += (share * h) * change
                 separation = separation + (share * h) * self._approach(contacts, change)
             # The share of an overlap beyond the slop that one substep undoes; by the next one's motion.
-            target = -(1.0 - settings.bias**h) / h * np.minimum(separation + settings.slop, 0.0)
+            target = -(1.0 - self._bias**h) / h * np.minimum(separation + self._slop, 0.0)
             self._pushes = bool(target.any())
             self.push[:] = 0.0
             if self._pushes:
-                solve_overlaps(contacts, target, self.push, roster.inverse_mass, settings.iterations)
+                solve_overlaps(contacts, target, self.push, self._roster.inverse_mass, self._settings.iterations)
         elif self._pushes:
             self._pushes = False
             self.push[:] = 0.0
@@ -144,11 +145,9 @@ class Stage:
         return -self._approach(contacts, x[1])
 
     def _solve(self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray) -> None:
-        roster = self._roster
+        inverse = self._roster.inverse_mass, self._roster.inverse_moment
         spin = (velocity if velocity.shape[1] == 3 else self._no_spin)[:, 2]
-        solve_velocities(
-            contacts, bounce, velocity, spin, roster.inverse_mass, roster.inverse_moment, impulse, self._settings.iterations
-        )  # fmt: skip
+        solve_velocities(contacts, bounce, velocity, spin, *inverse, impulse, self._settings.iterations)
 
     def _done(self, after: State, contacts: Manifolds, impulse: FloatArray, h: float) -> None:
         before, self.x = self.x, after

@@ -1,14 +1,15 @@
 """Refined: a fixed step, halved until the answer stays the same."""
 
 from dataclasses import dataclass
+from time import perf_counter
 
 import numpy as np
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.horizon import agree_until
+from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.recorder import frame_count
-from sandbox.measure.run import run
 from sandbox.scene.model import Scene
 from sandbox.scene.part import MAX_STEPS
 from sandbox.scene.settings import Settings
@@ -16,6 +17,9 @@ from sandbox.trajectory import Trajectory
 
 WORK = 5e6
 """Bodies × steps that all halvings together may take."""
+PATIENCE = 20.0
+"""s that all halvings of one choice of settings may take; the first run a fifth of it, else the next is tried.
+Where this ends it, a slower machine refines less: how often dt was halved is told."""
 HALVINGS = 8
 """At most; the time step is 1/256 then."""
 AGREE = 0.1
@@ -63,37 +67,42 @@ def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | Non
     names = sorted((name for name in ENGINES if name != "exact"), key=lambda name: name != "reference")
     iterations = max(settings.iterations, ITERATIONS)
     start = Settings(dt=settings.dt, record_every=settings.record_every, iterations=iterations, slop=SLOP * tolerance)
-    best: Refined | None = None
     for name in names:
         for preference in PREFERENCES:
             wanted = start.replace(**preference)
             if ENGINES[name].missing(scene, wanted):
                 continue
             found = _halved(scene, name, wanted, tolerance)
-            if found is not None and (best is None or found.agrees_until > best.agrees_until):
-                best = found
-            if best is not None:
-                return best
-    return best
+            if found is not None:
+                return found
+    return None
 
 
 def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> Refined | None:
-    """Refine one choice of settings; None where it does not even run to the end at first."""
-    coarse = run(scene, engine, audit=False, **settings.model_dump())
+    """Refine one choice of settings; None where not even the first run gets to its end."""
+    began = perf_counter()
+    try:
+        coarse = patient_run(scene, engine, settings, PATIENCE / 5.0)
+    except TookTooLongError:
+        return None
     if coarse.status != "ok":
         return None
     work = each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
-    agrees, halvings, about = 0.0, 0, "its first halving would be too much work"
+    agrees, halvings, about = 0.0, 0, "it was halved no further"
     while halvings < HALVINGS:
         each *= 2
+        finer = _half(settings)
         if work + each > WORK:
             about = "more halvings would be too much work"
             break
-        finer = _half(settings)
         if finer is None or scene.world.duration / finer.dt > MAX_STEPS:
             about = "dt cannot be halved further"
             break
-        fine = run(scene, engine, audit=True, **finer.model_dump())
+        try:
+            fine = patient_run(scene, engine, finer, PATIENCE - (perf_counter() - began), audit=True)
+        except TookTooLongError:
+            about = f"more halvings would take longer than {PATIENCE:g} s"
+            break
         if fine.status != "ok":
             about = f"the next halving {fine.status}: {fine.reason}"
             break
@@ -102,11 +111,9 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
         close = min(agree_until(fine, coarse, scene, AGREE * tolerance), missed)
         agrees = min(agree_until(fine, coarse, scene, tolerance), missed)
         coarse, settings, halvings, work = fine, finer, halvings + 1, work + each
-        about = f"agrees with the halving before within {AGREE * tolerance:.2g} m"
         if close == scene.world.duration:
+            about = f"agrees with the halving before within {AGREE * tolerance:.2g} m"
             break
-    else:
-        about = "it was halved no further"
     return Refined(engine, settings, halvings, coarse, agrees, about)
 
 

@@ -6,11 +6,15 @@ from typing import Literal
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.closed import solved
 from sandbox.measure.compare.horizon import NUDGE, agree_until, nudged
+from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.compare.refined import refined
 from sandbox.measure.run import run
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
+
+PATIENCE = 120.0
+"""s that `exact` may take; longer, and the refined truth is used."""
 
 TruthKind = Literal["closed_form", "exact", "refined"]
 
@@ -53,11 +57,15 @@ def truth_of(scene: Scene, settings: Settings, tolerance: float) -> Truth | None
     note = ""
     exact = ENGINES.get("exact")
     if exact is not None and not exact.missing(scene, bare(settings)):
-        found = run(scene, "exact", audit=False, **bare(settings).model_dump())
-        if found.status == "ok":
-            until = _horizon(scene, "exact", bare(settings), found, tolerance)
-            return Truth("exact", f"event-driven, models the whole scene{_limit(scene, until)}", found, until)
-        note = f"; exact gave up: {found.reason}"
+        try:
+            found = patient_run(scene, "exact", bare(settings), PATIENCE)
+        except TookTooLongError as error:
+            note = f"; exact was {error}"
+        else:
+            if found.status == "ok":
+                until = _horizon(scene, "exact", bare(settings), found, tolerance)
+                return Truth("exact", f"event-driven, models the whole scene{_limit(scene, until)}", found, until)
+            note = f"; exact {found.status}: {found.reason}"
 
     finest = refined(scene, settings, tolerance)
     if finest is None:

@@ -9,13 +9,19 @@ from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.errors import errors
-from sandbox.measure.run import run
+from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Detection, Integrator, Settings
 from sandbox.trajectory import Trajectory
 
 MATTERS = 0.9
 """A knob that leaves more of the error than this does not explain it."""
+PATIENCE = 30.0
+"""s that one rerun may take."""
+ALIKE = 1.01
+"""Knobs whose remaining errors differ by no more than this factor do equally well."""
+ROUNDING = 1e-9
+"""A knob that leaves no more of the error than this has removed it."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +33,7 @@ class Knob:
     value: float | str
     """what it was changed to"""
     status: str
-    """`ok`, `diverged`, `failed`, `refused`, or `same` where it was that already"""
+    """`ok`, `diverged`, `failed`, `refused`, `stopped` where it took too long, `same` where it was that already"""
     reason: str | None
     max_position_error: float | None
     """m, up to the same time"""
@@ -86,7 +92,11 @@ def turned(
         if missing:
             found.append(Knob(knob, value, "refused", "; ".join(missing), None, None))
             continue
-        again = run(scene, engine, audit=False, **settings.model_dump())
+        try:
+            again = patient_run(scene, engine, settings, PATIENCE)
+        except TookTooLongError as error:
+            found.append(Knob(knob, value, "stopped", str(error), None, None))
+            continue
         after = errors(again, truth, ~scene.bodies.fixed).until(until).max_position
         if after is None or not math.isfinite(after):
             found.append(Knob(knob, value, again.status, again.reason, None, None))
@@ -98,7 +108,9 @@ def turned(
 def verdict(engine: str, tried: tuple[Knob, ...], before: float) -> str:
     """Say which knob moves the error most."""
     usable = [knob for knob in tried if knob.status == "ok" and knob.ratio is not None]
-    best = min(usable, key=_ratio, default=None)
+    least = min(map(_ratio, usable), default=math.inf)
+    # The first of those that do as well: what they differ by then is rounding.
+    best = next((knob for knob in usable if _ratio(knob) <= max(ALIKE * least, ROUNDING)), None)
     if best is None:
         return f"{engine}: none of the knobs could be tried"
     if _ratio(best) > MATTERS:

@@ -1,9 +1,9 @@
 """Broad phases: which pairs of balls are near enough to look at. BROAD_PHASES is the table of them.
 
-Each is a kernel (order, position, radius, meets, moves, margin, keys) -> (found, tests). It writes the keys of candidate
-pairs into `keys` (C,), each once, in any order, as far as there is room, and returns how many it found and how many
-cheap tests that took. None loses a pair nearer than the margin, so after the narrow phase all agree. `order` (N,) is
-a broad phase's own, from step to step.
+Each is a kernel (order, position, radius, meets, moves, margin, keys) -> (found, tests). It writes the keys of
+candidate pairs into `keys` (C,), each once, in any order, as far as there is room, and returns how many it found and
+how many cheap tests that took. None loses a pair nearer than the margin, so after the narrow phase all agree.
+`order` (N,) is a broad phase's own, from step to step.
 """
 
 from collections.abc import Callable

@@ -20,7 +20,7 @@ def cell_of(coordinate: float, width: float) -> int:
     """Return the number of the cell that a coordinate lies in."""
     if math.isnan(coordinate):  # a body that has diverged meets nobody; the step ends with saying so
         return 0
-    return int(math.floor(min(max(coordinate / width, -FARTHEST_CELL), FARTHEST_CELL)))
+    return math.floor(min(max(coordinate / width, -FARTHEST_CELL), FARTHEST_CELL))
 
 
 @kernel

@@ -25,7 +25,7 @@ def resting(stage: Stage, h: float) -> IntArray:
     contacts = stage.finder.manifolds(x[0], stage.finder.candidates(x[0], reach), reach)
     distance = contacts.arm.sum(axis=1)
     still = (contacts.separation <= NEAR * distance) & (stage.closing(contacts, x) * h < SLOW * distance)
-    return contacts.key[still]
+    return np.asarray(contacts.key[still])
 
 
 def fresh(stage: Stage, x: State, rest: IntArray) -> Manifolds:
