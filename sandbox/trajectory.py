@@ -118,7 +118,7 @@ class Trajectory:
     """(M, 2) who should have touched, numbered as in `contact_pair`"""
     info: Mapping[str, Any] = field(default_factory=dict)
     """What was run and how it went: scene (as a document), engine, settings, actions, seed, status, reason, steps,
-    seconds, energy_start, energy_end, audited, versions."""
+    seconds, work, energy_start, energy_end, audited, versions."""
 
     @property
     def status(self) -> str:

@@ -45,6 +45,7 @@ class Outcome:
             "seconds": _number(seconds),
             "steps": steps,
             "steps_per_second": _number(steps / seconds if seconds else None),
+            "work": info.get("work", {}),
             "realtime_factor": _number(simulated / seconds if seconds else None),
             "energy_start": _number(info["energy_start"]),
             "energy_end": _number(info["energy_end"]),

@@ -56,9 +56,12 @@ def command(
     with gathering(faults, "--tolerance", (ValueError,)):
         if tolerance == float("inf") or tolerance != tolerance:
             raise ValueError(f"{tolerance} m; a tolerance is finite")
-    with gathering(faults, "--out", (OSError,)):
-        _check_folder(out)
+    if out is not None and out.exists() and not out.is_dir():
+        faults.append(Fault("--out", None, "", f"{out}: is no folder"))
 
+    if out is not None and not faults:
+        with gathering(faults):
+            _make_folder(out)
     comparison: Comparison | None = None
     if read is not None and not faults:
         with gathering(faults, scene, (TooLargeError,)), _telling(quiet or as_json) as told:
@@ -92,10 +95,8 @@ def command(
     return status
 
 
-def _check_folder(out: Path | None) -> None:
-    """Refuse before the runs what could not be written after them."""
-    if out is None:
-        return
+def _make_folder(out: Path) -> None:
+    """Make the folder before the runs, so that what could not be written is refused first."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

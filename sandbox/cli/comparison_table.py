@@ -59,6 +59,8 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
 
 def _below(comparison: Comparison, why: bool, refusals: bool) -> list[str]:
     lines = []
+    if any(row.energy_against == "start" and row.energy_drift for row in comparison.rows):
+        lines.append("energy: the change from the start, losses that are right included; the truth ends before the run")
     for row in comparison.rows:
         if refusals and row.status == "refused":
             lines.append(str(row.reason))

@@ -41,7 +41,7 @@ class Divergence(Exception):  # noqa: N818, a result of the physics asked for, n
 
 
 class Exhaustion(Exception):  # noqa: N818, as above
-    """A simulation has gathered more than memory should hold. What it has can be read."""
+    """A simulation needs more memory or work than is reasonable. What it has can be read, but not stepped further."""
 
 
 Observer: TypeAlias = "Callable[[float, FloatArray, FloatArray, IntArray], None]"
@@ -64,11 +64,16 @@ class Simulation(Protocol):
     def retired(self) -> Mapping[int, float]:
         """When each body that was removed, or left world.bounds, was gone: number → s."""
 
+    @property
+    def work(self) -> Mapping[str, int]:
+        """What was done so far, counted and not timed: the same on every machine. What is counted is the engine's."""
+
     def step(self) -> None:
         """Advance by one dt.
 
         Raises:
             Divergence: the state is not finite, or beyond all bounds.
+            Exhaustion: the step asks for more than can be had.
         """
 
     def finish(self, part: float) -> None:

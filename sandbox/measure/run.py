@@ -72,14 +72,14 @@ def run(
     began = perf_counter()
     status, reason, steps, contacts = _drive(scene, simulation, resolved, actions, recorder, progress)
     seconds = perf_counter() - began - (auditor.seconds if auditor else 0.0)
-    bodies = simulation.bodies
+    bodies, work = simulation.bodies, dict(simulation.work)
     simulation.close()
 
     retired = np.full(len(bodies), np.nan)
     for number, time in simulation.retired.items():
         retired[number] = time
     missed = auditor.missed if auditor else _no_misses()
-    outcome = {"status": status, "reason": reason, "steps": steps, "seconds": seconds, "audited": audit}
+    outcome = {"status": status, "reason": reason, "steps": steps, "seconds": seconds, "work": work, "audited": audit}
     info = _info(scene, engine, resolved, actions, **outcome)
     trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, missed, info)
     total = energies(trajectory.at([0, -1]), scene, bodies=bodies).total
@@ -102,7 +102,7 @@ def _info(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, 
 def _refused(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, ...], reason: str) -> Trajectory:
     """Return a trajectory without frames, which says why."""
     count = len(scene.bodies)
-    outcome = {"status": "refused", "reason": reason, "steps": 0, "seconds": 0.0, "audited": False}
+    outcome = {"status": "refused", "reason": reason, "steps": 0, "seconds": 0.0, "work": {}, "audited": False}
     info = _info(scene, engine, settings, actions, **outcome, energy_start=None, energy_end=None)
     shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
     frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}

@@ -12,8 +12,7 @@ from warnings import catch_warnings, filterwarnings
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import AxLine, Line2D
-from matplotlib.patches import Circle
+from matplotlib.lines import Line2D
 
 from sandbox.measure.compare import Comparison
 from sandbox.measure.compare.errors import Errors, errors
@@ -24,8 +23,6 @@ from sandbox.report.panels import (
     CLOSED,
     FAINT,
     INK,
-    MOST_POINTS,
-    STILL,
     add_legend,
     draw,
     draw_closed,
@@ -33,9 +30,9 @@ from sandbox.report.panels import (
     literal,
     shortened,
 )
+from sandbox.report.paths import draw_fixed, draw_path, draw_truth, moving_axes
 from sandbox.report.plots import COLOURS, FORMATS, MOST_BODIES
-from sandbox.scene.model import Plane, Post, Scene
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.trajectory import FloatArray
 
 FLOOR = 1e-16
 """The lowest that a logarithmic axis reaches; what is smaller, such as 0, is drawn at its floor."""
@@ -48,8 +45,6 @@ PALE = 0.25
 """Opacity beyond `trusted_until`."""
 DISTRUSTED: dict[str, Any] = {"color": "#efefef", "zorder": 0.1, "lw": 0}
 """The time beyond `trusted_until`."""
-SOLID: dict[str, Any] = {"color": "#9a9a9a", "lw": 1.4, "zorder": 0.6}
-"""Fixed things."""
 LEGEND: dict[str, Any] = {"loc": "outside lower center"}
 
 
@@ -74,19 +69,19 @@ def draw_trajectories(comparison: Comparison) -> Figure:
     """
     scene = comparison.scene
     numbers = np.flatnonzero(~scene.bodies.fixed)[:MOST_BODIES].tolist()
-    axes = _moving_axes(comparison, numbers)
+    axes = moving_axes(comparison.trajectories.values(), numbers)
     figure = Figure(figsize=(8.0, 6.0), facecolor="white")
     panel = figure.subplots()
     truth = comparison.best
-    for (name, colour), width in zip(_colours(comparison).items(), _widths(), strict=False):
+    for (name, colour), width in zip(_colours(comparison).items(), _widths(comparison), strict=False):
         run = comparison.trajectories[name]
         for number in numbers:
-            _draw_path(panel, run, number, axes, colour, comparison.trusted_until)
+            draw_path(panel, run, number, axes, colour, comparison.trusted_until)
             for line, opacity in zip(panel.lines[-2:], (OPAQUE, PALE), strict=True):
                 line.set(linewidth=width, alpha=opacity)
     if truth is not None:
         for number in numbers:
-            _draw_truth(panel, truth.trajectory, number, axes, truth.trusted_until)
+            draw_truth(panel, truth.trajectory, number, axes, truth.trusted_until)
     if len(axes) == 1:
         panel.set(xlabel="time, s", ylabel=f"position {'xy'[axes[0]]}, m")
         _shade(panel, comparison)
@@ -95,7 +90,7 @@ def draw_trajectories(comparison: Comparison) -> Figure:
         panel.set(xlabel="position x, m", ylabel="position y, m")
         dress(panel)
         panel.set_aspect("equal", adjustable="datalim")
-        _draw_fixed(panel, scene)
+        draw_fixed(panel, scene)
     if len(numbers) > 1:
         for number in numbers:
             x, y = scene.bodies.position[number].tolist()
@@ -147,7 +142,7 @@ def draw_energy(comparison: Comparison) -> Figure:
     upper.set_ylabel("total energy, J")
     lower.set_xlabel("time, s")
     curves = {}
-    for (name, colour), width in zip(_colours(comparison).items(), _widths(), strict=False):
+    for (name, colour), width in zip(_colours(comparison).items(), _widths(comparison), strict=False):
         run = comparison.trajectories[name]
         total = energies(run, scene).total
         draw(upper, run.time, total, colour)
@@ -172,72 +167,10 @@ def _colours(comparison: Comparison) -> dict[str, str]:
     return dict(zip(comparison.trajectories, cycle(COLOURS), strict=False))
 
 
-def _widths() -> Iterator[float]:
-    return chain(WIDTHS, repeat(WIDTHS[-1]))
-
-
-def _moving_axes(comparison: Comparison, numbers: list[int]) -> list[int]:
-    """Return the axes along which something moves; both, where nothing does."""
-    runs = [run.position[:, numbers] for run in comparison.trajectories.values()]
-    span = [max((_span(position[..., axis]) for position in runs), default=0.0) for axis in (0, 1)]
-    return [axis for axis in (0, 1) if span[axis] > STILL * max(span)] or [0, 1]
-
-
-def _span(position: FloatArray) -> float:
-    """Return how far any one of (T, K) coordinates travels."""
-    if not position.size:
-        return 0.0
-    with np.errstate(over="ignore", invalid="ignore"):
-        travelled = np.asarray(position.max(axis=0) - position.min(axis=0))
-    return float(np.nan_to_num(travelled, nan=0.0, posinf=0.0).max())
-
-
-def _draw_path(panel: Axes, run: Trajectory, number: int, axes: list[int], colour: str, until: float | None) -> None:
-    """Draw where a body went, in two lines: as far as the truth is trusted, and pale beyond."""
-    position = np.where((run.time >= run.retired_time[number])[:, None], np.nan, run.position[:, number])
-    trusted = run.time <= (math.inf if until is None else until)
-    begun = np.append(~trusted[1:], True)  # the pale line begins where the other ends
-    for kept in (trusted, begun):
-        there = np.where(kept[:, None], position, np.nan)
-        if len(axes) == 1:
-            draw(panel, run.time, there[:, axes[0]], colour)
-        else:
-            panel.plot(*_path(there).T, color=colour, solid_joinstyle="round", solid_capstyle="butt")
-
-
-def _draw_truth(panel: Axes, run: Trajectory, number: int, axes: list[int], until: float) -> None:
-    valid = (run.time <= until) & ~(run.time >= run.retired_time[number])
-    if len(axes) == 1:
-        draw_closed(panel, run.time, run.position[:, number, axes[0]], valid)
-        return
-    x, y = _path(run.position[valid, number]).T
-    panel.plot(x, y, **CLOSED)
-
-
-def _path(position: FloatArray) -> FloatArray:
-    """Thin a path (T, 2), and leave out what cannot be drawn."""
-    kept = position[:: max(1, math.ceil(len(position) / MOST_POINTS))]
-    kept = np.concatenate((kept, position[-1:]))
-    fine = np.asarray((np.abs(kept) < BEYOND).all(axis=1))
-    return np.where(fine[:, None], kept, np.nan)
-
-
-def _draw_fixed(panel: Axes, scene: Scene) -> None:
-    """Draw planes, walls, posts and fixed balls; as artists they have no say in the limits."""
-    bodies = scene.bodies
-    still = np.flatnonzero(bodies.fixed)
-    circles = list(zip(bodies.position[still].tolist(), bodies.radius[still].tolist(), strict=True))
-    for thing in scene.fixed:
-        if isinstance(thing, Plane):
-            x, y = thing.point
-            panel.add_artist(AxLine((x, y), (x - thing.normal[1], y + thing.normal[0]), None, **SOLID))
-        elif isinstance(thing, Post):
-            circles.append((list(thing.position), thing.radius))
-        else:
-            points = [*thing.points, thing.points[0]] if thing.closed else thing.points
-            panel.add_artist(Line2D(*np.asarray(points).T, **SOLID))
-    for (x, y), radius in circles:
-        panel.add_artist(Circle((x, y), radius, fill=False, **SOLID))
+def _widths(comparison: Comparison) -> Iterator[float]:
+    """Return a width for each engine that has a run; few need no wide ones."""
+    few = max(0, len(WIDTHS) - 1 - len(comparison.trajectories))
+    return chain(WIDTHS[few:], repeat(WIDTHS[-1]))
 
 
 def _draw_log(
@@ -248,7 +181,7 @@ def _draw_log(
     least = min((float(values.min()) for values in positive if len(values)), default=FLOOR)
     floor = max(FLOOR, 10.0 ** (math.floor(math.log10(least)) - 1))
     panel.set_ylabel(f"{label}\n(0 drawn at {floor:.0e})")
-    for (name, colour), width in zip(_colours(comparison).items(), _widths(), strict=False):
+    for (name, colour), width in zip(_colours(comparison).items(), _widths(comparison), strict=False):
         if name in curves:
             time, values = curves[name]
             draw(panel, time, np.where(np.isfinite(values), np.maximum(values, floor), np.nan), colour)

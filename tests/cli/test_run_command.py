@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from calling import DIVERGING, DROP, FAULTY, json_of, lines_of, process, written
 
+from sandbox.engines.registry import ENGINES
 from sandbox.trajectory import Trajectory
 
 KEYS = {
@@ -169,8 +170,8 @@ def test_fault_of_several_points_of_a_sweep_is_told_once(tmp_path: Path, capfd: 
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (("--engine", "none"), "--engine: no engine 'none'; engines: pymunk"),
-        (("--engines", "pymunk,"), "--engine: no engine ''; engines: pymunk"),
+        (("--engine", "none"), f"--engine: no engine 'none'; engines: {', '.join(ENGINES)}"),
+        (("--engines", "pymunk,"), f"--engine: no engine ''; engines: {', '.join(ENGINES)}"),
         (
             ("--sweep", "solver.dt=1:2:0"),
             "--sweep: 'solver.dt=1:2:0': a range has finite ends and 1 to 1,000,000 values",

@@ -67,6 +67,11 @@ class NativeSimulation:
         return MappingProxyType(self._retired)
 
     @property
+    def work(self) -> Mapping[str, int]:
+        """What was done so far: substeps; pymunk does not tell how much it looks at."""
+        return {"substeps": self._steps * self._settings.substeps}
+
+    @property
     def flying(self) -> int:
         """How many bodies are advanced as arrays, outside of pymunk."""
         return len(self._population.free)

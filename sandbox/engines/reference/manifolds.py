@@ -2,6 +2,8 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from sandbox.engines.kernel import kernel
 from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key
 from sandbox.engines.reference.narrow_phase import circle_circle, circle_half_plane, circle_segment
@@ -39,6 +41,11 @@ class Manifolds(NamedTuple):
     def of(self, which: IntArray | BoolArray | slice) -> "Manifolds":
         """Return some of them."""
         columns: Any = (column[which] for column in self)
+        return Manifolds(*columns)
+
+    def joined(self, more: "Manifolds") -> "Manifolds":
+        """Return these and more, one after the other: their keys need not ascend."""
+        columns: Any = (np.concatenate(pair) for pair in zip(self, more, strict=True))
         return Manifolds(*columns)
 
 

@@ -8,6 +8,10 @@ FIRST = 30
 SECOND = (1 << FIRST) - 1
 """The bits of the second."""
 
+ROUNDING = 1e-15
+"""What two edges, x ± r, can be off by together, as a part of what is added up in them: four roundings, and a bit.
+Boxes are widened by it, or far from the origin they would lose pairs whose centres are near enough."""
+
 
 @kernel
 def pair_key(i: int, j: int) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 
 from sandbox.engines.fixtures import Fixtures
 from sandbox.engines.kernel import kernel
-from sandbox.engines.reference.meeting import pair_key
+from sandbox.engines.reference.meeting import ROUNDING, pair_key
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 
@@ -44,6 +44,7 @@ def near_segments(
         if not able[i]:
             continue
         x, y, reach = position[i, 0], position[i, 1], radius[i] + margin
+        reach += ROUNDING * (abs(x) + abs(y) + reach + widest)
         low, high = 0, len(box)
         while low < high:  # the first that begins at x − reach − widest or farther right
             middle = (low + high) // 2

@@ -2,14 +2,13 @@
 
 import hashlib
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import NoReturn
 
 import numpy as np
 
 from sandbox.action import Action
 from sandbox.engines.acting import perform
-from sandbox.engines.contract import Divergence, Observer
+from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.kernel import tell_if_slow
 from sandbox.engines.ledger import ContactLedger
 from sandbox.engines.limits import BEYOND
@@ -67,8 +66,8 @@ class ReferenceSimulation:
 
     @property
     def work(self) -> Mapping[str, int]:
-        """What was done so far, without a clock: tests of the broad and narrow phases, contacts found."""
-        return MappingProxyType(self._stage.finder.work)
+        """What was done so far: substeps, tests of the broad and narrow phases, contacts found."""
+        return {"substeps": self._steps * self._settings.substeps, **self._stage.finder.work}
 
     def step(self) -> None:
         """Advance by one dt.
@@ -109,7 +108,11 @@ class ReferenceSimulation:
         """Advance by h: apply forces, then advance, detect and resolve, in the chosen detection's way."""
         self._stage.time = time
         self._stage.apply_forces()
-        self._advance(self._stage, h)
+        try:
+            self._advance(self._stage, h)
+        except Exhaustion:
+            self._ended = True
+            raise
 
     def _settle(self) -> None:
         """Write the state down, stop what is no longer finite and bounded, retire who has left world.bounds."""

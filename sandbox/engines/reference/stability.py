@@ -1,5 +1,7 @@
 """Stability: up to which step penalty springs are stable, by the integrator's own amplification."""
 
+import math
+
 import numpy as np
 
 from sandbox.engines.reference.integrators import INTEGRATORS, amplification
@@ -44,11 +46,21 @@ def unstable(scene: Scene, settings: Settings) -> str | None:
     if _growth(settings, frequency, crowd * worst, settings.h) <= 1.0 + ROUNDING:
         return None
     bound = _largest(settings, frequency, crowd * worst)
-    remedy = f"stable up to h = {bound:.3g} s" if bound else "stable at no step; semi_implicit_euler is, up to some h"
+    remedy = (
+        f"stable up to h = {_rounded_down(bound):g} s"
+        if bound
+        else "stable at no step; semi_implicit_euler is, up to some h"
+    )
     return (
         f"penalty springs of {settings.stiffness:g} N/m would gain energy at h = {settings.h:g} s "
         f"with {settings.integrator}: {remedy}, or state a smaller solver.stiffness"
     )
+
+
+def _rounded_down(value: float) -> float:
+    """Return three digits of a value, no larger than it: who is told a bound may try just that."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return math.floor(value / unit) * unit
 
 
 def _growth(settings: Settings, frequency: float, damping: float, h: float) -> float:

@@ -42,7 +42,8 @@ class Stage:
         self.penalty = Penalty(roster, settings, self.finder) if settings.response == "penalty" else None
         self.time = 0.0
         self.witness: Witness | None = None
-        self._memory: tuple[IntArray, FloatArray] = np.empty(0, np.int64), np.empty((0, 2))
+        self._memory: tuple[IntArray, FloatArray, float] = np.empty(0, np.int64), np.empty((0, 2)), settings.h
+        self.push: FloatArray = np.zeros((0, 2))
         self.enter()
 
     def enter(self) -> None:
@@ -56,8 +57,11 @@ class Stage:
                 for p in ((roster.position, roster.angle), (roster.velocity, roster.angular_velocity))
             ]
         self.x: State = np.stack(parts)
-        self.push: FloatArray = np.zeros((len(roster.position), 2))
-        self._pushes = False
+        # Overlap goes on being corrected, except for who is gone.
+        kept = np.zeros((len(roster.position), 2))
+        kept[: len(self.push)] = self.push
+        self.push = np.where(roster.moving[:, None], kept, 0.0)
+        self._pushes = bool(self.push.any())
         self._no_spin: FloatArray = np.zeros((len(roster.position), 3))
         self.finder.population_changed()
         if self.penalty is not None:
@@ -104,41 +108,59 @@ class Stage:
         if self.penalty is not None:
             self._done(moved, *self.penalty.given(), h)
             return
-        impulse = np.zeros((contacts.size, 2))
+        impulse = self._held(moved, contacts, h)
+        self._pushes = False
+        self.push[:] = 0.0
         if contacts.size:
-            share = self._integrator.share
-            bounce = self._approach(contacts, self.x[1]) * contacts.coefficient[:, 0]
-            remembered(contacts.key, *self._memory, impulse)
-            kicked = moved[1].copy()
-            self._solve(contacts, bounce, moved[1], impulse)
-            separation = contacts.separation
-            if share:
-                change = moved[1] - kicked
-                moved[0] += (share * h) * change
-                separation = separation + (share * h) * self._approach(contacts, change)
             # The share of an overlap beyond the slop that one substep undoes; by the next one's motion.
-            target = -(1.0 - self._bias**h) / h * np.minimum(separation + self._slop, 0.0)
+            target = -(1.0 - self._bias**h) / h * np.minimum(contacts.separation + self._slop, 0.0)
             self._pushes = bool(target.any())
-            self.push[:] = 0.0
             if self._pushes:
                 solve_overlaps(contacts, target, self.push, self._roster.inverse_mass, self._settings.iterations)
-        elif self._pushes:
-            self._pushes = False
-            self.push[:] = 0.0
-        self._memory = contacts.key.copy(), impulse
+        self._memory = contacts.key.copy(), impulse, h
         self._done(moved, contacts, impulse, h)
 
-    def impact(self, moved: State, contacts: Manifolds, h: float) -> None:
-        """Take a state a time h, s, ahead as the present one, in which some have just met; part them at once."""
+    def impact(self, moved: State, clash: Manifolds, lasting: Manifolds, h: float) -> None:
+        """Take a state a time h, s, ahead as the present one, in which some have just met; part them at once.
+
+        What touched all the while is held up as in `resolve`: else gravity's kick would make it bounce.
+        """
+        held = self._held(moved, lasting, h)
+        struck = np.zeros((clash.size, 2))
+        bounce = self._approach(clash, moved[1]) * clash.coefficient[:, 0]
+        self._solve(clash, bounce, moved[1], struck)
+        self._done(moved, lasting.joined(clash), np.concatenate((held, struck)), h)
+
+    def _held(self, moved: State, contacts: Manifolds, h: float) -> FloatArray:
+        """Solve what touches at the end of h, s; return the impulses (K, 2), N·s.
+
+        Both the state and the separations are brought up to date.
+        """
         impulse = np.zeros((contacts.size, 2))
-        bounce = self._approach(contacts, moved[1]) * contacts.coefficient[:, 0]
+        if not contacts.size:
+            return impulse
+        share = self._integrator.share
+        bounce = self._approach(contacts, self.x[1]) * contacts.coefficient[:, 0]
+        key, old, old_h = self._memory
+        remembered(contacts.key, key, old, impulse)
+        # What rests takes impulses in proportion to the time. Never more: a blow does not grow with it.
+        impulse *= min(h / old_h, 1.0)
+        kicked = moved[1].copy()
         self._solve(contacts, bounce, moved[1], impulse)
-        self._done(moved, contacts, impulse, h)
+        if share:
+            change = moved[1] - kicked
+            moved[0] += (share * h) * change
+            contacts.separation[:] += (share * h) * self._approach(contacts, change)
+        return impulse
 
     def _approach(self, contacts: Manifolds, velocity: FloatArray) -> FloatArray:
         out = np.empty(contacts.size)
         approach(contacts, velocity, out)
         return out
+
+    def gentle(self, h: float) -> float:
+        """Return the closing speed, m/s, that the forces of a substep or two bring about: of what rests, not hits."""
+        return 2.0 * h * float(np.abs(self.u.steady[:, :2]).max(initial=0.0))
 
     def closing(self, contacts: Manifolds, x: State) -> FloatArray:
         """Return how fast each contact closes in a state, (K,) m/s."""

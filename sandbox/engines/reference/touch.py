@@ -49,15 +49,22 @@ def touch_segment(
     x: float, y: float, mx: float, my: float, ax: float, ay: float, bx: float, by: float, distance: float
 ) -> float:
     """Return when a point at (x, y) that moves by (mx, my) comes within a distance of a segment, m."""
+    along_x, along_y = bx - ax, by - ay
+    length = math.sqrt(along_x * along_x + along_y * along_y)
+    place = 0.0
+    if length > 0.0:
+        along_x, along_y = along_x / length, along_y / length
+        place = min(max((x - ax) * along_x + (y - ay) * along_y, 0.0), length)
+    dx, dy = x - ax - place * along_x, y - ay - place * along_y
+    if dx * dx + dy * dy <= distance * distance:
+        # The whole is convex: who moves away from its nearest point does not come nearer later.
+        return 0.0 if dx * mx + dy * my < 0.0 else NEVER
     first = min(
         touch_circle(x - ax, y - ay, mx, my, distance),
         touch_circle(x - bx, y - by, mx, my, distance),
     )
-    along_x, along_y = bx - ax, by - ay
-    length = math.sqrt(along_x * along_x + along_y * along_y)
     if length == 0.0:
         return first
-    along_x, along_y = along_x / length, along_y / length
     side = along_x * (y - ay) - along_y * (x - ax)
     rate = along_x * my - along_y * mx
     if side < 0.0:

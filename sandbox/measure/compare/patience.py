@@ -15,6 +15,8 @@ class TookTooLongError(Exception):
 def patient_run(scene: Scene, engine: str, settings: Settings, seconds: float, *, audit: bool = False) -> Trajectory:
     """Run a scene, but give up after some time; looked at between steps, as a step cannot be interrupted.
 
+    The time runs from the end of the first step on: an engine may compile in it.
+
     Args:
         scene: what to run.
         engine: its name.
@@ -26,10 +28,12 @@ def patient_run(scene: Scene, engine: str, settings: Settings, seconds: float, *
         TookTooLongError: it took longer.
         TooLargeError: the frames would not fit into memory.
     """
-    began = perf_counter()
+    began: float | None = None
 
     def watch(share: float) -> None:
+        nonlocal began
+        began = perf_counter() if began is None else began
         if share < 1.0 and perf_counter() - began > seconds:
-            raise TookTooLongError(f"given up after {seconds:g} s, {share:.0%} done")
+            raise TookTooLongError(f"given up after {seconds:.3g} s, {share:.0%} done")
 
     return run(scene, engine, audit=audit, progress=watch, **settings.model_dump())

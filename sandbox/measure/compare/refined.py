@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.compare.horizon import agree_until
+from sandbox.measure.compare.horizon import agree_until, nudged
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.recorder import frame_count
 from sandbox.scene.model import Scene
@@ -56,7 +56,8 @@ class Refined:
 def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | None:
     """Halve dt until two successive answers agree within `AGREE` of the tolerance, or the work becomes too much.
 
-    An answer in which contacts were missed agrees with nothing from the first of them on.
+    Where a nudge changes the answer from some time on, they need not agree beyond it. An answer in which contacts
+    were missed agrees with nothing from the first of them on.
 
     The reference is asked first, then every other engine with a step, in the order of the registry; of each, the
     settings in the order of `PREFERENCES`. Frames stay where they were. None where no engine can run the scene.
@@ -80,13 +81,21 @@ def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | Non
 
 def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> Refined | None:
     """Refine one choice of settings; None where not even the first run gets to its end."""
-    began = perf_counter()
     try:
-        coarse = patient_run(scene, engine, settings, PATIENCE / 5.0)
+        try:
+            coarse = patient_run(scene, engine, settings, PATIENCE / 5.0)
+        except TookTooLongError:  # once more: it may have compiled on the way
+            coarse = patient_run(scene, engine, settings, PATIENCE / 5.0)
+        if coarse.status != "ok":
+            return None
+        # Beyond the time at which a nudge matters, agreement is not to be had, nor of use.
+        other = nudged(scene)
+        enough = scene.world.duration
+        if other is not None:
+            enough = agree_until(coarse, patient_run(other, engine, settings, PATIENCE / 5.0), scene, tolerance)
     except TookTooLongError:
         return None
-    if coarse.status != "ok":
-        return None
+    began = perf_counter()
     work = each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
     agrees, halvings, about = 0.0, 0, "it was halved no further"
     while halvings < HALVINGS:
@@ -111,7 +120,7 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
         close = min(agree_until(fine, coarse, scene, AGREE * tolerance), missed)
         agrees = min(agree_until(fine, coarse, scene, tolerance), missed)
         coarse, settings, halvings, work = fine, finer, halvings + 1, work + each
-        if close == scene.world.duration:
+        if close >= enough:
             about = f"agrees with the halving before within {AGREE * tolerance:.2g} m"
             break
     return Refined(engine, settings, halvings, coarse, agrees, about)

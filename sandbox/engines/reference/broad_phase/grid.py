@@ -71,19 +71,21 @@ def grid(
     for i in range(count):
         if meets[i] == 0:
             continue
-        for across in range(-1, 2):
-            for up in range(-1, 2):
-                s = slot_of(column[i] + across, row[i] + up, mask)
+        x, y = position[i, 0], position[i, 1]
+        # Three by three cells at most; told by positions, as far out neighbouring numbers would be rounded apart.
+        for across in range(cell_of(x - width, width), cell_of(x + width, width) + 1):
+            for up in range(cell_of(y - width, width), cell_of(y + width, width) + 1):
+                s = slot_of(across, up, mask)
                 for place in range(begin[s], begin[s + 1]):
                     j = order[place]
                     # Another cell may share the slot.
-                    if j <= i or column[j] != column[i] + across or row[j] != row[i] + up:
+                    if j <= i or column[j] != across or row[j] != up:
                         continue
                     if may_meet(meets[i], moves[i], meets[j], moves[j]):
                         tests += 1
-                        x, y = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+                        dx, dy = position[j, 0] - x, position[j, 1] - y
                         reach = radius[i] + radius[j] + margin
-                        if x * x + y * y <= reach * reach:
+                        if dx * dx + dy * dy <= reach * reach:
                             if found < len(keys):
                                 keys[found] = pair_key(i, j)
                             found += 1

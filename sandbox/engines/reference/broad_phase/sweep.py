@@ -4,7 +4,7 @@ O(N log N + pairs that overlap in x). Suits scenes that are wide, and balls of v
 """
 
 from sandbox.engines.kernel import kernel
-from sandbox.engines.reference.meeting import may_meet, pair_key
+from sandbox.engines.reference.meeting import ROUNDING, may_meet, pair_key
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 
@@ -34,7 +34,8 @@ def sweep(
     found, tests = 0, 0
     for k in range(len(order)):
         i = order[k]
-        right = position[i, 0] + radius[i] + margin
+        reach = radius[i] + margin
+        right = position[i, 0] + reach + ROUNDING * (abs(position[i, 0]) + reach)
         for next_k in range(k + 1, len(order)):
             j = order[next_k]
             if position[j, 0] - radius[j] > right:

@@ -6,7 +6,7 @@ through before the end of the step is not seen, as in discrete detection.
 """
 
 from sandbox.engines.reference.detection.discrete import discrete
-from sandbox.engines.reference.detection.resting import MOST_IMPACTS, fresh, resting
+from sandbox.engines.reference.detection.resting import MOST_IMPACTS, fresh, lasting, resting
 from sandbox.engines.reference.stage import Stage
 
 EPSILON = 1e-9
@@ -15,20 +15,21 @@ EPSILON = 1e-9
 
 def bisect(stage: Stage, h: float) -> None:
     """Advance from impact to impact, each to the last time at which nothing overlaps anew within EPSILON·h."""
-    left = h
+    left, gentle = h, stage.gentle(h)
     for _ in range(MOST_IMPACTS):
         rest = resting(stage, left)
-        clash = fresh(stage, stage.moved(left), rest)
+        clash = fresh(stage, stage.moved(left), rest, gentle)
         if not clash.size:
             break
         low, high = 0.0, left
         while high - low > EPSILON * h:
             middle = 0.5 * (low + high)
-            found = fresh(stage, stage.moved(middle), rest)
+            found = fresh(stage, stage.moved(middle), rest, gentle)
             if found.size:
                 clash, high = found, middle
             else:
                 low = middle
-        stage.impact(stage.moved(low), clash, low)
+        moved = stage.moved(low)
+        stage.impact(moved, clash, lasting(stage, moved, rest, clash), low)
         left -= low
     discrete(stage, left)

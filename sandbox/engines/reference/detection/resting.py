@@ -28,12 +28,23 @@ def resting(stage: Stage, h: float) -> IntArray:
     return np.asarray(contacts.key[still])
 
 
-def fresh(stage: Stage, x: State, rest: IntArray) -> Manifolds:
-    """Return the contacts of a state that are new: overlapping, approaching, and none of the resting ones."""
+def fresh(stage: Stage, x: State, rest: IntArray, gentle: float) -> Manifolds:
+    """Return the contacts of a state that are new: overlapping, none of the resting ones, closing faster than gently.
+
+    What closes gently came to rest: bounces smaller than a step can show would go on without an end.
+    """
     contacts = stage.overlaps(x)
     if not contacts.size:
         return contacts
-    return contacts.of(_new(contacts, rest) & (stage.closing(contacts, x) > 0.0))
+    return contacts.of(_new(contacts, rest) & (stage.closing(contacts, x) > gentle))
+
+
+def lasting(stage: Stage, x: State, rest: IntArray, clash: Manifolds) -> Manifolds:
+    """Return the contacts of a state that were resting ones before, apart from those of the clash."""
+    if not len(rest):
+        return clash.of(slice(0))
+    contacts = stage.overlaps(x)
+    return contacts.of(~_new(contacts, rest) & _new(contacts, clash.key))
 
 
 def _new(contacts: Manifolds, rest: IntArray) -> BoolArray:

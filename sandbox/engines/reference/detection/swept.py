@@ -4,20 +4,27 @@ Nothing is passed unseen, however fast. Paths under gravity are curved; what the
 that impacts are second order in time.
 """
 
+import numpy as np
+
 from sandbox.engines.reference.detection.discrete import discrete
-from sandbox.engines.reference.detection.resting import MOST_IMPACTS, resting
+from sandbox.engines.reference.detection.resting import MOST_IMPACTS, lasting, resting
 from sandbox.engines.reference.stage import Stage
 
 
 def swept(stage: Stage, h: float) -> None:
-    """Advance from one first touch to the next."""
-    left = h
+    """Advance from one first touch to the next; what closes gently comes to rest, and is the discrete stage's."""
+    left, gentle = h, stage.gentle(h)
+    rest = resting(stage, left)
     for _ in range(MOST_IMPACTS):
-        moved = stage.moved(left)
-        share, key = stage.finder.first_touch(stage.x[0], moved[0], resting(stage, left))
+        share, key = stage.finder.first_touch(stage.x[0], stage.moved(left)[0], rest)
         if key < 0:
             break
         reached = stage.moved(share * left)
-        stage.impact(reached, stage.finder.only(reached[0], key), share * left)
+        contact = stage.finder.only(reached[0], key)
+        if stage.closing(contact, reached)[0] <= gentle:
+            rest = np.union1d(rest, [key])
+            continue
+        stage.impact(reached, contact, lasting(stage, reached, rest, contact), share * left)
         left -= share * left
+        rest = resting(stage, left)
     discrete(stage, left)

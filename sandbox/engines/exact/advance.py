@@ -1,0 +1,178 @@
+"""Advance: event after event up to a time, all in one kernel call."""
+
+from sandbox.engines.exact.arena import (
+    AT_INSTANT,
+    BALL,
+    BUDGET,
+    EDGE,
+    EVENTS,
+    FLAT,
+    IN_SECOND,
+    INSTANT,
+    KNOB,
+    LIGHTNESS,
+    NEXT_KIND,
+    NEXT_STAMP,
+    NEXT_WHO,
+    NOW,
+    RECORDING,
+    ROWS,
+    SECOND,
+    SLIP_ENDS,
+    STAMP,
+    WHAT,
+    WHO,
+    WITH,
+    Arena,
+)
+from sandbox.engines.exact.impact import bring, hit_ball, hit_knob
+from sandbox.engines.exact.log import ROOM
+from sandbox.engines.exact.predict import place, predict, turned
+from sandbox.engines.exact.support import hit_flat, knocked, pass_edge, settle, slip_ends
+from sandbox.engines.kernel import kernel
+from sandbox.trajectory import FloatArray
+
+DONE, PAUSED, FULL, TOO_MANY, TOO_DENSE = range(5)
+"""What `advance` returns: up to the time; after `PAUSE` events; the log is full; more events within one second than
+the budget; more within one instant."""
+
+PAUSE = 100_000
+"""Events after which a kernel lets Python see to signals: a fraction of a second, compiled."""
+
+MOMENT = 1e-9
+"""s: events closer together than this count as one instant."""
+
+PER_BALL = 1000
+"""Events that an instant may have for each ball."""
+
+
+@kernel
+def start(arena: Arena) -> None:
+    """Let every ball move and look ahead, from the time on that the clock says."""
+    for i in range(len(arena.state)):
+        if arena.state[i, LIGHTNESS] > 0.0:
+            changed(arena, i)
+    look_ahead(arena)
+
+
+@kernel
+def look_ahead(arena: Arena) -> None:
+    """Predict every ball's earliest event anew."""
+    for k in range(len(arena.movers)):
+        predict(arena, arena.movers[k], arena.world[NOW])
+
+
+@kernel
+def renew(arena: Arena, t: float) -> None:
+    """Let every ball go on under what now holds, which an action has changed at a time."""
+    arena.world[NOW] = t
+    for i in range(len(arena.state)):
+        if arena.state[i, LIGHTNESS] > 0.0:
+            bring(arena, i, t)
+            knocked(arena, i)
+    start(arena)
+
+
+@kernel
+def changed(arena: Arena, i: int) -> None:
+    """Note that a ball moves otherwise from now on."""
+    settle(arena, i)
+    arena.tags[i, STAMP] += 1
+
+
+@kernel
+def earliest(arena: Arena) -> int:
+    """Return the ball whose event is next, of several at one time the lowest; −1 where none moves."""
+    movers, times = arena.movers, arena.next_time
+    who = -1
+    if len(movers) > 0:
+        who = movers[0]
+        best = times[who]
+        for k in range(1, len(movers)):
+            if times[movers[k]] < best:
+                who = movers[k]
+                best = times[who]
+    return who
+
+
+@kernel
+def within(arena: Arena, t: float) -> int:
+    """Count an event; return `DONE`, or which bound is passed."""
+    count, world = arena.counts, arena.world
+    count[EVENTS] += 1
+    if t > world[SECOND] + 1.0:
+        world[SECOND], count[IN_SECOND] = t, 0
+    if t > world[INSTANT] + MOMENT:
+        world[INSTANT], count[AT_INSTANT] = t, 0
+    count[IN_SECOND] += 1
+    count[AT_INSTANT] += 1
+    if count[AT_INSTANT] > PER_BALL * (len(arena.movers) + 1):
+        return TOO_DENSE
+    if count[IN_SECOND] > count[BUDGET]:
+        return TOO_MANY
+    return DONE
+
+
+@kernel
+def happen(arena: Arena, i: int, kind: int, partner: int, t: float) -> None:
+    """Let a ball's event happen, and look ahead for those whom it concerns.
+
+    Others that were to meet them are left: their times stay bounds, and are looked at when they come up.
+    """
+    bring(arena, i, t)
+    both = kind == BALL and arena.state[partner, LIGHTNESS] > 0.0
+    if kind == SLIP_ENDS:
+        slip_ends(arena, i)
+    elif kind == EDGE:
+        pass_edge(arena, i)
+    elif kind == FLAT:
+        hit_flat(arena, i, partner)
+    elif kind == KNOB:
+        hit_knob(arena, i, partner)
+        knocked(arena, i)
+    else:
+        bring(arena, partner, t)
+        hit_ball(arena, i, partner)
+        knocked(arena, i)
+        if both:
+            knocked(arena, partner)
+    changed(arena, i)
+    if both:
+        changed(arena, partner)
+        predict(arena, partner, t)
+    predict(arena, i, t)
+
+
+@kernel
+def advance(arena: Arena, until: float) -> int:
+    """Let all events up to a time happen; return why it stopped."""
+    for _ in range(PAUSE):
+        i = earliest(arena)
+        if i < 0 or arena.next_time[i] > until:
+            return DONE
+        if arena.counts[RECORDING] != 0 and arena.counts[ROWS] + ROOM > len(arena.log):
+            return FULL
+        t = arena.next_time[i]
+        kind, partner = arena.tags[i, NEXT_KIND], arena.tags[i, NEXT_WHO]
+        if kind == BALL and arena.tags[i, NEXT_STAMP] != arena.tags[partner, STAMP]:
+            predict(arena, i, t)
+            continue
+        arena.world[NOW] = t
+        arena.counts[WHO], arena.counts[WHAT], arena.counts[WITH] = i, kind, partner
+        bound = within(arena, t)
+        if bound != DONE:
+            return bound
+        happen(arena, i, kind, partner, t)
+    return PAUSED
+
+
+@kernel
+def evaluate(
+    arena: Arena, t: float, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray
+) -> None:
+    """Write down where every ball is at a time; their rows stay as they are."""
+    state = arena.state
+    for i in range(len(state)):
+        if state[i, LIGHTNESS] > 0.0:
+            position[i, 0], position[i, 1], velocity[i, 0], velocity[i, 1] = place(state, i, t)
+            angle[i], spin[i] = turned(state, i, t)

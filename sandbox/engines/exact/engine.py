@@ -1,0 +1,86 @@
+"""ExactEngine: what event-driven simulation can model. Light until started."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sandbox.scene.demands import Demand, demands
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+if TYPE_CHECKING:
+    from sandbox.engines.exact.simulation import ExactSimulation
+
+STEPS = ("integrator", "detection", "response", "broad_phase")
+"""Choices of solvers that step."""
+
+OVERLAP = ("slop", "bias", "persistence")
+"""Choices of solvers that find overlaps and part them."""
+
+
+@dataclass(frozen=True)
+class ExactEngine:
+    """Event-driven: closed-form motion from event to event, each found as a root.
+
+    dt only says where frames lie; substeps and iterations mean nothing here. Balls rest on planes and on the sides of
+    walls; on each other and on anything round they hop by some 1e-8 m instead. Simultaneous hits are worked one after
+    another: those of the lowest ball first, then by kind (flats, ends and posts, balls) and number.
+    """
+
+    name: str = "exact"
+    about: str = "event-driven: closed-form motion between events, next events from stable roots"
+    capabilities: frozenset[Demand] = frozenset(Demand) - {Demand.DRAG}
+
+    def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
+        """Return what scene and settings ask for that it lacks."""
+        lacks = [f"it does not model {demand}" for demand in sorted(demands(scene) - self.capabilities)]
+        for key in STEPS + OVERLAP:
+            stated = getattr(settings, key)
+            if stated is not None:
+                why = "takes no steps" if key in STEPS else "lets nothing overlap"
+                lacks.append(f"{key} {stated!r} is not a choice it has (it {why}; leave it out)")
+        if settings.half_kick:
+            lacks.append("half_kick is not a choice it has (it takes no steps; leave it out)")
+        overlap = _overlap(scene)
+        return (*lacks, overlap) if overlap else tuple(lacks)
+
+    def resolve(self, scene: Scene, settings: Settings) -> Settings:  # noqa: ARG002
+        """Return the settings: it has no choices to fill in."""
+        return settings
+
+    def start(self, scene: Scene, settings: Settings | None = None) -> "ExactSimulation":
+        """Set a scene up.
+
+        Raises:
+            Refusal: the engine lacks something that is asked for.
+        """
+        from sandbox.engines.contract import Refusal
+        from sandbox.engines.exact.simulation import ExactSimulation
+        from sandbox.engines.registry import able
+
+        settings = scene.solver if settings is None else settings
+        missing = self.missing(scene, settings)
+        if missing:
+            raise Refusal(self.name, missing, able(scene, settings))
+        return ExactSimulation(scene, settings)
+
+
+def _overlap(scene: Scene) -> str | None:
+    """Say which two overlap at the start, or None."""
+    from sandbox.engines.exact.overlap import overlapping_balls, overlapping_things, told
+    from sandbox.engines.fixtures import fixtures_of
+
+    bodies = scene.bodies
+    if not len(bodies):
+        return None
+    kinds = np.asarray([element.collides for element in bodies.elements])[bodies.element]
+    to_all, to_fixed = kinds == "all", kinds == "fixed"
+    pair = overlapping_balls(bodies.position, bodies.radius, to_all, to_fixed, bodies.fixed)
+    if pair is not None:
+        return told(bodies.names[pair[0]], bodies.names[pair[1]], pair[2])
+    meets = np.flatnonzero((to_all | to_fixed) & ~bodies.fixed)
+    found = overlapping_things(bodies.position[meets], bodies.radius[meets], fixtures_of(scene))
+    if found is not None:
+        return told(bodies.names[meets[found[0]]], scene.fixed_names[found[1]], found[2])
+    return None

@@ -1,0 +1,254 @@
+"""Prediction: a ball's earliest event, as all motions now are."""
+
+import math
+
+from sandbox.engines.exact.arena import (
+    ALPHA,
+    ANGLE,
+    AX,
+    AY,
+    BALL,
+    EDGE,
+    ENDS,
+    FLAT,
+    HALF,
+    KNOB,
+    LAST_KIND,
+    LAST_TIME,
+    LAST_WHO,
+    LENGTH,
+    LIGHTNESS,
+    MEETS,
+    NEXT_KIND,
+    NEXT_STAMP,
+    NEXT_WHO,
+    NONE,
+    NX,
+    NY,
+    PX,
+    PY,
+    RADIUS,
+    SLIDES,
+    SLIP_ENDS,
+    SPIN,
+    STAMP,
+    SUPPORT,
+    UX,
+    UY,
+    VX,
+    VY,
+    Arena,
+    T,
+    X,
+    Y,
+)
+from sandbox.engines.exact.quartic import curved_entry
+from sandbox.engines.exact.roots import NOISE, flat_entry, pair_entry
+from sandbox.engines.kernel import kernel
+from sandbox.engines.roster import ALL
+from sandbox.trajectory import FloatArray, IntArray
+
+PARALLEL = 1e-12
+"""Flats whose normals differ by less are one: a ball rolls from one on to the other."""
+
+
+@kernel
+def place(state: FloatArray, i: int, t: float) -> tuple[float, float, float, float]:
+    """Return a ball's position and velocity at a time."""
+    tau = t - state[i, T]
+    vx, vy = state[i, VX] + state[i, AX] * tau, state[i, VY] + state[i, AY] * tau
+    x = state[i, X] + (state[i, VX] + 0.5 * state[i, AX] * tau) * tau
+    y = state[i, Y] + (state[i, VY] + 0.5 * state[i, AY] * tau) * tau
+    return x, y, vx, vy
+
+
+@kernel
+def turned(state: FloatArray, i: int, t: float) -> tuple[float, float]:
+    """Return a ball's angle and spin at a time."""
+    tau = t - state[i, T]
+    spin = state[i, SPIN] + state[i, ALPHA] * tau
+    return state[i, ANGLE] + (state[i, SPIN] + 0.5 * state[i, ALPHA] * tau) * tau, spin
+
+
+@kernel
+def parallel(flats: FloatArray, f: int, g: int) -> bool:
+    """Tell whether two flats face the same way."""
+    cross = flats[f, NX] * flats[g, NY] - flats[f, NY] * flats[g, NX]
+    dot = flats[f, NX] * flats[g, NX] + flats[f, NY] * flats[g, NY]
+    return bool(dot > 0.0 and abs(cross) <= PARALLEL)
+
+
+@kernel
+def flat_time(
+    flats: FloatArray,
+    f: int,
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    ax: float,
+    ay: float,
+    radius: float,
+    met: bool,
+) -> float:
+    """Return after what time a ball hits a flat.
+
+    Args:
+        flats: all flats.
+        f: which.
+        x: of the ball, m.
+        y: likewise.
+        vx: its velocity, m/s.
+        vy: likewise.
+        ax: its acceleration, m/s².
+        ay: likewise.
+        radius: m.
+        met: they have just met, and do not close, whatever rounding says.
+    """
+    nx, ny, length = flats[f, NX], flats[f, NY], flats[f, LENGTH]
+    b, a = vx * nx + vy * ny, ax * nx + ay * ny
+    if abs(b) <= NOISE * (abs(vx) + abs(vy)) or (met and b < 0.0):
+        b = 0.0
+    if abs(a) <= NOISE * (abs(ax) + abs(ay)):
+        a = 0.0
+    if b >= 0.0 and a >= 0.0:
+        return math.inf
+    rx, ry = x - flats[f, PX], y - flats[f, PY]
+    c = rx * nx + ry * ny - radius
+    if length == math.inf:
+        return flat_entry(max(c, 0.0), b, a)
+    foot = rx * flats[f, UX] + ry * flats[f, UY]
+    if 0.0 <= foot <= length and c + radius + flats[f, HALF] > 0.0:
+        c = max(c, 0.0)  # in touch: what lies below zero is rounding, or an overlap that a start may have
+    tau = flat_entry(c, b, a)
+    if tau < math.inf:
+        along = foot + ((vx + 0.5 * ax * tau) * flats[f, UX] + (vy + 0.5 * ay * tau) * flats[f, UY]) * tau
+        if along < 0.0 or along > length:
+            return math.inf
+    return tau
+
+
+@kernel
+def edge_time(flats: FloatArray, f: int, x: float, y: float, vx: float, vy: float, ax: float, ay: float) -> float:
+    """Return after what time a ball that rests on a flat comes to an end of it."""
+    length, ux, uy = flats[f, LENGTH], flats[f, UX], flats[f, UY]
+    if length == math.inf:
+        return math.inf
+    foot = min(max((x - flats[f, PX]) * ux + (y - flats[f, PY]) * uy, 0.0), length)
+    v, a = vx * ux + vy * uy, ax * ux + ay * uy
+    return min(flat_entry(foot, v, a), flat_entry(length - foot, -v, -a))
+
+
+@kernel
+def predict(arena: Arena, i: int, now: float) -> None:
+    """Write down a ball's earliest event from now on.
+
+    Of several at one instant the first in this order: its sliding ends, it comes to an edge, flats, knobs, balls, each
+    by number.
+    """
+    state, tags, flats = arena.state, arena.tags, arena.flats
+    x, y, vx, vy = place(state, i, now)
+    ax, ay, radius = state[i, AX], state[i, AY], state[i, RADIUS]
+    best, kind, partner = math.inf, NONE, -1
+    fresh = state[i, LAST_TIME] == now
+    last_kind, last_who = tags[i, LAST_KIND], tags[i, LAST_WHO]
+    s1, s2 = tags[i, SUPPORT], tags[i, SUPPORT + 1]
+    if state[i, SLIDES] < math.inf:
+        best, kind = max(state[i, SLIDES] - now, 0.0), SLIP_ENDS
+    if s1 >= 0 and s2 < 0:
+        tau = edge_time(flats, s1, x, y, vx, vy, ax, ay)
+        if tau < best:
+            best, kind, partner = tau, EDGE, s1
+
+    for f in range(len(flats)):
+        if s1 >= 0 and (f in (s1, s2) or parallel(flats, f, s1)):
+            continue
+        if fresh and last_kind == EDGE and last_who == f:
+            continue  # it has just come to the end of this one
+        met = fresh and last_kind == FLAT and last_who == f
+        tau = flat_time(flats, f, x, y, vx, vy, ax, ay, radius, met)
+        if tau < best:
+            best, kind, partner = tau, FLAT, f
+
+    met_knob, skip, other = -1, -1, -1
+    if fresh and last_kind == KNOB:
+        met_knob = last_who
+    if s1 >= 0:
+        skip, other = arena.flat_tags[s1, ENDS], arena.flat_tags[s1, ENDS + 1]
+    k, tau = nearest_knob(arena.knobs, state, i, now, best, met_knob, skip, other)
+    if k >= 0:
+        best, kind, partner = tau, KNOB, k
+    j, tau = nearest_ball(state, tags, arena.others, i, now, best)
+    if j >= 0:
+        best, kind, partner = tau, BALL, j
+        tags[i, NEXT_STAMP] = tags[j, STAMP]
+    arena.next_time[i] = now + best
+    tags[i, NEXT_KIND], tags[i, NEXT_WHO] = kind, partner
+
+
+@kernel
+def nearest_knob(
+    knobs: FloatArray, state: FloatArray, i: int, now: float, best: float, met: int, skip: int, other: int
+) -> tuple[int, float]:
+    """Return which knob a ball meets first and after what time, less than `best`; −1 for none.
+
+    Args:
+        knobs: all knobs.
+        state: of all balls.
+        i: ball.
+        now: s.
+        best: s.
+        met: knob that it has just met, or −1.
+        skip: knob at an end of what it rests on, whose circle its path only touches; or −1.
+        other: likewise.
+    """
+    x, y, vx, vy = place(state, i, now)
+    ax, ay, radius = state[i, AX], state[i, AY], state[i, RADIUS]
+    straight, speed, partner = ax == 0.0 and ay == 0.0, abs(vx) + abs(vy), -1
+    for k in range(len(knobs)):
+        if k in (skip, other) or (straight and k == met):
+            continue
+        dx, dy, reach = knobs[k, 0] - x, knobs[k, 1] - y, knobs[k, 2] + radius
+        if straight:
+            tau = pair_entry(dx, dy, -vx, -vy, reach, speed)
+        else:
+            tau = curved_entry(dx, dy, -vx, -vy, -ax, -ay, reach, k == met, best)
+        if tau < best:
+            best, partner = tau, k
+    return partner, best
+
+
+@kernel
+def nearest_ball(
+    state: FloatArray, tags: IntArray, others: IntArray, i: int, now: float, best: float
+) -> tuple[int, float]:
+    """Return which ball a ball meets first and after what time, less than `best`; −1 for none."""
+    x, y, vx, vy = place(state, i, now)
+    ax, ay, size = state[i, AX], state[i, AY], state[i, RADIUS]
+    everybody = tags[i, MEETS] == ALL
+    fresh = state[i, LAST_TIME] == now and tags[i, LAST_KIND] == BALL
+    last, partner, speed = tags[i, LAST_WHO], -1, abs(vx) + abs(vy)
+    for k in range(len(others)):
+        j = others[k]
+        if j == i or not (everybody or state[j, LIGHTNESS] == 0.0):
+            continue
+        tau = now - state[j, T]
+        wx, wy = state[j, VX] + state[j, AX] * tau, state[j, VY] + state[j, AY] * tau
+        dx = state[j, X] + 0.5 * (state[j, VX] + wx) * tau - x
+        dy = state[j, Y] + 0.5 * (state[j, VY] + wy) * tau - y
+        ux, uy, bx, by = wx - vx, wy - vy, state[j, AX] - ax, state[j, AY] - ay
+        straight = bx == 0.0 and by == 0.0
+        if straight and dx * ux + dy * uy >= 0.0:
+            continue
+        met = fresh and last == j
+        if met and state[j, LIGHTNESS] > 0.0:
+            met = state[j, LAST_TIME] == now and tags[j, LAST_KIND] == BALL and tags[j, LAST_WHO] == i
+        if not straight:
+            after = curved_entry(dx, dy, ux, uy, bx, by, size + state[j, RADIUS], met, best)
+        elif met:
+            continue
+        else:
+            after = pair_entry(dx, dy, ux, uy, size + state[j, RADIUS], speed + abs(wx) + abs(wy))
+        if after < best:
+            best, partner = after, j
+    return partner, best

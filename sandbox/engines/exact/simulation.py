@@ -1,0 +1,305 @@
+"""ExactSimulation: a scene running from event to event."""
+
+import hashlib
+from collections.abc import Mapping
+from typing import NoReturn
+
+import numpy as np
+
+from sandbox.action import Action
+from sandbox.engines.acting import perform
+from sandbox.engines.contract import Divergence, Exhaustion, Observer
+from sandbox.engines.exact.advance import (
+    DONE,
+    FULL,
+    PAUSED,
+    TOO_DENSE,
+    advance,
+    changed,
+    evaluate,
+    look_ahead,
+    renew,
+    start,
+)
+from sandbox.engines.exact.arena import (
+    ANGLE,
+    AT_INSTANT,
+    BALL,
+    BUDGET,
+    EVENTS,
+    FLAT,
+    IN_SECOND,
+    KNOB,
+    LIGHTNESS,
+    NOW,
+    RECORDING,
+    ROWS,
+    SINCE,
+    SPIN,
+    STAMP,
+    SUPPORT,
+    THING,
+    VX,
+    VY,
+    WHAT,
+    WHO,
+    WITH,
+    Arena,
+    X,
+    Y,
+    arena_of,
+    renewed,
+)
+from sandbox.engines.exact.impact import bring
+from sandbox.engines.exact.log import log_rests, open_rest, taken, with_room
+from sandbox.engines.exact.predict import predict
+from sandbox.engines.exact.support import freed, knocked
+from sandbox.engines.exact.troupe import Troupe
+from sandbox.engines.kernel import tell_if_slow
+from sandbox.engines.ledger import MAX_ROWS
+from sandbox.engines.limits import BEYOND
+from sandbox.engines.turn import Turn
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Contacts, Frame, IntArray
+
+PER_SECOND, PER_SECOND_AND_BALL = 2_000_000, 2_000
+"""Events that one simulated second may have: the first, or the second for each ball where that is more."""
+
+FIRST_ROWS = 1024
+"""Rows that the log of contacts starts with."""
+
+
+class ExactSimulation:
+    """A running scene.
+
+    Between events every ball moves in closed form from its own last event on; frames are read off and change nothing.
+    So positions do not depend on dt, bit for bit.
+    """
+
+    def __init__(self, scene: Scene, settings: Settings) -> None:
+        self._settings = settings
+        self._troupe = Troupe(scene, settings.dt)
+        self._turn = Turn()
+        self._steps, self._part = 0, 0.0
+        self._stopped: float | None = None
+        self._ended = False
+        self._arena: Arena = arena_of(self._troupe)
+        tell_if_slow(len(scene.bodies))
+        self._allow()
+        with np.errstate(all="ignore"):
+            start(self._arena)
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied or pickled, as every engine here does."""
+        raise TypeError("a running simulation cannot be copied; start its scene again and repeat its actions")
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s; after an exhaustion, that of the last event."""
+        return (self._steps + self._part) * self._settings.dt if self._stopped is None else self._stopped
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies by number, as they started; spawned ones join at the end."""
+        return self._troupe.bodies
+
+    @property
+    def settings(self) -> Settings:
+        """The settings, with every choice filled in."""
+        return self._settings
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """When each body that is no longer there was gone: number → s."""
+        return self._troupe.retired
+
+    @property
+    def events(self) -> int:
+        """How many events there have been."""
+        return int(self._arena.counts[EVENTS])
+
+    def step(self) -> None:
+        """Advance by one dt.
+
+        Raises:
+            Divergence: a body is no longer finite, or beyond all bounds. The state can still be read.
+            Exhaustion: too many events, or too many contacts to keep.
+        """
+        with self._turn:
+            self._check_running()
+            self._advance((self._steps + 1) * self._settings.dt)
+            self._steps += 1
+            self._look()
+
+    def finish(self, part: float) -> None:
+        """Advance by a last part of dt, 0 < part < 1.
+
+        Raises:
+            Divergence: as `step`.
+            Exhaustion: as `step`.
+            ValueError: there is no such part.
+        """
+        if not 0.0 < part < 1.0:
+            raise ValueError(f"a last part of {part} steps; it is more than 0 and less than 1")
+        with self._turn:
+            self._check_running()
+            self._advance((self._steps + part) * self._settings.dt)
+            self._part = part
+            self._look()
+            self._ended = True
+
+    def apply(self, action: Action) -> None:
+        """Do what an action says, now.
+
+        Raises:
+            ActionError: it cannot be done. Nothing has changed then.
+        """
+        with self._turn, np.errstate(all="ignore"):
+            self._check_running()
+            self._troupe.settled()
+            leaving = perform(action, self._troupe)
+            self._acted()
+            if leaving is not None:
+                self._take_out(np.asarray([leaving]))
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+        troupe = self._troupe
+        return Frame(
+            self.time,
+            troupe.position.copy(),
+            troupe.velocity.copy(),
+            troupe.angle.copy(),
+            troupe.angular_velocity.copy(),
+            troupe.present.copy(),
+        )
+
+    def contacts(self) -> Contacts:
+        """Return the contacts since the last call; the first call starts the recording."""
+        arena, now = self._arena, self.time
+        with np.errstate(all="ignore"):
+            if not arena.counts[RECORDING]:
+                self._arena = arena = with_room(arena, max(FIRST_ROWS, 4 * len(arena.state)))
+                arena.counts[RECORDING], arena.world[NOW] = 1, now
+                arena.state[:, SINCE] = now
+                for i, which in np.argwhere(arena.tags[:, SUPPORT : SUPPORT + 2] >= 0).tolist():
+                    open_rest(arena, i, which)
+            log_rests(arena, now)
+        return taken(arena)
+
+    def watch(self, observer: Observer) -> None:
+        """Do nothing: there are no substeps to call an observer after, and no contact is missed."""
+
+    def state_hash(self) -> str:
+        """Return a SHA-256 of time and every body's state."""
+        frame = self.frame()
+        digest = hashlib.sha256(np.float64(frame.time).tobytes())
+        for array in (frame.position, frame.velocity, frame.angle, frame.angular_velocity, frame.present):
+            digest.update(array.tobytes())
+        return digest.hexdigest()
+
+    def close(self) -> None:
+        """End the simulation. What it holds goes with it."""
+        self._ended = True
+
+    def _check_running(self) -> None:
+        if self._ended:
+            raise RuntimeError("the simulation has ended; it can be read, but not go on")
+
+    def _advance(self, until: float) -> None:
+        """Let all events up to a time happen. Python sees to signals now and then, and makes room in the log."""
+        with np.errstate(all="ignore"):
+            while (status := advance(self._arena, until)) != DONE:
+                if status == FULL:
+                    rows = int(self._arena.counts[ROWS])
+                    if rows > MAX_ROWS:
+                        self._stop(f"more than {MAX_ROWS:,} contacts in one run")
+                    self._arena = with_room(self._arena, 2 * len(self._arena.log))
+                elif status != PAUSED:
+                    self._stop(self._too_many(status))
+
+    def _stop(self, why: str) -> NoReturn:
+        self._ended = True
+        self._stopped = float(self._arena.world[NOW])
+        self._evaluate()
+        raise Exhaustion(why)
+
+    def _too_many(self, status: int) -> str:
+        """Say when, how many and whose events there were."""
+        count, names = self._arena.counts, self.bodies.names
+        kind, partner = int(count[WHAT]), int(count[WITH])
+        who = repr(names[count[WHO]])
+        if kind == BALL:
+            who += f" and {names[partner]!r}"
+        elif kind in (FLAT, KNOB):
+            thing = self._arena.flat_tags[partner, THING] if kind == FLAT else self._arena.knob_tags[partner, THING]
+            who += f" and {self._troupe.scene.fixed_names[thing]!r}"
+        number, span = (count[AT_INSTANT], "an instant") if status == TOO_DENSE else (count[IN_SECOND], "one second")
+        when = float(self._arena.world[NOW])
+        return (
+            f"at {when:.9g} s: more than {int(number) - 1:,} events within {span}, last of {who}; "
+            "engines that step could go on: pymunk, reference"
+        )
+
+    def _evaluate(self) -> None:
+        troupe = self._troupe
+        with np.errstate(all="ignore"):
+            state = (troupe.position, troupe.velocity, troupe.angle, troupe.angular_velocity)
+            evaluate(self._arena, self.time, *state)
+
+    def _look(self) -> None:
+        """Read the state off, stop what is no longer finite and bounded, take out what has left world.bounds."""
+        self._evaluate()
+        beyond = self._troupe.beyond()
+        if beyond is not None:
+            self._ended = True
+            raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
+        outside = self._troupe.outside()
+        if len(outside):
+            self._take_out(outside)
+
+    def _acted(self) -> None:
+        """Bring into the kernels' arrays what an action has done to the roster."""
+        troupe, now = self._troupe, self.time
+        touched = sorted(troupe.kicked | troupe.moved)
+        for i in touched:
+            bring(self._arena, i, now)
+            self._arena.state[i, X : Y + 1], self._arena.state[i, VX : VY + 1] = troupe.position[i], troupe.velocity[i]
+            self._arena.state[i, ANGLE], self._arena.state[i, SPIN] = troupe.angle[i], troupe.angular_velocity[i]
+        arena = self._arena
+        for i in troupe.moved:
+            freed(arena, i)
+        if troupe.renewed:
+            self._arena = arena = renewed(arena, troupe)
+            self._allow()
+            renew(arena, now)
+            return
+        arena.world[NOW] = now
+        for i in touched:
+            if arena.state[i, LIGHTNESS] > 0.0:
+                knocked(arena, i)
+                changed(arena, i)
+        if any(self.bodies.fixed[i] for i in touched):
+            look_ahead(arena)  # others may now be in the way of what stood elsewhere
+        for i in touched:
+            if arena.state[i, LIGHTNESS] > 0.0:
+                predict(arena, i, now)
+
+    def _take_out(self, numbers: IntArray) -> None:
+        """Remove bodies; they stay where they are, with no velocity."""
+        now = self.time
+        with np.errstate(all="ignore"):
+            for i in numbers.tolist():
+                bring(self._arena, i, now)
+                freed(self._arena, i)
+                self._arena.state[i, VX : SPIN + 2] = 0.0
+                self._arena.next_time[i] = np.inf
+                self._arena.tags[i, STAMP] += 1
+        self._troupe.take_out(numbers, now)
+        self._arena = renewed(self._arena, self._troupe)
+
+    def _allow(self) -> None:
+        """Set how many events a second may have."""
+        self._arena.counts[BUDGET] = max(PER_SECOND, PER_SECOND_AND_BALL * len(self._arena.movers))

@@ -1,0 +1,286 @@
+"""Support: a ball at rest on a flat, or in the corner of two. It slides, rolls or stands, each in closed form.
+
+Slip of the contact point u = v·t − ω R, with t the normal turned left. While it slips friction is μ N against it; the
+slip changes at a constant rate and its end is an event. Then the ball rolls (a = ⅔ g·t for a disc) while that takes
+no more than μ N, that is while |g·t| ≤ 3 μ |g·n|, and slides on otherwise.
+"""
+
+import math
+
+from sandbox.engines.exact.arena import (
+    ALPHA,
+    AX,
+    AY,
+    COAT,
+    EDGE,
+    FLAT,
+    FORCE,
+    FRICTION,
+    GX,
+    GY,
+    LENGTH,
+    LIGHTNESS,
+    NX,
+    NY,
+    PX,
+    PY,
+    RADIUS,
+    READINESS,
+    RESTITUTION,
+    ROW,
+    SINCE,
+    SLIDES,
+    SPIN,
+    SUPPORT,
+    SURFACE,
+    THING,
+    UX,
+    UY,
+    VX,
+    VY,
+    Arena,
+    T,
+    X,
+    Y,
+)
+from sandbox.engines.exact.impact import note, strike
+from sandbox.engines.exact.log import add_impulse, open_rest, open_row
+from sandbox.engines.exact.predict import parallel
+from sandbox.engines.exact.roots import NOISE
+from sandbox.engines.kernel import kernel
+
+REST_TIME = 1e-13
+"""s: when what is left of a series of bounces takes less, the ball rests; it is as if they had all been made."""
+
+TICKS = 8.0 * 2.0**-52
+"""The same for a single bounce, as a share of the time: what is shorter cannot be told from nothing."""
+
+ABSORBED = 1e-3
+"""m/s: a ball at rest that is knocked into its support more slowly than this stays at rest."""
+
+TOUCH = 1e-9
+"""m: how far off the next flat may begin for a ball to roll on to it."""
+
+
+@kernel
+def hit_flat(arena: Arena, i: int, f: int) -> None:
+    """Let a ball hit a flat: it bounces, or begins to rest."""
+    state = arena.state
+    nx, ny = arena.flats[f, NX], arena.flats[f, NY]
+    mine, its = arena.tags[i, SURFACE], arena.flat_tags[f, COAT]
+    restitution, friction = arena.surfaces[RESTITUTION, mine, its], arena.surfaces[FRICTION, mine, its]
+    closing = max(-(state[i, VX] * nx + state[i, VY] * ny), 0.0)
+    press = -(state[i, AX] * nx + state[i, AY] * ny)
+    rests = False
+    if press > 0.0:
+        hop = 2.0 * restitution * closing / press
+        rests = hop <= TICKS * abs(state[i, T]) or hop <= REST_TIME * (1.0 - restitution)
+    jx, jy = strike(arena, i, nx, ny, 0.0 if rests else restitution * closing, friction)
+    note(arena, i, FLAT, f)
+    knocked(arena, i)
+    if rests and arena.tags[i, SUPPORT + 1] < 0:
+        which = 0 if arena.tags[i, SUPPORT] < 0 else 1
+        arena.tags[i, SUPPORT + which] = f
+        open_rest(arena, i, which)
+        add_impulse(arena, arena.tags[i, ROW + which], -jx, -jy)
+    else:
+        r = arena.state[i, RADIUS]
+        thing = -1 - arena.flat_tags[f, THING]
+        row = open_row(arena, i, thing, state[i, X] - r * nx, state[i, Y] - r * ny, -nx, -ny)
+        add_impulse(arena, row, -jx, -jy)
+
+
+@kernel
+def release(arena: Arena, i: int, which: int) -> None:
+    """End a support; the second of two becomes the first."""
+    if which == 0:
+        arena.tags[i, SUPPORT], arena.tags[i, ROW] = arena.tags[i, SUPPORT + 1], arena.tags[i, ROW + 1]
+    arena.tags[i, SUPPORT + 1], arena.tags[i, ROW + 1] = -1, -1
+    arena.state[i, FORCE + 2], arena.state[i, FORCE + 3] = 0.0, 0.0
+
+
+@kernel
+def knocked(arena: Arena, i: int) -> None:
+    """Decide which supports a ball keeps, whose velocity something has changed."""
+    state = arena.state
+    for which in (1, 0):
+        f = arena.tags[i, SUPPORT + which]
+        if f < 0:
+            continue
+        nx, ny = arena.flats[f, NX], arena.flats[f, NY]
+        press = -(arena.world[GX] * nx + arena.world[GY] * ny)
+        least = REST_TIME * abs(press) + NOISE * (abs(state[i, VX]) + abs(state[i, VY]))
+        out = state[i, VX] * nx + state[i, VY] * ny
+        if out > least or out < -max(ABSORBED, least):
+            release(arena, i, which)
+        elif out < -least:
+            friction = arena.surfaces[FRICTION, arena.tags[i, SURFACE], arena.flat_tags[f, COAT]]
+            jx, jy = strike(arena, i, nx, ny, 0.0, friction)
+            add_impulse(arena, arena.tags[i, ROW + which], -jx, -jy)
+
+
+@kernel
+def settle(arena: Arena, i: int) -> None:
+    """Work out how a ball moves on from now, by what it rests on."""
+    state = arena.state
+    if arena.tags[i, SUPPORT + 1] >= 0:
+        corner(arena, i)
+    if arena.tags[i, SUPPORT] >= 0 and arena.tags[i, SUPPORT + 1] < 0:
+        f = arena.tags[i, SUPPORT]
+        press = -(arena.world[GX] * arena.flats[f, NX] + arena.world[GY] * arena.flats[f, NY])
+        if press <= NOISE * (abs(arena.world[GX]) + abs(arena.world[GY])):
+            release(arena, i, 0)
+        else:
+            single(arena, i, f, press)
+    if arena.tags[i, SUPPORT] < 0:
+        state[i, AX], state[i, AY], state[i, ALPHA] = arena.world[GX], arena.world[GY], 0.0
+        state[i, SLIDES] = math.inf
+        arena.state[i, FORCE], arena.state[i, FORCE + 1] = 0.0, 0.0
+    state[i, SINCE] = state[i, T]
+
+
+@kernel
+def single(arena: Arena, i: int, f: int, press: float) -> None:
+    """Let a ball slide, roll or stand on one flat, which gravity presses it on to with `press`, m/s²."""
+    state, r = arena.state, arena.state[i, RADIUS]
+    im, ii = arena.state[i, LIGHTNESS], arena.state[i, READINESS]
+    nx, ny = arena.flats[f, NX], arena.flats[f, NY]
+    tx, ty = -ny, nx
+    pull = arena.world[GX] * tx + arena.world[GY] * ty
+    if abs(pull) <= NOISE * press:
+        pull = 0.0
+    v = state[i, VX] * tx + state[i, VY] * ty
+    friction = arena.surfaces[FRICTION, arena.tags[i, SURFACE], arena.flat_tags[f, COAT]]
+    ease = 1.0 + r * r * ii / im  # how much more readily the contact point moves than the centre
+    slip = v - state[i, SPIN] * r
+    slides, most = math.inf, friction * press
+    drive = 0.0  # friction by mass
+    if abs(slip) <= NOISE * (abs(v) + abs(state[i, SPIN] * r)) + REST_TIME * most * ease:
+        slip = 0.0
+    if slip == 0.0 and abs(pull) <= most * ease:
+        drive = -pull / ease
+        if ii > 0.0 and friction > 0.0:
+            state[i, SPIN] = v / r
+    else:
+        downhill = slip if slip != 0.0 else pull
+        drive = -most if downhill > 0.0 else most
+        rate = pull + drive * ease
+        if slip * rate < 0.0:
+            slides = state[i, T] - slip / rate
+    a = pull + drive
+    keep(arena, i, 0, v * tx, v * ty)
+    state[i, AX], state[i, AY] = a * tx, a * ty
+    state[i, ALPHA] = -r * drive * ii / im
+    state[i, SLIDES] = slides
+    arena.state[i, FORCE] = (state[i, AX] - arena.world[GX]) / im
+    arena.state[i, FORCE + 1] = (state[i, AY] - arena.world[GY]) / im
+
+
+@kernel
+def keep(arena: Arena, i: int, which: int, vx: float, vy: float) -> None:
+    """Set a ball's velocity to what its supports leave of it, and log the little that this changes."""
+    state, im = arena.state, arena.state[i, LIGHTNESS]
+    add_impulse(arena, arena.tags[i, ROW + which], (state[i, VX] - vx) / im, (state[i, VY] - vy) / im)
+    state[i, VX], state[i, VY] = vx, vy
+
+
+@kernel
+def pushes(arena: Arena, i: int, turning: float) -> tuple[float, float, float, float]:
+    """Return what holds a ball in a corner: normal force and friction of each support, by mass, m/s².
+
+    Args:
+        arena: everything.
+        i: ball.
+        turning: the sign of its spin; 0 leaves friction out, which a ball that stands does not need.
+    """
+    f, g = arena.tags[i, SUPPORT], arena.tags[i, SUPPORT + 1]
+    mine = arena.tags[i, SURFACE]
+    mu = turning * arena.surfaces[FRICTION, mine, arena.flat_tags[f, COAT]]
+    nu = turning * arena.surfaces[FRICTION, mine, arena.flat_tags[g, COAT]]
+    flats = arena.flats
+    # A ball that turns left slips to the right of each normal's left: friction acts along + t there.
+    ax, ay = flats[f, NX] - mu * flats[f, NY], flats[f, NY] + mu * flats[f, NX]
+    bx, by = flats[g, NX] - nu * flats[g, NY], flats[g, NY] + nu * flats[g, NX]
+    determinant = ax * by - ay * bx
+    if determinant == 0.0:
+        return -1.0, -1.0, 0.0, 0.0
+    gx, gy = -arena.world[GX], -arena.world[GY]
+    first, second = (gx * by - gy * bx) / determinant, (ax * gy - ay * gx) / determinant
+    return first, second, mu * first, nu * second
+
+
+@kernel
+def corner(arena: Arena, i: int) -> None:
+    """Let a ball stand in a corner, its spin fading; or end the support that does not press."""
+    state, r = arena.state, arena.state[i, RADIUS]
+    im, ii = arena.state[i, LIGHTNESS], arena.state[i, READINESS]
+    if abs(state[i, SPIN]) * r <= REST_TIME * (abs(arena.world[GX]) + abs(arena.world[GY])) and ii > 0.0:
+        state[i, SPIN] = 0.0
+    turning = 0.0
+    if state[i, SPIN] != 0.0 and ii > 0.0:
+        turning = 1.0 if state[i, SPIN] > 0.0 else -1.0
+    first, second, mu, nu = pushes(arena, i, turning)
+    if first < 0.0 or second < 0.0:
+        calm, other, _, _ = pushes(arena, i, 0.0)
+        if turning == 0.0 or calm < 0.0 or other < 0.0 or (first < 0.0) != (second < 0.0):
+            release(arena, i, 0 if first < 0.0 else 1)
+            return
+        state[i, SPIN], turning = 0.0, 0.0  # it jams: no two forces within friction let it turn on
+        first, second, mu, nu = calm, other, 0.0, 0.0
+    keep(arena, i, 1, 0.0, 0.0)
+    state[i, AX], state[i, AY] = 0.0, 0.0
+    state[i, ALPHA] = -r * (mu + nu) * ii / im
+    state[i, SLIDES] = math.inf
+    if state[i, ALPHA] != 0.0:
+        state[i, SLIDES] = state[i, T] - state[i, SPIN] / state[i, ALPHA]
+    for which in range(2):
+        f = arena.tags[i, SUPPORT + which]
+        push, rub = (first, mu) if which == 0 else (second, nu)
+        arena.state[i, FORCE + 2 * which] = (push * arena.flats[f, NX] - rub * arena.flats[f, NY]) / im
+        arena.state[i, FORCE + 2 * which + 1] = (push * arena.flats[f, NY] + rub * arena.flats[f, NX]) / im
+
+
+@kernel
+def slip_ends(arena: Arena, i: int) -> None:
+    """Let a ball's slip be zero, or in a corner its spin, as it is at the end of sliding but for rounding."""
+    state, f = arena.state, arena.tags[i, SUPPORT]
+    if arena.tags[i, SUPPORT + 1] >= 0:
+        state[i, SPIN] = 0.0
+    elif arena.state[i, READINESS] > 0.0:
+        state[i, SPIN] = (-state[i, VX] * arena.flats[f, NY] + state[i, VY] * arena.flats[f, NX]) / arena.state[
+            i, RADIUS
+        ]
+    else:
+        v = state[i, SPIN] * arena.state[i, RADIUS]
+        keep(arena, i, 0, -v * arena.flats[f, NY], v * arena.flats[f, NX])
+
+
+@kernel
+def pass_edge(arena: Arena, i: int) -> None:
+    """Let a ball that has come to the end of a flat roll on to the next, or leave."""
+    state, flats, f = arena.state, arena.flats, arena.tags[i, SUPPORT]
+    for g in range(len(flats)):
+        if g == f or not parallel(flats, f, g):
+            continue
+        x, y = state[i, X] - flats[g, PX], state[i, Y] - flats[g, PY]
+        if abs(x * flats[g, NX] + y * flats[g, NY] - arena.state[i, RADIUS]) > TOUCH:
+            continue
+        foot, v = x * flats[g, UX] + y * flats[g, UY], state[i, VX] * flats[g, UX] + state[i, VY] * flats[g, UY]
+        if v == 0.0:
+            v = state[i, AX] * flats[g, UX] + state[i, AY] * flats[g, UY]
+        if (v > 0.0 and -TOUCH <= foot < flats[g, LENGTH] - TOUCH) or (
+            v < 0.0 and TOUCH < foot <= flats[g, LENGTH] + TOUCH
+        ):
+            arena.tags[i, SUPPORT] = g
+            if arena.flat_tags[g, THING] != arena.flat_tags[f, THING]:
+                open_rest(arena, i, 0)
+            return
+    release(arena, i, 0)
+    note(arena, i, EDGE, f)
+
+
+@kernel
+def freed(arena: Arena, i: int) -> None:
+    """End all of a ball's supports, whose impulses are logged."""
+    release(arena, i, 0)
+    release(arena, i, 0)

@@ -1,0 +1,113 @@
+"""Troupe: a roster that keeps track of what an action touches, and refuses what has no closed form."""
+
+import numpy as np
+
+from sandbox.action import ActionError
+from sandbox.engines.exact.overlap import allowed, overlapping_things, told
+from sandbox.engines.roster import ALL, FIXED, NOTHING, Roster
+from sandbox.scene.model import Ball, Scene
+from sandbox.trajectory import BoolArray, FloatArray
+
+_MEETS = {"none": NOTHING, "fixed": FIXED, "all": ALL}
+
+
+class Troupe(Roster):
+    """The bodies of a running exact scene."""
+
+    def __init__(self, scene: Scene, h: float) -> None:
+        super().__init__(scene, h)
+        self.kicked: set[int] = set()
+        """whose velocity or spin an action has set"""
+        self.moved: set[int] = set()
+        """whose place it has"""
+        self.renewed = False
+        """whether it has changed gravity, coefficients or who there is"""
+
+    def settled(self) -> None:
+        """Forget what the last action did."""
+        self.kicked.clear()
+        self.moved.clear()
+        self.renewed = False
+
+    def set_velocity(self, number: int, velocity: FloatArray) -> None:
+        """Give a body a velocity, m/s."""
+        super().set_velocity(number, velocity)
+        self.kicked.add(number)
+
+    def set_spin(self, number: int, spin: float) -> None:
+        """Give a body an angular velocity, rad/s."""
+        super().set_spin(number, spin)
+        self.kicked.add(number)
+
+    def push(self, number: int, force: FloatArray, torque: float) -> None:
+        """Refuse a steady force: only uniform gravity has the closed forms that events are found from.
+
+        Raises:
+            ActionError: always, but for the end of a force that is not there.
+        """
+        if force.any() or torque:
+            raise ActionError(
+                f"exact models no steady force on one body, here on {self.bodies.names[number]!r}; "
+                "pymunk and reference do"
+            )
+
+    def put(self, number: int, position: FloatArray) -> None:
+        """Put a body somewhere, m.
+
+        Raises:
+            ActionError: something stands there.
+        """
+        others = np.arange(len(self.bodies)) != number
+        kind, fixed = int(self.meets[number]), bool(self.bodies.fixed[number])
+        self._check_free(self.bodies.names[number], position, float(self.radius[number]), kind, fixed, others)
+        super().put(number, position)
+        self.moved.add(number)
+
+    def change(self, scene: Scene) -> None:
+        """Go on with a scene that differs in gravity or coefficients alone.
+
+        Raises:
+            ActionError: it has drag, or more surfaces than a scene may have.
+        """
+        if scene.world.linear_drag or scene.world.quadratic_drag:
+            raise ActionError("exact does not model drag; pymunk and reference do")
+        super().change(scene)
+        self.renewed = True
+
+    def add(self, ball: Ball, name: str) -> int:
+        """Add a ball that was checked, and return its number.
+
+        Raises:
+            ActionError: something stands there, or it makes more surfaces than a scene may have.
+        """
+        others = np.ones(len(self.bodies), dtype=np.bool_)
+        self._check_free(name, np.asarray(ball.position), ball.radius, _MEETS[ball.collides], ball.fixed, others)
+        number = super().add(ball, name)
+        self.renewed = True
+        return number
+
+    def _check_free(
+        self, name: str, position: FloatArray, radius: float, kind: int, fixed: bool, others: BoolArray
+    ) -> None:
+        """Refuse a place where a ball would stand in another or in a fixed thing.
+
+        Raises:
+            ActionError: it would.
+        """
+        if kind == NOTHING:
+            return
+        still = self.bodies.fixed
+        meet = others & (self.meets == ALL) & ~still if kind == ALL else np.zeros_like(others)
+        meet |= others & (self.meets == FIXED) & ~still if fixed and kind == ALL else False
+        meet |= others & (self.meets == ALL) & still & (not fixed)
+        apart = self.position - position
+        depth = self.radius + radius - np.hypot(apart[:, 0], apart[:, 1])
+        here = np.broadcast_to(position, self.position.shape)
+        deep = np.flatnonzero(meet & (depth > allowed(self.position, here)))
+        if len(deep):
+            raise ActionError(told(name, self.bodies.names[deep[0]], float(depth[deep[0]])))
+        if fixed:
+            return
+        found = overlapping_things(position[None, :], np.array([radius]), self.fixtures)
+        if found is not None:
+            raise ActionError(told(name, self.scene.fixed_names[found[1]], found[2]))

@@ -1,0 +1,141 @@
+"""`sandbox compare`: what it prints, its JSON, its folder, its exit status."""
+
+import json
+from pathlib import Path
+
+import pytest
+from calling import DIVERGING, FAULTY, document_of, json_of, lines_of, process, written
+
+from sandbox.cli import compare as module
+from sandbox.cli.main import call
+
+PROMISED = {
+    "engine",
+    "settings",
+    "max_position_error",
+    "rms_position_error",
+    "energy_drift",
+    "first_divergence",
+    "missed_contacts",
+    "phantom_contacts",
+    "trusted_until",
+    "seconds",
+}
+
+
+def test_json_has_the_keys_promised(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, document, err = json_of(capfd, "compare", scene, "--engine", "pymunk")
+    assert (status, err) == (0, [])
+    assert (document["scene"], document["title"], document["truth"]) == (scene, "Drop", "closed_form")
+    (row,) = document["engines"]
+    assert set(row) >= PROMISED
+    assert (row["engine"], row["status"], row["trusted_until"]) == ("pymunk", "ok", 0.5)
+    # Half a metre at 10 m/s²: after 0.316 s explicit Euler is g·h·T/2 = 0.0158 m late.
+    assert row["max_position_error"] > 0.0158
+    assert (row["missed_contacts"], row["phantom_contacts"], row["matched_contacts"]) == (0, 0, 1)
+
+
+def test_table_says_the_truth_first(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, out, err = lines_of(capfd, "compare", scene, "--engines", "pymunk")
+    assert (status, err) == (0, [])
+    assert out[0] == f"{scene}: Drop"
+    assert out[1] == "truth: closed form (formulas for every body); trusted until 0.5 s of 0.5 s; tolerance 0.005 m"
+    assert out[2].split()[:3] == ["engine", "dt", "status"]
+    assert out[3].split()[:3] == ["pymunk", "0.01", "ok"]
+
+
+def test_why_tells_verdict_knobs_and_refusals(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = lines_of(capfd, "compare", written(tmp_path), "--engine", "pymunk", "--why")
+    assert status == 0
+    assert out[4].startswith("pymunk: ")
+    assert "slop 0: ×" in out[5]
+    assert "integrator rk4" in out[6]
+
+
+def test_missed_contact_is_named(capfd: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = lines_of(capfd, "compare", "bullet", "--engine", "pymunk")
+    assert out[-1].startswith("pymunk: missed bullet and wall at 0.009")
+
+
+def test_quiet_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert lines_of(capfd, "compare", written(tmp_path), "--engine", "pymunk", "--quiet") == (0, [], [])
+
+
+def test_folder_gets_plots_and_document(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "new" / "folder"
+    status, document, err = json_of(capfd, "compare", written(tmp_path), "--engine", "pymunk", "--out", str(out))
+    assert (status, err) == (0, [])
+    names = ["comparison.json", "energy.png", "error.png", "trajectories.png"]
+    assert sorted(path.name for path in out.iterdir()) == names
+    assert document_of((out / "comparison.json").read_text(encoding="utf-8")) == document
+    for name in names[1:]:
+        assert (out / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_named_engine_that_refuses_is_status_1(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    choice = ("--set", "solver.broad_phase='oriented'")
+    status, document, err = json_of(capfd, "compare", scene, "--engine", "pymunk", *choice)
+    assert status == 1
+    assert (document["engines"][0]["status"], document["engines"][0]["max_position_error"]) == ("refused", None)
+    assert [line.startswith(f"{scene}: pymunk refuses: ") for line in err] == [True]
+    status, out, err = lines_of(capfd, "compare", scene, "--engine", "pymunk", *choice)
+    assert status == 1
+    assert len(err) == 1
+    assert not any("pymunk refuses" in line for line in out)  # told once
+
+
+def test_run_that_diverges_is_status_1(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, err = json_of(capfd, "compare", written(tmp_path), "--engine", "pymunk", *DIVERGING)
+    assert (status, document["engines"][0]["status"]) == (1, "diverged")
+    assert "pymunk diverged" in err[0]
+
+
+def test_all_faults_are_told_at_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "taken").write_text("")
+    scene = written(tmp_path, FAULTY)
+    arguments = ("compare", scene, "--engines", "nope,pymunk", "--out", str(tmp_path / "taken"), "--tolerance", "inf")
+    status, document, err = json_of(capfd, *arguments)
+    assert (status, document["engines"], document["truth"]) == (2, [], None)
+    assert len(err) == len(document["faults"]) == 5
+    assert [line.split(":")[0] for line in err] == ["--engine", scene, scene, "--tolerance", "--out"]
+
+
+@pytest.mark.parametrize("tolerance", ["0", "-1", "x"])
+def test_tolerance_out_of_range_is_status_2(tolerance: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "compare", written(tmp_path), "--tolerance", tolerance)
+    assert (status, out, len(err)) == (2, [], 1)
+    assert "--tolerance" in err[0]
+
+
+def test_frames_that_would_not_fit_are_status_2(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    huge = ("--set", "world.duration=900000", "--set", "solver.dt=0.001", "--engine", "pymunk")
+    status, out, err = lines_of(capfd, "compare", written(tmp_path), *huge, "--quiet")
+    assert (status, out, len(err)) == (2, [], 1)
+    assert "GB" in err[0]
+
+
+def test_unknown_scene_is_status_2(capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "compare", "no_such_scene")
+    assert (status, out, len(err)) == (2, [], 1)
+
+
+def test_interrupt_is_status_130(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "compare", interrupted)
+    assert call(["compare", written(tmp_path)]) == 130
+    out, err = capfd.readouterr()
+    assert (out, err.splitlines()[-1]) == ("", "interrupted")
+
+
+def test_process_prints_one_document(tmp_path: Path) -> None:
+    written(tmp_path)
+    done = process("compare", "drop.toml", "--engine", "pymunk", "--json", cwd=tmp_path)
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["scene"] == "drop.toml"

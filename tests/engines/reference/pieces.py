@@ -1,0 +1,77 @@
+"""Scenes and simulations for the tests of the reference engine."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from sandbox.engines.contract import Simulation
+from sandbox.engines.registry import start
+from sandbox.engines.roster import Roster
+from sandbox.scene.file import from_document, load
+from sandbox.scene.model import Scene
+
+ROOT = Path(__file__).resolve().parents[3]
+
+FLOOR = {"name": "floor", "point": [0, 0], "normal": [0, 1]}
+
+EARTH = {"gravity": [0.0, -9.81]}
+
+PYMUNK_WAY = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
+"""The choices by which the reference is pymunk's scheme over again."""
+
+
+def ball(x: float, y: float, **more: Any) -> dict[str, Any]:
+    return {"position": [x, y], "radius": 0.5, **more}
+
+
+def scene_of(*balls: dict[str, Any], solver: dict[str, Any] | None = None, **document: Any) -> Scene:
+    return from_document({"ball": list(balls), "solver": solver or {}, **document})
+
+
+def shipped(name: str) -> Scene:
+    """Return a scene of the repository."""
+    return load(ROOT / "scenes" / f"{name}.toml")
+
+
+def running(scene: Scene, engine: str = "reference", **settings: Any) -> Simulation:
+    return start(scene, engine, scene.solver.replace(**settings))
+
+
+def stepped(simulation: Simulation, steps: int) -> Simulation:
+    for _ in range(steps):
+        simulation.step()
+    return simulation
+
+
+def side_by_side(scene: Scene, steps: int, **settings: Any) -> Iterator[tuple[Simulation, Simulation]]:
+    """Yield pymunk and the reference, both after each step."""
+    theirs, ours = running(scene, "pymunk", **settings), running(scene, "reference", **PYMUNK_WAY, **settings)
+    for _ in range(steps):
+        theirs.step()
+        ours.step()
+        yield theirs, ours
+
+
+def roster_of(scene: Scene) -> Roster:
+    return Roster(scene, scene.solver.h)
+
+
+def small_pile(count: int = 60) -> Scene:
+    """Return balls that fall into a box and settle: rubbing, bouncing little."""
+    coefficients = {"restitution": 0.1, "friction": 0.5}
+    planes = [
+        {**FLOOR, "material": "stone"},
+        {"name": "left", "point": [0, 0], "normal": [1, 0], "material": "stone"},
+        {"name": "right", "point": [0.68, 0], "normal": [-1, 0], "material": "stone"},
+    ]
+    grid = {"origin": [0.07, 0.06], "columns": 6, "rows": count // 6, "spacing": [0.108, 0.103], "radius": 0.05}
+    return from_document(
+        {
+            "world": {**EARTH, "seed": 1},
+            "solver": {"dt": 1 / 120},
+            "material": [{"name": "stone"}],
+            "pair": [{"between": ["stone", "stone"], **coefficients}],
+            "plane": planes,
+            "grid": [{**grid, "jitter": 0.002, "mass": 0.1, "material": "stone"}],
+        }
+    )

@@ -1,0 +1,231 @@
+"""Broad phases: whichever is chosen, the same contacts are found, and none nearer than the margin is lost."""
+
+import math
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from pieces import ball, roster_of, running, scene_of, shipped, small_pile, stepped
+
+from sandbox.engines.reference.broad_phase import BROAD_PHASES
+from sandbox.engines.reference.broad_phase.grid import cell_of
+from sandbox.engines.reference.finder import Finder
+from sandbox.engines.reference.meeting import FIRST, SECOND, may_meet, pair_key
+
+WORDS = st.sampled_from(["all", "fixed", "none"])
+
+
+@st.composite
+def crowds(draw):
+    """Balls near each other, of very different sizes, somewhere; some coincide, some stay where they are."""
+    offset = draw(st.sampled_from([0.0, 1e3, 1e6, 1e9, -1e9]))
+    places = st.one_of(st.integers(-6, 6).map(float), st.floats(-6, 6), st.sampled_from([0.1, 0.3, 0.7]))
+    balls = []
+    for _ in range(draw(st.integers(1, 12))):
+        x, y = offset + draw(places), offset + draw(places)
+        radius = draw(st.sampled_from([1e-6, 0.1, 0.35, 0.5, 1.0, 1 / 3, 10.0, 1e4]))
+        more = {"radius": radius, "collides": draw(WORDS)}
+        if draw(st.booleans()):
+            more["fixed"] = True
+        balls.append(ball(x, y, **more))
+    return balls
+
+
+def meets(one, other):
+    """The rule of `collides`, from the scene itself."""
+    words = [each["collides"] for each in (one, other)]
+    fixed = [bool(each.get("fixed")) for each in (one, other)]
+    if "none" in words or all(fixed):
+        return False
+    if any(fixed):
+        return words[fixed.index(True)] == "all"
+    return words == ["all", "all"]
+
+
+def found(finder, position, margin=0.0):
+    contacts = finder.manifolds(position, finder.candidates(position, margin), margin)
+    return [column.tolist() for column in contacts]
+
+
+@given(crowds())
+def test_all_find_the_same_manifolds(balls):
+    roster = roster_of(scene_of(*balls))
+    results = [found(Finder(roster, name), roster.position) for name in BROAD_PHASES]
+    assert all(result == results[0] for result in results)
+    overlapping = [
+        pair_key(i, j)
+        for (i, a), (j, b) in combinations(enumerate(balls), 2)
+        if meets(a, b) and math.dist(a["position"], b["position"]) < a["radius"] + b["radius"]
+    ]
+    assert results[0][0] == overlapping
+
+
+@given(crowds(), st.floats(0, 5))
+def test_none_loses_a_pair_nearer_than_the_margin(balls, margin):
+    roster = roster_of(scene_of(*balls))
+    near = {
+        pair_key(i, j)
+        for (i, a), (j, b) in combinations(enumerate(balls), 2)
+        if meets(a, b) and math.dist(a["position"], b["position"]) < a["radius"] + b["radius"] + margin * (1 - 1e-12)
+    }
+    for name in BROAD_PHASES:
+        keys = Finder(roster, name).candidates(roster.position, margin).balls.tolist()
+        assert keys == sorted(set(keys))
+        assert near <= set(keys)
+
+
+@given(crowds(), st.randoms(use_true_random=False))
+def test_the_order_kept_from_step_to_step_changes_nothing(balls, random):
+    roster = roster_of(scene_of(*balls))
+    used = Finder(roster, "sweep")
+    for _ in range(3):
+        moved = roster.position + np.array([[random.uniform(-3, 3), random.uniform(-3, 3)] for _ in balls])
+        assert found(used, moved) == found(Finder(roster, "all_pairs"), moved)
+
+
+def touching_within_rounding(count):
+    """Yield centres about 1e9 m out, and radii, that overlap by less than the spacing of the coordinates."""
+    random = np.random.default_rng(7)
+    while count:
+        x, a, b = 1e9 + random.uniform(0, 1e3), random.uniform(0.1, 1), random.uniform(0.1, 1)
+        other = x + a + b
+        if other - x < a + b:
+            yield x, a, other, b
+            count -= 1
+
+
+@pytest.mark.parametrize("name", BROAD_PHASES)
+def test_touches_within_the_rounding_of_a_far_place_are_not_lost(name):
+    for x, a, other, b in touching_within_rounding(300):
+        balls = [ball(x, 0.0, radius=a), ball(other, 0.0, radius=b)]
+        roster = roster_of(scene_of(*balls))
+        assert found(Finder(roster, name), roster.position)[0] == [pair_key(0, 1)]
+
+
+@pytest.mark.parametrize("name", BROAD_PHASES)
+def test_balls_near_the_end_of_doubles_are_neighbours_if_they_touch(name):
+    # Cells 2.02 m wide around the 2⁵²th: their numbers are rounded, and on one side twice as coarsely.
+    wide = 2.02
+    start = 2.0**52 * wide
+    for k in range(-40, 40):
+        x = start + 2.0 * k
+        roster = roster_of(scene_of(ball(x, 0.0, radius=wide / 2), ball(x + 2.0, 0.0, radius=wide / 2)))
+        assert found(Finder(roster, name), roster.position)[0] == [pair_key(0, 1)]
+
+
+@pytest.mark.parametrize("name", BROAD_PHASES)
+@pytest.mark.parametrize("balls", [[], [ball(0, 0)], [ball(0, 0), ball(0, 0)], [ball(0, 0, collides="none")] * 3])
+def test_empty_and_smallest_scenes(name, balls):
+    balls = [{**each, "name": f"b{k}"} for k, each in enumerate(balls)]
+    if not balls:  # a scene of nothing else is a fault
+        document = {"plane": [{"point": [0, 0], "normal": [0, 1]}]}
+        finder = Finder(roster_of(scene_of(**document)), name)
+        assert found(finder, np.empty((0, 2)))[0] == []
+        return
+    roster = roster_of(scene_of(*balls))
+    expected = [pair_key(0, 1)] if len(balls) == 2 else []
+    assert found(Finder(roster, name), roster.position)[0] == expected
+
+
+@pytest.mark.parametrize("name", BROAD_PHASES)
+def test_coincident_centres_have_the_normal_of_munk(name):
+    roster = roster_of(scene_of(ball(3, 4), ball(3, 4)))
+    contacts = Finder(roster, name).overlaps(roster.position)
+    assert (contacts.separation.tolist(), contacts.normal.tolist()) == ([-1.0], [[1.0, 0.0]])
+
+
+@pytest.mark.parametrize("name", BROAD_PHASES)
+def test_more_pairs_than_there_is_room_for_are_all_kept(name):
+    balls = [ball(0.001 * k, 0.0, name=f"b{k}") for k in range(40)]
+    roster = roster_of(scene_of(*balls))
+    assert len(Finder(roster, name).overlaps(roster.position).key) == 40 * 39 // 2
+
+
+@pytest.mark.parametrize("name", BROAD_PHASES)
+def test_a_position_that_is_no_number_meets_nobody_and_hides_nobody(name):
+    roster = roster_of(scene_of(ball(0, 0), ball(0.5, 0), ball(0.2, 0.2)))
+    position = roster.position.copy()
+    position[2] = np.nan
+    keys = found(Finder(roster, name), position)[0]
+    assert set(keys) <= {pair_key(0, 1)}
+    assert name == "sweep" or keys == [pair_key(0, 1)]
+
+
+def test_circles_tests_every_pair_that_may_meet_and_the_others_far_fewer():
+    wide = [ball(3.0 * k, 0.1 * (k % 7), name=f"b{k}") for k in range(400)]
+    roster = roster_of(scene_of(*wide, ball(0, 50, fixed=True), ball(9, 50, fixed=True), ball(4, 50, collides="fixed")))
+    tests = {}
+    for name in BROAD_PHASES:
+        finder = Finder(roster, name)
+        finder.overlaps(roster.position)
+        tests[name] = finder.work["broad_tests"]
+    assert tests["all_pairs"] == 0
+    assert tests["circles"] == 400 * 399 // 2 + 400 * 2 + 2
+    assert tests["grid"] < 1000  # at most the neighbours of each
+    assert tests["sweep"] < 1000  # likewise
+
+
+def test_one_huge_ball_spoils_the_grid_and_not_the_sweep():
+    small = [ball(3.0 * k, 0.0, name=f"b{k}") for k in range(200)]
+    roster = roster_of(scene_of(*small, ball(300, -1e4 - 1, radius=1e4)))
+    tests = {}
+    for name in ("grid", "sweep"):
+        finder = Finder(roster, name)
+        finder.overlaps(roster.position)
+        tests[name] = finder.work["broad_tests"]
+    assert tests["grid"] == 201 * 200 // 2  # all are in one cell, or in the next
+    assert tests["sweep"] < 500
+
+
+def same_runs(scene, steps, **settings):
+    runs = [stepped(running(scene, broad_phase=name, **settings), steps) for name in BROAD_PHASES]
+    assert runs[0].work["contacts"] > 0
+    return len({run.state_hash() for run in runs}) == 1
+
+
+def test_a_gas_runs_the_same_on_all():
+    assert same_runs(shipped("benchmark/gas"), 120, dt=0.01)
+
+
+def test_a_pile_runs_the_same_on_all():
+    assert same_runs(small_pile(), 80)
+
+
+@pytest.mark.parametrize("detection", ["bisect", "swept", "shrink"])
+def test_a_pile_runs_the_same_on_all_with_each_detection(detection):
+    assert same_runs(small_pile(18), 40, detection=detection)
+
+
+def test_penalty_runs_the_same_on_all():
+    assert same_runs(small_pile(), 20, response="penalty", substeps=20)
+
+
+def test_unlike_sizes_run_the_same_on_all():
+    radii = [0.02, 0.3, 0.05, 1.0, 0.1]
+    balls = [ball(1.1 * (k % 6), 1.2 + 1.3 * (k // 6), radius=radii[k % 5] / 2, name=f"b{k}") for k in range(30)]
+    scene = scene_of(
+        *balls, ball(3, -3, radius=3.0, fixed=True, name="hill"), world={"gravity": [0.0, -9.81]}, solver={"dt": 0.005}
+    )
+    assert same_runs(scene, 200)
+
+
+def test_keys_hold_both_numbers_and_ascend_as_pairs_do():
+    pairs = [(0, 0), (0, 1), (0, SECOND), (1, 0), (5, 7), (SECOND, SECOND)]
+    keys = [pair_key(i, j) for i, j in pairs]
+    assert keys == sorted(keys)
+    assert [(key >> FIRST, key & SECOND) for key in keys] == pairs
+
+
+@given(st.integers(0, 2), st.booleans(), st.integers(0, 2), st.booleans())
+def test_meeting_does_not_depend_on_who_is_asked_first(a, a_moves, b, b_moves):
+    assert may_meet(a, a_moves, b, b_moves) == may_meet(b, b_moves, a, a_moves)
+    assume(not (a_moves or b_moves))
+    assert not may_meet(a, a_moves, b, b_moves)
+
+
+def test_cells_are_numbered_from_left_to_right_as_far_as_numbers_go():
+    assert [cell_of(x, 0.5) for x in (-1.0, -0.1, 0.0, 0.49, 0.5)] == [-2, -1, 0, 0, 1]
+    assert cell_of(-1e300, 1e-9) < cell_of(1e300, 1e-9)
+    assert cell_of(math.nan, 1.0) == 0

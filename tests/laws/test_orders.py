@@ -1,0 +1,65 @@
+"""Convergence: by halving the step, the order that a scheme claims, in whole scenes."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from ways import INTEGRATORS, Way, drop
+
+from sandbox.engines.reference.integrators import INTEGRATORS as TABLE
+from sandbox.measure.closed_form import bounces
+from sandbox.scene.file import from_document
+
+STEPS = np.array([0.04, 0.02, 0.01, 0.005])
+
+
+def fitted(errors) -> float:
+    return float(np.polyfit(np.log(STEPS), np.log(errors), 1)[0])
+
+
+def thrown():
+    world = {"gravity": [0.0, -9.81], "linear_drag": 0.3, "quadratic_drag": 0.05, "wind": [2.0, 0.5], "duration": 2.0}
+    return from_document({"world": world, "ball": [{"position": [0, 0], "velocity": [15, 20], "radius": 0.1}]})
+
+
+def landing():
+    """DOP853 at its tightest: an oracle nobody here wrote."""
+
+    def flight(_, s):
+        wind = s[2:] - [2.0, 0.5]
+        return [*s[2:], *([0.0, -9.81] - 0.3 * wind - 0.05 * np.hypot(*wind) * wind)]
+
+    return solve_ivp(flight, (0, 2), [0, 0, 15, 20], method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+
+
+@pytest.mark.parametrize("way", [*(Way("reference", {"integrator": word}) for word in INTEGRATORS), Way("pymunk", {})])
+def test_flight_through_air_converges_at_the_order_of_its_scheme(way):
+    order = 1 if way.engine == "pymunk" else TABLE[way.settings["integrator"]].order
+    expected, scene = landing(), thrown()
+    errors = []
+    for dt in STEPS:
+        done = way.run(scene, dt=float(dt))
+        errors.append(np.abs(np.concatenate((done.position[-1, 0], done.velocity[-1, 0])) - expected).max())
+    assert fitted(errors) == pytest.approx(order, abs=0.2)  # a fit over three halvings
+
+
+@pytest.mark.parametrize(
+    ("settings", "order"),
+    [({"detection": "swept"}, 2), ({"detection": "discrete"}, 1)],
+)
+def test_a_bounce_converges_at_the_order_of_its_detection(settings, order):
+    """The worst over many phases of the impact within the step: a single one would err by chance."""
+    errors = np.zeros(len(STEPS))
+    for height in np.linspace(1.0, 1.2, 25):
+        scene = drop(0.8, float(height), 0.8)
+        exact = bounces(np.array([0.8]), float(height), 0.0, 9.81, 0.8)[0][0]
+        for k, dt in enumerate(STEPS):
+            done = Way("reference", {"integrator": "velocity_verlet", **settings}).run(scene, dt=float(dt))
+            errors[k] = max(errors[k], abs(done.position[-1, 0, 1] - 0.5 - exact))
+    assert fitted(errors) == pytest.approx(order, abs=0.3)  # the worst of 25 phases is not quite the worst of all
+
+
+def test_bisection_and_an_exact_flight_leave_only_its_epsilon():
+    scene = drop(0.8, 1.0, 0.8)
+    exact = bounces(np.array([0.8]), 1.0, 0.0, 9.81, 0.8)[0][0]
+    done = Way("reference", {"integrator": "velocity_verlet", "detection": "bisect"}).run(scene)
+    assert done.position[-1, 0, 1] - 0.5 == pytest.approx(exact, abs=1e-9)  # 1e-9 of 0.01 s at 4.4 m/s, 1.8-fold

@@ -1,0 +1,245 @@
+"""Comparing: whole comparisons, with figures that are known beforehand."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+
+import sandbox
+from sandbox.engines import registry
+from sandbox.engines.contract import Engine
+from sandbox.engines.native.engine import PymunkEngine
+from sandbox.measure import run as running
+from sandbox.measure.compare import compare
+from sandbox.measure.compare import truth as truth_module
+from sandbox.measure.compare.truth import truth_of
+from sandbox.measure.compare.why import Knob, knobs, verdict
+from sandbox.scene.file import load, loads
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.scene.shipped import find
+
+BOUNCE = load(find("bounce"), ["world.duration=2.0"])
+KEYS = [
+    "engine",
+    "status",
+    "reason",
+    "settings",
+    "max_position_error",
+    "rms_position_error",
+    "max_velocity_error",
+    "rms_velocity_error",
+    "energy_drift",
+    "momentum_drift",
+    "first_divergence",
+    "matched_contacts",
+    "missed_contacts",
+    "phantom_contacts",
+    "max_contact_delay",
+    "trusted_until",
+    "seconds",
+    "energy_against",
+    "events",
+    "missed",
+    "phantom",
+    "why",
+    "verdict",
+]
+
+
+@dataclass(frozen=True)
+class Recalled:
+    """pymunk under another name, to which `missing` may be added."""
+
+    name: str
+    lacks: tuple[str, ...] = ()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(PymunkEngine(), name)
+
+    def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
+        return self.lacks or PymunkEngine().missing(scene, settings)
+
+
+def install(monkeypatch: pytest.MonkeyPatch, **engines: Engine) -> None:
+    """Leave pymunk and these engines in the registry."""
+    for name in list(registry.ENGINES):
+        if name != "pymunk":
+            monkeypatch.delitem(registry.ENGINES, name)
+    for name, engine in engines.items():
+        monkeypatch.setitem(registry.ENGINES, name, engine)
+
+
+def test_explicit_euler_is_off_by_half_a_step_of_velocity() -> None:
+    scene = load(find("ball"))
+    (row,) = compare(scene, ["pymunk"]).rows
+    assert row.score.max_position == pytest.approx(9.81 * 0.01 * 1.0 / 2.0, rel=1e-12)  # g·h·T/2, 100 roundings
+    # Beyond 5 mm, 1 % of the radius, from T = 2·0.005/(g·h) = 0.102 s on.
+    assert row.first_divergence == pytest.approx(0.11, rel=1e-12)
+    assert row.count("matched") == row.count("missed") == row.count("phantom") == 0
+    assert row.seconds is not None
+    assert row.seconds > 0
+
+
+def test_bounce_is_matched_with_its_delay() -> None:
+    comparison = compare(BOUNCE, ["pymunk"], tolerance=0.002)
+    assert (comparison.truth, comparison.trusted_until) == ("closed_form", 2.0)
+    (row,) = comparison.rows
+    before = [error for error in (9.81 * 0.001 * t / 2.0 for t in (0.407, 0.408)) if error > 0.002]
+    assert len(before) == 1  # the tolerance is passed between these two frames
+    assert row.first_divergence == pytest.approx(0.408, rel=1e-12)
+    (event,) = row.events or ()
+    assert event.between == ("ball", "ground")
+    assert event.time == pytest.approx(1.0096375546923, rel=1e-12)  # √(2·5/9.81)
+    assert event.delta_time is not None
+    assert 0.0 < event.delta_time < 0.002  # late by g·h·T/2 over v = 0.5 ms, and a step until it is seen
+
+
+def test_row_has_exactly_the_keys_promised() -> None:
+    document = compare(BOUNCE, ["pymunk"]).document("bounce")
+    promised = ["scene", "title", "truth", "truth_about", "trusted_until", "duration", "tolerance", "engines"]
+    assert list(document) == promised
+    assert list(document["engines"][0]) == KEYS
+    assert (document["scene"], document["title"]) == ("bounce", "Bounce")
+    assert document["engines"][0]["settings"]["integrator"] == "explicit_euler"
+
+
+def test_engine_that_refuses_is_a_row_with_its_reason() -> None:
+    comparison = compare(BOUNCE, ["pymunk"], integrator="rk4")
+    (row,) = comparison.rows
+    assert row.status == "refused"
+    assert row.reason is not None
+    assert "integrator 'rk4'" in row.reason
+    assert row.score == (None, None, None, None)
+    assert row.events is row.seconds is row.energy_drift is None
+    assert comparison.truth == "closed_form"  # belongs to the scene, not to who is judged
+    assert comparison.trajectories == {}
+
+
+def test_without_names_every_engine_has_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, other=Recalled("other"), unable=Recalled("unable", ("it models nothing",)))
+    comparison = compare(BOUNCE)
+    assert [(row.engine, row.status) for row in comparison.rows] == [
+        ("pymunk", "ok"),
+        ("other", "ok"),
+        ("unable", "refused"),
+    ]
+    assert list(comparison.trajectories) == ["pymunk", "other"]
+
+
+def test_exact_is_the_truth_where_it_models_the_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = load(find("two_balls"))
+    install(monkeypatch, exact=Recalled("exact"))
+    comparison = compare(scene, ["pymunk"])
+    assert comparison.truth == "exact"
+    assert comparison.rows[0].score.max_position == 0.0
+    install(monkeypatch, exact=Recalled("exact", ("it does not model this",)))
+    assert compare(scene, ["pymunk"]).truth == "refined"
+
+
+def test_exact_that_takes_too_long_gives_way_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, exact=Recalled("exact"))
+    monkeypatch.setattr(truth_module, "PATIENCE", -1.0)
+    monkeypatch.setattr(running, "REPORT_EVERY", -1.0)  # looked at after every step
+    scene = load(find("two_balls"), ["solver.dt=0.01"])
+    truth = truth_of(scene, scene.solver, 1e-3)
+    assert truth is not None
+    assert truth.kind == "refined"
+    assert "; exact was given up after -1 s" in truth.about
+
+
+def test_truth_does_not_depend_on_the_choices_that_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch)
+    scene = load(find("newtons_cradle"), ["world.duration=0.4"])
+    rough, fine = (compare(scene, ["pymunk"], iterations=n, slop=s) for n, s in ((2, 0.01), (20, 0.0)))
+    assert rough.best is not None
+    assert fine.best is not None
+    assert (rough.best.trajectory.position == fine.best.trajectory.position).all()
+
+
+def test_refined_truth_agrees_with_the_known_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch)
+    scene = load(find("two_balls"), ["solver.dt=0.01"])
+    truth = truth_of(scene, scene.solver, 1e-3)
+    assert truth is not None
+    assert (truth.kind, truth.trusted_until) == ("refined", 1.0)
+    # They meet after 0.375 s and go on at 2.5 and 4.5 m/s: a tenth of the tolerance, of which the last step may be off.
+    assert truth.trajectory.position[-1, 0, 0] == pytest.approx(-2.0 + 4.0 * 0.375 + 2.5 * 0.625, abs=2e-4)
+    assert truth.trajectory.position[-1, 1, 0] == pytest.approx(4.5 * 0.625, abs=2e-4)  # likewise
+
+
+def test_missed_wall_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch)
+    (row,) = compare(load(find("bullet")), ["pymunk"]).rows
+    assert [(e.kind, e.between) for e in row.events or ()] == [("missed", ("bullet", "wall"))]
+    assert row.energy_drift == pytest.approx(0.75, rel=1e-9)  # it kept all, and should have kept e² = ¼
+
+
+def test_why_says_that_a_finer_step_halves_the_error() -> None:
+    comparison = compare(load(find("ball")), ["pymunk"], why=True)
+    (row,) = comparison.rows
+    tried = {(knob.knob, knob.value): knob for knob in row.why}
+    assert tried["dt", 0.005].ratio == pytest.approx(0.5, rel=1e-9)  # first order; hundreds of roundings of 10 m
+    assert tried["slop", 0.0].ratio == tried["iterations", 40].ratio == 1.0
+    assert tried["integrator", "rk4"].status == "refused"
+    assert tried["detection", "swept"].status == "refused"
+    assert row.verdict == "pymunk: dt = 0.005 moves the difference most, from 0.0491 m to 0.0245 m (×0.5)"
+
+
+def test_why_has_nothing_to_say_of_an_engine_that_is_right() -> None:
+    (row,) = compare(load(find("ball")), ["pymunk"], why=True, half_kick=True).rows
+    assert (row.why, row.verdict) == ((), None)
+
+
+def test_knobs_change_one_choice_each() -> None:
+    settings = Settings(integrator="explicit_euler", detection="discrete", record_every=3)
+    changes = [change for _, _, change in knobs(settings)]
+    assert changes[:3] == [{"dt": 0.005, "record_every": 6}, {"slop": 0.0}, {"iterations": 40}]
+    assert [next(iter(change)) for change in changes[3:]] == ["integrator"] * 4 + ["detection"] * 3
+
+
+def test_verdict_names_the_first_of_equals() -> None:
+    knob = Knob("dt", 0.5, "ok", None, 0.4, 0.4)
+    others = [
+        replace(knob, knob="integrator", value=value, max_position_error=r, ratio=r)
+        for value, r in (("a", 2e-13), ("b", 1e-13))
+    ]
+    assert "integrator = a" in verdict("e", (knob, *others), 1.0)
+    assert "no single knob" in verdict("e", (replace(knob, ratio=0.95), replace(knob, ratio=3.0)), 1.0)
+    assert "none of the knobs" in verdict("e", (replace(knob, status="refused", ratio=None),), 1.0)
+
+
+def test_scene_without_bodies_is_compared_too() -> None:
+    comparison = compare(loads("[world]\nduration = 0.1\n"), ["pymunk"])
+    (row,) = comparison.rows
+    assert (row.status, row.score.max_position, row.energy_drift, row.momentum_drift) == ("ok", None, 0.0, 0.0)
+
+
+def test_engine_that_diverges_is_told_from_where() -> None:
+    scene = loads(
+        "[world]\ngravity = [1e9, 0]\nduration = 10.0\n[solver]\ndt = 0.1\n"
+        "[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n[[ball]]\nposition = [0, 1]\nradius = 0.5\n"
+        "[[ball]]\nposition = [5, 9]\nradius = 0.5\n"
+    )
+    comparison = compare(scene, ["pymunk"])
+    (row,) = comparison.rows
+    assert row.status == "diverged"
+    assert row.energy_drift is None
+    assert comparison.document()["engines"][0]["status"] == "diverged"
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")])
+def test_tolerance_out_of_range_is_refused(tolerance: float) -> None:
+    with pytest.raises(ValueError, match="positive and finite"):
+        compare(BOUNCE, ["pymunk"], tolerance=tolerance)
+
+
+def test_unknown_engine_is_an_error() -> None:
+    with pytest.raises(registry.UnknownEngineError, match="no engine 'nonsense'"):
+        sandbox.compare(BOUNCE, engines=["nonsense"])
+
+
+def test_whoever_asks_is_told_what_is_done() -> None:
+    told: list[str] = []
+    compare(load(find("ball")), ["pymunk"], why=True, told=told.append)
+    assert told == ["the truth", "pymunk", "pymunk: why"]
