@@ -19,6 +19,8 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+from sandbox.engines.compiling import COMPILING, say
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -76,14 +78,6 @@ def cache_folder() -> Path | None:
     return None
 
 
-@cache
-def say(text: str) -> None:
-    """Tell whoever watches, on standard error, once."""
-    if sys.stderr is not None:
-        sys.stderr.write(f"{text}\n")
-        sys.stderr.flush()
-
-
 def tell_if_slow(bodies: int) -> None:
     """Say so where a large scene runs on kernels that are not compiled."""
     if not COMPILED and bodies >= LARGE:
@@ -92,15 +86,13 @@ def tell_if_slow(bodies: int) -> None:
 
 if COMPILED:
 
-    class _Announcer(event.Listener):
-        """Says once that something is being compiled: the first use takes seconds, later ones find it on disk."""
+    class _Listener(event.Listener):
+        """Tells of what numba compiles."""
 
         def on_start(self, event: Any) -> None:
-            dispatcher = event.data.get("dispatcher")
-            if getattr(dispatcher, "__module__", "").startswith(__package__):
-                say("compiling the solver's kernels: some seconds, this once")
+            COMPILING.begin(getattr(event.data.get("dispatcher"), "__module__", ""))
 
-        def on_end(self, event: Any) -> None:
-            """Nothing is said then."""
+        def on_end(self, event: Any) -> None:  # noqa: ARG002
+            COMPILING.end()
 
-    event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]  # numba's own
+    event.register("numba:compile", _Listener())  # type: ignore[no-untyped-call]  # numba's own

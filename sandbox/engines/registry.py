@@ -1,6 +1,7 @@
 """ENGINES: every engine by name."""
 
 from sandbox.engines.contract import Engine, Refusal, Simulation
+from sandbox.engines.exact.engine import ExactEngine
 from sandbox.engines.native.engine import PymunkEngine
 from sandbox.engines.reference.engine import ReferenceEngine
 from sandbox.scene.model import Scene
@@ -8,6 +9,7 @@ from sandbox.scene.settings import Settings
 
 ENGINES: dict[str, Engine] = {
     "pymunk": PymunkEngine(),
+    "exact": ExactEngine(),
     "reference": ReferenceEngine(),
 }
 

@@ -1,5 +1,6 @@
 """Roster: the bodies of a running scene as arrays in scene order, for the engines written by hand."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
@@ -8,6 +9,7 @@ import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.engines.fixtures import Fixtures, fixtures_of
+from sandbox.engines.kernel import kernel
 from sandbox.engines.limits import FARTHEST, FASTEST
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.crosscheck import MAX_SURFACES
@@ -171,7 +173,17 @@ class Roster:
 
     def beyond(self) -> int | None:
         """Return a body that is not finite, or beyond all bounds; else None."""
-        with np.errstate(over="ignore"):
-            good = (np.hypot(*self.position.T) <= FARTHEST) & (np.hypot(*self.velocity.T) <= FASTEST)
-            good &= np.isfinite(self.angular_velocity) & np.isfinite(self.angle)
-        return None if good.all() else int(np.argmin(good))
+        worst = first_beyond(self.position, self.velocity, self.angle, self.angular_velocity)
+        return None if worst < 0 else worst
+
+
+@kernel
+def first_beyond(position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray) -> int:
+    """Return the first of N bodies that is not finite, or beyond all bounds; −1 for none."""
+    for i in range(len(position)):
+        # Comparisons with nan are false, so that what is not good is caught, whatever it is.
+        good = position[i, 0] ** 2 + position[i, 1] ** 2 <= FARTHEST * FARTHEST
+        good = good and velocity[i, 0] ** 2 + velocity[i, 1] ** 2 <= FASTEST * FASTEST
+        if not (good and abs(spin[i]) < math.inf and abs(angle[i]) < math.inf):
+            return i
+    return -1

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from sandbox.action import Action, ActionError, Spawn, actions_to_json, in_order
+from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
 from sandbox.engines.registry import engine_named, start
 from sandbox.measure.audit import Audit
@@ -69,9 +70,9 @@ def run(
     recorder = Recorder(scene, resolved, len(scene.bodies) + spawned)
     auditor = Auditor(scene, simulation) if audit else None
 
-    began = perf_counter()
+    began, compiled = perf_counter(), COMPILING.seconds
     status, reason, steps, contacts = _drive(scene, simulation, resolved, actions, recorder, progress)
-    seconds = perf_counter() - began - (auditor.seconds if auditor else 0.0)
+    seconds = perf_counter() - began - (auditor.seconds if auditor else 0.0) - (COMPILING.seconds - compiled)
     bodies, work = simulation.bodies, dict(simulation.work)
     simulation.close()
 

@@ -12,9 +12,11 @@ from sandbox.engines.exact.arena import (
     KNOB,
     LIGHTNESS,
     NEXT_KIND,
+    NEXT_LATE,
     NEXT_STAMP,
     NEXT_WHO,
     NOW,
+    NOW_LATE,
     RECORDING,
     ROWS,
     SECOND,
@@ -59,16 +61,16 @@ def start(arena: Arena) -> None:
 def look_ahead(arena: Arena) -> None:
     """Predict every ball's earliest event anew."""
     for k in range(len(arena.movers)):
-        predict(arena, arena.movers[k], arena.world[NOW])
+        predict(arena, arena.movers[k], arena.world[NOW], arena.world[NOW_LATE])
 
 
 @kernel
 def renew(arena: Arena, t: float) -> None:
     """Let every ball go on under what now holds, which an action has changed at a time."""
-    arena.world[NOW] = t
+    arena.world[NOW], arena.world[NOW_LATE] = t, 0.0
     for i in range(len(arena.state)):
         if arena.state[i, LIGHTNESS] > 0.0:
-            bring(arena, i, t)
+            bring(arena, i, t, 0.0)
             knocked(arena, i)
     start(arena)
 
@@ -114,12 +116,12 @@ def within(arena: Arena, t: float) -> int:
 
 
 @kernel
-def happen(arena: Arena, i: int, kind: int, partner: int, t: float) -> None:
+def happen(arena: Arena, i: int, kind: int, partner: int, t: float, late: float) -> None:
     """Let a ball's event happen, and look ahead for those whom it concerns.
 
     Others that were to meet them are left: their times stay bounds, and are looked at when they come up.
     """
-    bring(arena, i, t)
+    bring(arena, i, t, late)
     both = kind == BALL and arena.state[partner, LIGHTNESS] > 0.0
     if kind == SLIP_ENDS:
         slip_ends(arena, i)
@@ -131,7 +133,7 @@ def happen(arena: Arena, i: int, kind: int, partner: int, t: float) -> None:
         hit_knob(arena, i, partner)
         knocked(arena, i)
     else:
-        bring(arena, partner, t)
+        bring(arena, partner, t, late)
         hit_ball(arena, i, partner)
         knocked(arena, i)
         if both:
@@ -139,8 +141,8 @@ def happen(arena: Arena, i: int, kind: int, partner: int, t: float) -> None:
     changed(arena, i)
     if both:
         changed(arena, partner)
-        predict(arena, partner, t)
-    predict(arena, i, t)
+        predict(arena, partner, t, late)
+    predict(arena, i, t, late)
 
 
 @kernel
@@ -152,17 +154,17 @@ def advance(arena: Arena, until: float) -> int:
             return DONE
         if arena.counts[RECORDING] != 0 and arena.counts[ROWS] + ROOM > len(arena.log):
             return FULL
-        t = arena.next_time[i]
+        t, late = arena.next_time[i], arena.state[i, NEXT_LATE]
         kind, partner = arena.tags[i, NEXT_KIND], arena.tags[i, NEXT_WHO]
         if kind == BALL and arena.tags[i, NEXT_STAMP] != arena.tags[partner, STAMP]:
-            predict(arena, i, t)
+            predict(arena, i, t, late)
             continue
-        arena.world[NOW] = t
+        arena.world[NOW], arena.world[NOW_LATE] = t, late
         arena.counts[WHO], arena.counts[WHAT], arena.counts[WITH] = i, kind, partner
         bound = within(arena, t)
         if bound != DONE:
             return bound
-        happen(arena, i, kind, partner, t)
+        happen(arena, i, kind, partner, t, late)
     return PAUSED
 
 
@@ -174,5 +176,5 @@ def evaluate(
     state = arena.state
     for i in range(len(state)):
         if state[i, LIGHTNESS] > 0.0:
-            position[i, 0], position[i, 1], velocity[i, 0], velocity[i, 1] = place(state, i, t)
-            angle[i], spin[i] = turned(state, i, t)
+            position[i, 0], position[i, 1], velocity[i, 0], velocity[i, 1] = place(state, i, t, 0.0)
+            angle[i], spin[i] = turned(state, i, t, 0.0)

@@ -13,13 +13,15 @@ from sandbox.engines.fixtures import Fixtures
 from sandbox.engines.roster import ALL, NOTHING, Roster
 from sandbox.trajectory import FloatArray, IntArray
 
-T, X, Y, VX, VY, AX, AY, RADIUS, ANGLE, SPIN, ALPHA, SLIDES, SINCE, LAST_TIME, LIGHTNESS, READINESS, FORCE = range(17)
-"""Columns of `state`: the ball's own time, s; place, velocity, acceleration; radius, m; angle, spin and its rate; when
-its sliding or spinning on a support ends; from when on its supports' impulses are not logged yet; when it last hit
-something; 1/mass, 0 for what never moves; 1/moment, 0 for what cannot turn; force of each of two supports on it, N."""
+T, X, Y, VX, VY, AX, AY, RADIUS, LATE, ANGLE, SPIN, ALPHA, SLIDES, SINCE = range(14)
+LAST_TIME, NEXT_LATE, LIGHTNESS, READINESS, FORCE = range(14, 19)
+"""Columns of `state`: the ball's own time, s; place, velocity, acceleration; radius, m; what rounding has cut off its
+own time; angle, spin and its rate; when its sliding or spinning on a support ends; from when on its supports' impulses
+are not logged yet; when it last hit something; what rounding has cut off its next event's time; 1/mass, 0 for what
+never moves; 1/moment, 0 for what cannot turn; force of each of two supports on it, N."""
 
 WIDTH = 24
-"""Columns of `state`: what prediction reads is the first eight, one cache line of a row of three."""
+"""Columns of `state`: what prediction reads stands first."""
 
 MEETS, SURFACE, SUPPORT, ROW = 0, 1, 2, 4
 LAST_KIND, LAST_WHO, NEXT_KIND, NEXT_WHO, NEXT_STAMP, STAMP, TAGS = range(6, 13)
@@ -37,9 +39,9 @@ THING, COAT, ENDS = range(3)
 RESTITUTION, FRICTION = range(2)
 """Places of `surfaces`."""
 
-GX, GY, HOP, NOW, SECOND, INSTANT = range(6)
-"""Places of `world`: gravity, m/s²; the speed of a hop, m/s; the time of the last event, s; the starts of the
-second and of the instant in which events are being counted."""
+GX, GY, HOP, NOW, NOW_LATE, SECOND, INSTANT = range(7)
+"""Places of `world`: gravity, m/s²; the speed of a hop, m/s; the time of the last event, s, and what rounding has cut
+off it; the starts of the second and of the instant in which events are being counted."""
 
 NONE, SLIP_ENDS, EDGE, FLAT, KNOB, BALL = range(6)
 """Kinds of event, in the order in which those of one ball at one instant happen."""
@@ -80,7 +82,7 @@ class Arena(NamedTuple):
     knob_tags: IntArray
     """(K, 2)"""
     world: FloatArray
-    """(6,)"""
+    """(7,)"""
     counts: IntArray
     """(9,)"""
     log: FloatArray
@@ -112,7 +114,7 @@ def arena_of(roster: Roster) -> Arena:
         flat_tags=np.column_stack((flat_thing, flat_thing, flat_knobs)),
         knobs=knobs,
         knob_tags=np.column_stack((knob_thing, knob_thing)),
-        world=np.zeros(6),
+        world=np.zeros(7),
         counts=np.zeros(9, np.int64),
         log=np.empty((0, 7)),
         log_pair=np.empty((0, 2), np.int64),

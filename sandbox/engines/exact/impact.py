@@ -14,6 +14,7 @@ from sandbox.engines.exact.arena import (
     LAST_KIND,
     LAST_TIME,
     LAST_WHO,
+    LATE,
     LIGHTNESS,
     RADIUS,
     READINESS,
@@ -39,15 +40,15 @@ part as fast as they met. This ends the endless series of hits into which inelas
 
 
 @kernel
-def bring(arena: Arena, i: int, t: float) -> None:
+def bring(arena: Arena, i: int, t: float, late: float) -> None:
     """Bring a ball's row to a time, that of an event of its own."""
     log_rest(arena, i, t)
     state = arena.state
-    x, y, vx, vy = place(state, i, t)
-    angle, spin = turned(state, i, t)
+    x, y, vx, vy = place(state, i, t, late)
+    angle, spin = turned(state, i, t, late)
     state[i, X], state[i, Y], state[i, VX], state[i, VY] = x, y, vx, vy
     state[i, ANGLE], state[i, SPIN] = angle, spin
-    state[i, T] = t
+    state[i, T], state[i, LATE] = t, late
 
 
 @kernel

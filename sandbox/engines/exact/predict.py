@@ -16,10 +16,12 @@ from sandbox.engines.exact.arena import (
     LAST_KIND,
     LAST_TIME,
     LAST_WHO,
+    LATE,
     LENGTH,
     LIGHTNESS,
     MEETS,
     NEXT_KIND,
+    NEXT_LATE,
     NEXT_STAMP,
     NEXT_WHO,
     NONE,
@@ -53,9 +55,9 @@ PARALLEL = 1e-12
 
 
 @kernel
-def place(state: FloatArray, i: int, t: float) -> tuple[float, float, float, float]:
-    """Return a ball's position and velocity at a time."""
-    tau = t - state[i, T]
+def place(state: FloatArray, i: int, t: float, late: float) -> tuple[float, float, float, float]:
+    """Return a ball's position and velocity at a time, t and `late`, what rounding has cut off it."""
+    tau = (t - state[i, T]) + (late - state[i, LATE])
     vx, vy = state[i, VX] + state[i, AX] * tau, state[i, VY] + state[i, AY] * tau
     x = state[i, X] + (state[i, VX] + 0.5 * state[i, AX] * tau) * tau
     y = state[i, Y] + (state[i, VY] + 0.5 * state[i, AY] * tau) * tau
@@ -63,9 +65,9 @@ def place(state: FloatArray, i: int, t: float) -> tuple[float, float, float, flo
 
 
 @kernel
-def turned(state: FloatArray, i: int, t: float) -> tuple[float, float]:
-    """Return a ball's angle and spin at a time."""
-    tau = t - state[i, T]
+def turned(state: FloatArray, i: int, t: float, late: float) -> tuple[float, float]:
+    """Return a ball's angle and spin at a time, as `place`."""
+    tau = (t - state[i, T]) + (late - state[i, LATE])
     spin = state[i, SPIN] + state[i, ALPHA] * tau
     return state[i, ANGLE] + (state[i, SPIN] + 0.5 * state[i, ALPHA] * tau) * tau, spin
 
@@ -140,21 +142,21 @@ def edge_time(flats: FloatArray, f: int, x: float, y: float, vx: float, vy: floa
 
 
 @kernel
-def predict(arena: Arena, i: int, now: float) -> None:
+def predict(arena: Arena, i: int, now: float, late: float) -> None:
     """Write down a ball's earliest event from now on.
 
     Of several at one instant the first in this order: its sliding ends, it comes to an edge, flats, knobs, balls, each
     by number.
     """
     state, tags, flats = arena.state, arena.tags, arena.flats
-    x, y, vx, vy = place(state, i, now)
+    x, y, vx, vy = place(state, i, now, late)
     ax, ay, radius = state[i, AX], state[i, AY], state[i, RADIUS]
     best, kind, partner = math.inf, NONE, -1
     fresh = state[i, LAST_TIME] == now
     last_kind, last_who = tags[i, LAST_KIND], tags[i, LAST_WHO]
     s1, s2 = tags[i, SUPPORT], tags[i, SUPPORT + 1]
     if state[i, SLIDES] < math.inf:
-        best, kind = max(state[i, SLIDES] - now, 0.0), SLIP_ENDS
+        best, kind = max((state[i, SLIDES] - now) - late, 0.0), SLIP_ENDS
     if s1 >= 0 and s2 < 0:
         tau = edge_time(flats, s1, x, y, vx, vy, ax, ay)
         if tau < best:
@@ -175,20 +177,35 @@ def predict(arena: Arena, i: int, now: float) -> None:
         met_knob = last_who
     if s1 >= 0:
         skip, other = arena.flat_tags[s1, ENDS], arena.flat_tags[s1, ENDS + 1]
-    k, tau = nearest_knob(arena.knobs, state, i, now, best, met_knob, skip, other)
+    k, tau = nearest_knob(arena.knobs, state, i, now, late, best, met_knob, skip, other)
     if k >= 0:
         best, kind, partner = tau, KNOB, k
-    j, tau = nearest_ball(state, tags, arena.others, i, now, best)
+    j, tau = nearest_ball(state, tags, arena.others, i, now, late, best)
     if j >= 0:
         best, kind, partner = tau, BALL, j
         tags[i, NEXT_STAMP] = tags[j, STAMP]
-    arena.next_time[i] = now + best
+    # Two-sum: times grow, and what rounding cuts off them would be the largest error of a long run.
+    after = best + late
+    time = now + after
+    virtual = time - now
+    state[i, NEXT_LATE] = 0.0
+    if time < math.inf:
+        state[i, NEXT_LATE] = (now - (time - virtual)) + (after - virtual)
+    arena.next_time[i] = time
     tags[i, NEXT_KIND], tags[i, NEXT_WHO] = kind, partner
 
 
 @kernel
 def nearest_knob(
-    knobs: FloatArray, state: FloatArray, i: int, now: float, best: float, met: int, skip: int, other: int
+    knobs: FloatArray,
+    state: FloatArray,
+    i: int,
+    now: float,
+    late: float,
+    best: float,
+    met: int,
+    skip: int,
+    other: int,
 ) -> tuple[int, float]:
     """Return which knob a ball meets first and after what time, less than `best`; −1 for none.
 
@@ -197,12 +214,13 @@ def nearest_knob(
         state: of all balls.
         i: ball.
         now: s.
+        late: what rounding has cut off it, s.
         best: s.
         met: knob that it has just met, or −1.
         skip: knob at an end of what it rests on, whose circle its path only touches; or −1.
         other: likewise.
     """
-    x, y, vx, vy = place(state, i, now)
+    x, y, vx, vy = place(state, i, now, late)
     ax, ay, radius = state[i, AX], state[i, AY], state[i, RADIUS]
     straight, speed, partner = ax == 0.0 and ay == 0.0, abs(vx) + abs(vy), -1
     for k in range(len(knobs)):
@@ -220,10 +238,10 @@ def nearest_knob(
 
 @kernel
 def nearest_ball(
-    state: FloatArray, tags: IntArray, others: IntArray, i: int, now: float, best: float
+    state: FloatArray, tags: IntArray, others: IntArray, i: int, now: float, late: float, best: float
 ) -> tuple[int, float]:
     """Return which ball a ball meets first and after what time, less than `best`; −1 for none."""
-    x, y, vx, vy = place(state, i, now)
+    x, y, vx, vy = place(state, i, now, late)
     ax, ay, size = state[i, AX], state[i, AY], state[i, RADIUS]
     everybody = tags[i, MEETS] == ALL
     fresh = state[i, LAST_TIME] == now and tags[i, LAST_KIND] == BALL
@@ -232,7 +250,7 @@ def nearest_ball(
         j = others[k]
         if j == i or not (everybody or state[j, LIGHTNESS] == 0.0):
             continue
-        tau = now - state[j, T]
+        tau = (now - state[j, T]) + (late - state[j, LATE])
         wx, wy = state[j, VX] + state[j, AX] * tau, state[j, VY] + state[j, AY] * tau
         dx = state[j, X] + 0.5 * (state[j, VX] + wx) * tau - x
         dy = state[j, Y] + 0.5 * (state[j, VY] + wy) * tau - y

@@ -32,6 +32,7 @@ from sandbox.engines.exact.arena import (
     KNOB,
     LIGHTNESS,
     NOW,
+    NOW_LATE,
     RECORDING,
     ROWS,
     SINCE,
@@ -265,7 +266,7 @@ class ExactSimulation:
         troupe, now = self._troupe, self.time
         touched = sorted(troupe.kicked | troupe.moved)
         for i in touched:
-            bring(self._arena, i, now)
+            bring(self._arena, i, now, 0.0)
             self._arena.state[i, X : Y + 1], self._arena.state[i, VX : VY + 1] = troupe.position[i], troupe.velocity[i]
             self._arena.state[i, ANGLE], self._arena.state[i, SPIN] = troupe.angle[i], troupe.angular_velocity[i]
         arena = self._arena
@@ -276,7 +277,7 @@ class ExactSimulation:
             self._allow()
             renew(arena, now)
             return
-        arena.world[NOW] = now
+        arena.world[NOW], arena.world[NOW_LATE] = now, 0.0
         for i in touched:
             if arena.state[i, LIGHTNESS] > 0.0:
                 knocked(arena, i)
@@ -285,14 +286,14 @@ class ExactSimulation:
             look_ahead(arena)  # others may now be in the way of what stood elsewhere
         for i in touched:
             if arena.state[i, LIGHTNESS] > 0.0:
-                predict(arena, i, now)
+                predict(arena, i, now, 0.0)
 
     def _take_out(self, numbers: IntArray) -> None:
         """Remove bodies; they stay where they are, with no velocity."""
         now = self.time
         with np.errstate(all="ignore"):
             for i in numbers.tolist():
-                bring(self._arena, i, now)
+                bring(self._arena, i, now, 0.0)
                 freed(self._arena, i)
                 self._arena.state[i, VX : SPIN + 2] = 0.0
                 self._arena.next_time[i] = np.inf

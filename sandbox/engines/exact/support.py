@@ -18,6 +18,7 @@ from sandbox.engines.exact.arena import (
     FRICTION,
     GX,
     GY,
+    LATE,
     LENGTH,
     LIGHTNESS,
     NX,
@@ -166,7 +167,7 @@ def single(arena: Arena, i: int, f: int, press: float) -> None:
         drive = -most if downhill > 0.0 else most
         rate = pull + drive * ease
         if slip * rate < 0.0:
-            slides = state[i, T] - slip / rate
+            slides = state[i, T] + (state[i, LATE] - slip / rate)
     a = pull + drive
     keep(arena, i, 0, v * tx, v * ty)
     state[i, AX], state[i, AY] = a * tx, a * ty
@@ -232,7 +233,7 @@ def corner(arena: Arena, i: int) -> None:
     state[i, ALPHA] = -r * (mu + nu) * ii / im
     state[i, SLIDES] = math.inf
     if state[i, ALPHA] != 0.0:
-        state[i, SLIDES] = state[i, T] - state[i, SPIN] / state[i, ALPHA]
+        state[i, SLIDES] = state[i, T] + (state[i, LATE] - state[i, SPIN] / state[i, ALPHA])
     for which in range(2):
         f = arena.tags[i, SUPPORT + which]
         push, rub = (first, mu) if which == 0 else (second, nu)

@@ -21,9 +21,6 @@ FEW = 24
 ONE_SIZE = 8.0
 """Ratio of radii up to which a uniform grid suits."""
 
-SPRING = 0.3
-"""ω·h of a penalty contact whose stiffness is left to the engine: ten substeps a contact."""
-
 
 @dataclass(frozen=True)
 class ReferenceEngine:
@@ -66,16 +63,17 @@ class ReferenceEngine:
         ]
         if settings.detection in ("bisect", "swept"):
             lacks.append(f"detection {settings.detection!r} leaves no overlap, which penalty springs act by")
-        reason = unstable(scene, self.resolve(scene, settings))
+        reason = unstable(scene, self.resolve(scene, settings), settings.stiffness is not None)
         return lacks if reason is None else [*lacks, reason]
 
     def resolve(self, scene: Scene, settings: Settings) -> Settings:
         """Return the settings with every choice filled in."""
         own: dict[str, object] = {**WORDS, "slop": slop_of(scene), "bias": BIAS, "persistence": 1}
         if settings.response == "penalty":
-            from sandbox.engines.reference.stability import lightest
+            from sandbox.engines.reference.stability import suited
 
-            own["stiffness"] = lightest(scene) * (SPRING / settings.h) ** 2
+            own["integrator"] = "semi_implicit_euler"  # explicit Euler makes springs gain energy
+            own["stiffness"] = suited(scene, settings)
         own["broad_phase"] = _suitable(scene)
         return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
 

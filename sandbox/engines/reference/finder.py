@@ -30,6 +30,7 @@ class Finder:
         self._roster, self._broad_phase = roster, BROAD_PHASES[broad_phase]
         self._ball_keys, self._segment_keys = np.empty(64, np.int64), np.empty(64, np.int64)
         self._out = _room_for(64)
+        self._none = self._out.of(slice(0))
         self.work: Counter[str] = Counter(broad_tests=0, narrow_tests=0, contacts=0)
         self.population_changed()
 
@@ -95,7 +96,7 @@ class Finder:
             self._looked(position, near, reach)
         self.work["narrow_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
         self.work["contacts"] += size
-        return self._out.of(slice(0, size))
+        return self._out.of(slice(0, size)) if size else self._none
 
     def _looked(self, position: FloatArray, near: Candidates, reach: float) -> int:
         """Write the contacts as far as there is room; return how many there are."""

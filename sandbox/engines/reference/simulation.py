@@ -17,7 +17,7 @@ from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.motion import State
 from sandbox.engines.reference.stage import Stage
 from sandbox.engines.roster import Roster
-from sandbox.engines.touching import Touching
+from sandbox.engines.touching import NOTHING, Touching
 from sandbox.engines.turn import Turn
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
@@ -105,9 +105,11 @@ class ReferenceSimulation:
             self._ended = True
 
     def _substep(self, time: float, h: float) -> None:
-        """Advance by h: apply forces, then advance, detect and resolve, in the chosen detection's way."""
+        """Advance by h under the forces that apply: advance, detect and resolve, in the chosen detection's way.
+
+        Which forces apply (`Stage.apply_forces`) changes only when an action does something, not from step to step.
+        """
         self._stage.time = time
-        self._stage.apply_forces()
         try:
             self._advance(self._stage, h)
         except Exhaustion:
@@ -191,6 +193,8 @@ class ReferenceSimulation:
 
 def _touching(contacts: Manifolds, impulse: FloatArray) -> Touching:
     """Return contacts as the ledger takes them: complex numbers, the impulse on the first."""
+    if not contacts.size:
+        return NOTHING
     normal = contacts.normal[:, 0] + 1j * contacts.normal[:, 1]
     point = contacts.point[:, 0] + 1j * contacts.point[:, 1]
     given = normal * (impulse[:, 0] + 1j * impulse[:, 1])

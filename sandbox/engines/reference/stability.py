@@ -6,12 +6,21 @@ import numpy as np
 
 from sandbox.engines.reference.integrators import INTEGRATORS, amplification
 from sandbox.engines.reference.springs import LEAST_RESTITUTION, damping_of
-from sandbox.scene.meetings import meetings
+from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
 ROUNDING = 1e-9
 """Amplification above 1 that is rounding: a scheme that conserves energy has exactly 1."""
+
+SPRING = 0.3
+"""ω·h of a contact whose stiffness is left to the engine: ten substeps a contact."""
+
+WORTH = 1e-3
+"""ω·h below which a stable step is none worth the name: thousands of substeps a contact."""
+
+DAMPER = 1.3
+"""Times the damping ratio: by how much softer such a contact is where its damper is what limits the step."""
 
 
 def lightest(scene: Scene) -> float:
@@ -23,7 +32,21 @@ def lightest(scene: Scene) -> float:
     return float(masses.min()) * (0.5 if meet.ball_ball else 1.0)
 
 
-def unstable(scene: Scene, settings: Settings) -> str | None:
+def suited(scene: Scene, settings: Settings) -> float:
+    """Return a stiffness, N/m, that goes with a step and the dampings that are asked for."""
+    stiffest_damper = max(_dampings(meetings(scene), settings), default=0.0)
+    return lightest(scene) * (SPRING / max(1.0, DAMPER * stiffest_damper) / settings.h) ** 2
+
+
+def _dampings(meet: Meetings, settings: Settings) -> list[float]:
+    """Return the damping ratios of all contacts that can come about."""
+    if settings.damping is not None:
+        return [settings.damping]
+    restitution = np.unique(meet.surfaces.restitution[meet.touching])
+    return [damping_of(max(e, LEAST_RESTITUTION)) for e in restitution.tolist()]
+
+
+def unstable(scene: Scene, settings: Settings, stiffness_stated: bool = True) -> str | None:
     """Return why penalty springs cannot work as set, or None where they can.
 
     The stiffest that can come about is a ball held by several springs: against fixed things by two, in a close packing
@@ -39,21 +62,24 @@ def unstable(scene: Scene, settings: Settings) -> str | None:
             f"a penalty contact always rebounds: restitution {table.min():g} cannot be had, {LEAST_RESTITUTION:g} can; "
             "state solver.damping, 1 for critical, to take what it gives"
         )
-    dampings = [settings.damping] if settings.damping is not None else [damping_of(float(e)) for e in np.unique(table)]
+    dampings = _dampings(meet, settings)
     crowd = np.sqrt(3.0) if meet.ball_ball else np.sqrt(2.0)
     frequency = crowd * np.sqrt(settings.stiffness / lightest(scene))
     worst = max(dampings, key=lambda z: _growth(settings, frequency, crowd * z, settings.h))
     if _growth(settings, frequency, crowd * worst, settings.h) <= 1.0 + ROUNDING:
         return None
     bound = _largest(settings, frequency, crowd * worst)
-    remedy = (
-        f"stable up to h = {_rounded_down(bound):g} s"
-        if bound
-        else "stable at no step; semi_implicit_euler is, up to some h"
-    )
+    if not bound:
+        remedy = "stable at no step; semi_implicit_euler is, up to some h"
+    else:
+        # Only ω·h counts, so that a bound of the one is a bound of the other.
+        softer = settings.stiffness * (bound / settings.h) ** 2
+        remedy = f"stable up to a solver.stiffness of {_rounded_down(softer):g} N/m"
+        if stiffness_stated:  # the engine's own grows as h falls
+            remedy += f", or up to h = {_rounded_down(bound):g} s"
     return (
         f"penalty springs of {settings.stiffness:g} N/m would gain energy at h = {settings.h:g} s "
-        f"with {settings.integrator}: {remedy}, or state a smaller solver.stiffness"
+        f"with {settings.integrator}: {remedy}"
     )
 
 
@@ -74,4 +100,4 @@ def _largest(settings: Settings, frequency: float, damping: float) -> float:
     for _ in range(30):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _growth(settings, frequency, damping, middle) <= 1.0 + ROUNDING else (low, middle)
-    return low if low > 1e-6 * settings.h else 0.0
+    return low if frequency * low > WORTH else 0.0

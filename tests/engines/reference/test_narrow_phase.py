@@ -98,7 +98,7 @@ def test_no_sampled_point_of_a_segment_is_nearer(x, y, ax, ay, bx, by):
 
 @given(coordinates, coordinates, radii, coordinates, coordinates, radii)
 def test_swapping_circles_turns_the_normal_round(ax, ay, a, bx, by, b):
-    assume((ax, ay) != (bx, by))
+    assume(math.dist((ax, ay), (bx, by)) > 1e-150)  # nearer, squares vanish, and they count as coincident
     one, other = circle_circle(ax, ay, a, bx, by, b), circle_circle(bx, by, b, ax, ay, a)
     assert one == (other[0], -other[1], -other[2])
 
@@ -116,7 +116,7 @@ def test_swapping_the_ends_of_a_segment_changes_nothing(x, y, ax, ay, bx, by):
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(-2, 2), st.floats(-2, 2), radii)
 def test_a_segment_of_no_length_is_a_circle(x, y, ax, ay, half):
-    assume((x, y) != (ax, ay))
+    assume(math.dist((x, y), (ax, ay)) > 1e-150)  # as above
     assert circle_segment(x, y, 0.5, ax, ay, ax, ay, half) == circle_circle(x, y, 0.5, ax, ay, half)
 
 

@@ -18,14 +18,22 @@ places = st.floats(-10, 10)
 ways = st.floats(-30, 30)
 
 
+def whole(*values):
+    """Return doubles as whole numbers of one common unit."""
+    ratios = [value.as_integer_ratio() for value in values]
+    unit = max(denominator for _, denominator in ratios)
+    return [numerator * (unit // denominator) for numerator, denominator in ratios]
+
+
 def meets_exactly(x, y, mx, my, distance):
-    """Tell, in rational numbers, whether a way comes nearer than a distance to the origin before its end."""
-    x, y, mx, my, distance = map(Fraction, (x, y, mx, my, distance))
+    """Tell, in whole numbers, whether a way comes as near as a distance to the origin before its end."""
+    x, y, mx, my, distance = whole(x, y, mx, my, distance)
     along, length2 = x * mx + y * my, mx * mx + my * my
     if along >= 0:
         return False
-    share = min(-along / length2, Fraction(1))  # where it is nearest
-    return (x + share * mx) ** 2 + (y + share * my) ** 2 <= distance**2
+    if -along >= length2:  # its nearest point lies beyond its end
+        return (x + mx) ** 2 + (y + my) ** 2 <= distance**2
+    return (x * my - y * mx) ** 2 <= distance**2 * length2
 
 
 def test_grazing_circles_are_neither_missed_nor_invented():

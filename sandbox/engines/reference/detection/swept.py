@@ -7,7 +7,7 @@ that impacts are second order in time.
 import numpy as np
 
 from sandbox.engines.reference.detection.discrete import discrete
-from sandbox.engines.reference.detection.resting import MOST_IMPACTS, lasting, resting
+from sandbox.engines.reference.detection.resting import MOST_IMPACTS, SLOW, lasting, resting
 from sandbox.engines.reference.stage import Stage
 
 
@@ -21,10 +21,12 @@ def swept(stage: Stage, h: float) -> None:
             break
         reached = stage.moved(share * left)
         contact = stage.finder.only(reached[0], key)
-        if stage.closing(contact, reached)[0] <= gentle:
+        if stage.closing(contact, reached)[0] <= min(gentle, SLOW * contact.arm.sum() / left):
             rest = np.union1d(rest, [key])
             continue
         stage.impact(reached, contact, lasting(stage, reached, rest, contact), share * left)
         left -= share * left
+        if left <= 0.0:  # hit just at the end of the step
+            return
         rest = resting(stage, left)
     discrete(stage, left)

@@ -1,0 +1,100 @@
+"""Segments: the broad phase of walls and posts loses none, and looks at few."""
+
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from pieces import ball, roster_of, scene_of
+
+from sandbox.engines.reference.finder import Finder
+from sandbox.engines.reference.meeting import pair_key
+from sandbox.engines.reference.narrow_phase import circle_segment
+from sandbox.engines.reference.segments import SegmentBoxes
+
+corner = st.tuples(st.integers(-40, 40), st.integers(-40, 40)).map(lambda c: [c[0] / 4, c[1] / 4])
+
+
+@st.composite
+def courts(draw):
+    walls = [
+        {
+            "points": draw(st.lists(corner, min_size=2, max_size=5, unique_by=tuple)),
+            "thickness": draw(st.sampled_from([0.0, 0.1, 2.0])),
+            "closed": False,
+        }
+        for _ in range(draw(st.integers(0, 4)))
+    ]
+    posts = [
+        {"position": draw(corner), "radius": draw(st.sampled_from([1e-3, 0.3, 5.0]))}
+        for _ in range(draw(st.integers(0, 4)))
+    ]
+    balls = [
+        ball(*draw(corner), radius=draw(st.sampled_from([1e-3, 0.25, 1.0, 8.0])), collides=draw(st.sampled_from(WORDS)))
+        for _ in range(draw(st.integers(1, 5)))
+    ]
+    return scene_of(*balls, wall=walls, post=posts)
+
+
+WORDS = ["all", "fixed", "none"]
+
+
+@given(courts(), st.floats(0, 4))
+def test_none_nearer_than_the_margin_is_lost(scene, margin):
+    roster = roster_of(scene)
+    near = {
+        pair_key(i, s)
+        for i, (x, y) in enumerate(roster.position)
+        for s, (ax, ay, bx, by, half) in enumerate(roster.fixtures.segments)
+        if roster.meets[i] and circle_segment(x, y, roster.radius[i], ax, ay, bx, by, half)[0] < margin * (1 - 1e-12)
+    }
+    keys = Finder(roster, "grid").candidates(roster.position, margin).segments.tolist()
+    assert keys == sorted(set(keys))
+    assert near <= set(keys)
+
+
+@given(courts())
+def test_contacts_are_those_that_overlap(scene):
+    roster = roster_of(scene)
+    contacts = Finder(roster, "grid").overlaps(roster.position)
+    walls = contacts.second < 0
+    expected = [
+        (i, -1 - int(roster.fixtures.segment_thing[s]))
+        for i, (x, y) in enumerate(roster.position)
+        for s, (ax, ay, bx, by, half) in enumerate(roster.fixtures.segments)
+        if roster.meets[i] and circle_segment(x, y, roster.radius[i], ax, ay, bx, by, half)[0] < 0
+    ]
+    assert list(zip(contacts.first[walls].tolist(), contacts.second[walls].tolist(), strict=True)) == expected
+
+
+def test_walls_far_out_are_not_lost_to_rounding():
+    random = np.random.default_rng(3)
+    seen = 0
+    while seen < 200:
+        x, r, half = 1e9 + random.uniform(0, 1e3), random.uniform(0.1, 1), random.uniform(0.1, 1)
+        place = x + r + half
+        if not place - x < r + half:
+            continue
+        seen += 1
+        wall = {"points": [[place, -1.0], [place, 1.0]], "thickness": 2 * half}
+        roster = roster_of(scene_of(ball(x, 0, radius=r), wall=[wall]))
+        assert Finder(roster, "grid").overlaps(roster.position).size == 1
+
+
+def test_a_long_street_is_not_looked_at_as_a_whole():
+    posts = [{"position": [3.0 * k, 0.0], "radius": 0.5} for k in range(1000)]
+    roster = roster_of(scene_of(ball(1500, 0.2), post=posts))
+    finder = Finder(roster, "grid")
+    assert finder.overlaps(roster.position).size == 1
+    assert finder.work["broad_tests"] <= 3
+
+
+def test_boxes_are_sorted_and_know_whose_they_are():
+    scene = scene_of(ball(9, 9), wall=[{"points": [[3, 0], [1, 2]], "thickness": 0.5}], post=[
+        {"position": [0, 0], "radius": 2.0}
+    ])  # fmt: skip
+    boxes = SegmentBoxes(roster_of(scene).fixtures)
+    assert boxes.box.tolist() == [[-2.0, -2.0, 2.0, 2.0], [0.75, -0.25, 3.25, 2.25]]
+    assert boxes.index.tolist() == [1, 0]
+    assert (len(boxes), boxes.widest) == (2, 4.0)
+    assert math.isclose(boxes.widest, (boxes.box[:, 2] - boxes.box[:, 0]).max())
