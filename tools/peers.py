@@ -1,5 +1,6 @@
 """Peers: what the benchmarks compare with, written as directly as it can be done."""
 
+import math
 import time
 from collections.abc import Callable
 
@@ -10,7 +11,11 @@ from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, 
 from sandbox.engines.contract import Simulation
 from sandbox.engines.native.engine import PERSISTENCE
 from sandbox.engines.overlap import BIAS, SLOP_PER_RADIUS
+from sandbox.engines.registry import start
+from sandbox.measure.closed_form import bounces
+from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
+from sandbox.trajectory import FloatArray
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 TOUCH = (
@@ -134,3 +139,83 @@ def give_moments(simulation: Simulation, scene: Scene) -> None:
     half = simulation._population.meeting  # type: ignore[attr-defined]
     for number, moment in enumerate(scene.bodies.moment.tolist()):
         half.give_moment(number, moment)
+
+
+def gas(count: int) -> Scene:
+    """Return an elastic gas of 16, 100 or 1,000 balls in a box, as dilute as the shipped one; 1e4 s, for who counts."""
+    columns, rows = {16: (4, 4), 100: (10, 10), 1000: (40, 25)}[count]
+    sides = [([0, 0], [1, 0]), ([0, 0], [0, 1]), ([columns, rows], [-1, 0]), ([columns, rows], [0, -1])]
+    return from_document(
+        {
+            "world": {"duration": 1e4, "seed": 1},
+            "solver": {"dt": 0.005},
+            "material": [{"name": "elastic"}],
+            "pair": [{"between": ["elastic", "elastic"], "restitution": 1.0}],
+            "plane": [{"point": point, "normal": normal, "material": "elastic"} for point, normal in sides],
+            "grid": [
+                {
+                    "origin": [0.5, 0.5],
+                    "columns": columns,
+                    "rows": rows,
+                    "spacing": [1.0, 1.0],
+                    "radius": 0.25,
+                    "velocity_jitter": 1.0,
+                    "material": "elastic",
+                }
+            ],
+        }
+    )
+
+
+def contacts_a_second(count: int) -> Callable[[], float]:
+    """Return the contacts a second that pymunk gets through in the same gas, at its dt of 5 ms."""
+
+    def work() -> float:
+        simulation = start(gas(count), "pymunk")
+        simulation.contacts()
+        began = time.perf_counter()
+        for _ in range(2000 if count < 1000 else 400):
+            simulation.step()
+        seconds = time.perf_counter() - began
+        return len(simulation.contacts()) / seconds
+
+    return work
+
+
+def bounce_to(scene: Scene, tolerance: float) -> Callable[[], float]:
+    """Time a bounce in pymunk alone, at the largest dt = scene's / 2ⁿ whose frames are right to a tolerance, m.
+
+    The dt is sought first, against the closed form; velocities start half a kick ahead, so that flight is exact, and
+    what is left is the time of impact.
+    """
+    frames, height = round(scene.world.duration / scene.solver.dt), 0.05
+    times = scene.solver.dt * np.arange(1, frames + 1)
+    truth, _ = bounces(times, height, 0.0, 9.81, 0.8)
+    each = 1
+    while True:
+        found, seconds = _bounced(scene, frames, each, height)
+        if np.abs(found - truth).max() <= tolerance:
+            break
+        if seconds > 60.0:
+            raise RuntimeError(f"pymunk does not get within {tolerance:g} m in a minute")
+        each *= 2
+    return lambda: _bounced(scene, frames, each, height)[1]
+
+
+def _bounced(scene: Scene, frames: int, each: int, height: float) -> tuple[FloatArray, float]:
+    """Return the ball's heights at the frames, with so many steps each, and the seconds that took."""
+    dt = scene.solver.dt / each
+    space = pymunk.Space()
+    space.gravity, space.collision_slop = (0.0, -9.81), 1e-9
+    body, ground = pymunk.Body(1.0, math.inf), pymunk.Body(body_type=pymunk.Body.STATIC)
+    body.position, body.velocity = (0.0, 0.5 + height), (0.0, -9.81 * dt / 2)
+    ball, floor = pymunk.Circle(body, 0.5), pymunk.Segment(ground, (-1e4, -1e3), (1e4, -1e3), 1e3)
+    ball.elasticity, floor.elasticity = 0.8, 1.0
+    space.add(body, ball, ground, floor)
+    found = np.empty(frames)
+    began = time.perf_counter()
+    for frame in range(frames):
+        for _ in range(each):
+            space.step(dt)
+        found[frame] = body.position.y - 0.5
+    return found, time.perf_counter() - began

@@ -57,21 +57,22 @@ def cache_folder() -> Path | None:
 
     Folders of former states of the sources are removed.
     """
-    stamp = blake2b(f"{sys.version} {numba.__version__}".encode(), digest_size=8)
     here = Path(__file__).resolve().parent
+    place = blake2b(str(here).encode(), digest_size=4).hexdigest()  # installations may share the user's folder
+    stamp = blake2b(f"{sys.version} {numba.__version__}".encode(), digest_size=8)
     for file in sorted(here.rglob("*.py")):
         status = file.stat()
-        stamp.update(f"{file} {status.st_mtime_ns} {status.st_size}".encode())
+        stamp.update(f"{file.name} {status.st_mtime_ns} {status.st_size}".encode())
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     for home in (here / "__pycache__", user / "sandbox2d"):
-        folder = home / f"kernels-{stamp.hexdigest()}"
+        folder = home / f"kernels-{place}-{stamp.hexdigest()}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if not os.access(folder, os.W_OK):
                 continue
         except OSError:
             continue
-        for old in home.glob("kernels-*"):
+        for old in home.glob(f"kernels-{place}-*"):
             if old != folder:
                 shutil.rmtree(old, ignore_errors=True)  # another process may be removing it too
         return folder

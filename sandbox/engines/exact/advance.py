@@ -7,6 +7,7 @@ from sandbox.engines.exact.arena import (
     EDGE,
     EVENTS,
     FLAT,
+    HOP,
     IN_SECOND,
     INSTANT,
     KNOB,
@@ -20,19 +21,19 @@ from sandbox.engines.exact.arena import (
     RECORDING,
     ROWS,
     SECOND,
-    SLIP_ENDS,
     STAMP,
+    SUPPORT,
     WHAT,
     WHO,
     WITH,
     Arena,
 )
-from sandbox.engines.exact.impact import bring, hit_ball, hit_knob
+from sandbox.engines.exact.impact import bring, hit_ball, hit_knob, log_hit
 from sandbox.engines.exact.log import ROOM
 from sandbox.engines.exact.predict import place, predict, turned
-from sandbox.engines.exact.support import hit_flat, knocked, pass_edge, settle, slip_ends
+from sandbox.engines.exact.support import fly, hit_flat, knocked, pass_edge, settle, slip_ends
 from sandbox.engines.kernel import kernel
-from sandbox.trajectory import FloatArray
+from sandbox.trajectory import FloatArray, IntArray
 
 DONE, PAUSED, FULL, TOO_MANY, TOO_DENSE = range(5)
 """What `advance` returns: up to the time; after `PAUSE` events; the log is full; more events within one second than
@@ -44,7 +45,7 @@ PAUSE = 100_000
 MOMENT = 1e-9
 """s: events closer together than this count as one instant."""
 
-PER_BALL = 1000
+PER_BALL = 10_000
 """Events that an instant may have for each ball."""
 
 
@@ -70,7 +71,7 @@ def renew(arena: Arena, t: float) -> None:
     arena.world[NOW], arena.world[NOW_LATE] = t, 0.0
     for i in range(len(arena.state)):
         if arena.state[i, LIGHTNESS] > 0.0:
-            bring(arena, i, t, 0.0)
+            bring(arena.state, arena.tags, arena.log, i, t, 0.0)
             knocked(arena, i)
     start(arena)
 
@@ -78,14 +79,16 @@ def renew(arena: Arena, t: float) -> None:
 @kernel
 def changed(arena: Arena, i: int) -> None:
     """Note that a ball moves otherwise from now on."""
-    settle(arena, i)
+    if arena.tags[i, SUPPORT] >= 0:
+        settle(arena, i)
+    else:
+        fly(arena.state, arena.world, i)
     arena.tags[i, STAMP] += 1
 
 
 @kernel
-def earliest(arena: Arena) -> int:
+def earliest(movers: IntArray, times: FloatArray) -> int:
     """Return the ball whose event is next, of several at one time the lowest; −1 where none moves."""
-    movers, times = arena.movers, arena.next_time
     who = -1
     if len(movers) > 0:
         who = movers[0]
@@ -98,19 +101,18 @@ def earliest(arena: Arena) -> int:
 
 
 @kernel
-def within(arena: Arena, t: float) -> int:
+def within(counts: IntArray, world: FloatArray, balls: int, t: float) -> int:
     """Count an event; return `DONE`, or which bound is passed."""
-    count, world = arena.counts, arena.world
-    count[EVENTS] += 1
+    counts[EVENTS] += 1
     if t > world[SECOND] + 1.0:
-        world[SECOND], count[IN_SECOND] = t, 0
+        world[SECOND], counts[IN_SECOND] = t, 0
     if t > world[INSTANT] + MOMENT:
-        world[INSTANT], count[AT_INSTANT] = t, 0
-    count[IN_SECOND] += 1
-    count[AT_INSTANT] += 1
-    if count[AT_INSTANT] > PER_BALL * (len(arena.movers) + 1):
+        world[INSTANT], counts[AT_INSTANT] = t, 0
+    counts[IN_SECOND] += 1
+    counts[AT_INSTANT] += 1
+    if counts[AT_INSTANT] > PER_BALL * (balls + 1):
         return TOO_DENSE
-    if count[IN_SECOND] > count[BUDGET]:
+    if counts[IN_SECOND] > counts[BUDGET]:
         return TOO_MANY
     return DONE
 
@@ -121,23 +123,26 @@ def happen(arena: Arena, i: int, kind: int, partner: int, t: float, late: float)
 
     Others that were to meet them are left: their times stay bounds, and are looked at when they come up.
     """
-    bring(arena, i, t, late)
-    both = kind == BALL and arena.state[partner, LIGHTNESS] > 0.0
-    if kind == SLIP_ENDS:
-        slip_ends(arena, i)
-    elif kind == EDGE:
-        pass_edge(arena, i)
+    state, tags = arena.state, arena.tags
+    bring(state, tags, arena.log, i, t, late)
+    both = kind == BALL and state[partner, LIGHTNESS] > 0.0
+    if kind == BALL:
+        bring(state, tags, arena.log, partner, t, late)
+        jx, jy, nx, ny = hit_ball(state, tags, arena.surfaces, arena.world[HOP], i, partner)
+        if arena.counts[RECORDING] != 0:
+            log_hit(arena, i, partner, jx, jy, nx, ny)
     elif kind == FLAT:
         hit_flat(arena, i, partner)
     elif kind == KNOB:
         hit_knob(arena, i, partner)
-        knocked(arena, i)
+    elif kind == EDGE:
+        pass_edge(arena, i)
     else:
-        bring(arena, partner, t, late)
-        hit_ball(arena, i, partner)
+        slip_ends(arena, i)
+    if kind in (BALL, KNOB) and tags[i, SUPPORT] >= 0:
         knocked(arena, i)
-        if both:
-            knocked(arena, partner)
+    if both and tags[partner, SUPPORT] >= 0:
+        knocked(arena, partner)
     changed(arena, i)
     if both:
         changed(arena, partner)
@@ -148,20 +153,22 @@ def happen(arena: Arena, i: int, kind: int, partner: int, t: float, late: float)
 @kernel
 def advance(arena: Arena, until: float) -> int:
     """Let all events up to a time happen; return why it stopped."""
+    state, tags, times = arena.state, arena.tags, arena.next_time
+    movers, counts, world = arena.movers, arena.counts, arena.world
     for _ in range(PAUSE):
-        i = earliest(arena)
-        if i < 0 or arena.next_time[i] > until:
+        i = earliest(movers, times)
+        if i < 0 or times[i] > until:
             return DONE
-        if arena.counts[RECORDING] != 0 and arena.counts[ROWS] + ROOM > len(arena.log):
+        if counts[RECORDING] != 0 and counts[ROWS] + ROOM > len(arena.log):
             return FULL
-        t, late = arena.next_time[i], arena.state[i, NEXT_LATE]
-        kind, partner = arena.tags[i, NEXT_KIND], arena.tags[i, NEXT_WHO]
-        if kind == BALL and arena.tags[i, NEXT_STAMP] != arena.tags[partner, STAMP]:
+        t, late = times[i], state[i, NEXT_LATE]
+        kind, partner = tags[i, NEXT_KIND], tags[i, NEXT_WHO]
+        if kind == BALL and tags[i, NEXT_STAMP] != tags[partner, STAMP]:
             predict(arena, i, t, late)
             continue
-        arena.world[NOW], arena.world[NOW_LATE] = t, late
-        arena.counts[WHO], arena.counts[WHAT], arena.counts[WITH] = i, kind, partner
-        bound = within(arena, t)
+        world[NOW], world[NOW_LATE] = t, late
+        counts[WHO], counts[WHAT], counts[WITH] = i, kind, partner
+        bound = within(counts, world, len(movers), t)
         if bound != DONE:
             return bound
         happen(arena, i, kind, partner, t, late)

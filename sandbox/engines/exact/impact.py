@@ -33,6 +33,7 @@ from sandbox.engines.exact.log import add_impulse, log_rest, open_row
 from sandbox.engines.exact.predict import place, turned
 from sandbox.engines.exact.roots import NOISE
 from sandbox.engines.kernel import kernel
+from sandbox.trajectory import FloatArray, IntArray
 
 ALMOST_STILL = 1e-9
 """m/s: two things, at least one of them round, that meet more slowly than this, or than a hop where there is gravity,
@@ -40,10 +41,9 @@ part as fast as they met. This ends the endless series of hits into which inelas
 
 
 @kernel
-def bring(arena: Arena, i: int, t: float, late: float) -> None:
+def bring(state: FloatArray, tags: IntArray, log: FloatArray, i: int, t: float, late: float) -> None:
     """Bring a ball's row to a time, that of an event of its own."""
-    log_rest(arena, i, t)
-    state = arena.state
+    log_rest(state, tags, log, i, t)
     x, y, vx, vy = place(state, i, t, late)
     angle, spin = turned(state, i, t, late)
     state[i, X], state[i, Y], state[i, VX], state[i, VY] = x, y, vx, vy
@@ -52,10 +52,10 @@ def bring(arena: Arena, i: int, t: float, late: float) -> None:
 
 
 @kernel
-def note(arena: Arena, i: int, kind: int, partner: int) -> None:
+def note(state: FloatArray, tags: IntArray, i: int, kind: int, partner: int) -> None:
     """Note whom a ball has just met."""
-    arena.tags[i, LAST_KIND], arena.tags[i, LAST_WHO] = kind, partner
-    arena.state[i, LAST_TIME] = arena.state[i, T]
+    tags[i, LAST_KIND], tags[i, LAST_WHO] = kind, partner
+    state[i, LAST_TIME] = state[i, T]
 
 
 @kernel
@@ -96,17 +96,17 @@ def strike(arena: Arena, i: int, nx: float, ny: float, rebound: float, friction:
 
 
 @kernel
-def parting_speed(arena: Arena, closing: float, restitution: float, press: float) -> float:
+def parting_speed(hop: float, closing: float, restitution: float, press: float) -> float:
     """Return how fast two things part of which at least one is round.
 
     e times the closing speed; all of it where that is next to nothing; and where gravity presses them together, no
     less than a hop's speed: there is no rest on anything round.
     """
     parting = restitution * closing
-    if closing <= max(arena.world[HOP], ALMOST_STILL):
+    if closing <= max(hop, ALMOST_STILL):
         parting = max(closing, 0.0)
     if press > 0.0:
-        parting = max(parting, arena.world[HOP])
+        parting = max(parting, hop)
     return parting
 
 
@@ -123,22 +123,35 @@ def hit_knob(arena: Arena, i: int, k: int) -> None:
     across = -state[i, VX] * ny + state[i, VY] * nx
     press = state[i, AX] * nx + state[i, AY] * ny - across * across / distance
     mine, its = arena.tags[i, SURFACE], arena.knob_tags[k, COAT]
-    parting = parting_speed(arena, closing, arena.surfaces[RESTITUTION, mine, its], press)
+    parting = parting_speed(arena.world[HOP], closing, arena.surfaces[RESTITUTION, mine, its], press)
     jx, jy = strike(arena, i, -nx, -ny, parting, arena.surfaces[FRICTION, mine, its])
     r = arena.state[i, RADIUS]
     row = open_row(arena, i, -1 - arena.knob_tags[k, THING], state[i, X] + r * nx, state[i, Y] + r * ny, nx, ny)
     add_impulse(arena, row, -jx, -jy)
-    note(arena, i, KNOB, k)
+    note(state, arena.tags, i, KNOB, k)
 
 
 @kernel
-def hit_ball(arena: Arena, i: int, j: int) -> None:
-    """Let two balls hit each other, of which the second may be fixed."""
-    state = arena.state
+def hit_ball(
+    state: FloatArray, tags: IntArray, surfaces: FloatArray, hop: float, i: int, j: int
+) -> tuple[float, float, float, float]:
+    """Let two balls hit each other, of which the second may be fixed.
+
+    Args:
+        state: of all balls.
+        tags: likewise.
+        surfaces: of all pairs.
+        hop: m/s, as in `Arena`.
+        i: ball.
+        j: ball.
+
+    Returns:
+        The impulse that i gives to j, N·s, and the normal from i to j.
+    """
     dx, dy = state[j, X] - state[i, X], state[j, Y] - state[i, Y]
     distance = math.sqrt(dx * dx + dy * dy)
     if distance == 0.0:
-        return
+        return 0.0, 0.0, 1.0, 0.0
     nx, ny = dx / distance, dy / distance
     vx, vy = state[j, VX] - state[i, VX], state[j, VY] - state[i, VY]
     closing, across = -(vx * nx + vy * ny), -vx * ny + vy * nx
@@ -146,14 +159,14 @@ def hit_ball(arena: Arena, i: int, j: int) -> None:
     press = -pull - across * across / distance
     if abs(pull) <= NOISE * (abs(state[i, AX]) + abs(state[i, AY]) + abs(state[j, AX]) + abs(state[j, AY])):
         press = 0.0  # they fall alike: nothing presses them together
-    mine, its = arena.tags[i, SURFACE], arena.tags[j, SURFACE]
-    parting = parting_speed(arena, closing, arena.surfaces[RESTITUTION, mine, its], press)
-    ri, rj = arena.state[i, RADIUS], arena.state[j, RADIUS]
-    mi, mj = arena.state[i, LIGHTNESS], arena.state[j, LIGHTNESS]
-    ii, ij = arena.state[i, READINESS], arena.state[j, READINESS]
+    mine, its = tags[i, SURFACE], tags[j, SURFACE]
+    parting = parting_speed(hop, closing, surfaces[RESTITUTION, mine, its], press)
+    ri, rj = state[i, RADIUS], state[j, RADIUS]
+    mi, mj = state[i, LIGHTNESS], state[j, LIGHTNESS]
+    ii, ij = state[i, READINESS], state[j, READINESS]
     normal = max((closing + parting) / (mi + mj), 0.0)
     rub = 0.0
-    friction = arena.surfaces[FRICTION, mine, its]
+    friction = surfaces[FRICTION, mine, its]
     if friction > 0.0:
         slip = across - (state[i, SPIN] * ri + state[j, SPIN] * rj)
         rub = rubbed(slip, mi + mj + ri * ri * ii + rj * rj * ij, friction, normal)
@@ -164,11 +177,18 @@ def hit_ball(arena: Arena, i: int, j: int) -> None:
     state[j, VY] += jy * mj
     state[i, SPIN] -= ri * rub * ii
     state[j, SPIN] -= rj * rub * ij
-    share = ri / (ri + rj)
-    px, py = state[i, X] + share * dx, state[i, Y] + share * dy
+    note(state, tags, i, BALL, j)
+    note(state, tags, j, BALL, i)
+    return jx, jy, nx, ny
+
+
+@kernel
+def log_hit(arena: Arena, i: int, j: int, jx: float, jy: float, nx: float, ny: float) -> None:
+    """Log that two balls have hit each other."""
+    state = arena.state
+    r = state[i, RADIUS]
+    px, py = state[i, X] + r * nx, state[i, Y] + r * ny
     if i < j:
         add_impulse(arena, open_row(arena, i, j, px, py, nx, ny), jx, jy)
     else:
         add_impulse(arena, open_row(arena, j, i, px, py, -nx, -ny), -jx, -jy)
-    note(arena, i, BALL, j)
-    note(arena, j, BALL, i)

@@ -19,7 +19,7 @@ from sandbox.engines.exact.arena import (
     Y,
 )
 from sandbox.engines.kernel import kernel
-from sandbox.trajectory import Contacts
+from sandbox.trajectory import Contacts, FloatArray, IntArray
 
 ROOM = 16
 """Rows that one event may need at most."""
@@ -71,23 +71,22 @@ def add_impulse(arena: Arena, row: int, jx: float, jy: float) -> None:
 
 
 @kernel
-def log_rest(arena: Arena, i: int, t: float) -> None:
+def log_rest(state: FloatArray, tags: IntArray, log: FloatArray, i: int, t: float) -> None:
     """Add what a ball has given to its supports up to a time."""
-    span = t - arena.state[i, SINCE]
-    arena.state[i, SINCE] = t
+    span = t - state[i, SINCE]
+    state[i, SINCE] = t
     for which in range(2):
-        row = arena.tags[i, ROW + which]
+        row = tags[i, ROW + which]
         if row >= 0 and span > 0.0:
-            add_impulse(
-                arena, row, -arena.state[i, FORCE + 2 * which] * span, -arena.state[i, FORCE + 2 * which + 1] * span
-            )
+            log[row, 5] -= state[i, FORCE + 2 * which] * span
+            log[row, 6] -= state[i, FORCE + 2 * which + 1] * span
 
 
 @kernel
 def log_rests(arena: Arena, t: float) -> None:
     """Do so for every ball."""
     for k in range(len(arena.movers)):
-        log_rest(arena, arena.movers[k], t)
+        log_rest(arena.state, arena.tags, arena.log, arena.movers[k], t)
 
 
 def with_room(arena: Arena, rows: int) -> Arena:

@@ -143,12 +143,39 @@ def edge_time(flats: FloatArray, f: int, x: float, y: float, vx: float, vy: floa
 
 @kernel
 def predict(arena: Arena, i: int, now: float, late: float) -> None:
-    """Write down a ball's earliest event from now on.
+    """Write down a ball's earliest event from now on."""
+    foresee(
+        arena.state,
+        arena.tags,
+        arena.next_time,
+        arena.flats,
+        arena.flat_tags,
+        arena.knobs,
+        arena.others,
+        i,
+        now,
+        late,
+    )
+
+
+@kernel
+def foresee(
+    state: FloatArray,
+    tags: IntArray,
+    next_time: FloatArray,
+    flats: FloatArray,
+    flat_tags: IntArray,
+    knobs: FloatArray,
+    others: IntArray,
+    i: int,
+    now: float,
+    late: float,
+) -> None:
+    """Do so; passing few arrays instead of the arena saves counting references to all.
 
     Of several at one instant the first in this order: its sliding ends, it comes to an edge, flats, knobs, balls, each
     by number.
     """
-    state, tags, flats = arena.state, arena.tags, arena.flats
     x, y, vx, vy = place(state, i, now, late)
     ax, ay, radius = state[i, AX], state[i, AY], state[i, RADIUS]
     best, kind, partner = math.inf, NONE, -1
@@ -176,11 +203,13 @@ def predict(arena: Arena, i: int, now: float, late: float) -> None:
     if fresh and last_kind == KNOB:
         met_knob = last_who
     if s1 >= 0:
-        skip, other = arena.flat_tags[s1, ENDS], arena.flat_tags[s1, ENDS + 1]
-    k, tau = nearest_knob(arena.knobs, state, i, now, late, best, met_knob, skip, other)
+        skip, other = flat_tags[s1, ENDS], flat_tags[s1, ENDS + 1]
+    k, tau = -1, math.inf
+    if len(knobs) > 0:
+        k, tau = nearest_knob(knobs, state, i, now, late, best, met_knob, skip, other)
     if k >= 0:
         best, kind, partner = tau, KNOB, k
-    j, tau = nearest_ball(state, tags, arena.others, i, now, late, best)
+    j, tau = nearest_ball(state, tags, others, i, now, late, best)
     if j >= 0:
         best, kind, partner = tau, BALL, j
         tags[i, NEXT_STAMP] = tags[j, STAMP]
@@ -191,7 +220,7 @@ def predict(arena: Arena, i: int, now: float, late: float) -> None:
     state[i, NEXT_LATE] = 0.0
     if time < math.inf:
         state[i, NEXT_LATE] = (now - (time - virtual)) + (after - virtual)
-    arena.next_time[i] = time
+    next_time[i] = time
     tags[i, NEXT_KIND], tags[i, NEXT_WHO] = kind, partner
 
 

@@ -121,6 +121,11 @@ class ExactSimulation:
         """How many events there have been."""
         return int(self._arena.counts[EVENTS])
 
+    @property
+    def work(self) -> Mapping[str, int]:
+        """What was done so far: events."""
+        return {"events": self.events}
+
     def step(self) -> None:
         """Advance by one dt.
 
@@ -266,7 +271,7 @@ class ExactSimulation:
         troupe, now = self._troupe, self.time
         touched = sorted(troupe.kicked | troupe.moved)
         for i in touched:
-            bring(self._arena, i, now, 0.0)
+            bring(self._arena.state, self._arena.tags, self._arena.log, i, now, 0.0)
             self._arena.state[i, X : Y + 1], self._arena.state[i, VX : VY + 1] = troupe.position[i], troupe.velocity[i]
             self._arena.state[i, ANGLE], self._arena.state[i, SPIN] = troupe.angle[i], troupe.angular_velocity[i]
         arena = self._arena
@@ -293,7 +298,7 @@ class ExactSimulation:
         now = self.time
         with np.errstate(all="ignore"):
             for i in numbers.tolist():
-                bring(self._arena, i, now, 0.0)
+                bring(self._arena.state, self._arena.tags, self._arena.log, i, now, 0.0)
                 freed(self._arena, i)
                 self._arena.state[i, VX : SPIN + 2] = 0.0
                 self._arena.next_time[i] = np.inf

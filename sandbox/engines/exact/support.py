@@ -49,6 +49,7 @@ from sandbox.engines.exact.log import add_impulse, open_rest, open_row
 from sandbox.engines.exact.predict import parallel
 from sandbox.engines.exact.roots import NOISE
 from sandbox.engines.kernel import kernel
+from sandbox.trajectory import FloatArray
 
 REST_TIME = 1e-13
 """s: when what is left of a series of bounces takes less, the ball rests; it is as if they had all been made."""
@@ -77,7 +78,7 @@ def hit_flat(arena: Arena, i: int, f: int) -> None:
         hop = 2.0 * restitution * closing / press
         rests = hop <= TICKS * abs(state[i, T]) or hop <= REST_TIME * (1.0 - restitution)
     jx, jy = strike(arena, i, nx, ny, 0.0 if rests else restitution * closing, friction)
-    note(arena, i, FLAT, f)
+    note(state, arena.tags, i, FLAT, f)
     knocked(arena, i)
     if rests and arena.tags[i, SUPPORT + 1] < 0:
         which = 0 if arena.tags[i, SUPPORT] < 0 else 1
@@ -134,10 +135,16 @@ def settle(arena: Arena, i: int) -> None:
         else:
             single(arena, i, f, press)
     if arena.tags[i, SUPPORT] < 0:
-        state[i, AX], state[i, AY], state[i, ALPHA] = arena.world[GX], arena.world[GY], 0.0
-        state[i, SLIDES] = math.inf
+        fly(state, arena.world, i)
         arena.state[i, FORCE], arena.state[i, FORCE + 1] = 0.0, 0.0
     state[i, SINCE] = state[i, T]
+
+
+@kernel
+def fly(state: FloatArray, world: FloatArray, i: int) -> None:
+    """Let a ball that nothing supports fall."""
+    state[i, AX], state[i, AY], state[i, ALPHA] = world[GX], world[GY], 0.0
+    state[i, SLIDES] = math.inf
 
 
 @kernel
@@ -277,7 +284,7 @@ def pass_edge(arena: Arena, i: int) -> None:
                 open_rest(arena, i, 0)
             return
     release(arena, i, 0)
-    note(arena, i, EDGE, f)
+    note(state, arena.tags, i, EDGE, f)
 
 
 @kernel

@@ -53,9 +53,7 @@ def test_restitution_is_that_of_an_independent_integration(z):
 
 def measured(e, name, **settings):
     """Return the rebound of a ball that meets a floor at 1 m/s, without gravity."""
-    scene = scene_of(
-        ball(0, 0.51, velocity=[0, -1], restitution=e), plane=[FLOOR], solver={"dt": 0.01, "substeps": 50}
-    )
+    scene = scene_of(ball(0, 0.51, velocity=[0, -1], restitution=e), plane=[FLOOR], solver={"dt": 0.01, "substeps": 50})
     simulation = running(scene, response="penalty", integrator=name, **settings)
     return float(stepped(simulation, 60).frame().velocity[0, 1])
 

@@ -60,8 +60,10 @@ def test_the_share_is_where_the_distance_is_reached(x, y, mx, my, distance):
     if share == NEVER:
         speed = math.hypot(mx, my)
         # in the last rounding of a graze, or of the end of the way, either answer is right
-        assert not exact or abs(abs(x * my - y * mx) - speed * distance) < 1e-12 * speed * 20 or (
-            abs(math.hypot(x + mx, y + my) - distance) < 1e-12
+        assert (
+            not exact
+            or abs(abs(x * my - y * mx) - speed * distance) < 1e-12 * speed * 20
+            or (abs(math.hypot(x + mx, y + my) - distance) < 1e-12)
         )
         return
     assert 0.0 <= share <= 1.0

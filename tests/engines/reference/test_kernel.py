@@ -1,0 +1,157 @@
+"""Kernels: the same answers with and without numba, in processes of their own, and what is said about compiling."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+from functools import cache
+from pathlib import Path
+
+import pytest
+from pieces import ROOT
+
+HERE = Path(__file__).resolve().parent
+
+ANNOUNCEMENT = "compiling the solver's kernels: some seconds, this once"
+
+HASHES = """
+import json
+from pieces import EARTH, FLOOR, ball, running, scene_of, shipped, small_pile, stepped
+
+def court(**more):
+    balls = [ball(-2 + 1.1 * k, 2 + 0.3 * k, velocity=[9 - 5 * k, -6], name=f"b{k}", friction=0.3) for k in range(4)]
+    return scene_of(
+        *balls, world={**EARTH, "linear_drag": 0.1, "quadratic_drag": 0.05}, plane=[FLOOR], solver={"dt": 0.02},
+        wall=[{"points": [[3, 0], [3, 4], [-4, 5], [-4, 0]], "restitution": 0.7, "friction": 0.2}],
+        post=[{"position": [0.5, 1.2], "radius": 0.3, "restitution": 0.9}],
+    )
+
+runs = {
+    "bounce": stepped(running(shipped("tutorial/bounce")), 1500),
+    "pile": stepped(running(small_pile(60)), 40),
+    "pile, sweep": stepped(running(small_pile(24), broad_phase="sweep"), 40),
+    "pile, circles": stepped(running(small_pile(24), broad_phase="circles"), 40),
+    "gas": stepped(running(shipped("benchmark/gas"), dt=0.02, substeps=1), 40),
+    "penalty": stepped(running(small_pile(12), response="penalty", substeps=10), 20),
+    "bisect": stepped(running(court(), detection="bisect", integrator="velocity_verlet"), 60),
+    "swept": stepped(running(court(), detection="swept", integrator="rk4"), 60),
+    "shrink": stepped(running(court(), detection="shrink", integrator="leapfrog"), 30),
+}
+assert all(run.work["contacts"] for run in runs.values())
+print(json.dumps({name: run.state_hash() for name, run in runs.items()}))
+"""
+
+TINY = """
+from sandbox.engines.reference.narrow_phase import circle_circle
+print(circle_circle(0.0, 0.0, 1.0, 3.0, 4.0, 1.0))
+"""
+
+
+def python(code, root=ROOT, **environment):
+    """Run code in a process of its own; return what it wrote, on standard output and on standard error."""
+    paths = os.pathsep.join((str(root), str(HERE)))
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)],
+        env={**os.environ, "PYTHONPATH": paths, **environment},
+        cwd=root,
+        capture_output=True,
+        text=True,
+        timeout=250,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout, done.stderr
+
+
+@cache
+def hashes(disabled):
+    return json.loads(python(HASHES, NUMBA_DISABLE_JIT=disabled)[0])
+
+
+@pytest.mark.slow  # the court, the pile and the gas take some seconds uncompiled
+def test_answers_are_the_same_bit_for_bit_compiled_or_not():
+    assert hashes("0") == hashes("1")
+
+
+def installed(folder):
+    """Return a copy of the package, whose sources no cache knows."""
+    shutil.copytree(ROOT / "sandbox", folder / "sandbox", ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+def test_compiling_is_announced_once_and_found_on_disk_after(tmp_path):
+    root = installed(tmp_path)
+    first, second = (python(TINY, root, NUMBA_DISABLE_JIT="0") for _ in range(2))
+    assert first[0] == second[0] == "(3.0, 0.6000000000000001, 0.8)\n"
+    assert first[1] == ANNOUNCEMENT + "\n"
+    assert second[1] == ""
+
+
+def test_changed_sources_are_compiled_anew_and_the_old_are_removed(tmp_path):
+    root = installed(tmp_path)
+    python(TINY, root, NUMBA_DISABLE_JIT="0")
+    cache_home = root / "sandbox" / "engines" / "__pycache__"
+    (before,) = cache_home.glob("kernels-*")
+    # A callee in another file: what numba's own cache would not notice.
+    source = root / "sandbox" / "engines" / "reference" / "meeting.py"
+    source.write_text(source.read_text() + "\n# changed\n")
+    assert python(TINY, root, NUMBA_DISABLE_JIT="0")[1] == ANNOUNCEMENT + "\n"
+    (after,) = cache_home.glob("kernels-*")
+    assert after != before
+
+
+def test_where_the_install_cannot_be_written_the_users_cache_serves(tmp_path):
+    root = installed(tmp_path / "site")
+    # A file in the place of the folder: no user, not even root, can write into it.
+    (root / "sandbox" / "engines" / "__pycache__").write_text("")
+    home = tmp_path / "cache"
+    home.mkdir()
+    environment = {"XDG_CACHE_HOME": str(home), "NUMBA_DISABLE_JIT": "0", "PYTHONDONTWRITEBYTECODE": "1"}
+    first, second = (python(TINY, root, **environment) for _ in range(2))
+    assert first[1] == ANNOUNCEMENT + "\n"
+    assert second == (first[0], "")
+    assert len(list((home / "sandbox2d").glob("kernels-*"))) == 1
+
+
+def test_where_nothing_can_be_written_it_works_all_the_same(tmp_path):
+    root = installed(tmp_path / "site")
+    (root / "sandbox" / "engines" / "__pycache__").write_text("")
+    home = tmp_path / "cache"
+    home.write_text("")
+    environment = {"XDG_CACHE_HOME": str(home), "NUMBA_DISABLE_JIT": "0", "PYTHONDONTWRITEBYTECODE": "1"}
+    out, _ = python(TINY, root, **environment)
+    assert out == "(3.0, 0.6000000000000001, 0.8)\n"
+
+
+SLOW = """
+from pieces import ball, running, scene_of
+for _ in range(2):
+    running(scene_of(*(ball(3 * k, 0, name=f"b{k}") for k in range(COUNT))))
+"""
+
+
+@pytest.mark.parametrize(("count", "said"), [(99, ""), (100, "100 bodies without compiled kernels will be slow")])
+def test_large_scenes_uncompiled_are_said_to_be_slow_once(count, said):
+    _, errors = python(SLOW.replace("COUNT", str(count)), NUMBA_DISABLE_JIT="1")
+    assert errors == (f"{said}: pip install 'sandbox2d[fast]'\n" if said else "")
+
+
+def test_large_scenes_compiled_are_not():
+    _, errors = python(SLOW.replace("COUNT", "100"), NUMBA_DISABLE_JIT="0")
+    assert "slow" not in errors
+
+
+def test_without_numba_kernels_are_the_functions_themselves():
+    code = """
+        import sys
+        sys.modules["numba"] = None
+        from sandbox.engines.kernel import COMPILED, kernel
+        def twice(x):
+            return 2 * x
+        assert kernel(twice) is twice
+        print(COMPILED)
+    """
+    assert python(code)[0] == "False\n"
+    assert python(f"import sys; sys.modules['numba'] = None\n{TINY}")[0] == "(3.0, 0.6000000000000001, 0.8)\n"
