@@ -18,6 +18,9 @@ STEPS = ("integrator", "detection", "response", "broad_phase")
 OVERLAP = ("slop", "bias", "persistence")
 """Choices of solvers that find overlaps and part them."""
 
+SPRINGS = ("stiffness", "damping")
+"""Choices of solvers that let springs part what overlaps."""
+
 
 @dataclass(frozen=True)
 class ExactEngine:
@@ -35,7 +38,7 @@ class ExactEngine:
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that it lacks."""
         lacks = [f"it does not model {demand}" for demand in sorted(demands(scene) - self.capabilities)]
-        for key in STEPS + OVERLAP:
+        for key in STEPS + OVERLAP + SPRINGS:
             stated = getattr(settings, key)
             if stated is not None:
                 why = "takes no steps" if key in STEPS else "lets nothing overlap"
@@ -57,12 +60,11 @@ class ExactEngine:
         """
         from sandbox.engines.contract import Refusal
         from sandbox.engines.exact.simulation import ExactSimulation
-        from sandbox.engines.registry import able
 
         settings = scene.solver if settings is None else settings
         missing = self.missing(scene, settings)
         if missing:
-            raise Refusal(self.name, missing, able(scene, settings))
+            raise Refusal(self.name, missing, ())
         return ExactSimulation(scene, settings)
 
 

@@ -3,8 +3,6 @@
 import math
 
 from sandbox.engines.exact.arena import (
-    ALPHA,
-    ANGLE,
     AX,
     AY,
     BALL,
@@ -16,10 +14,7 @@ from sandbox.engines.exact.arena import (
     LAST_KIND,
     LAST_TIME,
     LAST_WHO,
-    LATE,
     LENGTH,
-    LIGHTNESS,
-    MEETS,
     NEXT_KIND,
     NEXT_LATE,
     NEXT_STAMP,
@@ -32,44 +27,20 @@ from sandbox.engines.exact.arena import (
     RADIUS,
     SLIDES,
     SLIP_ENDS,
-    SPIN,
     STAMP,
     SUPPORT,
     UX,
     UY,
-    VX,
-    VY,
     Arena,
-    T,
-    X,
-    Y,
 )
-from sandbox.engines.exact.quartic import curved_entry
-from sandbox.engines.exact.roots import NOISE, flat_entry, pair_entry
-from sandbox.engines.kernel import kernel
-from sandbox.engines.roster import ALL
+from sandbox.engines.exact.bare import kernel
+from sandbox.engines.exact.motion import place
+from sandbox.engines.exact.nearest import nearest_ball, nearest_knob
+from sandbox.engines.exact.roots import NOISE, flat_entry
 from sandbox.trajectory import FloatArray, IntArray
 
 PARALLEL = 1e-12
 """Flats whose normals differ by less are one: a ball rolls from one on to the other."""
-
-
-@kernel
-def place(state: FloatArray, i: int, t: float, late: float) -> tuple[float, float, float, float]:
-    """Return a ball's position and velocity at a time, t and `late`, what rounding has cut off it."""
-    tau = (t - state[i, T]) + (late - state[i, LATE])
-    vx, vy = state[i, VX] + state[i, AX] * tau, state[i, VY] + state[i, AY] * tau
-    x = state[i, X] + (state[i, VX] + 0.5 * state[i, AX] * tau) * tau
-    y = state[i, Y] + (state[i, VY] + 0.5 * state[i, AY] * tau) * tau
-    return x, y, vx, vy
-
-
-@kernel
-def turned(state: FloatArray, i: int, t: float, late: float) -> tuple[float, float]:
-    """Return a ball's angle and spin at a time, as `place`."""
-    tau = (t - state[i, T]) + (late - state[i, LATE])
-    spin = state[i, SPIN] + state[i, ALPHA] * tau
-    return state[i, ANGLE] + (state[i, SPIN] + 0.5 * state[i, ALPHA] * tau) * tau, spin
 
 
 @kernel
@@ -192,6 +163,8 @@ def foresee(
     for f in range(len(flats)):
         if s1 >= 0 and (f in (s1, s2) or parallel(flats, f, s1)):
             continue
+        if vx * flats[f, NX] + vy * flats[f, NY] >= 0.0 and ax * flats[f, NX] + ay * flats[f, NY] >= 0.0:
+            continue
         if fresh and last_kind == EDGE and last_who == f:
             continue  # it has just come to the end of this one
         met = fresh and last_kind == FLAT and last_who == f
@@ -222,80 +195,3 @@ def foresee(
         state[i, NEXT_LATE] = (now - (time - virtual)) + (after - virtual)
     next_time[i] = time
     tags[i, NEXT_KIND], tags[i, NEXT_WHO] = kind, partner
-
-
-@kernel
-def nearest_knob(
-    knobs: FloatArray,
-    state: FloatArray,
-    i: int,
-    now: float,
-    late: float,
-    best: float,
-    met: int,
-    skip: int,
-    other: int,
-) -> tuple[int, float]:
-    """Return which knob a ball meets first and after what time, less than `best`; −1 for none.
-
-    Args:
-        knobs: all knobs.
-        state: of all balls.
-        i: ball.
-        now: s.
-        late: what rounding has cut off it, s.
-        best: s.
-        met: knob that it has just met, or −1.
-        skip: knob at an end of what it rests on, whose circle its path only touches; or −1.
-        other: likewise.
-    """
-    x, y, vx, vy = place(state, i, now, late)
-    ax, ay, radius = state[i, AX], state[i, AY], state[i, RADIUS]
-    straight, speed, partner = ax == 0.0 and ay == 0.0, abs(vx) + abs(vy), -1
-    for k in range(len(knobs)):
-        if k in (skip, other) or (straight and k == met):
-            continue
-        dx, dy, reach = knobs[k, 0] - x, knobs[k, 1] - y, knobs[k, 2] + radius
-        if straight:
-            tau = pair_entry(dx, dy, -vx, -vy, reach, speed)
-        else:
-            tau = curved_entry(dx, dy, -vx, -vy, -ax, -ay, reach, k == met, best)
-        if tau < best:
-            best, partner = tau, k
-    return partner, best
-
-
-@kernel
-def nearest_ball(
-    state: FloatArray, tags: IntArray, others: IntArray, i: int, now: float, late: float, best: float
-) -> tuple[int, float]:
-    """Return which ball a ball meets first and after what time, less than `best`; −1 for none."""
-    x, y, vx, vy = place(state, i, now, late)
-    ax, ay, size = state[i, AX], state[i, AY], state[i, RADIUS]
-    everybody = tags[i, MEETS] == ALL
-    fresh = state[i, LAST_TIME] == now and tags[i, LAST_KIND] == BALL
-    last, partner, speed = tags[i, LAST_WHO], -1, abs(vx) + abs(vy)
-    for k in range(len(others)):
-        j = others[k]
-        if j == i or not (everybody or state[j, LIGHTNESS] == 0.0):
-            continue
-        tau = (now - state[j, T]) + (late - state[j, LATE])
-        wx, wy = state[j, VX] + state[j, AX] * tau, state[j, VY] + state[j, AY] * tau
-        dx = state[j, X] + 0.5 * (state[j, VX] + wx) * tau - x
-        dy = state[j, Y] + 0.5 * (state[j, VY] + wy) * tau - y
-        ux, uy, bx, by = wx - vx, wy - vy, state[j, AX] - ax, state[j, AY] - ay
-        straight = bx == 0.0 and by == 0.0
-        if straight and dx * ux + dy * uy >= 0.0:
-            continue
-        met = fresh and last == j
-        if met and state[j, LIGHTNESS] > 0.0:
-            met = state[j, LAST_TIME] == now and tags[j, LAST_KIND] == BALL and tags[j, LAST_WHO] == i
-        if not straight:
-            after = curved_entry(dx, dy, ux, uy, bx, by, size + state[j, RADIUS], met, best)
-        elif met:
-            continue
-        else:
-            after = pair_entry(dx, dy, ux, uy, size + state[j, RADIUS], speed + abs(wx) + abs(wy))
-        if after < best:
-            best, partner = after, j
-    return partner, best

@@ -13,7 +13,6 @@ from sandbox.engines.exact.advance import (
     DONE,
     FULL,
     PAUSED,
-    TOO_DENSE,
     advance,
     changed,
     evaluate,
@@ -23,13 +22,8 @@ from sandbox.engines.exact.advance import (
 )
 from sandbox.engines.exact.arena import (
     ANGLE,
-    AT_INSTANT,
-    BALL,
     BUDGET,
     EVENTS,
-    FLAT,
-    IN_SECOND,
-    KNOB,
     LIGHTNESS,
     NOW,
     NOW_LATE,
@@ -39,18 +33,15 @@ from sandbox.engines.exact.arena import (
     SPIN,
     STAMP,
     SUPPORT,
-    THING,
     VX,
     VY,
-    WHAT,
-    WHO,
-    WITH,
     Arena,
     X,
     Y,
     arena_of,
     renewed,
 )
+from sandbox.engines.exact.excess import too_many
 from sandbox.engines.exact.impact import bring
 from sandbox.engines.exact.log import log_rests, open_rest, taken, with_room
 from sandbox.engines.exact.predict import predict
@@ -224,30 +215,13 @@ class ExactSimulation:
                         self._stop(f"more than {MAX_ROWS:,} contacts in one run")
                     self._arena = with_room(self._arena, 2 * len(self._arena.log))
                 elif status != PAUSED:
-                    self._stop(self._too_many(status))
+                    self._stop(too_many(self._arena, self.bodies.names, self._troupe.scene.fixed_names, status))
 
     def _stop(self, why: str) -> NoReturn:
         self._ended = True
         self._stopped = float(self._arena.world[NOW])
         self._evaluate()
         raise Exhaustion(why)
-
-    def _too_many(self, status: int) -> str:
-        """Say when, how many and whose events there were."""
-        count, names = self._arena.counts, self.bodies.names
-        kind, partner = int(count[WHAT]), int(count[WITH])
-        who = repr(names[count[WHO]])
-        if kind == BALL:
-            who += f" and {names[partner]!r}"
-        elif kind in (FLAT, KNOB):
-            thing = self._arena.flat_tags[partner, THING] if kind == FLAT else self._arena.knob_tags[partner, THING]
-            who += f" and {self._troupe.scene.fixed_names[thing]!r}"
-        number, span = (count[AT_INSTANT], "an instant") if status == TOO_DENSE else (count[IN_SECOND], "one second")
-        when = float(self._arena.world[NOW])
-        return (
-            f"at {when:.9g} s: more than {int(number) - 1:,} events within {span}, last of {who}; "
-            "engines that step could go on: pymunk, reference"
-        )
 
     def _evaluate(self) -> None:
         troupe = self._troupe

@@ -46,6 +46,9 @@ class Penalty:
         near = self._finder.candidates(x[0], margin)
         self._keys = self._finder.manifolds(x[0], near, margin).key.copy()
         rows = len(self._keys)
+        if not rows:
+            self._given = self._given[0].of(slice(0)), self._given[1][:0]
+            return step(transition, t, x, u, h)
 
         def forces(state: State) -> FloatArray:
             contacts = self._finder.manifolds(state[0, :count], near)
@@ -65,8 +68,6 @@ class Penalty:
 
     def _rows(self, contacts: Manifolds) -> tuple[IntArray, BoolArray]:
         """Return each contact's row, and whether it has one: only in a diverging state do some have none."""
-        if not len(self._keys):
-            return np.zeros(contacts.size, np.int64), np.zeros(contacts.size, np.bool_)
         row = np.minimum(np.searchsorted(self._keys, contacts.key), len(self._keys) - 1)
         return row, np.asarray(self._keys[row] == contacts.key)
 

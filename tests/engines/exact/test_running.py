@@ -11,6 +11,7 @@ import pytest
 from sandbox.action import ActionError, Force, Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.exact.engine import ExactEngine
+from sandbox.engines.registry import start
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Ball
 
@@ -169,9 +170,15 @@ def test_what_is_too_fast_is_given_up(monkeypatch):
 def test_refusals_name_what_is_missing_and_who_could():
     drag = from_document({**BOUNCE, "world": {"gravity": [0, -G], "linear_drag": 0.1}})
     with pytest.raises(Refusal, match=r"exact refuses: it does not model drag; these could: .*pymunk"):
-        ExactEngine().start(drag)
+        start(drag, "exact")
     scene, engine = from_document(BOUNCE), ExactEngine()
-    for choice in ({"integrator": "rk4"}, {"slop": 0.01}, {"half_kick": True}, {"broad_phase": "grid"}):
+    for choice in (
+        {"integrator": "rk4"},
+        {"slop": 0.01},
+        {"stiffness": 1e3},
+        {"half_kick": True},
+        {"broad_phase": "grid"},
+    ):
         (lack,) = engine.missing(scene, scene.solver.replace(**choice))
         assert next(iter(choice)) in lack
         assert "leave it out" in lack

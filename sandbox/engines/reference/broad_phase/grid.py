@@ -14,6 +14,9 @@ from sandbox.trajectory import BoolArray, FloatArray, IntArray
 FARTHEST_CELL = 4e18
 """Cells beyond fall together: the numbers of cells are 64-bit."""
 
+LOW = 2**31 - 1
+"""The low bits of a cell's number: more than any table has slots."""
+
 
 @kernel
 def cell_of(coordinate: float, width: float) -> int:
@@ -26,7 +29,8 @@ def cell_of(coordinate: float, width: float) -> int:
 @kernel
 def slot_of(column: int, row: int, mask: int) -> int:
     """Return the slot of a cell in a table of mask + 1 slots (Teschner et al. 2003, their two primes)."""
-    return int(((column * 73856093) ^ (row * 19349663)) & mask)
+    # By their low bits alone, so that no product overflows; of a product, they depend on nothing else.
+    return int((((column & LOW) * 73856093) ^ ((row & LOW) * 19349663)) & mask)
 
 
 @kernel

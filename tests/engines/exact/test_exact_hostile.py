@@ -1,0 +1,49 @@
+"""The exact engine under any scene: it ends, stays finite, and does so again."""
+
+import numpy as np
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from strategies import Document, documents
+
+from sandbox.engines.contract import Divergence, Exhaustion
+from sandbox.engines.exact.engine import ExactEngine
+from sandbox.engines.exact.simulation import ExactSimulation
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Scene
+
+
+@st.composite
+def runnable(draw: st.DrawFn) -> Scene:
+    """Sound scenes without drag and without words that only other engines know."""
+    document: Document = draw(documents(most=3))
+    document["solver"] = {"dt": document.get("solver", {}).get("dt", 0.01)}
+    for key in ("linear_drag", "quadratic_drag"):
+        document.get("world", {}).pop(key, None)
+    scene = from_document(document)
+    assume(not ExactEngine().missing(scene, scene.solver))
+    return scene
+
+
+def outcome(simulation: ExactSimulation) -> tuple[str | None, str]:
+    """Step; return why it ended, if it did, and the hash of the state at the end."""
+    ended = None
+    try:
+        for _ in range(10):
+            simulation.step()
+            frame = simulation.frame()
+            state = (frame.position, frame.velocity, frame.angle, frame.angular_velocity)
+            assert all(bool(np.isfinite(each).all()) for each in state)
+    except (Divergence, Exhaustion) as reason:
+        ended = str(reason)
+    return ended, simulation.state_hash()
+
+
+@given(runnable())
+@settings(max_examples=80)
+def test_any_scene_runs_finite_or_ends_with_a_reason_and_does_so_again(scene: Scene) -> None:
+    first, again = ExactEngine().start(scene), ExactEngine().start(scene)
+    first.contacts()  # recording contacts must not matter
+    assert outcome(first) == outcome(again)
+    contacts = first.contacts()
+    assert np.isfinite(contacts.time).all()
+    assert np.isfinite(contacts.impulse).all()
