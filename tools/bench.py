@@ -122,7 +122,7 @@ def events(count: int) -> Timed:
     """Return the events a second of `exact` in an elastic gas of so many balls, between frames 10 s apart."""
 
     def work() -> float:
-        gas = peers.gas(count)
+        gas = peers.gas(count, 100.0)
         simulation = start(gas, "exact", gas.solver.replace(dt=10.0))
         simulation.step()
         began, before = time.perf_counter(), simulation.work["events"]
