@@ -172,7 +172,7 @@ def gas(count: int, speed: float) -> Scene:
 
 
 def contacts_a_second(count: int) -> Callable[[], float]:
-    """Return the contacts a second that pymunk gets through in the same gas, at a dt in which a ball moves 1/50 of its radius."""
+    """Return the contacts a second that pymunk gets through in the same gas, 1/50 of a radius a step."""
 
     def work() -> float:
         simulation = start(gas(count, 1.0), "pymunk")

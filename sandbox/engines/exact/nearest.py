@@ -83,14 +83,15 @@ def nearest_ball(
         tau = (now - state[j, T]) + (late - state[j, LATE])
         bx, by, reach = state[j, AX] - ax, state[j, AY] - ay, size + state[j, RADIUS]
         straight = bx == 0.0 and by == 0.0
-        wx = state[j, VX] + state[j, AX] * tau
-        dx, ux = state[j, X] + 0.5 * (state[j, VX] + wx) * tau - x, wx - vx
-        # Most cannot come near before the best so far; a little slack keeps rounding from deciding.
-        if straight and abs(dx) > reach + abs(ux) * best * 1.000001:
-            continue
-        wy = state[j, VY] + state[j, AY] * tau
-        dy, uy = state[j, Y] + 0.5 * (state[j, VY] + wy) * tau - y, wy - vy
-        if straight and (dx * ux + dy * uy >= 0.0 or abs(dy) > reach + abs(uy) * best * 1.000001):
+        wx, wy = state[j, VX] + state[j, AX] * tau, state[j, VY] + state[j, AY] * tau
+        ux, uy = wx - vx, wy - vy
+        dx = state[j, X] + 0.5 * (state[j, VX] + wx) * tau - x
+        dy = state[j, Y] + 0.5 * (state[j, VY] + wy) * tau - y
+        # Most leave, or cannot come near before the best so far. One test for all: each alone is a coin's throw, which
+        # a processor guesses wrong. A little slack keeps rounding from deciding.
+        ahead = best * 1.000001
+        far = (dx * ux + dy * uy >= 0.0) | (abs(dx) > reach + abs(ux) * ahead) | (abs(dy) > reach + abs(uy) * ahead)
+        if straight & far:
             continue
         met = fresh and last == j
         if met and state[j, LIGHTNESS] > 0.0:
