@@ -14,7 +14,7 @@ def say(text: str) -> None:
 
 
 class Compiling:
-    """Times compiling, and says once that it happens: the first use takes seconds, later ones find it on disk."""
+    """Times compiling, and says once that it happens: half a minute at first, later uses find it on disk."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
@@ -27,7 +27,7 @@ class Compiling:
             self._began = perf_counter()
         self._depth += 1
         if module.startswith("sandbox."):
-            say("compiling the solver's kernels: some seconds, this once")
+            say("compiling the solver's kernels: up to half a minute, this once")
 
     def end(self) -> None:
         """Note that it is done."""

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from functools import cache
 from hashlib import blake2b
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 from sandbox.engines.compiling import COMPILING, say
 
@@ -39,16 +39,29 @@ LARGE = 100
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Return a function compiled at its first call, or as it is where numba is not installed."""
-    if not COMPILED:
-        return function
+    return _compiled(function, {}) if COMPILED else function
+
+
+def bare_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Return a function compiled as `kernel` does, which may read and write arrays but make none.
+
+    References to the arrays it is handed are not counted: that is an atomic operation for each array at each call,
+    and took half the time of kernels as short as those of events.
+    """
+    # numba's own name for "no run-time support"; it has no public one.
+    return _compiled(function, {"_nrt": False}) if COMPILED else function
+
+
+def _compiled(function: Callable[P, R], options: dict[str, bool]) -> Callable[P, R]:
     config: Any = numba.config
     theirs, folder = config.CACHE_DIR, cache_folder()
     config.CACHE_DIR = str(folder) if folder is not None else theirs
     try:
-        compiled: Callable[P, R] = numba.njit(cache=folder is not None, error_model="numpy")(function)
+        compiled: Any = numba.njit(cache=folder is not None, error_model="numpy")(function)
     finally:
         config.CACHE_DIR = theirs
-    return compiled
+    compiled.targetoptions.update(options)  # compiling waits for the first call, so this is in time
+    return cast("Callable[P, R]", compiled)
 
 
 @cache
@@ -58,8 +71,9 @@ def cache_folder() -> Path | None:
     Folders of former states of the sources are removed.
     """
     here = Path(__file__).resolve().parent
-    place = blake2b(str(here).encode(), digest_size=4).hexdigest()  # installations may share the user's folder
-    stamp = blake2b(f"{sys.version} {numba.__version__}".encode(), digest_size=8)
+    # Installations may share the user's folder, and Pythons the sources: each has folders of its own.
+    place = blake2b(f"{here} {sys.version} {numba.__version__}".encode(), digest_size=4).hexdigest()
+    stamp = blake2b(digest_size=8)
     for file in sorted(here.rglob("*.py")):
         status = file.stat()
         stamp.update(f"{file.name} {status.st_mtime_ns} {status.st_size}".encode())

@@ -4,7 +4,10 @@ import threading
 
 
 class Turn:
-    """Held while a space is being changed: two threads in one pymunk space hang or crash the process."""
+    """Held while a simulation is being changed.
+
+    Two threads in one pymunk space hang or crash the process; elsewhere they would mix two steps into one.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

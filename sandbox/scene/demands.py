@@ -29,6 +29,24 @@ class Demand(StrEnum):
     BOUNDS = "bounds"
 
 
+BALLS = frozenset(
+    {
+        Demand.TRANSLATION,
+        Demand.ROTATION,
+        Demand.GRAVITY,
+        Demand.DRAG,
+        Demand.BALL_BALL,
+        Demand.BALL_PLANE,
+        Demand.BALL_SEGMENT,
+        Demand.BALL_POST,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.BOUNDS,
+    }
+)
+"""All that a scene of balls and fixed things can demand. Engines list what they have: a new demand is nobody's yet."""
+
+
 class Item(NamedTuple):
     """One line of the bill: a demand, whether the scene makes it, and why or why not."""
 

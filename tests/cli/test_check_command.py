@@ -57,10 +57,13 @@ def test_scene_that_no_engine_can_run_is_refused(tmp_path: Path, capfd: pytest.C
     scene = written(tmp_path)
     status, document, _ = json_of(capfd, "check", scene, "--set", "solver.detection=penalty_is_none")
     assert (status, document["ok"]) == (2, False)
-    status, document, _ = json_of(capfd, "check", scene, "--set", "solver.response=penalty")
+    status, document, _ = json_of(capfd, "check", scene, "--set", "solver.broad_phase=oriented")
     assert (status, document["ok"], document["faults"]) == (1, True, [])
-    verdict = document["engines"]["pymunk"]
-    assert verdict == {"ok": False, "missing": ["response 'penalty' is not a choice it has (only 'impulse')"]}
+    assert list(document["engines"]) == list(ENGINES)
+    for verdict in document["engines"].values():
+        (reason,) = verdict["missing"]
+        assert not verdict["ok"]
+        assert reason.startswith("broad_phase 'oriented' ")
 
 
 def test_warning_carries_kind_message_and_figures(capfd: pytest.CaptureFixture[str]) -> None:
@@ -88,8 +91,8 @@ def test_bill_is_printed_a_line_each(tmp_path: Path, capfd: pytest.CaptureFixtur
     assert (status, out[0], err) == (0, f"{scene}: Drop", [])
     marks = {line.split()[1]: line.split()[0] for line in out[1:12]}
     assert (marks["gravity"], marks["drag"], marks["rotation"]) == ("on", "off", "off")
-    assert out[12] == "  engine pymunk: models all of it"
-    assert len(out) == 14
+    assert out[12 : 12 + len(ENGINES)] == [f"  engine {name}: models all of it" for name in ENGINES]
+    assert len(out) == 13 + len(ENGINES)
 
 
 def test_quiet_tells_only_what_is_wrong(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

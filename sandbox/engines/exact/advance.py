@@ -28,12 +28,12 @@ from sandbox.engines.exact.arena import (
     WITH,
     Arena,
 )
-from sandbox.engines.exact.bare import kernel
 from sandbox.engines.exact.impact import bring, hit_ball, hit_knob, log_hit
 from sandbox.engines.exact.log import ROOM
 from sandbox.engines.exact.motion import place, turned
 from sandbox.engines.exact.predict import predict
 from sandbox.engines.exact.support import fly, hit_flat, knocked, pass_edge, settle, slip_ends
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.trajectory import FloatArray, IntArray
 
 DONE, PAUSED, FULL, TOO_MANY, TOO_DENSE = range(5)

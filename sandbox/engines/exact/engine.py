@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sandbox.scene.demands import Demand, demands
+from sandbox.scene.demands import BALLS, Demand, demands
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -33,7 +33,7 @@ class ExactEngine:
 
     name: str = "exact"
     about: str = "event-driven: closed-form motion between events, next events from stable roots"
-    capabilities: frozenset[Demand] = frozenset(Demand) - {Demand.DRAG}
+    capabilities: frozenset[Demand] = BALLS - {Demand.DRAG}
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that it lacks."""

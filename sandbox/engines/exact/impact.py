@@ -29,10 +29,10 @@ from sandbox.engines.exact.arena import (
     X,
     Y,
 )
-from sandbox.engines.exact.bare import kernel
 from sandbox.engines.exact.log import add_impulse, log_rest, open_row
 from sandbox.engines.exact.motion import place, turned
 from sandbox.engines.exact.roots import NOISE
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.trajectory import FloatArray, IntArray
 
 ALMOST_STILL = 1e-9

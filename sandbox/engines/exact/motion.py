@@ -13,7 +13,7 @@ from sandbox.engines.exact.arena import (
     X,
     Y,
 )
-from sandbox.engines.exact.bare import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.trajectory import FloatArray
 
 

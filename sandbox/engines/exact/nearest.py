@@ -17,10 +17,10 @@ from sandbox.engines.exact.arena import (
     X,
     Y,
 )
-from sandbox.engines.exact.bare import kernel
 from sandbox.engines.exact.motion import place
 from sandbox.engines.exact.quartic import curved_entry
 from sandbox.engines.exact.roots import pair_entry
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.roster import ALL
 from sandbox.trajectory import FloatArray, IntArray
 

@@ -33,10 +33,10 @@ from sandbox.engines.exact.arena import (
     UY,
     Arena,
 )
-from sandbox.engines.exact.bare import kernel
 from sandbox.engines.exact.motion import place
 from sandbox.engines.exact.nearest import nearest_ball, nearest_knob
 from sandbox.engines.exact.roots import NOISE, flat_entry
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.trajectory import FloatArray, IntArray
 
 PARALLEL = 1e-12

@@ -7,7 +7,7 @@ extremes is missed, whatever the coefficients.
 
 import math
 
-from sandbox.engines.exact.bare import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 
 MOST = 200
 """Halvings: doubles between 0 and the largest have no more."""

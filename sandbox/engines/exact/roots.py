@@ -6,7 +6,7 @@ lose no digits where the textbook formula subtracts nearly equal numbers.
 
 import math
 
-from sandbox.engines.exact.bare import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 
 NOISE = 8.0 * 2.0**-52
 """A component of a vector that is smaller than this share of the vector is rounding."""

@@ -44,11 +44,11 @@ from sandbox.engines.exact.arena import (
     X,
     Y,
 )
-from sandbox.engines.exact.bare import kernel
 from sandbox.engines.exact.impact import note, strike
 from sandbox.engines.exact.log import add_impulse, open_rest, open_row
 from sandbox.engines.exact.predict import parallel
 from sandbox.engines.exact.roots import NOISE
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.trajectory import FloatArray
 
 REST_TIME = 1e-13

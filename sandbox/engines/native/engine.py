@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.overlap import BIAS, slop_of
-from sandbox.scene.demands import Demand, demands
+from sandbox.scene.demands import BALLS, Demand, demands
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -29,7 +29,7 @@ class PymunkEngine:
 
     name: str = "pymunk"
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
-    capabilities: frozenset[Demand] = frozenset(Demand)
+    capabilities: frozenset[Demand] = BALLS
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that pymunk lacks."""

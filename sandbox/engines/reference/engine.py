@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.overlap import BIAS, slop_of
-from sandbox.scene.demands import Demand, demands
+from sandbox.scene.demands import BALLS, Demand, demands
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -27,12 +27,12 @@ class ReferenceEngine:
     """Written by hand to be read: fixed step, every axis a table of interchangeable functions.
 
     Integrator, broad phase, detection and response are chosen by settings. As explicit_euler, discrete and impulse it
-    is pymunk's scheme over again.
+    is pymunk's scheme over again, but for drag: that is an exponential step there, here a force like any other.
     """
 
     name: str = "reference"
     about: str = "by hand, fixed step: integrators, broad phases, times of impact, impulses or penalty springs"
-    capabilities: frozenset[Demand] = frozenset(Demand)
+    capabilities: frozenset[Demand] = BALLS
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that the reference lacks."""

@@ -24,6 +24,9 @@ from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
 
+ROUNDING = 1e-12
+"""An overlap of less than this share of the contact distance is none."""
+
 
 class ReferenceSimulation:
     """A running scene. A substep reads as the tutorial's: apply forces, advance, detect and resolve."""
@@ -169,7 +172,7 @@ class ReferenceSimulation:
         self, start: float, end: float, before: State, after: State, contacts: Manifolds, impulse: FloatArray
     ) -> None:
         assert self._ledger is not None
-        self._ledger.record(end, _touching(contacts, impulse))
+        self._ledger.record(end, _touching(*_real(contacts, impulse)))
         if self._observer is not None:
             # The observer may keep what it is given: these arrays are never written to again.
             self._observer(start, before[0, :, :2], after[0, :, :2], self._ledger.pairs())
@@ -189,6 +192,14 @@ class ReferenceSimulation:
     def _check_running(self) -> None:
         if self._ended:
             raise RuntimeError("the simulation has ended; it can be read, but not go on")
+
+
+def _real(contacts: Manifolds, impulse: FloatArray) -> tuple[Manifolds, FloatArray]:
+    """Leave out what overlaps by rounding alone, and pushes nothing: two that go side by side after an impact."""
+    if not contacts.size:
+        return contacts, impulse
+    real = (contacts.separation < -ROUNDING * contacts.arm.sum(axis=1)) | impulse.any(axis=1)
+    return (contacts, impulse) if real.all() else (contacts.of(real), impulse[real])
 
 
 def _touching(contacts: Manifolds, impulse: FloatArray) -> Touching:

@@ -96,8 +96,8 @@ class Stage:
         return moved
 
     def overlaps(self, x: State) -> Manifolds:
-        """Return the contacts in a state; they are good until the next look."""
-        return self.finder.overlaps(x[0])
+        """Return the contacts in a state; they are good until the next look. Springs have looked while they moved."""
+        return self.finder.overlaps(x[0]) if self.penalty is None else self.penalty.given()[0]
 
     def resolve(self, moved: State, contacts: Manifolds, h: float) -> None:
         """Part what overlaps after a step of h, s, and take the result as the present state.
