@@ -1,6 +1,5 @@
 """ExactSimulation: a scene running from event to event."""
 
-import hashlib
 from collections.abc import Mapping
 from typing import NoReturn
 
@@ -50,20 +49,20 @@ from sandbox.engines.exact.troupe import Troupe
 from sandbox.engines.kernel import tell_if_slow
 from sandbox.engines.ledger import MAX_ROWS
 from sandbox.engines.limits import BEYOND
-from sandbox.engines.turn import Turn
+from sandbox.engines.running import Running
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, Frame, IntArray
 
-PER_SECOND, PER_SECOND_AND_BALL = 2_000_000, 2_000
+PER_SECOND, PER_SECOND_AND_BALL = 1_000_000, 1_000
 """Events that one simulated second may have: the first, or the second for each ball where that is more."""
 
 FIRST_ROWS = 1024
 """Rows that the log of contacts starts with."""
 
 
-class ExactSimulation:
+class ExactSimulation(Running):
     """A running scene.
 
     Between events every ball moves in closed form from its own last event on; frames are read off and change nothing.
@@ -71,21 +70,14 @@ class ExactSimulation:
     """
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
-        self._settings = settings
+        super().__init__(settings)
         self._troupe = Troupe(scene, settings.dt)
-        self._turn = Turn()
-        self._steps, self._part = 0, 0.0
         self._stopped: float | None = None
-        self._ended = False
         self._arena: Arena = arena_of(self._troupe)
         tell_if_slow(len(scene.bodies))
         self._allow()
         with np.errstate(all="ignore"):
             start(self._arena)
-
-    def __reduce__(self) -> NoReturn:
-        """Refuse to be copied or pickled, as every engine here does."""
-        raise TypeError("a running simulation cannot be copied; start its scene again and repeat its actions")
 
     @property
     def time(self) -> float:
@@ -96,11 +88,6 @@ class ExactSimulation:
     def bodies(self) -> Bodies:
         """The bodies by number, as they started; spawned ones join at the end."""
         return self._troupe.bodies
-
-    @property
-    def settings(self) -> Settings:
-        """The settings, with every choice filled in."""
-        return self._settings
 
     @property
     def retired(self) -> Mapping[int, float]:
@@ -138,8 +125,7 @@ class ExactSimulation:
             Exhaustion: as `step`.
             ValueError: there is no such part.
         """
-        if not 0.0 < part < 1.0:
-            raise ValueError(f"a last part of {part} steps; it is more than 0 and less than 1")
+        self._check_part(part)
         with self._turn:
             self._check_running()
             self._advance((self._steps + part) * self._settings.dt)
@@ -188,22 +174,6 @@ class ExactSimulation:
 
     def watch(self, observer: Observer) -> None:
         """Do nothing: there are no substeps to call an observer after, and no contact is missed."""
-
-    def state_hash(self) -> str:
-        """Return a SHA-256 of time and every body's state."""
-        frame = self.frame()
-        digest = hashlib.sha256(np.float64(frame.time).tobytes())
-        for array in (frame.position, frame.velocity, frame.angle, frame.angular_velocity, frame.present):
-            digest.update(array.tobytes())
-        return digest.hexdigest()
-
-    def close(self) -> None:
-        """End the simulation. What it holds goes with it."""
-        self._ended = True
-
-    def _check_running(self) -> None:
-        if self._ended:
-            raise RuntimeError("the simulation has ended; it can be read, but not go on")
 
     def _advance(self, until: float) -> None:
         """Let all events up to a time happen. Python sees to signals now and then, and makes room in the log."""

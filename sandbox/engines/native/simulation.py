@@ -1,9 +1,7 @@
 """NativeSimulation: a scene running in a pymunk space, and beside it, as arrays, what can meet nothing."""
 
-import hashlib
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import NoReturn
 
 import numpy as np
 
@@ -13,14 +11,14 @@ from sandbox.engines.contract import Divergence, Observer
 from sandbox.engines.ledger import ContactLedger
 from sandbox.engines.native.memory import PartedMemory
 from sandbox.engines.native.population import Population
-from sandbox.engines.turn import Turn
+from sandbox.engines.running import Running
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
 
 
-class NativeSimulation:
+class NativeSimulation(Running):
     """A running scene.
 
     Scheme: drift–kick, explicit Euler for free motion (position error +g·h·T/2, velocity exact). With `half_kick`
@@ -32,34 +30,17 @@ class NativeSimulation:
     """
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
-        self._settings = settings
+        super().__init__(settings)
         self._population = Population(scene, settings)
-        self._turn = Turn()
-        self._steps = 0
-        self._part = 0.0
         self._ledger: ContactLedger | None = None
         self._observer: Observer | None = None
         self._retired: dict[int, float] = {}
         self._still: tuple[FloatArray, FloatArray] | None = None  # angles and spins, which frames share if they can
 
-    def __reduce__(self) -> NoReturn:
-        """Refuse to be copied or pickled: in contact a copied space goes on differently, and says nothing."""
-        raise TypeError("a running simulation cannot be copied; start its scene again and repeat its actions")
-
-    @property
-    def time(self) -> float:
-        """Simulated time, s."""
-        return (self._steps + self._part) * self._settings.dt
-
     @property
     def bodies(self) -> Bodies:
         """The bodies by number, as they started; spawned ones join at the end."""
         return self._population.bodies
-
-    @property
-    def settings(self) -> Settings:
-        """The settings, with every choice filled in."""
-        return self._settings
 
     @property
     def retired(self) -> Mapping[int, float]:
@@ -100,8 +81,7 @@ class NativeSimulation:
             Divergence: as `step`.
             ValueError: there is no such part.
         """
-        if not 0.0 < part < 1.0:
-            raise ValueError(f"a last part of {part} steps; it is more than 0 and less than 1")
+        self._check_part(part)
         with self._turn:
             self._check_running()
             self._finish(part)
@@ -160,17 +140,10 @@ class NativeSimulation:
             self.contacts()
         self._observer = observer
 
-    def state_hash(self) -> str:
-        """Return a SHA-256 of time and every body's state."""
-        frame = self.frame()
-        digest = hashlib.sha256(np.float64(frame.time).tobytes())
-        for array in (frame.position, frame.velocity, frame.angle, frame.angular_velocity, frame.present):
-            digest.update(array.tobytes())
-        return digest.hexdigest()
-
     def close(self) -> None:
         """End the simulation. What it holds goes with it."""
         self._population.end()
+        super().close()
 
     def _check_running(self) -> None:
         if self._population.ended:

@@ -6,8 +6,13 @@ import numpy as np
 
 from sandbox.engines.kernel import kernel
 from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key
-from sandbox.engines.reference.narrow_phase import circle_circle, circle_half_plane, circle_segment
+from sandbox.engines.reference.narrow_phase import NARROW_PHASE
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+# Looked up once: compiled code cannot search a table.
+circle_circle = NARROW_PHASE["circle", "circle"]
+circle_half_plane = NARROW_PHASE["circle", "half_plane"]
+circle_segment = NARROW_PHASE["circle", "segment"]
 
 KIND = 60
 """Bits below the kind of a pair in its key: 0 ball-ball, 1 ball-plane, 2 ball-segment. Keys ascend."""

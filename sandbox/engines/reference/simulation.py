@@ -1,8 +1,6 @@
 """ReferenceSimulation: a scene running on the hand-written solvers, one fixed step after the other."""
 
-import hashlib
 from collections.abc import Mapping
-from typing import NoReturn
 
 import numpy as np
 
@@ -17,8 +15,8 @@ from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.motion import State
 from sandbox.engines.reference.stage import Stage
 from sandbox.engines.roster import Roster
+from sandbox.engines.running import Running
 from sandbox.engines.touching import NOTHING, Touching
-from sandbox.engines.turn import Turn
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -28,39 +26,23 @@ ROUNDING = 1e-12
 """An overlap of less than this share of the contact distance is none."""
 
 
-class ReferenceSimulation:
+class ReferenceSimulation(Running):
     """A running scene. A substep reads as the tutorial's: apply forces, advance, detect and resolve."""
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
         assert settings.detection is not None
-        self._settings = settings
+        super().__init__(settings)
         self._roster = Roster(scene, settings.h)
         self._stage = Stage(self._roster, settings)
         self._advance = DETECTIONS[settings.detection]
-        self._turn = Turn()
-        self._steps, self._part, self._ended = 0, 0.0, False
         self._ledger: ContactLedger | None = None
         self._observer: Observer | None = None
         tell_if_slow(len(scene.bodies))
-
-    def __reduce__(self) -> NoReturn:
-        """Refuse to be copied or pickled, as every simulation does."""
-        raise TypeError("a running simulation cannot be copied; start its scene again and repeat its actions")
-
-    @property
-    def time(self) -> float:
-        """Simulated time, s."""
-        return (self._steps + self._part) * self._settings.dt
 
     @property
     def bodies(self) -> Bodies:
         """The bodies by number, as they started; spawned ones join at the end."""
         return self._roster.bodies
-
-    @property
-    def settings(self) -> Settings:
-        """The settings, with every choice filled in."""
-        return self._settings
 
     @property
     def retired(self) -> Mapping[int, float]:
@@ -93,8 +75,7 @@ class ReferenceSimulation:
             Divergence: as `step`.
             ValueError: there is no such part.
         """
-        if not 0.0 < part < 1.0:
-            raise ValueError(f"a last part of {part} steps; it is more than 0 and less than 1")
+        self._check_part(part)
         with self._turn, np.errstate(all="ignore"):
             self._check_running()
             whole, rest = divmod(part * self._settings.substeps, 1.0)
@@ -176,22 +157,6 @@ class ReferenceSimulation:
         if self._observer is not None:
             # The observer may keep what it is given: these arrays are never written to again.
             self._observer(start, before[0, :, :2], after[0, :, :2], self._ledger.pairs())
-
-    def state_hash(self) -> str:
-        """Return a SHA-256 of time and every body's state."""
-        frame = self.frame()
-        digest = hashlib.sha256(np.float64(frame.time).tobytes())
-        for array in (frame.position, frame.velocity, frame.angle, frame.angular_velocity, frame.present):
-            digest.update(array.tobytes())
-        return digest.hexdigest()
-
-    def close(self) -> None:
-        """End the simulation."""
-        self._ended = True
-
-    def _check_running(self) -> None:
-        if self._ended:
-            raise RuntimeError("the simulation has ended; it can be read, but not go on")
 
 
 def _real(contacts: Manifolds, impulse: FloatArray) -> tuple[Manifolds, FloatArray]:

@@ -1,0 +1,60 @@
+"""Running: what every simulation here has of its own accord: a clock, a lock, an end, and a fingerprint."""
+
+import hashlib
+from abc import ABC, abstractmethod
+from typing import NoReturn
+
+import numpy as np
+
+from sandbox.engines.turn import Turn
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Frame
+
+
+class Running(ABC):
+    """A simulation that advances by steps of dt, one thread at a time, until it ends."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._turn = Turn()
+        self._steps, self._part = 0, 0.0
+        self._ended = False
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied or pickled: in contact a copied space goes on differently, and says nothing."""
+        raise TypeError("a running simulation cannot be copied; start its scene again and repeat its actions")
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return (self._steps + self._part) * self._settings.dt
+
+    @property
+    def settings(self) -> Settings:
+        """The settings, with every choice filled in."""
+        return self._settings
+
+    @abstractmethod
+    def frame(self) -> Frame:
+        """Return the present state."""
+
+    def state_hash(self) -> str:
+        """Return a SHA-256 of time and every body's state."""
+        frame = self.frame()
+        digest = hashlib.sha256(np.float64(frame.time).tobytes())
+        for array in (frame.position, frame.velocity, frame.angle, frame.angular_velocity, frame.present):
+            digest.update(array.tobytes())
+        return digest.hexdigest()
+
+    def close(self) -> None:
+        """End the simulation. What it holds goes with it."""
+        self._ended = True
+
+    def _check_running(self) -> None:
+        if self._ended:
+            raise RuntimeError("the simulation has ended; it can be read, but not go on")
+
+    @staticmethod
+    def _check_part(part: float) -> None:
+        if not 0.0 < part < 1.0:
+            raise ValueError(f"a last part of {part} steps; it is more than 0 and less than 1")
