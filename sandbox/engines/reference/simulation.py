@@ -23,7 +23,7 @@ from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
 
 ROUNDING = 1e-12
-"""An overlap of less than this share of the contact distance is none."""
+"""Less than this share of the contact distance is no overlap, less than this share of the speed no kick."""
 
 
 class ReferenceSimulation(Running):
@@ -153,17 +153,25 @@ class ReferenceSimulation(Running):
         self, start: float, end: float, before: State, after: State, contacts: Manifolds, impulse: FloatArray
     ) -> None:
         assert self._ledger is not None
-        self._ledger.record(end, _touching(*_real(contacts, impulse)))
+        self._ledger.record(end, _touching(*_real(contacts, impulse, after[1], self._roster.inverse_mass)))
         if self._observer is not None:
             # The observer may keep what it is given: these arrays are never written to again.
             self._observer(start, before[0, :, :2], after[0, :, :2], self._ledger.pairs())
 
 
-def _real(contacts: Manifolds, impulse: FloatArray) -> tuple[Manifolds, FloatArray]:
-    """Leave out what overlaps by rounding alone, and pushes nothing: two that go side by side after an impact."""
+def _real(
+    contacts: Manifolds, impulse: FloatArray, rates: FloatArray, inverse_mass: FloatArray
+) -> tuple[Manifolds, FloatArray]:
+    """Leave out what overlaps and pushes by rounding alone: two that go side by side after an impact."""
     if not contacts.size:
         return contacts, impulse
-    real = (contacts.separation < -ROUNDING * contacts.arm.sum(axis=1)) | impulse.any(axis=1)
+    first, second = contacts.first, contacts.second
+    speed = np.hypot(rates[:, 0], rates[:, 1])
+    # What is fixed has no speed and no inverse mass of its own: the first of the pair stands in, and changes nothing.
+    other = np.where(second >= 0, second, first)
+    kick = np.hypot(impulse[:, 0], impulse[:, 1]) * np.maximum(inverse_mass[first], inverse_mass[other])
+    real = contacts.separation < -ROUNDING * contacts.arm.sum(axis=1)
+    real |= kick > ROUNDING * (speed[first] + speed[other])
     return (contacts, impulse) if real.all() else (contacts.of(real), impulse[real])
 
 
