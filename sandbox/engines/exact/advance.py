@@ -40,8 +40,8 @@ DONE, PAUSED, FULL, TOO_MANY, TOO_DENSE = range(5)
 """What `advance` returns: up to the time; after `PAUSE` events; the log is full; more events within one second than
 the budget; more within one instant."""
 
-PAUSE = 100_000
-"""Events after which a kernel lets Python see to signals: a fraction of a second, compiled."""
+PAUSE = 10_000
+"""Events after which a kernel lets Python see to signals: a third of a second with 1,000 balls, compiled."""
 
 MOMENT = 1e-9
 """s: events closer together than this count as one instant."""
