@@ -143,9 +143,8 @@ def flight_by_dop853(state, gaps, restitution, until):
 
     now, times = 0.0, []
     while True:
-        run = solve_ivp(
-            flight, (now, until), state, method="DOP853", rtol=1e-13, atol=1e-13, max_step=0.02, events=[event(g) for g in gaps]
-        )  # fmt: skip
+        tight = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-13, "max_step": 0.02}
+        run = solve_ivp(flight, (now, until), state, events=[event(gap) for gap in gaps], **tight)
         state, now = run.y[:, -1], float(run.t[-1])
         if run.status == 0:
             return times, state
