@@ -58,6 +58,15 @@ def test_a_bounce_converges_at_the_order_of_its_detection(settings, order):
     assert fitted(errors) == pytest.approx(order, abs=0.3)  # the worst of 25 phases is not quite the worst of all
 
 
+@pytest.mark.parametrize("detection", ["bisect", "swept"])
+@pytest.mark.parametrize(("e", "h"), [(0.8, 0.007), (0.8, 0.0035), (0.9, 0.007)])
+def test_explicit_euler_with_exact_impacts_never_stops_bouncing(detection, e, h):
+    """Each flight gains g·h, so rebounds tend to v = e·(v + g·h): a scheme's flaw, as it is documented."""
+    done = Way("reference", {"detection": detection}).run(drop(e, 1.0, 15.0), dt=h)
+    rebound = -e / (1 + e) * done.contact_impulse[-4:, 1]
+    np.testing.assert_allclose(rebound, e * 9.81 * h / (1 - e), rtol=0.05)  # the gain varies with the phase in a step
+
+
 def test_bisection_and_an_exact_flight_leave_only_its_epsilon():
     scene = drop(0.8, 1.0, 0.8)
     exact = bounces(np.array([0.8]), 1.0, 0.0, 9.81, 0.8)[0][0]
