@@ -9,9 +9,7 @@ A row is one entry of BENCHES. Times are seconds unless the unit says otherwise.
 import argparse
 import json
 import statistics
-import subprocess
 import sys
-import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,19 +18,9 @@ from typing import NamedTuple
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import peers
+from workloads import Timed, command, events, running, scene, staged, stepping
 
-from sandbox.engines.reference.engine import ReferenceEngine
-from sandbox.engines.reference.stage import Stage
-from sandbox.engines.registry import start
-from sandbox.engines.roster import Roster
-from sandbox.measure.run import run
 from sandbox.measure.versions import machine, versions
-from sandbox.scene.file import load
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
-
-Timed = Callable[[], float]
-"""Does the work once and returns what it took."""
 
 
 class Bench(NamedTuple):
@@ -49,117 +37,6 @@ class Bench(NamedTuple):
     """Ours is what exceeds the peer, not its whole."""
     rate: bool = False
     """Ours and the peer return how much they did in a second; the target is what ours must reach."""
-
-
-def timed(work: Callable[[], object]) -> float:
-    """Return the seconds that a piece of work takes."""
-    began = time.perf_counter()
-    work()
-    return time.perf_counter() - began
-
-
-def scene(name: str, *overrides: str) -> Scene:
-    """Return a shipped scene."""
-    return load(find(name), overrides)
-
-
-def running(which: Scene, audit: bool = True) -> Timed:
-    """Time a whole recorded run."""
-    return lambda: timed(lambda: run(which, audit=audit))
-
-
-def stepping(
-    which: Scene,
-    steps: int,
-    record: bool = True,
-    contacts: bool = True,
-    turning: bool = False,
-    engine: str = "pymunk",
-) -> Timed:
-    """Time some steps, from the start, of a simulation that is set up before."""
-
-    def work() -> float:
-        simulation = start(which, engine)
-        if contacts:
-            simulation.contacts()
-        if turning:
-            peers.give_moments(simulation, which)
-
-        def go() -> None:
-            for _ in range(steps):
-                simulation.step()
-                if record:
-                    simulation.frame()
-
-        return timed(go)
-
-    return work
-
-
-def exactly(which: Scene) -> Timed:
-    """Time a scene on exact from start to end, each frame read."""
-
-    def work() -> float:
-        simulation = start(which, "exact")
-
-        def go() -> None:
-            for _ in range(round(which.world.duration / which.solver.dt)):
-                simulation.step()
-                simulation.frame()
-
-        return timed(go)
-
-    return work
-
-
-def command(*arguments: str) -> Timed:
-    """Time a Python process from start to end."""
-    line = [sys.executable, *arguments]
-    return lambda: timed(lambda: subprocess.run(line, check=True, capture_output=True))
-
-
-def events(count: int) -> Timed:
-    """Return the events a second of `exact` in an elastic gas of so many balls, between frames 10 s apart."""
-
-    def work() -> float:
-        gas = peers.gas(count, 100.0)
-        simulation = start(gas, "exact", gas.solver.replace(dt=10.0))
-        simulation.step()
-        began, before = time.perf_counter(), simulation.work["events"]
-        while simulation.work["events"] < before + 100_000:
-            simulation.step()
-        return (simulation.work["events"] - before) / (time.perf_counter() - began)
-
-    return work
-
-
-def staged(name: str, steps: int = 2000) -> Timed:
-    """Time one stage of a reference step with one ball: "move", "look", "resolve", or "step" for the whole."""
-
-    def work() -> float:
-        simulation = ReferenceEngine().start(BOUNCE)
-        stage = Stage(Roster(BOUNCE, BOUNCE.solver.h), simulation.settings)
-        moved = stage.moved(BOUNCE.solver.h)
-        contacts = stage.overlaps(moved)
-        stages = {
-            "move": lambda: stage.moved(BOUNCE.solver.h),
-            "look": lambda: stage.overlaps(moved),
-            "resolve": lambda: stage.resolve(moved, contacts, BOUNCE.solver.h),
-            "step": simulation.step,
-        }
-        return timed(lambda: [stages[name]() for _ in range(steps)])
-
-    return work
-
-
-def one_ball(engine: str, steps: int = 2000) -> Timed:
-    """Time steps of one ball above a plane."""
-
-    def work() -> float:
-        simulation = start(BOUNCE, engine)
-        return timed(lambda: [simulation.step() for _ in range(steps)])
-
-    return work
 
 
 SPARKS = ("world.duration=1.0", "solver.record_every=1")
@@ -241,21 +118,21 @@ BENCHES = (
     Bench(
         "bounce-1e-6",
         "a ball dropped from 5 cm for 0.25 s, right to 1e-6 m: exact / pymunk by hand, at the dt that gets there",
-        lambda: exactly(LOW),
+        lambda: stepping(LOW, 250, contacts=False, engine="exact"),
         lambda: peers.bounce_to(LOW, 1e-6),
     ),
     Bench(
         "one-ball",
         "a step of one ball above a plane on the reference / on pymunk through the adapter",
-        lambda: one_ball("reference"),
-        lambda: one_ball("pymunk"),
+        lambda: stepping(BOUNCE, 2000, record=False, contacts=False, engine="reference"),
+        lambda: stepping(BOUNCE, 2000, record=False, contacts=False),
     ),
     *(
         Bench(
             f"one-ball-{name}",
             f"of such a step on the reference, {about} / the whole step",
-            lambda name=name: staged(name),
-            lambda: staged("step"),
+            lambda name=name: staged(BOUNCE, name),
+            lambda: staged(BOUNCE, "step"),
         )
         for name, about in (("move", "forces and advance"), ("look", "detect"), ("resolve", "resolve"))
     ),

@@ -20,13 +20,14 @@ from sandbox.action import (
 )
 from sandbox.scene.address import AddressError, assign
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.crosscheck import crosscheck
+from sandbox.scene.crosscheck import MAX_SURFACES, crosscheck
 from sandbox.scene.document import to_document
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import from_document
+from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Ball, Collides, Scene, default_name
-from sandbox.scene.part import MAX_BODIES
-from sandbox.trajectory import FloatArray
+from sandbox.scene.part import BACKING, MAX_BODIES
+from sandbox.trajectory import BoolArray, FloatArray
 
 
 class Cast(Protocol):
@@ -44,12 +45,9 @@ class Cast(Protocol):
     def h(self) -> float:
         """The substep, s."""
 
-    def number(self, name: str) -> int:
-        """Return the number of a body that is there.
-
-        Raises:
-            ActionError: there is none of that name.
-        """
+    @property
+    def present(self) -> BoolArray:
+        """(N,) which bodies are there."""
 
     def motion(self, number: int) -> tuple[FloatArray, float]:
         """Return a body's velocity (2,), m/s, and angular velocity, rad/s."""
@@ -71,7 +69,7 @@ class Cast(Protocol):
         """Put a body somewhere, m."""
 
     def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
-        """Refuse a place that the engine cannot start from.
+        """Refuse a place that this engine cannot start from, though others may.
 
         Raises:
             ActionError: it is one.
@@ -108,7 +106,7 @@ def perform(action: Action, cast: Cast) -> int | None:
         case Spawn():
             _spawn(action, cast)
         case Remove():
-            return cast.number(action.body)
+            return _number(action.body, cast)
         case SetParameter():
             _set(action, cast)
         case _:
@@ -116,8 +114,44 @@ def perform(action: Action, cast: Cast) -> int | None:
     return None
 
 
+def derived(scene: Scene, bodies: Bodies) -> Meetings:
+    """Derive what can meet what once an action has changed a scene or its bodies.
+
+    Raises:
+        ActionError: there are more different surfaces than a scene may have.
+    """
+    meet = meetings(scene, bodies)
+    if len(meet.surfaces.surfaces) > MAX_SURFACES:
+        raise ActionError(f"more than {MAX_SURFACES} different surfaces; share materials between balls")
+    return meet
+
+
+def _number(name: str, cast: Cast) -> int:
+    """Return the number of a body that is there."""
+    try:
+        number = cast.bodies.names.index(name)
+    except ValueError:
+        raise ActionError(f"no body is named {name!r}") from None
+    if not cast.present[number]:
+        raise ActionError(f"{name!r} is no longer there")
+    return number
+
+
+def _check_place(position: tuple[float, float], radius: float, collides: Collides, cast: Cast) -> None:
+    """Refuse a place deep behind a plane, or one that the engine cannot start from."""
+    if collides == "none":
+        return
+    scene = cast.scene
+    for plane, name in zip(scene.planes, scene.fixed_names, strict=False):  # planes come first among the names
+        normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+        depth = float((np.asarray(plane.point) - np.asarray(position)) @ normal)
+        if depth > BACKING:
+            raise ActionError(f"{depth:g} m behind the plane {name!r}; at most {BACKING:g}")
+    cast.check_place(position, radius, collides)
+
+
 def _mover(name: str, cast: Cast) -> int:
-    number = cast.number(name)
+    number = _number(name, cast)
     if cast.bodies.fixed[number]:
         raise ActionError(f"{name!r} is fixed; nothing can move it")
     return number
@@ -144,12 +178,12 @@ def _push(action: Force, cast: Cast) -> None:
 
 
 def _move(action: Move, cast: Cast) -> None:
-    number = cast.number(action.body)
+    number = _number(action.body, cast)
     fixed = bool(cast.bodies.fixed[number])
     if fixed and action.velocity not in (None, (0.0, 0.0)):
         raise ActionError(f"{action.body!r} is fixed; it can be put elsewhere, but has no velocity")
     element = cast.bodies.elements[cast.bodies.element[number]]
-    cast.check_place(action.position, element.radius, element.collides)
+    _check_place(action.position, element.radius, element.collides, cast)
     cast.put(number, np.asarray(action.position))
     if action.velocity is not None and not fixed:
         cast.set_velocity(number, np.asarray(action.velocity))
@@ -166,7 +200,7 @@ def _spawn(action: Spawn, cast: Cast) -> None:
     faults = crosscheck(alone)
     if faults:
         raise ActionError("; ".join(message for _, message in faults))
-    cast.check_place(ball.position, ball.radius, ball.collides)
+    _check_place(ball.position, ball.radius, ball.collides, cast)
     cast.add(ball, name)
 
 

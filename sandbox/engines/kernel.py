@@ -107,7 +107,7 @@ if COMPILED:
         def on_start(self, event: Any) -> None:
             COMPILING.begin(getattr(event.data.get("dispatcher"), "__module__", ""))
 
-        def on_end(self, event: Any) -> None:  # noqa: ARG002
+        def on_end(self, event: Any) -> None:  # noqa: ARG002, numba's signature
             COMPILING.end()
 
     event.register("numba:compile", _Listener())  # type: ignore[no-untyped-call]  # numba's own

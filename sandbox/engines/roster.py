@@ -7,21 +7,19 @@ from types import MappingProxyType
 
 import numpy as np
 
-from sandbox.action import ActionError
+from sandbox.engines.acting import derived
 from sandbox.engines.fixtures import Fixtures, fixtures_of
 from sandbox.engines.kernel import kernel
 from sandbox.engines.limits import FARTHEST, FASTEST
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.crosscheck import MAX_SURFACES
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Ball, Collides, Scene
-from sandbox.scene.part import BACKING
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 NOTHING, FIXED, ALL = 0, 1, 2
 """What a body can meet, as `Roster.meets` holds it: by `collides`, and nothing at all once it is gone."""
 
-_MEETS: dict[Collides, int] = {"none": NOTHING, "fixed": FIXED, "all": ALL}
+MEETS: dict[Collides, int] = {"none": NOTHING, "fixed": FIXED, "all": ALL}
 
 
 class Roster:
@@ -46,8 +44,6 @@ class Roster:
 
     def _assume(self, scene: Scene, bodies: Bodies, meet: Meetings) -> None:
         """Derive what follows from who there is and what they are made of."""
-        if len(meet.surfaces.surfaces) > MAX_SURFACES:
-            raise ActionError(f"more than {MAX_SURFACES} different surfaces; share materials between balls")
         self.scene, self.bodies, self.meet = scene, bodies, meet
         surfaces = meet.surfaces
         self.radius: FloatArray = bodies.radius
@@ -55,7 +51,7 @@ class Roster:
         self.fixed_surface: IntArray = surfaces.of_fixed
         self.restitution: FloatArray = surfaces.restitution
         self.friction: FloatArray = surfaces.friction
-        kinds = np.asarray([_MEETS[element.collides] for element in bodies.elements], dtype=np.int64)
+        kinds = np.asarray([MEETS[element.collides] for element in bodies.elements], dtype=np.int64)
         self.meets: IntArray = np.where(self.present, kinds[bodies.element], NOTHING)
         """(N,) `NOTHING`, `FIXED` (planes, walls, posts, fixed balls) or `ALL`"""
         moves = self.moving
@@ -73,20 +69,6 @@ class Roster:
     def retired(self) -> Mapping[int, float]:
         """When each body that is no longer there was gone: number → s."""
         return MappingProxyType(self._retired)
-
-    def number(self, name: str) -> int:
-        """Return the number of a body that is there.
-
-        Raises:
-            ActionError: there is none of that name.
-        """
-        try:
-            number = self.bodies.names.index(name)
-        except ValueError:
-            raise ActionError(f"no body is named {name!r}") from None
-        if not self.present[number]:
-            raise ActionError(f"{name!r} is no longer there")
-        return number
 
     def motion(self, number: int) -> tuple[FloatArray, float]:
         """Return a body's velocity (2,), m/s, and angular velocity, rad/s."""
@@ -111,19 +93,8 @@ class Roster:
         """Put a body somewhere, m."""
         self.position[number] = position
 
-    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:  # noqa: ARG002
-        """Refuse a place deep behind a plane.
-
-        Raises:
-            ActionError: it is one.
-        """
-        if collides == "none":
-            return
-        for (px, py, nx, ny), thing in zip(self.fixtures.planes, self.fixtures.plane_thing, strict=True):
-            depth = (px - position[0]) * nx + (py - position[1]) * ny
-            if depth > BACKING:
-                name = self.scene.fixed_names[thing]
-                raise ActionError(f"{depth:g} m behind the plane {name!r}; at most {BACKING:g}")
+    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
+        """Refuse no place: bodies may start from anywhere."""
 
     def change(self, scene: Scene) -> None:
         """Go on with a scene that differs in air, gravity or coefficients alone.
@@ -133,7 +104,7 @@ class Roster:
         """
         spawned = self.bodies.elements[len(self.scene.bodies.elements) :]
         bodies = replace(self.bodies, elements=(*scene.bodies.elements, *spawned))
-        self._assume(scene, bodies, meetings(scene, bodies))
+        self._assume(scene, bodies, derived(scene, bodies))
 
     def add(self, ball: Ball, name: str) -> int:
         """Add a ball that was checked, and return its number.
@@ -142,9 +113,7 @@ class Roster:
             ActionError: it makes more surfaces than a scene may have.
         """
         bodies = self.bodies.joined_by(ball, name)
-        meet = meetings(self.scene, bodies)
-        if len(meet.surfaces.surfaces) > MAX_SURFACES:
-            raise ActionError(f"more than {MAX_SURFACES} different surfaces; share materials between balls")
+        meet = derived(self.scene, bodies)
         self.position = np.vstack((self.position, bodies.position[-1:]))
         self.velocity = np.vstack((self.velocity, bodies.velocity[-1:]))
         self.angle = np.append(self.angle, bodies.angle[-1])

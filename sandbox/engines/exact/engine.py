@@ -48,7 +48,7 @@ class ExactEngine:
         overlap = _overlap(scene)
         return (*lacks, overlap) if overlap else tuple(lacks)
 
-    def resolve(self, scene: Scene, settings: Settings) -> Settings:  # noqa: ARG002
+    def resolve(self, scene: Scene, settings: Settings) -> Settings:  # noqa: ARG002, all engines are asked alike
         """Return the settings: it has no choices to fill in."""
         return settings
 

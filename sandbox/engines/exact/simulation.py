@@ -82,7 +82,7 @@ class ExactSimulation(Running):
     @property
     def time(self) -> float:
         """Simulated time, s; after an exhaustion, that of the last event."""
-        return (self._steps + self._part) * self._settings.dt if self._stopped is None else self._stopped
+        return super().time if self._stopped is None else self._stopped
 
     @property
     def bodies(self) -> Bodies:

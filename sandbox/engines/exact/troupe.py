@@ -4,11 +4,9 @@ import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.engines.exact.overlap import allowed, overlapping_things, told
-from sandbox.engines.roster import ALL, FIXED, NOTHING, Roster
+from sandbox.engines.roster import ALL, FIXED, MEETS, NOTHING, Roster
 from sandbox.scene.model import Ball, Scene
 from sandbox.trajectory import BoolArray, FloatArray
-
-_MEETS = {"none": NOTHING, "fixed": FIXED, "all": ALL}
 
 
 class Troupe(Roster):
@@ -81,7 +79,7 @@ class Troupe(Roster):
             ActionError: something stands there, or it makes more surfaces than a scene may have.
         """
         others = np.ones(len(self.bodies), dtype=np.bool_)
-        self._check_free(name, np.asarray(ball.position), ball.radius, _MEETS[ball.collides], ball.fixed, others)
+        self._check_free(name, np.asarray(ball.position), ball.radius, MEETS[ball.collides], ball.fixed, others)
         number = super().add(ball, name)
         self.renewed = True
         return number

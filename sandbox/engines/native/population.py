@@ -10,13 +10,12 @@ from dataclasses import replace
 import numpy as np
 
 from sandbox.action import ActionError
+from sandbox.engines.acting import derived
 from sandbox.engines.native.free import FreeFlight
 from sandbox.engines.native.meeting import MeetingBodies
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.crosscheck import MAX_SURFACES
-from sandbox.scene.meetings import Meetings, meetings
+from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Ball, Collides, Scene
-from sandbox.scene.part import BACKING
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
@@ -61,20 +60,6 @@ class Population:
     def turns(self) -> bool:
         """Whether some angle may change."""
         return self.free.turns or len(self.meeting) > 0
-
-    def number(self, name: str) -> int:
-        """Return the number of a body that is there.
-
-        Raises:
-            ActionError: there is none of that name.
-        """
-        try:
-            number = self.bodies.names.index(name)
-        except ValueError:
-            raise ActionError(f"no body is named {name!r}") from None
-        if not self.present[number]:
-            raise ActionError(f"{name!r} is no longer there")
-        return number
 
     def half_of(self, number: int) -> FreeFlight | MeetingBodies | None:
         """Return the half that holds a body; none holds a fixed one that nothing can meet."""
@@ -124,7 +109,7 @@ class Population:
             raise ActionError("drag cannot come up in a run that was started with half_kick, which knows none")
         spawned = self.bodies.elements[len(self.scene.bodies.elements) :]
         bodies = replace(self.bodies, elements=(*scene.bodies.elements, *spawned))
-        meet = _meetings(scene, bodies)
+        meet = derived(scene, bodies)
         self.refresh()
         self.velocity[self.moving] -= self.ahead
         self.scene, self.bodies, self._meet = scene, bodies, meet
@@ -176,7 +161,7 @@ class Population:
         """
         scene = self.scene
         bodies = self.bodies.joined_by(ball, name)
-        meet = _meetings(scene, bodies)
+        meet = derived(scene, bodies)
         self.refresh()
         number = len(self.bodies)
         self.bodies, self._meet = bodies, meet
@@ -216,19 +201,12 @@ class Population:
         self.velocity[numbers], self.angular_velocity[numbers] = 0.0, 0.0
 
     def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
-        """Refuse a place that an engine cannot start from.
+        """Refuse a place that pymunk cannot start from.
 
         Raises:
-            ActionError: it lies too deep behind a plane, out of reach, or in a crowd.
+            ActionError: it lies out of reach, or in a crowd.
         """
-        if collides == "none":
-            return
         place = np.asarray(position)
-        for plane, name in zip(self.scene.planes, self.scene.fixed_names, strict=False):
-            normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
-            depth = float((np.asarray(plane.point) - place) @ normal)
-            if depth > BACKING:
-                raise ActionError(f"{depth:g} m behind the plane {name!r}; at most {BACKING:g}")
         self.refresh()
         if not self.meeting.reaches(place):
             raise ActionError(f"{position} m is out of reach: pymunk's half-planes end before it")
@@ -239,15 +217,3 @@ class Population:
             raise ActionError(f"it would overlap {how.count('all')} bodies; pymunk parts {CROWD} at most")
         if len(how) - how.count("none") >= SWARM:
             raise ActionError(f"it would overlap {len(how) - how.count('none')} bodies; at most {SWARM}")
-
-
-def _meetings(scene: Scene, bodies: Bodies) -> Meetings:
-    """Derive what can meet what.
-
-    Raises:
-        ActionError: there are more different surfaces than a scene may have.
-    """
-    meet = meetings(scene, bodies)
-    if len(meet.surfaces.surfaces) > MAX_SURFACES:
-        raise ActionError(f"more than {MAX_SURFACES} different surfaces; share materials between balls")
-    return meet

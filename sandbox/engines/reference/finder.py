@@ -43,12 +43,11 @@ class Finder:
         self._boxes = SegmentBoxes(roster.fixtures)
         self._planes = len(roster.fixtures.planes) if self.able.any() else 0
         self._plane_tests = self._planes * int(np.count_nonzero(self.able))
-        self.idle = not (roster.meet.ball_ball or self._planes or (len(self._boxes) and self.able.any()))
-        """Nothing can meet anything."""
         touching = roster.radius[self.able]
         self.widest = float(roster.radius[roster.meets > NOTHING].max(initial=0.0))
         """m; the largest radius of what can touch anything"""
-        self.thinnest = float(touching.min()) if len(touching) and not self.idle else np.inf
+        alone = not (roster.meet.ball_ball or self._planes or len(self._boxes))
+        self.thinnest = np.inf if alone else float(touching.min(initial=np.inf))
         """m; the smallest radius of what moves and can touch anything"""
         self.use(roster.restitution)
 

@@ -1,8 +1,10 @@
 """Stage: the present state of a run, and the verbs that every detection scheme is spelled of.
 
-moved = stage.moved(h)              advance, freely
-contacts = stage.overlaps(moved)    detect
-stage.resolve(moved, contacts, h)   resolve, and take the result as the present state
+    moved = stage.moved(h)              advance, freely
+    contacts = stage.overlaps(moved)    detect
+    stage.resolve(moved, contacts, h)   resolve, and take the result as the present state
+
+Only `resolve` and `impact` change the present state.
 """
 
 from collections.abc import Callable

@@ -26,7 +26,7 @@ Told = Callable[[str], None]
 TOLERANCE = 0.01
 """The share of the smallest moving ball's radius that is the tolerance where none is given."""
 WORTH_REPEATING = 5.0
-"""s: a run no longer than this is timed a second time, as the first may have compiled."""
+"""s: a run no longer than this is timed a second time, as the first may have read compiled code from disk."""
 NEGLIGIBLE = 1e-6
 """The share of the tolerance below which an error needs no explanation."""
 
@@ -95,7 +95,7 @@ def usual_tolerance(scene: Scene) -> float:
 
 
 def timed(scene: Scene, engine: str, settings: Settings) -> Trajectory:
-    """Run an engine; a short run twice, and its shorter time counts: the first may have compiled on the way."""
+    """Run an engine; a short run twice, and its shorter time counts: the first may have read compiled code."""
     first = run(scene, engine, audit=False, **settings.model_dump())
     if first.status == "refused" or first.info["seconds"] > WORTH_REPEATING:
         return first

@@ -1,0 +1,105 @@
+"""Workloads: what the benches time of ours, each set up first and then returned as a piece of work to be timed."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import peers
+
+from sandbox.engines.reference.engine import ReferenceEngine
+from sandbox.engines.reference.stage import Stage
+from sandbox.engines.registry import start
+from sandbox.engines.roster import Roster
+from sandbox.measure.run import run
+from sandbox.scene.file import load
+from sandbox.scene.model import Scene
+from sandbox.scene.shipped import find
+
+Timed = Callable[[], float]
+"""Does the work once and returns what it took."""
+
+
+def timed(work: Callable[[], object]) -> float:
+    """Return the seconds that a piece of work takes."""
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+def scene(name: str, *overrides: str) -> Scene:
+    """Return a shipped scene."""
+    return load(find(name), overrides)
+
+
+def running(which: Scene, audit: bool = True) -> Timed:
+    """Time a whole recorded run."""
+    return lambda: timed(lambda: run(which, audit=audit))
+
+
+def stepping(
+    which: Scene,
+    steps: int,
+    record: bool = True,
+    contacts: bool = True,
+    turning: bool = False,
+    engine: str = "pymunk",
+) -> Timed:
+    """Time some steps, from the start, of a simulation that is set up before."""
+
+    def work() -> float:
+        simulation = start(which, engine)
+        if contacts:
+            simulation.contacts()
+        if turning:
+            peers.give_moments(simulation, which)
+
+        def go() -> None:
+            for _ in range(steps):
+                simulation.step()
+                if record:
+                    simulation.frame()
+
+        return timed(go)
+
+    return work
+
+
+def command(*arguments: str) -> Timed:
+    """Time a Python process from start to end."""
+    line = [sys.executable, *arguments]
+    return lambda: timed(lambda: subprocess.run(line, check=True, capture_output=True))
+
+
+def events(count: int) -> Timed:
+    """Return the events a second of `exact` in an elastic gas of so many balls, between frames 10 s apart."""
+
+    def work() -> float:
+        gas = peers.gas(count, 100.0)
+        simulation = start(gas, "exact", gas.solver.replace(dt=10.0))
+        simulation.step()
+        began, before = time.perf_counter(), simulation.work["events"]
+        while simulation.work["events"] < before + 100_000:
+            simulation.step()
+        return (simulation.work["events"] - before) / (time.perf_counter() - began)
+
+    return work
+
+
+def staged(which: Scene, name: str, steps: int = 2000) -> Timed:
+    """Time one stage of a reference step with one ball: "move", "look", "resolve", or "step" for the whole."""
+
+    def work() -> float:
+        simulation = ReferenceEngine().start(which)
+        stage = Stage(Roster(which, which.solver.h), simulation.settings)
+        moved = stage.moved(which.solver.h)
+        contacts = stage.overlaps(moved)
+        stages = {
+            "move": lambda: stage.moved(which.solver.h),
+            "look": lambda: stage.overlaps(moved),
+            "resolve": lambda: stage.resolve(moved, contacts, which.solver.h),
+            "step": simulation.step,
+        }
+        return timed(lambda: [stages[name]() for _ in range(steps)])
+
+    return work
