@@ -1,0 +1,1 @@
+"""The window: scenes to play with, and stored runs to look at."""

@@ -1,0 +1,91 @@
+"""Camera: which part of the world a picture shows. It alone knows that pixels count downwards."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from sandbox.trajectory import FloatArray
+
+CLOSEST, FARTHEST = 1e12, 1e-14
+"""px/m: what double precision can still tell apart, and the widest view of the largest scene"""
+
+Box = tuple[tuple[float, float], tuple[float, float]]
+"""Lower-left and upper-right corner, m."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A view of the world: y up in metres there, y down in pixels here. A value: moving it makes another."""
+
+    centre: tuple[float, float]
+    """what is shown in the middle, m"""
+    scale: float
+    """px/m"""
+    size: tuple[int, int]
+    """of the picture, px"""
+
+    @classmethod
+    def fitting(cls, box: Box, size: tuple[int, int], margin: float = 0.06, inset: int = 0) -> Self:
+        """Return the camera that shows a box whole.
+
+        Args:
+            box: what to show, m; its sides may be 0.
+            size: of the picture, px.
+            margin: share of the picture left free on each side.
+            inset: px at the right that something else covers.
+        """
+        (left, bottom), (right, top) = box
+        free = max(size[0] - inset, size[0] // 3, 1), max(size[1], 1)
+        room = 1.0 - 2.0 * margin
+        width, height = max(right - left, 1e-9), max(top - bottom, 1e-9)
+        scale = min(max(min(free[0] * room / width, free[1] * room / height), FARTHEST), CLOSEST)
+        shift = (size[0] - free[0]) / 2.0 / scale
+        return cls(((left + right) / 2.0 + shift, (bottom + top) / 2.0), scale, size)
+
+    def to_screen(self, points: FloatArray) -> FloatArray:
+        """Return where points (…, 2), m, lie in the picture, (…, 2) px from its upper left corner."""
+        middle = np.asarray(self.size) / 2.0
+        return np.asarray((points - np.asarray(self.centre)) * (self.scale, -self.scale) + middle)
+
+    def to_world(self, pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the place that a pixel shows, m."""
+        return (
+            self.centre[0] + (pixel[0] - self.size[0] / 2.0) / self.scale,
+            self.centre[1] - (pixel[1] - self.size[1] / 2.0) / self.scale,
+        )
+
+    @property
+    def box(self) -> Box:
+        """What is in sight, m."""
+        half = self.size[0] / 2.0 / self.scale, self.size[1] / 2.0 / self.scale
+        x, y = self.centre
+        return (x - half[0], y - half[1]), (x + half[0], y + half[1])
+
+    def in_sight(
+        self, position: FloatArray, radius: FloatArray | float
+    ) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+        """Tell which circles, at (N, 2) m, are at least partly in the picture, (N,). Those at nan are not."""
+        (left, bottom), (right, top) = self.box
+        x, y = position[:, 0], position[:, 1]
+        return np.asarray((x + radius >= left) & (x - radius <= right) & (y + radius >= bottom) & (y - radius <= top))
+
+    def zoomed(self, factor: float, about: tuple[float, float]) -> Self:
+        """Return this camera closer by a factor; the place under a pixel stays there."""
+        scale = min(max(self.scale * factor, FARTHEST), CLOSEST)
+        x, y = self.to_world(about)
+        centre = (
+            x - (about[0] - self.size[0] / 2.0) / scale,
+            y + (about[1] - self.size[1] / 2.0) / scale,
+        )
+        return replace(self, centre=centre, scale=scale) if all(map(math.isfinite, centre)) else self
+
+    def panned(self, by: tuple[float, float]) -> Self:
+        """Return this camera moved so that what is shown moves by so many pixels."""
+        return replace(self, centre=(self.centre[0] - by[0] / self.scale, self.centre[1] + by[1] / self.scale))
+
+    def resized(self, size: tuple[int, int]) -> Self:
+        """Return this camera for a picture of another size, showing about the same."""
+        before, after = min(self.size), max(min(size), 1)
+        return replace(self, size=size, scale=min(max(self.scale * after / max(before, 1), FARTHEST), CLOSEST))
