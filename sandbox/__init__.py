@@ -13,7 +13,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sandbox.engines.registry import ENGINES, start
+    from sandbox.engines.registry import ENGINES
+    from sandbox.engines.relay import start
     from sandbox.measure.compare import compare
     from sandbox.measure.run import run
     from sandbox.recording import Recording
@@ -59,7 +60,7 @@ _HOMES = {
     "load": "sandbox.scene.file",
     "loads": "sandbox.scene.file",
     "run": "sandbox.measure.run",
-    "start": "sandbox.engines.registry",
+    "start": "sandbox.engines.relay",
 }
 
 

@@ -14,6 +14,10 @@ Amount = Annotated[float, Field(ge=-1e42, le=1e42)]
 """Of an impulse or force: no more than the greatest mass at the greatest speed takes."""
 
 
+Value = float | int | bool | str | None
+"""Of a setting."""
+
+
 class ActionError(ValueError):
     """An action that cannot be applied; `str()` says why. The simulation is left as it was."""
 
@@ -78,7 +82,42 @@ class SetParameter(Timed):
     value: float | int | bool | str | list[float] | None
 
 
-Action = Annotated[Impulse | Force | Move | Spawn | Remove | SetParameter, Field(discriminator="kind")]
+class Pull(Timed):
+    """Pull a body by a damped spring from now on, as a hand does; without a target, let it go.
+
+    The spring is 7.5 Hz, critically damped, its force at most 100 times the body's weight; it is a soft constraint,
+    stable at any dt. Where it holds is told in the body's own frame, so that it turns with the body.
+    """
+
+    kind: Literal["pull"] = "pull"
+    body: Name
+    grip: Point = (0.0, 0.0)
+    """from the centre of the body, in its own frame, m"""
+    target: Point | None = None
+    """where the hand is, m"""
+
+
+class Launch(Timed):
+    """Start the balls of a grid, scatter or emitter anew, laid out with another seed."""
+
+    kind: Literal["launch"] = "launch"
+    generator: Name
+    seed: Annotated[int, Field(ge=0, lt=2**63)]
+
+
+class Switch(Timed):
+    """Go on with another engine, or with other settings, from the state as it is."""
+
+    kind: Literal["switch"] = "switch"
+    engine: Name | None = None
+    """none goes on with the same"""
+    settings: dict[str, Value] = Field(default_factory=dict)
+    """what changes of `[solver]`"""
+
+
+Action = Annotated[
+    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Switch, Field(discriminator="kind")
+]
 
 _ACTIONS: TypeAdapter[tuple[Action, ...]] = TypeAdapter(tuple[Action, ...])
 

@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
+from uuid import uuid4
 
 from pydantic import ValidationError
 
-from sandbox.action import Action, ActionError, actions_from_json, actions_to_json
+from sandbox.action import Action, ActionError, Switch, actions_from_json, actions_to_json
 from sandbox.scene.document import to_document
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import from_document
@@ -31,6 +32,32 @@ class Recording:
     """s"""
     state_hash: str | None = None
     """of the state at the end, where it is known"""
+
+    @property
+    def whole_scene(self) -> Scene:
+        """The scene, with the session's duration."""
+        world = self.scene.world.model_copy(update={"duration": self.duration})
+        return self.scene.model_copy(update={"world": world})
+
+    def on(self, engine: str) -> Self:
+        """Return the session as another engine is to play it, from start to end."""
+        actions = tuple(
+            action.model_copy(update={"engine": None}) if isinstance(action, Switch) else action
+            for action in self.actions
+        )
+        return replace(self, engine=engine, actions=actions, state_hash=None)
+
+    def save(self, path: str | Path) -> Path:
+        """Write it to a file, to a temporary name first: never half a file."""
+        path = Path(path)
+        temporary = path.with_name(f".{path.name}-{uuid4().hex}.tmp")
+        try:
+            temporary.write_text(self.to_json(), encoding="utf-8")
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+        return path
 
     def to_json(self) -> str:
         """Write it as a JSON document."""

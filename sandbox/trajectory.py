@@ -1,5 +1,6 @@
 """What comes out of a simulation: frames, contacts, and whole trajectories as arrays."""
 
+import hashlib
 import json
 import zipfile
 import zlib
@@ -38,6 +39,13 @@ class Frame:
         """Freeze the arrays, which frames may share."""
         for array in (self.position, self.velocity, self.angle, self.angular_velocity, self.present):
             array.flags.writeable = False
+
+    def state_hash(self) -> str:
+        """Return a SHA-256 of time and every body's state, bit for bit."""
+        digest = hashlib.sha256(np.float64(self.time).tobytes())
+        for array in (self.position, self.velocity, self.angle, self.angular_velocity, self.present):
+            digest.update(array.tobytes())
+        return digest.hexdigest()
 
 
 class ContactEvent(NamedTuple):
@@ -118,7 +126,7 @@ class Trajectory:
     """(M, 2) who should have touched, numbered as in `contact_pair`"""
     info: Mapping[str, Any] = field(default_factory=dict)
     """What was run and how it went: scene (as a document), engine, settings, actions, seed, status, reason, steps,
-    seconds, work, energy_start, energy_end, audited, versions."""
+    seconds, work, energy_start, energy_end, audited, state_hash (of the end), versions."""
 
     @property
     def status(self) -> str:

@@ -106,6 +106,7 @@ def run_id(
     """
     document = to_document(scene)
     document.pop("solver", None)
+    document.pop("play", None)
     return _hash(
         {
             "scene": document,

@@ -15,6 +15,7 @@ COMMANDS = {
     "run": "run scenes headless and tell how they went",
     "check": "check scenes: faults, what they demand, who can run them, what would go wrong",
     "compare": "one scene on several engines, against the best known truth",
+    "export": "a stored run as csv, parquet, gif, mp4 or png",
     "scenes": "list the scenes that ship",
     "engines": "list the engines",
     "schema": "print the JSON Schema of a scene file",

@@ -110,7 +110,7 @@ def perform(action: Action, cast: Cast) -> int | None:
         case SetParameter():
             _set(action, cast)
         case _:
-            raise ActionError(f"{action!r} is no action")
+            raise ActionError(f"{action!r} is nothing that an engine does by itself; sandbox.start gives one that can")
     return None
 
 

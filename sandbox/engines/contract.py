@@ -38,6 +38,7 @@ class Divergence(Exception):  # noqa: N818, a result of the physics asked for, n
         super().__init__(f"at {time:g} s: {body!r} {what}")
         self.time = time
         self.body = body
+        self.what = what
 
 
 class Exhaustion(Exception):  # noqa: N818, as above
@@ -52,9 +53,20 @@ Observer: TypeAlias = "Callable[[float, FloatArray, FloatArray, IntArray], None]
 class Simulation(Protocol):
     """A running scene. Everything that changes lives in here; all that comes out is a value."""
 
+    patience: float | None
+    """s that a step may take, where the engine can tell while it works; beyond, it is an `Exhaustion`. None: any"""
+
     @property
     def time(self) -> float:
         """Simulated time, s: k·dt."""
+
+    @property
+    def scene(self) -> Scene:
+        """What runs, with all that was set since."""
+
+    @property
+    def settings(self) -> Settings:
+        """The settings, with every choice filled in."""
 
     @property
     def bodies(self) -> Bodies:

@@ -102,8 +102,8 @@ class Roster:
         Raises:
             ActionError: it has more surfaces than a scene may have.
         """
-        spawned = self.bodies.elements[len(self.scene.bodies.elements) :]
-        bodies = replace(self.bodies, elements=(*scene.bodies.elements, *spawned))
+        spawned = self.bodies.elements[len(self.scene.discs) :]
+        bodies = replace(self.bodies, elements=(*scene.discs, *spawned))
         self._assume(scene, bodies, derived(scene, bodies))
 
     def add(self, ball: Ball, name: str) -> int:

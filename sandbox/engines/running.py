@@ -1,10 +1,7 @@
 """Running: what every simulation here has of its own accord: a clock, a lock, an end, and a fingerprint."""
 
-import hashlib
 from abc import ABC, abstractmethod
 from typing import NoReturn
-
-import numpy as np
 
 from sandbox.engines.turn import Turn
 from sandbox.scene.settings import Settings
@@ -19,6 +16,8 @@ class Running(ABC):
         self._turn = Turn()
         self._steps, self._part = 0, 0.0
         self._ended = False
+        self.patience: float | None = None
+        """s that a step may take, where the engine can tell while it works"""
 
     def __reduce__(self) -> NoReturn:
         """Refuse to be copied or pickled: in contact a copied space goes on differently, and says nothing."""
@@ -40,11 +39,7 @@ class Running(ABC):
 
     def state_hash(self) -> str:
         """Return a SHA-256 of time and every body's state."""
-        frame = self.frame()
-        digest = hashlib.sha256(np.float64(frame.time).tobytes())
-        for array in (frame.position, frame.velocity, frame.angle, frame.angular_velocity, frame.present):
-            digest.update(array.tobytes())
-        return digest.hexdigest()
+        return self.frame().state_hash()
 
     def close(self) -> None:
         """End the simulation. What it holds goes with it."""

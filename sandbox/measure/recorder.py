@@ -1,10 +1,12 @@
 """Recorder: arrays for the frames of a run, sized before it starts."""
 
-import math
 import os
+from collections.abc import Sequence
 
 import numpy as np
 
+from sandbox.action import Action
+from sandbox.measure.schedule import schedule
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import FloatArray, Frame
@@ -20,16 +22,13 @@ class TooLargeError(ValueError):
     """A run whose frames would not fit into memory; `str()` says how it would."""
 
 
-def frame_count(scene: Scene, settings: Settings) -> tuple[int, float]:
+def frame_count(scene: Scene, settings: Settings, actions: Sequence[Action] = ()) -> tuple[int, float]:
     """Return how many whole steps a run has, and the part of a step (0 ≤ part < 1) that is left for its end.
 
     A duration within rounding of a whole number of steps is that number.
     """
-    steps = scene.world.duration / settings.dt
-    whole = round(steps)
-    if abs(steps - whole) <= 1e-9 * whole:
-        return whole, 0.0
-    return math.floor(steps), steps - math.floor(steps)
+    stretches = schedule(scene.world.duration, settings.dt, actions)
+    return sum(stretch.steps for stretch in stretches), stretches[-1].part
 
 
 def free_memory() -> int:
@@ -47,13 +46,13 @@ def kept_frames(steps: int, part: float, every: int) -> int:
     return 1 + steps // every + (part > 0.0 or steps % every > 0)
 
 
-def require_memory(scene: Scene, settings: Settings, bodies: int) -> int:
+def require_memory(scene: Scene, settings: Settings, bodies: int, actions: Sequence[Action] = ()) -> int:
     """Return how many frames a run keeps, having made sure that they fit into memory.
 
     Raises:
         TooLargeError: they do not; it names a `record_every` that would fit, where one does.
     """
-    steps, part = frame_count(scene, settings)
+    steps, part = frame_count(scene, settings, actions)
     kept = kept_frames(steps, part, settings.record_every)
     each, free = max(bodies, 1) * BYTES_PER_BODY, int(free_memory() * SHARE)
     fitting = free // each
@@ -73,16 +72,15 @@ def require_memory(scene: Scene, settings: Settings, bodies: int) -> int:
 class Recorder:
     """The kept frames of a run: every n-th, and the last."""
 
-    def __init__(self, scene: Scene, settings: Settings, bodies: int) -> None:
+    def __init__(self, scene: Scene, settings: Settings, bodies: int, actions: Sequence[Action] = ()) -> None:
         """Allocate.
 
         Raises:
             TooLargeError: the frames would not fit.
         """
-        kept = require_memory(scene, settings, bodies)
+        kept = require_memory(scene, settings, bodies, actions)
         self._every = settings.record_every
         self._count = 0
-        self.steps, self.part = frame_count(scene, settings)
         self.time: FloatArray = np.empty(kept)
         # A body that is not there yet is nan.
         self.position, self.velocity = (np.full((kept, bodies, 2), np.nan) for _ in range(2))
@@ -96,6 +94,11 @@ class Recorder:
         """Keep a frame where a run ends early, unless it is the one kept last."""
         if frame.time != self.time[self._count - 1]:
             self.keep(frame, frame.time)
+
+    def amend(self, frame: Frame) -> None:
+        """Put a frame in place of the last."""
+        self._count -= 1
+        self.keep(frame, float(self.time[self._count]))
 
     def keep(self, frame: Frame, time: float) -> None:
         """Keep a frame, as of a time."""

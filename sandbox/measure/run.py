@@ -9,10 +9,12 @@ import numpy as np
 from sandbox.action import Action, ActionError, Spawn, actions_to_json, in_order
 from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
-from sandbox.engines.registry import engine_named, start
+from sandbox.engines.registry import engine_named
+from sandbox.engines.relay import start
 from sandbox.measure.audit import Audit
 from sandbox.measure.energy import energies
 from sandbox.measure.recorder import Recorder, TooLargeError
+from sandbox.measure.schedule import ROUNDING, Stretch, schedule
 from sandbox.measure.versions import versions
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.document import to_document
@@ -41,7 +43,8 @@ def run(
     Args:
         scene: what to run.
         engine: its name in the registry.
-        actions: what happens on the way; each takes effect before the first step that starts at its time or later.
+        actions: what happens on the way; each takes effect before the first step that starts at its time or later,
+            those of the very end after the last step.
         audit: count the contacts that the engine misses.
         progress: who is told how far it is.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
@@ -58,22 +61,25 @@ def run(
     """
     chosen = engine_named(engine)
     wanted = scene.solver.replace(**settings) if settings else scene.solver
-    if scene.world.duration / wanted.h > MAX_STEPS:
-        raise TooLargeError(f"{scene.world.duration / wanted.h:.3g} steps a run; at most {MAX_STEPS:g}")
     actions = in_order(tuple(actions))
+    stretches = schedule(scene.world.duration, wanted.dt, actions)
+    substeps = sum(stretch.steps + stretch.part for stretch in stretches) * wanted.substeps
+    if substeps > MAX_STEPS:
+        raise TooLargeError(f"{substeps:.3g} steps a run; at most {MAX_STEPS:g}")
     try:
         simulation = start(scene, engine, wanted)
     except Refusal as refusal:
         return _refused(scene, engine, wanted, actions, str(refusal))
     resolved = chosen.resolve(scene, wanted)
     spawned = sum(isinstance(action, Spawn) for action in actions)
-    recorder = Recorder(scene, resolved, len(scene.bodies) + spawned)
+    recorder = Recorder(scene, resolved, len(scene.bodies) + spawned, actions)
     auditor = Auditor(scene, simulation) if audit else None
 
     began, compiled = perf_counter(), COMPILING.seconds
-    status, reason, steps, contacts = _drive(scene, simulation, resolved, actions, recorder, progress)
+    status, reason, steps, contacts = _drive(scene, simulation, stretches, actions, recorder, progress)
     seconds = perf_counter() - began - (auditor.seconds if auditor else 0.0) - (COMPILING.seconds - compiled)
     bodies, work = simulation.bodies, dict(simulation.work)
+    state_hash = simulation.state_hash()
     simulation.close()
 
     retired = np.full(len(bodies), np.nan)
@@ -81,6 +87,7 @@ def run(
         retired[number] = time
     missed = auditor.missed if auditor else _no_misses()
     outcome = {"status": status, "reason": reason, "steps": steps, "seconds": seconds, "work": work, "audited": audit}
+    outcome["state_hash"] = state_hash
     info = _info(scene, engine, resolved, actions, **outcome)
     trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, missed, info)
     total = energies(trajectory.at([0, -1]), scene, bodies=bodies).total
@@ -104,6 +111,7 @@ def _refused(scene: Scene, engine: str, settings: Settings, actions: tuple[Actio
     """Return a trajectory without frames, which says why."""
     count = len(scene.bodies)
     outcome = {"status": "refused", "reason": reason, "steps": 0, "seconds": 0.0, "work": {}, "audited": False}
+    outcome["state_hash"] = None
     info = _info(scene, engine, settings, actions, **outcome, energy_start=None, energy_end=None)
     shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
     frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}
@@ -169,40 +177,44 @@ class Auditor:
 def _drive(
     scene: Scene,
     simulation: Simulation,
-    settings: Settings,
+    stretches: list[Stretch],
     actions: tuple[Action, ...],
     recorder: Recorder,
     progress: Progress | None,
 ) -> tuple[str, str | None, int, Contacts]:
     """Step to the end. Return status, reason, steps and contacts."""
     status, reason, step, due = "ok", None, 0, 0
-    steps, part, dt = recorder.steps, recorder.part, settings.dt
+    every = sum(stretch.steps for stretch in stretches)
+    part, duration = stretches[-1].part, scene.world.duration
     told = perf_counter()
     simulation.contacts()
     recorder.keep(simulation.frame(), 0.0)
     try:
-        for step in range(steps):
-            due = _act(simulation, actions, due, (step + 1e-9) * dt)
-            simulation.step()
-            last = step + 1 == steps and part == 0.0
-            if recorder.wants(step + 1, last):
-                recorder.keep(simulation.frame(), scene.world.duration if last else simulation.time)
-            if progress is not None and perf_counter() - told > REPORT_EVERY:
-                told = perf_counter()
-                progress((step + 1) / (steps + part))
-        step = steps
+        for stretch in stretches:
+            for _ in range(stretch.steps):
+                due = _act(simulation, actions, due, simulation.time + ROUNDING * stretch.dt)
+                simulation.step()
+                step += 1
+                last = step == every and part == 0.0
+                if recorder.wants(step, last):
+                    recorder.keep(simulation.frame(), duration if last else simulation.time)
+                if progress is not None and perf_counter() - told > REPORT_EVERY:
+                    told = perf_counter()
+                    progress(step / (every + part))
         if part > 0.0:
-            _act(simulation, actions, due, (steps + 1e-9) * dt)
+            due = _act(simulation, actions, due, simulation.time + ROUNDING * stretches[-1].dt)
             simulation.finish(part)
-            recorder.keep(simulation.frame(), scene.world.duration)
+            recorder.keep(simulation.frame(), duration)
+        elif _act(simulation, actions, due, simulation.time + ROUNDING * stretches[-1].dt) > due:
+            recorder.amend(simulation.frame())
     except Divergence as divergence:
         status, reason = "diverged", str(divergence)
         recorder.keep(simulation.frame(), divergence.time)
     except ActionError as error:
-        status, reason = "failed", f"at {step * dt:g} s: {error}"
+        status, reason = "failed", f"at {simulation.time:g} s: {error}"
         recorder.keep_as_it_is(simulation.frame())
     except Exhaustion as error:  # within a step: there is no frame of it
-        status, reason = "failed", f"at {step * dt:g} s: {error}"
+        status, reason = "failed", f"at {simulation.time:g} s: {error}"
     if progress is not None:
         progress(1.0)
     return status, reason, step, _by_pair(simulation.contacts())

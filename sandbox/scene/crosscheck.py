@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sandbox.scene.bodies import Bodies, mass_of
+from sandbox.scene.claimed import claimed
 from sandbox.scene.faults import Location
 from sandbox.scene.generators import GeneratorError, size
 from sandbox.scene.model import Disc, Emitter, Generator, Grid, Plane, Scatter, Scene, Surfaced
@@ -37,7 +38,7 @@ def crosscheck(scene: Scene) -> list[Found]:
         bodies = scene.bodies
     except GeneratorError as error:
         return [*found, (error.location, str(error))]
-    found += [*_names(scene, bodies), *_states(scene, bodies), *_starts(scene, bodies)]
+    found += [*_names(scene, bodies), *_states(scene, bodies), *_starts(scene, bodies), *claimed(scene, bodies)]
     return found if materials else [*found, *_surfaces(scene, bodies)]
 
 

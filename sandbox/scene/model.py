@@ -175,6 +175,19 @@ class Emitter(Disc):
 Generator = Grid | Scatter | Emitter
 
 
+class Play(Part):
+    """How the window plays a scene. No engine reads it, and no run depends on it."""
+
+    arrows: Name | None = None
+    """a body that the arrow keys move"""
+    arrow_step: Annotated[float, Field(gt=0, le=1e9)] = 0.5
+    """m, how far each time"""
+    relaunch: Name | None = None
+    """a generator whose balls Space starts anew, with other chances"""
+    show: Literal["overlap"] | None = None
+    """Colour bodies by whether they overlap anything."""
+
+
 class Scene(Part):
     """A whole scene file."""
 
@@ -183,6 +196,7 @@ class Scene(Part):
     """What to look for."""
     world: World = Field(default_factory=World)
     solver: Settings = Field(default_factory=Settings)
+    play: Play = Field(default_factory=Play)
     materials: tuple[Material, ...] = Field((), alias="material")
     pairs: tuple[Pair, ...] = Field((), alias="pair")
     planes: tuple[Plane, ...] = Field((), alias="plane")
@@ -199,6 +213,20 @@ class Scene(Part):
         from sandbox.scene.bodies import expand  # needs numpy, which reading a file does not
 
         return expand(self)
+
+    @property
+    def discs(self) -> tuple[Disc, ...]:
+        """The balls and generators of the file, in scene order."""
+        return self.balls + self.grids + self.scatters + self.emitters
+
+    def placed(self, bodies: "Bodies") -> "Scene":
+        """Return this scene with its bodies as they have come to be: elsewhere, fewer, or more.
+
+        Only `bodies` differs: the file that it would be written to is the same.
+        """
+        scene = self.model_copy()
+        scene.__dict__["bodies"] = bodies  # where cached_property looks first
+        return scene
 
     @property
     def fixed(self) -> tuple[Plane | Wall | Post, ...]:

@@ -215,14 +215,15 @@ ACTIONS: tuple[Action, ...] = (
 
 
 @given(st.integers(0, 100), st.sampled_from(["0", "0.5"]))
-def test_impulse_acts_from_the_first_step_that_starts_at_its_time_or_later(thousandths: int, part: str) -> None:
+def test_impulse_acts_from_the_first_step_of_its_time_or_later_or_at_the_end(thousandths: int, part: str) -> None:
     steps = 10 + Fraction(part)
     kick = Impulse(time=thousandths / 1000, body="a", impulse=(2.0, -4.0))
     result = run(flight(float(steps / 100)), actions=[kick])
     first = math.ceil(Fraction(thousandths, 10))  # number of the step
     for k, time in enumerate(result.time):
         after = max(Fraction(0), min(Fraction(k), steps) - first) / 100  # s since then
-        assert result.velocity[k, 0].tolist() == ([1.0, -2.0] if after > 0 else [0.0, 0.0]), time
+        kicked = after > 0 or Fraction(k) == steps == first  # what comes at the very end shows in the last frame
+        assert result.velocity[k, 0].tolist() == ([1.0, -2.0] if kicked else [0.0, 0.0]), time
         # Ten additions of numbers up to 2.
         assert result.position[k, 0] == pytest.approx([1 + float(after), 2 - 2 * float(after)], abs=1e-14)
 
@@ -234,10 +235,17 @@ def test_actions_of_one_time_act_in_the_order_given_and_others_in_that_of_time()
 
 
 def test_actions_after_the_end_never_happen() -> None:
-    late = Spawn(time=0.1, ball=Ball(position=(0.0, 0.0), radius=1.0)), Remove(time=5.0, body="nobody")
+    late = Spawn(time=0.101, ball=Ball(position=(0.0, 0.0), radius=1.0)), Remove(time=5.0, body="nobody")
     result = run(flight(0.1), actions=late)
     assert (result.status, result.names.tolist()) == ("ok", ["a"])
     assert same(result, run(flight(0.1)))
+
+
+def test_actions_of_the_very_end_show_in_the_last_frame_alone() -> None:
+    result = run(flight(0.1), actions=[Spawn(time=0.1, ball=Ball(name="b", position=(3.0, 4.0), radius=1.0))])
+    assert result.names.tolist() == ["a", "b"]
+    assert np.isnan(result.position[:-1, 1]).all()
+    assert result.position[-1, 1].tolist() == [3.0, 4.0]
 
 
 def replayed(recording: Recording) -> str:

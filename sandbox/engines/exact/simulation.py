@@ -1,12 +1,14 @@
 """ExactSimulation: a scene running from event to event."""
 
 from collections.abc import Mapping
+from time import perf_counter
 from typing import NoReturn
 
 import numpy as np
 
 from sandbox.action import Action
 from sandbox.engines.acting import perform
+from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.exact.advance import (
     DONE,
@@ -83,6 +85,11 @@ class ExactSimulation(Running):
     def time(self) -> float:
         """Simulated time, s; after an exhaustion, that of the last event."""
         return super().time if self._stopped is None else self._stopped
+
+    @property
+    def scene(self) -> Scene:
+        """What runs, with all that was set since."""
+        return self._troupe.scene
 
     @property
     def bodies(self) -> Bodies:
@@ -177,8 +184,12 @@ class ExactSimulation(Running):
 
     def _advance(self, until: float) -> None:
         """Let all events up to a time happen. Python sees to signals now and then, and makes room in the log."""
+        began, compiled = perf_counter(), COMPILING.seconds
         with np.errstate(all="ignore"):
             while (status := advance(self._arena, until)) != DONE:
+                waited = perf_counter() - began - (COMPILING.seconds - compiled)
+                if self.patience is not None and waited > self.patience:
+                    self._stop(f"a step of {self._settings.dt:g} s takes longer than {self.patience:g} s to compute")
                 if status == FULL:
                     rows = int(self._arena.counts[ROWS])
                     if rows > MAX_ROWS:

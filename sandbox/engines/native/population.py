@@ -107,8 +107,8 @@ class Population:
         """
         if self._half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             raise ActionError("drag cannot come up in a run that was started with half_kick, which knows none")
-        spawned = self.bodies.elements[len(self.scene.bodies.elements) :]
-        bodies = replace(self.bodies, elements=(*scene.bodies.elements, *spawned))
+        spawned = self.bodies.elements[len(self.scene.discs) :]
+        bodies = replace(self.bodies, elements=(*scene.discs, *spawned))
         meet = derived(scene, bodies)
         self.refresh()
         self.velocity[self.moving] -= self.ahead

@@ -38,6 +38,11 @@ class NativeSimulation(Running):
         self._still: tuple[FloatArray, FloatArray] | None = None  # angles and spins, which frames share if they can
 
     @property
+    def scene(self) -> Scene:
+        """What runs, with all that was set since."""
+        return self._population.scene
+
+    @property
     def bodies(self) -> Bodies:
         """The bodies by number, as they started; spawned ones join at the end."""
         return self._population.bodies

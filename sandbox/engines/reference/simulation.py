@@ -40,6 +40,11 @@ class ReferenceSimulation(Running):
         tell_if_slow(len(scene.bodies))
 
     @property
+    def scene(self) -> Scene:
+        """What runs, with all that was set since."""
+        return self._roster.scene
+
+    @property
     def bodies(self) -> Bodies:
         """The bodies by number, as they started; spawned ones join at the end."""
         return self._roster.bodies

@@ -1,0 +1,47 @@
+"""Checkpoint: all that can be known of a running scene from outside, as values; what a relay is taken up from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from sandbox.action import Force, Pull
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Frame
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """A moment of a running scene."""
+
+    scene: Scene
+    engine: str
+    wanted: Settings
+    bodies: Bodies
+    frame: Frame
+    origin: float
+    """s, from which on steps count"""
+    steps: float
+    """since then"""
+    retired: Mapping[int, float]
+    forces: Mapping[str, Force]
+    pulls: Mapping[str, Pull]
+
+
+def cast(bodies: Bodies, frame: Frame) -> Bodies:
+    """Return the bodies that are there, in the state of a frame."""
+    there = np.flatnonzero(frame.present)
+    return Bodies(
+        names=bodies.names if len(there) == len(bodies) else tuple(bodies.names[n] for n in there.tolist()),
+        position=frame.position[there],
+        velocity=frame.velocity[there],
+        angle=frame.angle[there],
+        angular_velocity=frame.angular_velocity[there],
+        radius=bodies.radius[there],
+        mass=bodies.mass[there],
+        fixed=bodies.fixed[there],
+        element=bodies.element[there],
+        elements=bodies.elements,
+    )

@@ -1,0 +1,134 @@
+"""Leg: one simulation of a relay, and how its numbers and times read in the whole."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sandbox.action import ActionError, Force
+from sandbox.engines.checkpoint import cast
+from sandbox.engines.contract import Observer, Simulation
+from sandbox.engines.registry import start as start_engine
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
+
+
+@dataclass(eq=False)
+class Leg:
+    """A simulation that began at some time, with those bodies that were there then.
+
+    In the whole a body keeps its number; here they count anew, without those that were gone.
+    """
+
+    simulation: Simulation
+    bodies: Bodies
+    """all N, by the numbers of the whole"""
+    before: Frame | None = None
+    """the state in which it began, of the N bodies of that time; none for the first leg"""
+    numbers: IntArray | None = None
+    """(n,) the number in the whole of each of its bodies; none where they are the same"""
+    origin: float = 0.0
+    """when its steps begin to count, s"""
+    steps: float = 0.0
+    """that it has made since then; where a leg is taken up again, also those made before"""
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s: counted in steps, so that a leg taken up again has the same times, bit for bit."""
+        return self.origin + self.steps * self.simulation.settings.dt
+
+    @property
+    def _began(self) -> float:
+        return 0.0 if self.before is None else self.before.time
+
+    def joined_by(self, bodies: Bodies) -> None:
+        """Take note that the simulation has one more body, the last of `bodies`."""
+        if self.numbers is not None:
+            self.numbers = np.append(self.numbers, len(bodies) - 1)
+        self.bodies = bodies
+
+    def frame(self) -> Frame:
+        """Return the present state of all bodies."""
+        frame = self.simulation.frame()
+        if self.before is None:
+            return frame
+        if self.numbers is None:
+            return replace(frame, time=self.time)
+        count, known = len(self.bodies), len(self.before.position)
+        position, velocity, angle, spin = np.zeros((count, 2)), np.zeros((count, 2)), np.zeros(count), np.zeros(count)
+        present = np.zeros(count, np.bool_)
+        position[:known], angle[:known] = self.before.position, self.before.angle  # where those who are gone were last
+        for whole, own in (
+            (position, frame.position),
+            (velocity, frame.velocity),
+            (angle, frame.angle),
+            (spin, frame.angular_velocity),
+        ):
+            whole[self.numbers] = own
+        present[self.numbers] = frame.present
+        return Frame(self.time, position, velocity, angle, spin, present)
+
+    def contacts(self) -> Contacts:
+        """Return the contacts since the last call."""
+        found = self.simulation.contacts()
+        if self.before is None:
+            return found
+        return replace(found, time=found.time + self._began, pair=self._numbered(found.pair))
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """When each body was gone that left in this leg: number → s."""
+        own = self.simulation.retired
+        if self.before is None:
+            return own
+        return {self._number(n): self._began + time for n, time in own.items()}
+
+    def watched_by(self, observer: Observer) -> None:
+        """Have an observer called after every substep."""
+        if self.before is None:
+            self.simulation.watch(observer)
+            return
+
+        def tell(time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
+            observer(self._began + time, self._spread(start), self._spread(end), self._numbered(touching))
+
+        self.simulation.watch(tell)
+
+    def _number(self, own: int) -> int:
+        return own if self.numbers is None else int(self.numbers[own])
+
+    def _numbered(self, pair: IntArray) -> IntArray:
+        """Return pairs (K, 2) as the whole has them; fixed things are called the same in every leg."""
+        if self.numbers is None or not len(self.numbers):
+            return pair
+        return np.asarray(np.where(pair >= 0, self.numbers[np.maximum(pair, 0)], pair))
+
+    def _spread(self, position: FloatArray) -> FloatArray:
+        """Return the centres of all bodies, (N, 2); nan for those who are gone."""
+        if self.numbers is None:
+            return position
+        everyone = np.full((len(self.bodies), 2), np.nan)
+        everyone[self.numbers[: len(position)]] = position
+        return everyone
+
+
+def begun(
+    scene: Scene, engine: str, wanted: Settings, bodies: Bodies, frame: Frame, forces: Mapping[str, Force]
+) -> Leg:
+    """Start a leg from a state.
+
+    Raises:
+        Refusal: the engine lacks something.
+        ActionError: it cannot take over a steady force.
+    """
+    simulation = start_engine(scene.placed(cast(bodies, frame)), engine, wanted)
+    for force in forces.values():
+        try:
+            simulation.apply(force)
+        except ActionError as error:
+            simulation.close()
+            raise ActionError(f"{engine} cannot go on with the steady force on {force.body!r}: {error}") from None
+    numbers = None if frame.present.all() else np.flatnonzero(frame.present)
+    return Leg(simulation, bodies, frame, numbers, frame.time)

@@ -1,0 +1,260 @@
+"""Relay: a running scene that can change its engine, its settings and its cast while it runs.
+
+Each leg is a simulation of its own, started from the state in which the last one ended; bodies keep their numbers
+and time goes on. What engines remember beyond that state, such as the impulses of contacts that last, begins anew.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Self
+
+import numpy as np
+from pydantic import ValidationError
+
+from sandbox.action import Action, ActionError, Force, Launch, Pull, Remove, SetParameter, Spawn, Switch
+from sandbox.engines.checkpoint import Checkpoint
+from sandbox.engines.contract import Divergence, Exhaustion, Observer, Refusal
+from sandbox.engines.launch import launched
+from sandbox.engines.leg import Leg, begun
+from sandbox.engines.pull import Hands
+from sandbox.engines.registry import UnknownEngineError
+from sandbox.engines.registry import start as start_engine
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene, default_name
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Contacts, Frame
+
+
+def start(scene: Scene, engine: str = "pymunk", settings: Settings | None = None) -> "Relay":
+    """Start a scene on an engine, ready for every action.
+
+    Raises:
+        UnknownEngineError: no engine has that name.
+        Refusal: the engine lacks something, with the engines that do not.
+    """
+    return Relay(scene, engine, settings)
+
+
+class Relay:
+    """A running scene, with an engine that can be exchanged. It is a `Simulation` like any other."""
+
+    def __init__(self, scene: Scene, engine: str = "pymunk", settings: Settings | None = None) -> None:
+        self.engine = engine
+        """its name"""
+        self.wanted = scene.solver if settings is None else settings
+        """the settings as they were asked for; what they leave open is the engine's choice"""
+        self._leg = Leg(start_engine(scene, engine, self.wanted), scene.bodies)
+        self._retired: dict[int, float] = {}
+        self._work: Counter[str] = Counter()
+        self._hands = Hands()
+        self._forces: dict[str, Force] = {}
+        self._kept: list[Contacts] | None = None  # of earlier legs, since the last call; none before the first
+        self._observer: Observer | None = None
+
+    def checkpoint(self) -> Checkpoint:
+        """Return what `resumed` goes on from."""
+        return Checkpoint(
+            scene=self.scene,
+            engine=self.engine,
+            wanted=self.wanted,
+            bodies=self.bodies,
+            frame=self.frame(),
+            origin=self._leg.origin,
+            steps=self._leg.steps,
+            retired=dict(self.retired),
+            forces=dict(self._forces),
+            pulls=self._hands.pulls,
+        )
+
+    @classmethod
+    def resumed(cls, point: Checkpoint) -> Self:
+        """Go on from a checkpoint.
+
+        In free flight that leads to the same states as going on without, bit for bit, wherever an engine's rule needs
+        no more than the state. In contact it does not: what engines remember of contacts is not in it.
+
+        Raises:
+            Refusal: the engine cannot begin from there.
+            ActionError: it cannot take over a steady force.
+        """
+        relay = cls.__new__(cls)
+        relay.engine, relay.wanted = point.engine, point.wanted
+        relay._leg = begun(point.scene, point.engine, point.wanted, point.bodies, point.frame, point.forces)
+        relay._leg.origin, relay._leg.steps = point.origin, point.steps
+        relay._retired, relay._work = dict(point.retired), Counter()
+        relay._forces, relay._hands = dict(point.forces), Hands(point.pulls)
+        relay._kept, relay._observer = None, None
+        return relay
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._leg.time
+
+    @property
+    def patience(self) -> float | None:
+        """How long a step may take, s, as far as an engine can tell while it works; `Exhaustion` beyond."""
+        return self._leg.simulation.patience
+
+    @patience.setter
+    def patience(self, seconds: float | None) -> None:
+        self._leg.simulation.patience = seconds
+
+    @property
+    def scene(self) -> Scene:
+        """What runs, with all that was set since."""
+        return self._leg.simulation.scene
+
+    @property
+    def settings(self) -> Settings:
+        """The settings, with every choice filled in."""
+        return self._leg.simulation.settings
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies by number, as they started; spawned ones join at the end."""
+        return self._leg.bodies
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """When each body that was removed, or left world.bounds, was gone: number → s."""
+        return MappingProxyType({**self._retired, **self._leg.retired})
+
+    @property
+    def work(self) -> Mapping[str, int]:
+        """What was done so far, by all engines that took part."""
+        return dict(self._work + Counter(self._leg.simulation.work)) if self._work else self._leg.simulation.work
+
+    def step(self) -> None:
+        """Advance by one dt.
+
+        Raises:
+            Divergence: the state is not finite, or beyond all bounds.
+            Exhaustion: the step asks for more than can be had.
+        """
+        self._hands.act(self._leg.simulation, self.settings.dt)
+        self._leg.steps += 1
+        try:
+            self._leg.simulation.step()
+        except Divergence as divergence:
+            raise self._later(divergence) from None
+        except Exhaustion:
+            self._leg.steps -= 1
+            raise
+
+    def finish(self, part: float) -> None:
+        """Advance by a last part of dt, 0 < part < 1.
+
+        Raises:
+            Divergence: as `step`.
+            ValueError: there is no such part.
+        """
+        self._hands.act(self._leg.simulation, self.settings.dt * part)
+        self._leg.steps += part
+        try:
+            self._leg.simulation.finish(part)
+        except Divergence as divergence:
+            raise self._later(divergence) from None
+
+    def _later(self, divergence: Divergence) -> Divergence:
+        return Divergence(self.time, divergence.body, divergence.what)
+
+    def apply(self, action: Action) -> None:
+        """Do what an action says, now; its time is the caller's affair.
+
+        Raises:
+            ActionError: it cannot be done. Nothing has changed then.
+        """
+        match action:
+            case Pull():
+                self._hands.hold(action, self._leg.simulation)
+            case Switch():
+                self._switch(action)
+            case Launch():
+                frame, those = launched(action, self.scene, self.bodies, self.frame())
+                retired = {n: time for n, time in self.retired.items() if not those[n]}
+                self._hand_over(self.engine, self.wanted, frame, retired)
+            case Spawn():
+                self._spawn(action)
+            case _:
+                self._leg.simulation.apply(action)
+                if isinstance(action, Force):
+                    self._forces[action.body] = action
+                elif isinstance(action, Remove):
+                    self._forces.pop(action.body, None)
+                elif isinstance(action, SetParameter):
+                    self._leg.bodies = replace(self._leg.bodies, elements=self._leg.simulation.bodies.elements)
+
+    def _spawn(self, action: Spawn) -> None:
+        name = action.ball.name or default_name("spawned", len(self.bodies))
+        if name in self.bodies.names:
+            raise ActionError(f"a body or fixed thing is called {name!r} already")
+        ball = action.ball.model_copy(update={"name": name})
+        self._leg.simulation.apply(Spawn(time=action.time, ball=ball))
+        self._leg.joined_by(self.bodies.joined_by(ball, name))
+
+    def _switch(self, action: Switch) -> None:
+        try:
+            wanted = self.wanted.replace(**action.settings)
+        except ValidationError as error:
+            told = (f"solver.{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
+            raise ActionError("; ".join(told)) from None
+        self._hand_over(action.engine or self.engine, wanted, self.frame(), dict(self.retired))
+
+    def _hand_over(self, engine: str, wanted: Settings, frame: Frame, retired: dict[int, float]) -> None:
+        """Start the next leg from a state.
+
+        Raises:
+            ActionError: the engine cannot go on from it. Nothing has changed then.
+        """
+        try:
+            leg = begun(self.scene, engine, wanted, self.bodies, frame, self._forces)
+        except (Refusal, UnknownEngineError) as refusal:
+            raise ActionError(str(refusal)) from None
+        old = self._leg
+        leg.simulation.patience = old.simulation.patience
+        if self._kept is not None:
+            self._kept.append(old.contacts())
+            leg.simulation.contacts()
+        self._work.update(old.simulation.work)
+        self._retired = retired
+        self.engine, self.wanted = engine, wanted
+        old.simulation.close()
+        self._leg = leg
+        if self._observer is not None:
+            self._leg.watched_by(self._observer)
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+        return self._leg.frame()
+
+    def contacts(self) -> Contacts:
+        """Return the contacts since the last call; the first call starts the recording.
+
+        One that lasts while the engine is exchanged is a new contact after that.
+        """
+        kept, self._kept = self._kept or [], []
+        found = self._leg.contacts()
+        return joined([*kept, found]) if kept else found
+
+    def watch(self, observer: Observer) -> None:
+        """Have an observer called after every substep."""
+        self._observer = observer
+        self._kept = self._kept or []
+        self._leg.watched_by(observer)
+
+    def state_hash(self) -> str:
+        """Return a hash of time and every body's state, bit for bit."""
+        return self.frame().state_hash()
+
+    def close(self) -> None:
+        """Release what the engine holds."""
+        self._leg.simulation.close()
+
+
+def joined(parts: list[Contacts]) -> Contacts:
+    """Return contacts one after the other."""
+    columns = ("time", "pair", "point", "normal", "impulse")
+    return Contacts(*(np.concatenate([getattr(part, column) for part in parts]) for column in columns))

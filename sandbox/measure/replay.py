@@ -1,0 +1,34 @@
+"""Replaying: a recorded session run again without a window, on its own engine or another."""
+
+from sandbox.measure.run import Progress, run
+from sandbox.recording import Recording
+from sandbox.trajectory import Trajectory
+
+
+def rerun(
+    recording: Recording, engine: str | None = None, *, audit: bool = True, progress: Progress | None = None
+) -> Trajectory:
+    """Run a session again.
+
+    With its own engine and the same versions it ends in the same state, bit for bit: `info["state_hash"]` is the
+    recording's. Another engine computes the whole session, also where the session changed engines.
+
+    Args:
+        recording: the session.
+        engine: another engine's name; without, the session's own.
+        audit: count the contacts that the engine misses.
+        progress: who is told how far it is.
+
+    Raises:
+        UnknownEngineError: no engine has that name.
+        TooLargeError: the frames would not fit into memory.
+    """
+    chosen = recording if engine is None else recording.on(engine)
+    return run(
+        chosen.whole_scene,
+        chosen.engine,
+        actions=chosen.actions,
+        audit=audit,
+        progress=progress,
+        **chosen.settings.model_dump(),
+    )

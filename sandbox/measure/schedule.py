@@ -1,0 +1,58 @@
+"""Schedule: how many steps a run has, and of what length, where actions may change dt on the way."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from sandbox.action import Action, Switch
+
+ROUNDING = 1e-9
+"""Shares of a step by which a time may miss a whole number of steps and count as it."""
+
+
+class Stretch(NamedTuple):
+    """Steps of one length."""
+
+    steps: int
+    dt: float
+    """s"""
+    part: float = 0.0
+    """0 ≤ part < 1 of a further step, at the end of a run"""
+
+
+def schedule(duration: float, dt: float, actions: Sequence[Action] = ()) -> list[Stretch]:
+    """Return the stretches of a run; only the last may end with a part of a step.
+
+    Args:
+        duration: of the run, s.
+        dt: at its start, s.
+        actions: in order of time.
+    """
+    return list(_stretches(duration, dt, actions))
+
+
+def _stretches(duration: float, dt: float, actions: Sequence[Action]) -> Iterator[Stretch]:
+    begin = 0.0
+    for time, changed in _changes(actions):
+        steps = math.ceil((time - begin) / dt - ROUNDING)
+        if begin + steps * dt >= duration * (1.0 - ROUNDING):
+            break
+        if steps > 0:
+            yield Stretch(steps, dt)
+            begin += steps * dt
+        dt = changed
+    steps_left = (duration - begin) / dt
+    whole = round(steps_left)
+    if abs(steps_left - whole) <= ROUNDING * whole:
+        yield Stretch(whole, dt)
+    else:
+        yield Stretch(math.floor(steps_left), dt, steps_left - math.floor(steps_left))
+
+
+def _changes(actions: Sequence[Action]) -> Iterator[tuple[float, float]]:
+    """Yield when dt changes, and to what."""
+    for action in actions:
+        if isinstance(action, Switch):
+            dt = action.settings.get("dt")
+            if isinstance(dt, (int, float)) and dt > 0:  # else the action will be refused
+                yield action.time, float(dt)

@@ -1,0 +1,92 @@
+"""Palette: the colours of the window. Accents are those of Okabe and Ito, told apart by colour-blind people too.
+
+Source: M. Okabe, K. Ito, "Color Universal Design", 2008; its black is left out, as the background is dark.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Ball, Surfaced
+
+Colour = tuple[int, int, int]
+"""sRGB, 0 to 255 each."""
+ColourArray = npt.NDArray[np.uint8]
+
+BACKGROUND: Colour = (20, 24, 31)
+PANEL: Colour = (29, 35, 44)
+PANEL_RAISED: Colour = (42, 50, 62)
+LINE: Colour = (56, 66, 80)
+GRID: Colour = (29, 34, 43)
+GRID_STRONG: Colour = (37, 44, 55)
+SOLID: Colour = (38, 46, 57)
+"""What planes and walls are filled with."""
+SURFACE: Colour = (138, 151, 168)
+"""The lit edge of what is solid."""
+INK: Colour = (230, 235, 242)
+FAINT: Colour = (146, 158, 174)
+NEUTRAL: Colour = (126, 137, 152)
+"""Fixed balls and posts."""
+
+ORANGE: Colour = (230, 159, 0)
+SKY: Colour = (86, 180, 233)
+GREEN: Colour = (0, 158, 115)
+YELLOW: Colour = (240, 228, 66)
+BLUE: Colour = (0, 114, 178)
+VERMILION: Colour = (213, 94, 0)
+PURPLE: Colour = (204, 121, 167)
+ACCENTS: tuple[Colour, ...] = (SKY, ORANGE, GREEN, YELLOW, PURPLE, VERMILION, BLUE)
+"""In the order in which elements get them."""
+
+TOUCHING, CLEAR = VERMILION, GREEN
+"""Bodies that overlap something, and those that do not, where a scene shows contact by colour."""
+WARNING: Colour = (255, 92, 80)
+"""Only beside words or a shape: red alone says nothing to some."""
+
+FEW = 8
+"""A generator of no more balls gives each a colour of its own."""
+TINTS = (0.0, 0.4, 0.1, 0.5, 0.2, 0.3)
+"""How far the balls of a larger generator lean from its accent to the next: lively, but of one family."""
+
+
+def hex_colour(text: str) -> Colour:
+    """Return the colour that `#rrggbb` writes."""
+    value = int(text[1:], 16)
+    return value >> 16, value >> 8 & 255, value & 255
+
+
+def mixed(a: Colour, b: Colour, share: float) -> Colour:
+    """Return the colour that is `share` of the way from `a` to `b`."""
+    red, green, blue = (round(x + (y - x) * share) for x, y in zip(a, b, strict=True))
+    return red, green, blue
+
+
+def accent(number: int) -> Colour:
+    """Return the accent of the number-th element."""
+    return ACCENTS[number % len(ACCENTS)]
+
+
+def colour_of_fixed(thing: Surfaced, otherwise: Colour = NEUTRAL) -> Colour:
+    """Return the colour of a plane, wall or post: its own, or a neutral one."""
+    return otherwise if thing.colour is None else hex_colour(thing.colour)
+
+
+def colour_of(bodies: Bodies) -> ColourArray:
+    """Return the colours of bodies, (N, 3), which stay what they are when another body joins.
+
+    An element's own colour, else the accents in turn; fixed balls are neutral.
+    """
+    colours = np.empty((len(bodies), 3), np.uint8)
+    first = np.searchsorted(bodies.element, np.arange(len(bodies.elements) + 1))
+    for k, element in enumerate(bodies.elements):
+        start, end = int(first[k]), int(first[k + 1])
+        if element.colour is not None:
+            colours[start:end] = hex_colour(element.colour)
+        elif isinstance(element, Ball):
+            colours[start:end] = NEUTRAL if element.fixed else accent(k)
+        elif end - start <= FEW:
+            colours[start:end] = [accent(k + n) for n in range(end - start)]
+        else:
+            tints = [mixed(accent(k), accent(k + 1), share) for share in TINTS]
+            colours[start:end] = np.asarray(tints, np.uint8)[np.arange(end - start) % len(tints)]
+    return colours

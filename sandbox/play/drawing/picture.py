@@ -1,0 +1,168 @@
+"""Picture: one moment of a scene, drawn. It touches only what is in sight, and keeps what does not change."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.discs import Discs, spokes
+from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
+from sandbox.play.drawing.grid import draw_grid, draw_scale
+from sandbox.play.drawing.overlays import Overlays
+from sandbox.play.drawing.palette import BACKGROUND, CLEAR, TOUCHING, ColourArray, colour_of
+from sandbox.play.drawing.points import Packed, Points, packed
+from sandbox.play.drawing.view import View
+from sandbox.play.sight import Sight
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.meetings import meetings
+from sandbox.scene.model import Scene
+from sandbox.scene.near import IntArray
+from sandbox.trajectory import BoolArray
+
+POINT = 1.2
+"""px, the radius below which a ball is a point"""
+
+
+class Kept(NamedTuple):
+    """What a background was drawn for; `scene` is compared by identity."""
+
+    scene: Scene
+    camera: Camera
+    bounds: bool
+    antialias: bool
+    unit: float
+    foot: float
+    format: tuple[object, ...]
+
+
+class Picture:
+    """Draws pictures of scenes. One of them serves a window for its whole life; its caches are bounded."""
+
+    def __init__(self) -> None:
+        self._discs = Discs()
+        self._points = Points()
+        self._overlays = Overlays(self._discs, self._points)
+        self._background: tuple[Kept, pygame.Surface] | None = None
+        self._bodies: Bodies | None = None
+        self._colours: ColourArray = np.empty((0, 3), np.uint8)
+        self._turning: BoolArray = np.empty(0, np.bool_)
+        self._tones: tuple[tuple[object, ...], Packed] | None = None
+
+    def draw(
+        self,
+        surface: pygame.Surface,
+        camera: Camera,
+        sight: Sight,
+        *,
+        antialias: bool = True,
+        unit: float = 1.0,
+        foot: float = 0.0,
+    ) -> None:
+        """Draw one moment over the whole of a surface.
+
+        Args:
+            surface: of any format; `camera.size` is its size.
+            camera: what it shows.
+            sight: the moment. Bodies at nan or inf, and those not present, are left out.
+            antialias: whether edges are smooth; without, it takes about half the time.
+            unit: px, of a line that is one pixel wide on a 1080p display; all widths and letters grow with it.
+            foot: px at the lower edge that something else will cover.
+        """
+        self._blit_background(surface, camera, sight, antialias, unit, foot)
+        self._know(sight)
+        frame = sight.frame
+        count = min(len(frame.position), len(sight.bodies))
+        position, radius = frame.position[:count], sight.bodies.radius[:count]
+        with np.errstate(invalid="ignore", over="ignore"):  # what is far out of sight may overflow, or be nan
+            tiny = radius * camera.scale < POINT * max(unit, 1.0)
+        colours = self._colours if sight.overlapping is None else _by_contact(sight.overlapping, count)
+        if "shapes" in sight.overlays and tiny.any():
+            self._draw_points(surface, camera, sight, tiny, colours, unit)
+
+        with np.errstate(invalid="ignore", over="ignore"):
+            seen = camera.in_sight(position, radius) & frame.present[:count]
+        shown = np.flatnonzero(seen)
+        view = View(
+            surface=surface,
+            camera=camera,
+            sight=sight,
+            unit=unit,
+            antialias=antialias,
+            shown=shown,
+            centre=camera.to_screen(position[shown]),
+            radius=radius[shown] * camera.scale,
+            colours=colours[shown],
+        )
+        self._overlays.below(view)
+        if "shapes" in sight.overlays:
+            self._draw_discs(view, np.flatnonzero(~tiny[shown]) if tiny.any() else None)
+        self._overlays.above(view)
+
+    def _draw_discs(self, view: View, which: IntArray | None) -> None:
+        """Draw the bodies that are no points: all, or those at some places of the view."""
+        centre, radius, colours, shown = view.centre, view.radius, view.colours, view.shown
+        if which is not None:
+            centre, radius, colours, shown = centre[which], radius[which], colours[which], shown[which]
+        self._discs.draw(view.surface, centre, radius, colours, view.style())
+        turning = self._turning[shown]
+        if not turning.all():
+            centre, radius, colours, shown = centre[turning], radius[turning], colours[turning], shown[turning]
+        if len(shown):
+            spokes(view.surface, centre, radius, view.sight.frame.angle[shown], colours, view.antialias)
+
+    def _draw_points(
+        self,
+        surface: pygame.Surface,
+        camera: Camera,
+        sight: Sight,
+        tiny: BoolArray,
+        colours: ColourArray,
+        unit: float,
+    ) -> None:
+        """Draw the bodies that are too small for discs, as points about as large as the median of them."""
+        frame, count = sight.frame, len(tiny)
+        form = (id(colours), surface.get_masks(), surface.get_bytesize())
+        if self._tones is None or self._tones[0] != form or sight.overlapping is not None:
+            self._tones = form, packed(colours, surface)
+        tones, position = self._tones[1], frame.position[:count]
+        present = frame.present[:count]
+        who = present if tiny.all() else present & tiny
+        diameter = 2.0 * float(np.median(sight.bodies.radius[:count][tiny])) * camera.scale
+        side = int(min(max(round(diameter), round(unit), 1), 3))
+        self._points.draw(surface, camera, position, tones, None if who.all() else who, side)
+
+    def _know(self, sight: Sight) -> None:
+        """Work out what holds for bodies as long as they stay the same: their colours, and who can turn."""
+        if sight.bodies is self._bodies:
+            return
+        bodies = sight.bodies
+        self._bodies, self._colours = bodies, colour_of(bodies)
+        turnable = meetings(sight.scene).turnable
+        self._turning = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
+        self._turning[: len(turnable)] |= turnable[: len(bodies)]
+        self._turning[len(turnable) :] = True  # spawned: it may meet anything
+
+    def _blit_background(
+        self, surface: pygame.Surface, camera: Camera, sight: Sight, antialias: bool, unit: float, foot: float
+    ) -> None:
+        form = (surface.get_size(), surface.get_masks(), surface.get_bytesize())
+        wanted = Kept(sight.scene, camera, "bounds" in sight.overlays, antialias, unit, foot, form)
+        known = self._background
+        if known is None or known[0].scene is not wanted.scene or known[0][1:] != wanted[1:]:
+            drawn = pygame.Surface(surface.get_size(), 0, surface)
+            drawn.fill(BACKGROUND)
+            draw_grid(drawn, camera, unit)
+            draw_fixtures(drawn, camera, sight.scene, unit, antialias)
+            if wanted.bounds:
+                draw_bounds(drawn, camera, sight.scene.world.bounds, unit, antialias)
+            draw_scale(drawn, camera, unit, foot)
+            self._background = known = (wanted, drawn)
+        surface.blit(known[1], (0, 0))
+
+
+def _by_contact(overlapping: BoolArray, count: int) -> ColourArray:
+    """Return the colours of a scene that shows contact by colour."""
+    touching = np.zeros(count, np.bool_)
+    touching[: len(overlapping)] = overlapping[:count]
+    return np.where(touching[:, None], np.asarray(TOUCHING, np.uint8), np.asarray(CLEAR, np.uint8))

@@ -1,0 +1,125 @@
+"""Strokes: lines and arrows of any length, cut to the picture before SDL, which counts in 32 bits, sees them."""
+
+import math
+from collections.abc import Iterable
+
+import pygame
+
+from sandbox.play.drawing.palette import Colour
+
+Pixel = tuple[float, float]
+"""A place in a picture, px from its upper left corner; a pixel's middle lies at a half."""
+
+
+def clipped(a: Pixel, b: Pixel, area: pygame.Rect, margin: float = 4.0) -> tuple[Pixel, Pixel] | None:
+    """Return the part of a segment that lies in an area with a margin around it, or None.
+
+    Liang and Barsky's way, 1984: each edge narrows the share of the segment that is left.
+    """
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    if not (math.isfinite(dx) and math.isfinite(dy) and math.isfinite(a[0]) and math.isfinite(a[1])):
+        return None
+    first, last = 0.0, 1.0
+    for move, gap in (
+        (-dx, a[0] - area.left + margin),
+        (dx, area.right + margin - a[0]),
+        (-dy, a[1] - area.top + margin),
+        (dy, area.bottom + margin - a[1]),
+    ):
+        if move == 0.0:
+            if gap < 0.0:
+                return None
+        elif move < 0.0:
+            first = max(first, gap / move)
+        else:
+            last = min(last, gap / move)
+    if first > last:
+        return None
+    start = a if first == 0.0 else (a[0] + first * dx, a[1] + first * dy)
+    end = b if last == 1.0 else (a[0] + last * dx, a[1] + last * dy)
+    widest = 4.0 * margin + area.width + area.height  # what rounding leaves of places far beyond all sense
+    if any(abs(p[0] - area.centerx) > widest or abs(p[1] - area.centery) > widest for p in (start, end)):
+        return None
+    return start, end
+
+
+def stroke(
+    surface: pygame.Surface, a: Pixel, b: Pixel, colour: Colour, width: float = 1.0, antialias: bool = True
+) -> None:
+    """Draw a line with flat ends, `width` px wide."""
+    part = clipped(a, b, surface.get_clip(), width + 4.0)
+    if part is None:
+        return
+    (ax, ay), (bx, by) = part
+    start, end = (ax - 0.5, ay - 0.5), (bx - 0.5, by - 0.5)  # SDL has a pixel's middle at a whole number
+    if not antialias:
+        pygame.draw.line(surface, colour, _whole(start), _whole(end), max(1, round(width)))
+        return
+    length = math.hypot(bx - ax, by - ay)
+    if width < 1.5 or length < 1e-9:
+        pygame.draw.aaline(surface, colour, start, end)
+        return
+    half = width / 2.0 - 0.5  # the antialiased outline adds half a pixel
+    across = -(by - ay) / length * half, (bx - ax) / length * half
+    fill(
+        surface,
+        [
+            (ax + across[0], ay + across[1]),
+            (bx + across[0], by + across[1]),
+            (bx - across[0], by - across[1]),
+            (ax - across[0], ay - across[1]),
+        ],
+        colour,
+    )
+
+
+def fill(surface: pygame.Surface, corners: list[Pixel], colour: Colour, antialias: bool = True) -> None:
+    """Fill a polygon whose corners lie in or near the picture."""
+    moved = [(x - 0.5, y - 0.5) for x, y in corners]
+    pygame.draw.polygon(surface, colour, [_whole(p) for p in moved])
+    if antialias:
+        pygame.draw.aalines(surface, colour, True, moved)
+
+
+def arrow(
+    surface: pygame.Surface, a: Pixel, b: Pixel, colour: Colour, width: float = 2.0, antialias: bool = True
+) -> None:
+    """Draw an arrow from `a` to `b`, with a head in proportion to its width."""
+    length = math.hypot(b[0] - a[0], b[1] - a[1])
+    if not 0.0 < length < math.inf:
+        return
+    along = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+    head = min(5.0 * width, 0.6 * length)
+    neck = b[0] - along[0] * head, b[1] - along[1] * head
+    stroke(surface, a, (neck[0] + along[0], neck[1] + along[1]), colour, width, antialias)
+    if clipped(b, neck, surface.get_clip(), 40.0) is not None:
+        side = -along[1] * head * 0.42, along[0] * head * 0.42
+        corners = [b, (neck[0] + side[0], neck[1] + side[1]), (neck[0] - side[0], neck[1] - side[1])]
+        fill(surface, corners, colour, antialias)
+
+
+def dashes(
+    surface: pygame.Surface, corners: Iterable[tuple[Pixel, Pixel]], colour: Colour, dash: float, antialias: bool = True
+) -> None:
+    """Draw segments dashed; the dashes stay where they are while the picture's edge passes over them."""
+    area = surface.get_clip()
+    for a, b in corners:
+        part = clipped(a, b, area)
+        if part is None:
+            continue
+        (ax, ay), (bx, by) = part
+        length = math.hypot(bx - ax, by - ay)
+        if length == 0.0:
+            continue
+        ux, uy = (bx - ax) / length, (by - ay) / length
+        at = -math.fmod(math.hypot(ax - a[0], ay - a[1]), 2.0 * dash)
+        while at < length:
+            start, end = max(at, 0.0), min(at + dash, length)
+            if end > start:
+                p, q = (ax + ux * start, ay + uy * start), (ax + ux * end, ay + uy * end)
+                stroke(surface, p, q, colour, 1.0, antialias)
+            at += 2.0 * dash
+
+
+def _whole(point: Pixel) -> tuple[int, int]:
+    return round(point[0]), round(point[1])

@@ -1,0 +1,123 @@
+"""History: the states that were seen, and the checkpoints from which the way back to them is short."""
+
+from bisect import bisect_left, bisect_right, insort
+from typing import NamedTuple
+
+from sandbox.engines.checkpoint import Checkpoint
+from sandbox.trajectory import Frame
+
+BUDGET = 256 * 2**20
+"""Bytes that the kept states may take."""
+BYTES_PER_BODY = 6 * 8 + 1
+APART = 30
+"""States seen between two checkpoints, at least."""
+MOST = 64
+"""Checkpoints kept."""
+
+
+class Mark(NamedTuple):
+    """A checkpoint, and how many actions had been done by then."""
+
+    step: int
+    actions: int
+    point: Checkpoint
+
+
+class History:
+    """What a session has seen so far, by the number of the step.
+
+    States are thinned out where they would take too much memory, and checkpoints where there are many: what was long
+    ago keeps every second. The first and the last stay.
+    """
+
+    def __init__(self) -> None:
+        self._steps: list[int] = []
+        self._frames: list[Frame] = []
+        self._bytes = 0
+        self._marks: list[Mark] = []
+        self.marking = True
+        """Whether checkpoints are of use; they are not, once one has led somewhere else than the way from the start."""
+
+    @property
+    def furthest(self) -> int:
+        """The last step that was seen."""
+        return self._steps[-1] if self._steps else 0
+
+    @property
+    def marks(self) -> tuple[int, ...]:
+        """The steps of the checkpoints."""
+        return tuple(mark.step for mark in self._marks)
+
+    def keep(self, step: int, frame: Frame) -> None:
+        """Keep the state after so many steps; one that is known stays as it is."""
+        at = bisect_left(self._steps, step)
+        if at < len(self._steps) and self._steps[at] == step:
+            return
+        self._steps.insert(at, step)
+        self._frames.insert(at, frame)
+        self._bytes += len(frame.position) * BYTES_PER_BODY
+        if self._bytes > BUDGET and len(self._steps) > 2:
+            self._thin()
+
+    def _thin(self) -> None:
+        half = len(self._steps) // 2
+        kept = [*range(0, half, 2), *range(half, len(self._steps))]
+        if len(kept) == len(self._steps):  # two are left, and one of them is the first
+            kept = [0, len(self._steps) - 1]
+        self._steps, self._frames = [self._steps[k] for k in kept], [self._frames[k] for k in kept]
+        self._bytes = sum(len(frame.position) for frame in self._frames) * BYTES_PER_BODY
+
+    def known(self, step: int) -> Frame | None:
+        """Return the state after so many steps, where it was kept."""
+        at = bisect_left(self._steps, step)
+        return self._frames[at] if at < len(self._steps) and self._steps[at] == step else None
+
+    def next_known(self, step: int) -> int | None:
+        """Return the next step after one whose state is kept."""
+        at = bisect_right(self._steps, step)
+        return self._steps[at] if at < len(self._steps) else None
+
+    def nearest(self, time: float) -> tuple[int, Frame]:
+        """Return the kept state that is nearest to a time, s, and its step.
+
+        Raises:
+            LookupError: none is kept.
+        """
+        if not self._steps:
+            raise LookupError("nothing has been seen yet")
+        at = min(bisect_right(self._frames, time, key=lambda frame: frame.time), len(self._frames) - 1)
+        if at > 0 and time - self._frames[at - 1].time < self._frames[at].time - time:
+            at -= 1
+        return self._steps[at], self._frames[at]
+
+    def wants_mark(self, step: int) -> bool:
+        """Tell whether enough was seen since the last checkpoint before a step."""
+        if not self.marking:
+            return False
+        last = self.before(step)
+        since = last.step if last is not None else 0
+        return bisect_left(self._steps, step) - bisect_right(self._steps, since) >= APART
+
+    def mark(self, mark: Mark) -> None:
+        """Keep a checkpoint."""
+        insort(self._marks, mark, key=lambda other: other.step)
+        if len(self._marks) > MOST:
+            half = len(self._marks) // 2
+            self._marks = self._marks[:half:2] + self._marks[half:]
+
+    def before(self, step: int) -> Mark | None:
+        """Return the last checkpoint at or before a step."""
+        found = [mark for mark in self._marks if mark.step <= step]
+        return found[-1] if found else None
+
+    def distrust(self) -> None:
+        """Forget all checkpoints, and keep none from now on: they do not lead where the way from the start does."""
+        self._marks.clear()
+        self.marking = False
+
+    def cut(self, step: int) -> None:
+        """Forget what came after a step: from there it will go another way."""
+        at = bisect_right(self._steps, step)
+        del self._steps[at:], self._frames[at:]
+        self._bytes = sum(len(frame.position) for frame in self._frames) * BYTES_PER_BODY
+        self._marks = [mark for mark in self._marks if mark.step <= step]

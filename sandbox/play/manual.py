@@ -1,0 +1,145 @@
+"""Manual: the help overlay, every key and what the mouse does, those that the scene claims first."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import pygame
+
+from sandbox.play.drawing.palette import BACKGROUND, FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY
+from sandbox.play.drawing.text import measure, write
+from sandbox.play.keys import BINDINGS
+from sandbox.play.plates import plate, shortened
+
+SIZES = (14.0, 13.0, 12.0, 11.0, 10.0, 9.0, 8.0, 7.0, 6.0)
+"""px at unit 1, of letters; the largest at which everything fits is taken."""
+
+MOUSE = (
+    ("wheel", "zoom about the cursor"),
+    ("right-drag", "pan"),
+    ("left-drag", "pull a body"),
+    ("left-drag, paused", "move a body"),
+    ("click", "pick a body"),
+)
+
+
+class Group(NamedTuple):
+    """Keys that belong together."""
+
+    title: str
+    lines: tuple[tuple[str, str], ...]
+    """keys, and what they do"""
+
+
+def groups(claimed: Sequence[tuple[str, str]] = ()) -> tuple[Group, ...]:
+    """Return all that help lists: what the scene claims, all bindings, the mouse."""
+    titles = dict.fromkeys(binding.group for binding in BINDINGS)
+    ours = tuple(
+        Group(title, tuple((binding.label, binding.about) for binding in BINDINGS if binding.group == title))
+        for title in titles
+    )
+    first = (Group(CLAIMED, tuple(claimed)),) if claimed else ()
+    return (*first, *ours, Group("Mouse", MOUSE))
+
+
+CLAIMED = "This scene"
+
+
+class Manual:
+    """The overlay, open or closed."""
+
+    def __init__(self) -> None:
+        self.open = False
+
+    def handle(self, event: pygame.event.Event) -> bool:
+        """Close at any key or click, and tell whether the event was used up; closed, nothing is."""
+        if not self.open or event.type not in (pygame.KEYDOWN, pygame.MOUSEBUTTONDOWN):
+            return False
+        self.open = False
+        return True
+
+    def draw(self, surface: pygame.Surface, unit: float, claimed: Sequence[tuple[str, str]] = ()) -> None:
+        """Draw the overlay over the whole picture, open or not."""
+        plate(surface, surface.get_rect(), 0, BACKGROUND, 236, None)
+        everything = groups(claimed)
+        margin = round(min(28 * unit, 0.04 * min(surface.get_size())))
+        free = surface.get_rect().inflate(-2 * margin, -2 * margin)
+        for size in SIZES:
+            columns = _columns(everything, free, size * unit)
+            if columns is not None:
+                break
+        else:
+            columns = _columns(everything, free.inflate(10**6, 10**6), size * unit) or []
+        _draw_columns(surface, columns, free, size * unit)
+
+
+Column = list[Group]
+
+
+def _width(group: Group, size: float) -> tuple[int, int]:
+    """Return how wide the keys of a group and the words beside them are."""
+    keys = max(measure(keys, 0.92 * size, mono=True)[0] for keys, _ in group.lines)
+    words = max(measure(words, size)[0] for _, words in group.lines)
+    return keys + round(1.0 * size), words
+
+
+def _height(group: Group, size: float) -> float:
+    return (1.75 * len(group.lines) + 3.2) * size
+
+
+def _wide(column: Column, size: float) -> tuple[int, int]:
+    widths = [_width(group, size) for group in column]
+    return max(keys for keys, _ in widths), max(words for _, words in widths)
+
+
+def _columns(everything: Sequence[Group], free: pygame.Rect, size: float) -> list[Column] | None:
+    """Return groups in columns that fit a rectangle below the title, as few as can be, or None."""
+    room = free.height - 4.2 * size
+    columns: list[Column] = [[]]
+    filled = 0.0
+    for group in everything:
+        tall = _height(group, size)
+        if tall > room:
+            return None
+        if filled + tall > room:
+            columns.append([])
+            filled = 0.0
+        columns[-1].append(group)
+        filled += tall
+    total = sum(sum(_wide(column, size)) + 1.2 * size for column in columns) + 2.4 * size * (len(columns) - 1)
+    return columns if total <= free.width else None
+
+
+def _draw_columns(surface: pygame.Surface, columns: list[Column], free: pygame.Rect, size: float) -> None:
+    widths = [_wide(column, size) for column in columns]
+    gap = 2.4 * size
+    total = sum(sum(width) + 1.2 * size for width in widths) + gap * (len(columns) - 1)
+    tallest = max((sum(_height(group, size) for group in column) for column in columns), default=0.0)
+    left = max(free.centerx - total / 2, free.left)
+    top = max(free.centery - (tallest + 4.2 * size) / 2, free.top)
+    rect = write(surface, "Keys", (left, top), 1.7 * size, INK, bold=True)
+    hint = shortened("any key closes this", size, free.right - rect.right - size)
+    write(surface, hint, (rect.right + size, rect.bottom - 0.25 * size), size, FAINT, "bottomleft")
+    for column, (keys, words) in zip(columns, widths, strict=True):
+        y = top + 4.2 * size
+        for group in column:
+            _draw_group(surface, group, (left, y), keys, keys + words + 1.2 * size, size)
+            y += _height(group, size)
+        left += keys + words + 1.2 * size + gap
+
+
+def _draw_group(
+    surface: pygame.Surface, group: Group, at: tuple[float, float], keys: int, width: float, size: float
+) -> None:
+    left, y = at
+    colour = ORANGE if group.title == CLAIMED else SKY
+    write(surface, group.title, at, size, colour, bold=True)
+    line_y = round(y + 1.5 * size)
+    pygame.draw.line(surface, LINE, (left, line_y), (left + width, line_y), max(round(size / 13), 1))
+    y += 2.6 * size
+    for label, about in group.lines:
+        cap = pygame.Rect(0, 0, measure(label, 0.92 * size, mono=True)[0] + round(0.8 * size), round(1.5 * size))
+        cap.midleft = round(left), round(y)
+        plate(surface, cap, 0.3 * size, PANEL_RAISED, 255, LINE)
+        write(surface, label, cap.center, 0.92 * size, INK, "center", mono=True)
+        write(surface, about, (left + keys + 1.2 * size, y), size, INK, "midleft")
+        y += 1.75 * size

@@ -1,0 +1,299 @@
+"""Session: a scene being played. It goes on by steps, does what hands do, remembers it, and finds the way back.
+
+A session is its scene and its actions; going back is to go there again. From a checkpoint that is shorter, but a
+state does not hold what an engine remembers of contacts: so checkpoints are made where nothing has touched for a
+while, and wherever a state is known from before, its hash must be the same. Where it is not, the way from the start
+is taken, which is the same every time.
+"""
+
+from collections.abc import Iterator
+from time import perf_counter
+
+from sandbox.action import Action, ActionError, Switch, Value
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal
+from sandbox.engines.relay import Relay, joined
+from sandbox.play.history import History, Mark
+from sandbox.recording import Recording
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Contacts, Frame
+
+CALM = 8
+"""Substeps without contact before a checkpoint is made; engines remember parted contacts for 3 by default."""
+
+PACE = 16
+"""Steps made at a time on the way to another one."""
+
+
+class WrongWayError(Exception):
+    """The way from a checkpoint leads to another state than was seen before."""
+
+
+class Session:
+    """A scene that is being played on an engine.
+
+    Steps that were made before are made again with the actions of then, until something else is done: from there on
+    what came later is forgotten.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        engine: str = "pymunk",
+        settings: Settings | None = None,
+        actions: tuple[Action, ...] = (),
+    ) -> None:
+        """Start.
+
+        Args:
+            scene: what is played.
+            engine: its name.
+            settings: by default the scene's own.
+            actions: to be done again on the way, in order of time.
+
+        Raises:
+            UnknownEngineError: no engine has that name.
+            Refusal: the engine cannot run the scene.
+        """
+        self._scene, self._engine = scene, engine
+        self._relay = Relay(scene, engine, settings)
+        self._settings = self._relay.wanted
+        self._actions = list(actions)
+        self._done = 0
+        self._step = 0
+        self._calm = 0
+        self._contacts: list[Contacts] = []
+        self.history = History()
+        self.ended: str | None = None
+        """why it cannot go on: it diverged, or asks for more than can be had"""
+        self._relay.contacts()
+        self._redo()
+        self._previous = self._frame = self._relay.frame()
+        self.history.keep(0, self._frame)
+
+    @property
+    def scene(self) -> Scene:
+        """What runs, with all that was set since."""
+        return self._relay.scene
+
+    @property
+    def engine(self) -> str:
+        """The present engine's name."""
+        return self._relay.engine
+
+    @property
+    def settings(self) -> Settings:
+        """The present settings, with every choice filled in."""
+        return self._relay.settings
+
+    @property
+    def wanted(self) -> Settings:
+        """The present settings as they were asked for."""
+        return self._relay.wanted
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies by number; spawned ones at the end."""
+        return self._relay.bodies
+
+    @property
+    def relay(self) -> Relay:
+        """What runs."""
+        return self._relay
+
+    @property
+    def step_number(self) -> int:
+        """Steps made since the start."""
+        return self._step
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._frame.time
+
+    @property
+    def frame(self) -> Frame:
+        """The present state."""
+        return self._frame
+
+    @property
+    def previous(self) -> Frame:
+        """The state one step before, or the present one where there is none to go by."""
+        return self._previous
+
+    @property
+    def actions(self) -> tuple[Action, ...]:
+        """All that was done, up to now."""
+        return tuple(self._actions[: self._done])
+
+    def advance(self, steps: int = 1, until: float | None = None) -> int:
+        """Make steps; return how many were made.
+
+        Args:
+            steps: how many, at most.
+            until: the time (`perf_counter`, s) by which to stop, after one step at least.
+
+        Raises:
+            WrongWayError: it leads to another state than was seen before; `seek` knows the way.
+        """
+        made, last = 0, False
+        while made < steps and self.ended is None and not last:
+            last = made + 1 == steps or (made > 0 and until is not None and perf_counter() > until)
+            if last:
+                self._previous = self._relay.frame()
+            if not self._one():
+                break
+            made += 1
+        if made:
+            self._see()
+        return made
+
+    def _one(self) -> bool:
+        """Make a step, and do what is to be done then; tell whether the step was made."""
+        try:
+            self._relay.step()
+        except Divergence as divergence:
+            self.ended = str(divergence)
+        except Exhaustion as exhaustion:
+            self.ended = f"at {self._relay.time:g} s: {exhaustion}"
+            return False
+        self._step += 1
+        if self.ended is None:
+            self._redo()
+        return True
+
+    def _redo(self) -> None:
+        """Do again what was done at this time."""
+        due = self._relay.time + 1e-9 * self._relay.settings.dt
+        try:
+            while self._done < len(self._actions) and self._actions[self._done].time <= due:
+                self._relay.apply(self._actions[self._done])
+                self._done += 1
+        except ActionError as error:  # of a recording that this engine cannot follow
+            self.ended = f"at {self._relay.time:g} s: {error}"
+
+    def _see(self) -> None:
+        """Look at the present state: keep it, hold it against what was seen before, and make a checkpoint if due."""
+        self._frame = self._relay.frame()
+        self._contacts.append(self._relay.contacts())
+        del self._contacts[:-64]  # nobody asks
+        if len(self._contacts[-1]):
+            self._calm = 0
+        else:
+            self._calm += self._relay.settings.substeps
+        known = self.history.known(self._step)
+        if known is not None and known.state_hash() != self._frame.state_hash():
+            raise WrongWayError(f"step {self._step} led elsewhere than before")
+        self.history.keep(self._step, self._frame)
+        calm = self._calm >= max(CALM, 2 * (self._relay.settings.persistence or 1))
+        if calm and self.ended is None and self.history.wants_mark(self._step):
+            self.history.mark(Mark(self._step, self._done, self._relay.checkpoint()))
+
+    def contacts(self) -> Contacts:
+        """Return the contacts that were open since the last call."""
+        parts, self._contacts = self._contacts, []
+        return joined(parts) if parts else Contacts.none()
+
+    def act(self, action: Action) -> Action:
+        """Do something now, whatever its time says, and remember it; what came later is forgotten.
+
+        Returns:
+            The action with its time.
+
+        Raises:
+            ActionError: it cannot be done. Nothing has changed then.
+        """
+        if self.ended is not None:
+            raise ActionError("the scene has ended here; go back, or restart")
+        timed = action.model_copy(update={"time": self._relay.time})
+        self._relay.apply(timed)
+        self._actions[self._done :] = [timed]
+        self._done += 1
+        self.history.cut(self._step - 1)
+        self._frame = self._previous = self._relay.frame()
+        self.history.keep(self._step, self._frame)
+        self._calm = 0
+        return timed
+
+    def switch(self, engine: str) -> str | None:
+        """Go on with another engine from the state as it is.
+
+        Choices that only the present engine knows are left to the other; it is told which.
+
+        Raises:
+            ActionError: the other engine cannot go on from here.
+        """
+        try:
+            self.act(Switch(time=0.0, engine=engine))
+        except ActionError as error:
+            stated = self._relay.wanted.model_dump(exclude_defaults=True)
+            own = [key for key in stated if key not in ("dt", "substeps", "iterations", "record_every")]
+            if not own:
+                raise
+            free: dict[str, Value] = {key: False if key == "half_kick" else None for key in own}
+            try:
+                self.act(Switch(time=0.0, engine=engine, settings=free))
+            except ActionError:
+                raise error from None
+            return f"left to {engine}: {', '.join(own)}"
+        return None
+
+    def seek(self, step: int) -> Iterator[float]:
+        """Go to a step, back or forth. Yields the share that is done, after each part of the way.
+
+        The session is in between while this is not finished; a caller may give up, and ask for another step.
+        """
+        step = max(0, step)
+        if step < self._step:
+            mark = self.history.before(step)
+            self._restore(mark)
+        try:
+            yield from self._forth(step)
+        except WrongWayError:
+            self.history.distrust()
+            self._restore(None)
+            yield from self._forth(step)
+
+    def _forth(self, step: int) -> Iterator[float]:
+        begin = self._step
+        while self._step < step and self.ended is None:
+            known = self.history.next_known(self._step)  # to be held against
+            self.advance(min(PACE, step - self._step, known - self._step if known is not None else PACE))
+            yield (self._step - begin) / (step - begin)
+
+    def _restore(self, mark: Mark | None) -> None:
+        """Take up the checkpoint, or start anew."""
+        relay = None
+        if mark is not None:
+            try:
+                relay = Relay.resumed(mark.point)
+            except (Refusal, ActionError):
+                self.history.distrust()
+        self._relay.close()
+        if relay is None or mark is None:
+            self._relay = Relay(self._scene, self._engine, self._settings)
+            self._step = self._done = 0
+        else:
+            self._relay, self._step, self._done = relay, mark.step, mark.actions
+        self.ended = None
+        self._calm = 0
+        self._contacts.clear()
+        self._relay.contacts()
+        self._redo()
+        self._previous = self._frame = self._relay.frame()
+
+    def recording(self) -> Recording:
+        """Return the session up to now."""
+        return Recording(
+            scene=self._scene,
+            engine=self._engine,
+            settings=self._settings,
+            actions=self.actions,
+            duration=self._relay.time,
+            state_hash=self._relay.state_hash(),
+        )
+
+    def close(self) -> None:
+        """Release what the engine holds."""
+        self._relay.close()
