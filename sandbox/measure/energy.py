@@ -6,7 +6,7 @@ import numpy as np
 
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray, FloatArray, Trajectory
+from sandbox.trajectory import BoolArray, FloatArray, Frame, Trajectory
 
 CHUNK = 10_000_000
 """Frames × bodies worked on at once: a few arrays of 80 MB."""
@@ -85,3 +85,15 @@ def _there(position: FloatArray, seen: BoolArray) -> BoolArray:
 
 def _sum(values: FloatArray, counts: BoolArray, weights: FloatArray) -> FloatArray:
     return np.asarray(np.where(counts, values, 0.0) @ weights)
+
+
+def energy_of(frame: Frame, bodies: Bodies, gravity: tuple[float, float]) -> tuple[float, float, float]:
+    """Return the kinetic, potential and total energy of one state, J; of those who are there and move."""
+    count = len(frame.position)
+    counts = frame.present & ~bodies.fixed[:count]
+    mass, moment = bodies.mass[:count][counts], bodies.moment[:count][counts]
+    with np.errstate(over="ignore", invalid="ignore"):  # as above
+        squared = np.einsum("nk,nk->n", frame.velocity[counts], frame.velocity[counts])
+        kinetic = 0.5 * float(mass @ squared + moment @ np.square(frame.angular_velocity[counts]))
+        potential = -float(mass @ (frame.position[counts] @ np.asarray(gravity)))
+        return kinetic, potential, kinetic + potential

@@ -153,9 +153,9 @@ class Auditor:
     """An audit that times itself, so that a run's seconds are the engine's."""
 
     def __init__(self, scene: Scene, simulation: Simulation) -> None:
-        self._audit = Audit(scene)
+        self._audit = Audit(scene, simulation.bodies)
         self._simulation = simulation
-        self._known = len(scene.bodies)
+        self._known = len(simulation.bodies)
         self.seconds = 0.0
         simulation.watch(self)
 

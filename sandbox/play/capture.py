@@ -1,22 +1,17 @@
 """Capture: pictures of the window as files. It takes surfaces and knows no window."""
 
 import math
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Protocol
 
 import pygame
 
+from sandbox.play.limits import MOST_GIF_PICTURES, NEEDS_VIDEO, can_make_mp4
 from sandbox.play.outfile import CaptureError, Outfile, unwritable
 from sandbox.play.still import Size, png
 
 FILMS = (".gif", ".mp4")
 """Suffixes of moving pictures."""
-FASTEST_GIF = 50.0
-"""pictures/s: viewers show what is quicker than 0.02 s at a tenth of its speed"""
-MOST_GIF_PICTURES = 3000
-"""Of one gif, which viewers unpack into memory as a whole: 100 s at 30 a second."""
-NEEDS_VIDEO = 'mp4 needs the `video` extra: pip install "sandbox2d[video]"; a gif needs nothing more'
 
 
 class Recorder(Protocol):
@@ -93,11 +88,6 @@ def recorder_in(folder: Path, stem: str, suffix: str, size: Size, fps: float) ->
         CaptureError: as `recorder_for`.
     """
     return _recorder(Outfile.numbered(folder, stem, suffix), suffix, size, fps)
-
-
-def can_make_mp4() -> bool:
-    """Tell whether the `video` extra is installed."""
-    return find_spec("imageio_ffmpeg") is not None
 
 
 def size_within(size: Size, width: int) -> Size:

@@ -7,6 +7,7 @@ from pygame_widgets.slider import Slider  # type: ignore[import-untyped]  # the 
 
 from sandbox.play.drawing.palette import INK, LINE, PANEL_RAISED, SKY
 from sandbox.play.drawing.text import write
+from sandbox.play.icons import draw_disc
 from sandbox.play.knob import Knob, Value
 from sandbox.play.plates import shortened
 from sandbox.play.widgets import LETTERS, Control, Report
@@ -56,6 +57,8 @@ class KnobSlider(Dial, Slider):  # type: ignore[misc]  # the library ships no ty
         self.min, self.max, self.value = 0.0, 1.0, 0.0
         self._before: Value = knob.value
         self._grip = 0.0
+        self.row = pygame.Rect(0, 0, 0, 0)
+        """label, value and track together"""
         self._pressed = -DOUBLE - 1, (0, 0)
         super().__init__(surface, knob)
         self.min, self.max = 0.0, 1.0
@@ -144,8 +147,8 @@ class KnobSlider(Dial, Slider):  # type: ignore[misc]  # the library ships no ty
         pygame.draw.rect(self.win, SKY if live else PANEL_RAISED, bar, border_radius=thick)
         at = track.left + round(share * track.width), track.centery
         radius = self.handleRadius if self.held or self.hovered else self.handleRadius - self.unit
-        pygame.draw.circle(self.win, SKY if live else LINE, at, radius)
-        pygame.draw.circle(self.win, INK if live else PANEL_RAISED, at, max(radius - 2.2 * self.unit, 1))
+        draw_disc(self.win, at, radius, SKY if live else LINE)
+        draw_disc(self.win, at, max(radius - 2.4 * self.unit, 1), INK if live else PANEL_RAISED)
 
 
 class Choice(Dial):
@@ -158,7 +161,7 @@ class Choice(Dial):
     @property
     def _box(self) -> pygame.Rect:
         rect = self.rect
-        wide = round(0.6 * rect.width)
+        wide = round(0.68 * rect.width)
         return pygame.Rect(rect.right - wide, rect.top, wide, rect.height)
 
     def click(self, event: pygame.event.Event) -> None:
@@ -174,9 +177,9 @@ class Choice(Dial):
         write(self.win, label, (self.rect.left, box.centery), size, self.ink, "midleft")
         lit = self.hovered and self.isEnabled()
         pygame.draw.rect(self.win, LINE if lit else PANEL_RAISED, box, border_radius=round(4 * self.unit))
-        text = shortened(self.knob.text(self.now), 0.95 * size, box.width - 2.6 * size)
+        text = shortened(self.knob.text(self.now), 0.95 * size, box.width - 2.2 * size)
         write(self.win, text, box.center, 0.95 * size, self.ink, "center")
-        reach, x = 0.3 * size, 0.8 * size
+        reach, x = 0.28 * size, 0.6 * size
         for end, way in ((box.left + x, -1), (box.right - x, 1)):
             corners = [(end - way * reach / 2, box.centery - reach), (end + way * reach / 2, box.centery)]
             corners.append((corners[0][0], box.centery + reach))

@@ -1,5 +1,6 @@
 """Film: a stored run as pictures. It knows the state at any time of the run, and draws it as the window does."""
 
+import json
 from collections.abc import Iterator
 from functools import cached_property
 
@@ -8,6 +9,7 @@ import pygame
 
 from sandbox.action import ActionError, Spawn, actions_from_json, in_order
 from sandbox.play.camera import Box, Camera
+from sandbox.play.crowd import anchors_of, crowd
 from sandbox.play.drawing.palette import FAINT, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
@@ -15,7 +17,7 @@ from sandbox.play.sight import Flash, Sight
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene, Wall
+from sandbox.scene.model import Scene
 from sandbox.trajectory import BoolArray, Contacts, FloatArray, Frame, Trajectory
 
 LINGER = 0.12
@@ -24,8 +26,6 @@ FLASH = 0.6
 """s of the film that a missed contact is marked"""
 TRAIL, TRAIL_PLACES = 1.0, 60
 """How far back a trail goes, s of the film, and through how many stored frames at most."""
-STRAY = 3.0
-"""Sizes of the middle of a crowd that a body may go beyond it and still be fitted into the picture."""
 
 
 class Film:
@@ -68,7 +68,7 @@ class Film:
             here, there = states[k], states[after]
             each = weight if here.ndim == 1 else weight[:, None]
             with np.errstate(over="ignore", invalid="ignore"):  # the last frame of a run that diverged
-                return np.where(each > 0.0, here + (there - here) * each, here)
+                return np.asarray(np.where(each > 0.0, here + (there - here) * each, here))
 
         velocity, spin = between(run.velocity), between(run.angular_velocity)
         velocity[gone], spin[gone] = 0.0, 0.0
@@ -136,7 +136,7 @@ class Film:
     @cached_property
     def box(self) -> Box:
         """What a picture of the whole run shows, m; what strays far from the rest does not count."""
-        return crowd(self.trajectory.position, self.bodies.radius, _anchors(self.scene))
+        return crowd(self.trajectory.position, self.bodies.radius, anchors_of(self.scene))
 
     def draw(
         self,
@@ -188,10 +188,10 @@ def moments(start: float, end: float, fps: float, speed: float = 1.0) -> tuple[F
     """
     seconds = (end - start) / speed
     count = max(1, round(seconds * fps))
-    shown = np.full(count, 1.0 / fps)
+    shown: FloatArray = np.full(count, 1.0 / fps)
     if seconds > 0.0:
         shown[-1] = seconds - (count - 1) / fps
-    return start + np.arange(count) * (speed / fps), shown
+    return np.asarray(start + np.arange(count) * (speed / fps)), shown
 
 
 def scene_of(trajectory: Trajectory) -> Scene:
@@ -214,7 +214,7 @@ def bodies_of(trajectory: Trajectory, scene: Scene) -> Bodies:
     """
     bodies = scene.bodies
     try:
-        actions = in_order(actions_from_json(_json(trajectory.info.get("actions", []))))
+        actions = in_order(actions_from_json(json.dumps(trajectory.info.get("actions", []))))
     except ActionError as error:
         raise SceneError([Fault("<run>", None, "info.actions", line) for line in str(error).splitlines()]) from None
     spawned = [action.ball for action in actions if isinstance(action, Spawn)]
@@ -224,36 +224,3 @@ def bodies_of(trajectory: Trajectory, scene: Scene) -> Bodies:
     if list(bodies.names) != names:
         raise SceneError([Fault("<run>", None, "names", "the bodies are not those of the run's scene and actions")])
     return bodies
-
-
-def crowd(position: FloatArray, radius: FloatArray, anchors: FloatArray) -> Box:
-    """Return the box that a crowd moves in, m, leaving out those who stray.
-
-    Args:
-        position: (T, N, 2) m; what is not finite counts nothing.
-        radius: (N,) m
-        anchors: (K, 2) m, places of fixed things, shown where they are not far from the crowd.
-    """
-    lower, upper = np.fmin.reduce(position, axis=0), np.fmax.reduce(position, axis=0)
-    fine = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
-    lower, upper = lower[fine] - radius[fine, None], upper[fine] + radius[fine, None]
-    if not len(lower) and not len(anchors):
-        return (-1.0, -1.0), (1.0, 1.0)
-    corners = np.concatenate((lower, upper)) if len(lower) else anchors
-    middle = np.percentile(corners, (10.0, 90.0), axis=0)
-    reach = STRAY * max(float((middle[1] - middle[0]).max()), 1e-9)
-    both = np.concatenate((corners, anchors))
-    kept = both[((both >= middle[0] - reach) & (both <= middle[1] + reach)).all(axis=1)]
-    if not len(kept):
-        kept = middle
-    (left, bottom), (right, top) = kept.min(axis=0).tolist(), kept.max(axis=0).tolist()
-    return (left, bottom), (right, top)
-
-
-def _anchors(scene: Scene) -> FloatArray:
-    """Return the ends of walls and the edges of posts, (K, 2) m; planes have no end."""
-    places = [point for wall in scene.walls for point in wall.points]
-    for post in scene.posts:
-        (x, y), r = post.position, post.radius
-        places += [(x - r, y - r), (x + r, y + r)]
-    return np.asarray(places, np.float64).reshape(-1, 2)

@@ -146,7 +146,8 @@ class EnergyGraph:
         if not shown:
             return
         first, last = shown[0][0], shown[-1][0]
-        text = shortened(f"last {figure(last - first, 's')}", small, chart.width)
+        length = self.span if last - first > 0.98 * self.span else last - first
+        text = shortened(f"last {length:.2g} s", small, chart.width)
         write(surface, text, (chart.left, chart.bottom + 0.1 * size), small, FAINT)
         wanted = [self._height(value, chart) if math.isfinite(value) else chart.centery for value in shown[-1][1:]]
         places = spread(wanted, 1.3 * size, chart.top, chart.bottom)

@@ -48,6 +48,16 @@ class History:
         """The steps of the checkpoints."""
         return tuple(mark.step for mark in self._marks)
 
+    @property
+    def end(self) -> float:
+        """The time of the last state, s."""
+        return self._frames[-1].time if self._frames else 0.0
+
+    @property
+    def mark_times(self) -> tuple[float, ...]:
+        """The times of the checkpoints, s."""
+        return tuple(mark.point.frame.time for mark in self._marks)
+
     def keep(self, step: int, frame: Frame) -> None:
         """Keep the state after so many steps; one that is known stays as it is."""
         at = bisect_left(self._steps, step)

@@ -8,6 +8,7 @@ import pygame
 from sandbox.play.drawing.palette import FAINT, GREEN, INK, ORANGE, PANEL, SKY, VERMILION, WARNING, Colour
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.figures import clock, figure, percent
+from sandbox.play.icons import draw_disc
 from sandbox.play.plates import plate, shortened, wrapped
 from sandbox.play.sight import Status
 
@@ -19,6 +20,9 @@ FULL = 460, 320
 """px at unit 1: a smaller picture gets smaller letters."""
 SMALLEST = 9.0
 """px, letters that can still be read"""
+
+ESSENTIAL = 2
+"""The rank of what is shown even beside the faults of a file."""
 
 Mark = Literal["", "disc", "triangle", "ring", "bars"]
 
@@ -103,11 +107,19 @@ def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int
     free = pygame.Rect(margin, margin, width - 2 * margin, height - 2 * margin)
     if free.width < 2 * size or free.height < size:
         return
-    block = _draw_rows(surface, rows(status), free, size)
+    shown, room = rows(status), free.copy()
+    if status.faults:
+        shown = tuple(row for row in shown if row.rank <= ESSENTIAL)
+    elif status.messages:
+        room.height -= round(2.8 * size)  # the newest finds its place
+    block = _draw_rows(surface, shown, room, size)
     _draw_rate(surface, status, free, block, size)
+    if status.faults:
+        top = block.bottom + _pad(size)
+        _draw_faults(surface, status.faults, pygame.Rect(free.left, top, free.width, free.bottom - top), size)
+        return
     box = _draw_picked(surface, status.picked, free, block, size)
     _draw_messages(surface, status.messages, free, (block, box), size)
-    _draw_faults(surface, status.faults, free, size)
 
 
 def _pad(size: float) -> int:
@@ -146,9 +158,9 @@ def draw_mark(surface: pygame.Surface, mark: Mark, at: tuple[float, float], radi
     x, y = at
     wide = max(round(0.4 * radius), 1)
     if mark == "disc":
-        pygame.draw.circle(surface, colour, (round(x), round(y)), max(round(radius), 2))
+        draw_disc(surface, at, radius, colour)
     elif mark == "ring":
-        pygame.draw.circle(surface, colour, (round(x), round(y)), max(round(radius), 2), wide)
+        draw_disc(surface, at, radius, colour, 0.55 * radius)
     elif mark == "triangle":
         corners = [(x, y - radius), (x + 1.1 * radius, y + 0.9 * radius), (x - 1.1 * radius, y + 0.9 * radius)]
         pygame.draw.polygon(surface, colour, corners)
@@ -223,27 +235,37 @@ def _draw_messages(
 
 def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], free: pygame.Rect, size: float) -> None:
     """Draw the faults of the scene file in a box in the middle; those that find no room are counted."""
-    if not faults:
-        return
-    pad, line = round(1.1 * size), round(1.45 * size)
+    pad, line = round(min(1.1 * size, 0.04 * free.width)), round(1.45 * size)
     room = min(free.width, round(62 * size)) - 2 * pad
     head = "The scene file has a fault" if len(faults) == 1 else f"The scene file has {len(faults)} faults"
     heads = wrapped(f"{head}; the scene before it goes on", size, room - 1.6 * size, 2, bold=True)
-    most = max((free.height - 2 * pad) // line - len(heads), 0)
-    lines: list[str] = []
-    for number, fault in enumerate(faults):
-        more = wrapped(fault, size, room, 4, mono=True)
-        last = number == len(faults) - 1
-        if len(lines) + len(more) + (not last) > most:
-            lines.append(f"… and {len(faults) - number} more" if number else shortened(fault, size, room, mono=True))
-            break
-        lines += more
-    lines = lines[:most]
+    most = (free.height - 2 * pad) // line - len(heads)
+    if most < 1:
+        heads = (shortened(head, size, room - 1.6 * size, bold=True),)
+    lines = _fault_lines(faults, size, room, most)
     rect = pygame.Rect(0, 0, room + 2 * pad, (len(heads) + len(lines)) * line + 2 * pad)
     rect.center = free.center
     plate(surface, rect, 0.6 * size, opacity=244, edge=WARNING)
     draw_mark(surface, "triangle", (rect.left + pad + 0.4 * size, rect.top + pad + line / 2), 0.5 * size, WARNING)
-    for k, text in enumerate((*heads, *lines)):
-        bold = k < len(heads)
-        at = rect.left + pad + (round(1.6 * size) if bold else 0), rect.top + pad + (k + 0.5) * line
-        write(surface, text, at, size, INK, "midleft", bold=bold, mono=not bold)
+    left, y = rect.left + pad, rect.top + pad + line / 2
+    for text in heads:
+        write(surface, text, (left + round(1.6 * size), y), size, INK, "midleft", bold=True)
+        y += line
+    for indent, text in lines:
+        colour = FAINT if indent else INK
+        write(surface, text, (left + indent, y), size, colour, "midleft", mono=True)
+        y += line
+
+
+def _fault_lines(faults: tuple[str, ...], size: float, room: int, most: int) -> list[tuple[int, str]]:
+    """Return lines with their indents, px: each fault begins at the left, and the last line counts what is missing."""
+    indent = round(1.4 * size)
+    lines: list[tuple[int, str]] = []
+    for number, fault in enumerate(faults):
+        first, *rest = wrapped(fault, size, room - indent, 4, mono=True) or ("",)
+        last = number == len(faults) - 1
+        if len(lines) + 1 + len(rest) + (not last) > most:
+            lines.append((0, f"… and {len(faults) - number} more" if number else first))
+            break
+        lines += [(0, first), *((indent, text) for text in rest)]
+    return lines[: max(most, 0)]

@@ -1,5 +1,6 @@
 """Icons: the pictures on the panel's buttons, drawn large and made small so that they are smooth."""
 
+import math
 from functools import lru_cache
 
 import pygame
@@ -21,6 +22,26 @@ def icon(name: str, side: int, colour: Colour) -> pygame.Surface | None:
     large = pygame.Surface((side * _OVER, side * _OVER), pygame.SRCALPHA)
     large.fill((*colour, 0))  # so that edges do not darken towards black
     _Pen(large, side * _OVER / _GRID, colour).draw(name)
+    return pygame.transform.smoothscale(large, (side, side))
+
+
+def draw_disc(
+    surface: pygame.Surface, at: tuple[float, float], radius: float, colour: Colour, hole: float = 0.0
+) -> None:
+    """Draw a smooth small disc, or a ring where a hole of some radius is left; px."""
+    made = _disc(round(_OVER * max(radius, 0.5)), colour, round(_OVER * hole))
+    surface.blit(made, made.get_rect(center=(round(at[0]), round(at[1]))))
+
+
+@lru_cache(maxsize=256)
+def _disc(radius: int, colour: Colour, hole: int) -> pygame.Surface:
+    side = 2 * (radius // _OVER) + 3  # odd, so that it has a middle pixel
+    large = pygame.Surface((side * _OVER, side * _OVER), pygame.SRCALPHA)
+    large.fill((*colour, 0))
+    middle = large.get_rect().center
+    pygame.draw.circle(large, colour, middle, radius)
+    if hole > 0:
+        pygame.draw.circle(large, (*colour, 0), middle, hole)
     return pygame.transform.smoothscale(large, (side, side))
 
 
@@ -66,14 +87,19 @@ class _Pen:
                     self._box(x, y, 7.5, 7.5, 1.5)
 
     def _restart(self) -> None:
-        rect = self._rect(4, 4.5, 16, 16)
-        pygame.draw.arc(self.surface, self.colour, rect, -3.6, 1.2, max(round(2.8 * self.scale), 1))
-        self._polygon((12.5, 0.8), (19.5, 5.6), (12.2, 10.2))
+        self._arc(12, 13, 8, 180, 450)
+        self._polygon((12.6, 0.6), (12.6, 9.4), (6.6, 5))
 
     def _help(self) -> None:
-        pygame.draw.arc(self.surface, self.colour, self._rect(6.5, 3, 11, 10.5), -1.3, 3.3, round(2.8 * self.scale))
-        self._box(10.7, 11.2, 2.7, 4.6)
-        self._disc(12, 19.3, 1.8)
+        self._arc(12, 8, 4.6, -70, 185)
+        self._box(10.6, 11.6, 2.8, 4.4, 0)
+        self._disc(12, 19.4, 1.8)
+
+    def _arc(self, x: float, y: float, radius: float, start: float, end: float) -> None:
+        """Draw part of a circle, between two angles in degrees, with round ends."""
+        for degrees in range(round(start), round(end) + 1, 3):
+            angle = math.radians(degrees)
+            self._disc(x + radius * math.cos(angle), y - radius * math.sin(angle), 1.4)
 
     def _rect(self, x: float, y: float, wide: float, high: float) -> pygame.Rect:
         return pygame.Rect(*(round(part * self.scale) for part in (x, y, wide, high)))

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from sandbox.play.figures import figure
+from sandbox.play.figures import figure, percent
 
 Value = float | str
 
@@ -24,6 +24,7 @@ class Knob:
     step: float = 0.01
     """what a notch of the wheel adds, and what values are whole multiples of; of a logarithmic knob, in decades"""
     unit: str = ""
+    """with `%`, shares are shown in percent"""
     choices: tuple[str, ...] = ()
     enabled: bool = True
     why: str = ""
@@ -79,6 +80,8 @@ class Knob:
         """Return a value as it is shown."""
         if isinstance(value, str):
             return value.replace("_", " ")
+        if self.unit == "%":
+            return percent(value)
         if self.whole and math.isfinite(value):
             tail = f" {self.unit}" if self.unit else ""
             return f"{value:.0f}{tail}".replace("-", "−")

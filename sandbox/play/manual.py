@@ -7,11 +7,17 @@ import pygame
 
 from sandbox.play.drawing.palette import BACKGROUND, FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY
 from sandbox.play.drawing.text import measure, write
-from sandbox.play.keys import BINDINGS
+from sandbox.play.keys import BINDINGS, Binding
 from sandbox.play.plates import plate, shortened
 
-SIZES = (14.0, 13.0, 12.0, 11.0, 10.0, 9.0, 8.0, 7.0, 6.0)
-"""px at unit 1, of letters; the largest at which everything fits is taken."""
+SIZES = (14.0, 13.0, 12.0, 11.0, 10.0, 9.0)
+"""px at unit 1, of letters: the largest at which everything fits; at the smallest the wheel scrolls."""
+
+HEAD = 3.7
+"""heights of a letter that the title takes"""
+
+LINE_STEP = 1.66
+"""heights of a letter from line to line"""
 
 MOUSE = (
     ("wheel", "zoom about the cursor"),
@@ -20,6 +26,10 @@ MOUSE = (
     ("left-drag, paused", "move a body"),
     ("click", "pick a body"),
 )
+
+
+CLAIMED = "This scene"
+UNCLAIMABLE = ("P", "O", "F1", "Esc")
 
 
 class Group(NamedTuple):
@@ -33,15 +43,23 @@ class Group(NamedTuple):
 def groups(claimed: Sequence[tuple[str, str]] = ()) -> tuple[Group, ...]:
     """Return all that help lists: what the scene claims, all bindings, the mouse."""
     titles = dict.fromkeys(binding.group for binding in BINDINGS)
+    taken = {name for label, _ in claimed for name in _names(label)}
     ours = tuple(
-        Group(title, tuple((binding.label, binding.about) for binding in BINDINGS if binding.group == title))
-        for title in titles
+        Group(title, tuple(_line(binding, taken) for binding in BINDINGS if binding.group == title)) for title in titles
     )
     first = (Group(CLAIMED, tuple(claimed)),) if claimed else ()
     return (*first, *ours, Group("Mouse", MOUSE))
 
 
-CLAIMED = "This scene"
+def _names(label: str) -> list[str]:
+    """Return the keys that a label names: `S (hold)` is about S."""
+    return [name.split(" (")[0].strip() for name in label.split(" or ")]
+
+
+def _line(binding: Binding, taken: set[str]) -> tuple[str, str]:
+    """Return a binding as help lists it, with what the scene leaves of its keys."""
+    keys = [name for name in _names(binding.label) if name in UNCLAIMABLE or name not in taken]
+    return (" or ".join(keys), binding.about) if keys else (binding.label, f"({binding.about})")
 
 
 class Manual:
@@ -49,13 +67,21 @@ class Manual:
 
     def __init__(self) -> None:
         self.open = False
+        self._scroll = 0.0
 
     def handle(self, event: pygame.event.Event) -> bool:
-        """Close at any key or click, and tell whether the event was used up; closed, nothing is."""
-        if not self.open or event.type not in (pygame.KEYDOWN, pygame.MOUSEBUTTONDOWN):
+        """Close at any key or click, scroll by the wheel; tell whether the event was used up. Closed, nothing is."""
+        if not self.open:
             return False
-        self.open = False
-        return True
+        if event.type == pygame.MOUSEWHEEL:
+            self._scroll -= 3 * event.y
+            return True
+        if event.type == pygame.MOUSEBUTTONDOWN and event.button > 3:  # the wheel once more
+            return True
+        if event.type in (pygame.KEYDOWN, pygame.MOUSEBUTTONDOWN):
+            self.open, self._scroll = False, 0.0
+            return True
+        return False
 
     def draw(self, surface: pygame.Surface, unit: float, claimed: Sequence[tuple[str, str]] = ()) -> None:
         """Draw the overlay over the whole picture, open or not."""
@@ -63,13 +89,11 @@ class Manual:
         everything = groups(claimed)
         margin = round(min(28 * unit, 0.04 * min(surface.get_size())))
         free = surface.get_rect().inflate(-2 * margin, -2 * margin)
-        for size in SIZES:
-            columns = _columns(everything, free, size * unit)
-            if columns is not None:
-                break
-        else:
-            columns = _columns(everything, free.inflate(10**6, 10**6), size * unit) or []
-        _draw_columns(surface, columns, free, size * unit)
+        size, columns = _fitted(everything, free, unit)
+        tall = max(sum(_height(group, size) for group in column) for column in columns) + HEAD * size
+        self._scroll = min(max(self._scroll, 0.0), max(tall - free.height, 0.0) / size)
+        hint = "any key closes this" if tall <= free.height else "wheel: more · any key closes this"
+        _draw_columns(surface, columns, free.move(0, -round(self._scroll * size)), size, hint)
 
 
 Column = list[Group]
@@ -83,7 +107,7 @@ def _width(group: Group, size: float) -> tuple[int, int]:
 
 
 def _height(group: Group, size: float) -> float:
-    return (1.75 * len(group.lines) + 3.2) * size
+    return (LINE_STEP * len(group.lines) + 2.9) * size
 
 
 def _wide(column: Column, size: float) -> tuple[int, int]:
@@ -91,9 +115,23 @@ def _wide(column: Column, size: float) -> tuple[int, int]:
     return max(keys for keys, _ in widths), max(words for _, words in widths)
 
 
+def _fitted(everything: Sequence[Group], free: pygame.Rect, unit: float) -> tuple[float, list[Column]]:
+    """Return the largest letters at which everything fits, px, and the columns; at the smallest they may be longer."""
+    for size in SIZES:
+        columns = _columns(everything, free, size * unit)
+        if columns is not None:
+            return size * unit, columns
+    smallest = SIZES[-1] * unit
+    for times in (1.5, 2.0, 3.0, 5.0):
+        columns = _columns(everything, pygame.Rect(free.topleft, (free.width, round(times * free.height))), smallest)
+        if columns is not None:
+            return smallest, columns
+    return smallest, [list(everything)]
+
+
 def _columns(everything: Sequence[Group], free: pygame.Rect, size: float) -> list[Column] | None:
     """Return groups in columns that fit a rectangle below the title, as few as can be, or None."""
-    room = free.height - 4.2 * size
+    room = free.height - HEAD * size
     columns: list[Column] = [[]]
     filled = 0.0
     for group in everything:
@@ -109,18 +147,18 @@ def _columns(everything: Sequence[Group], free: pygame.Rect, size: float) -> lis
     return columns if total <= free.width else None
 
 
-def _draw_columns(surface: pygame.Surface, columns: list[Column], free: pygame.Rect, size: float) -> None:
+def _draw_columns(surface: pygame.Surface, columns: list[Column], free: pygame.Rect, size: float, hint: str) -> None:
     widths = [_wide(column, size) for column in columns]
     gap = 2.4 * size
     total = sum(sum(width) + 1.2 * size for width in widths) + gap * (len(columns) - 1)
     tallest = max((sum(_height(group, size) for group in column) for column in columns), default=0.0)
     left = max(free.centerx - total / 2, free.left)
-    top = max(free.centery - (tallest + 4.2 * size) / 2, free.top)
+    top = max(free.centery - (tallest + HEAD * size) / 2, free.top)
     rect = write(surface, "Keys", (left, top), 1.7 * size, INK, bold=True)
-    hint = shortened("any key closes this", size, free.right - rect.right - size)
+    hint = shortened(hint, size, free.right - rect.right - size)
     write(surface, hint, (rect.right + size, rect.bottom - 0.25 * size), size, FAINT, "bottomleft")
     for column, (keys, words) in zip(columns, widths, strict=True):
-        y = top + 4.2 * size
+        y = top + HEAD * size
         for group in column:
             _draw_group(surface, group, (left, y), keys, keys + words + 1.2 * size, size)
             y += _height(group, size)
@@ -135,11 +173,12 @@ def _draw_group(
     write(surface, group.title, at, size, colour, bold=True)
     line_y = round(y + 1.5 * size)
     pygame.draw.line(surface, LINE, (left, line_y), (left + width, line_y), max(round(size / 13), 1))
-    y += 2.6 * size
+    y += 2.45 * size
     for label, about in group.lines:
         cap = pygame.Rect(0, 0, measure(label, 0.92 * size, mono=True)[0] + round(0.8 * size), round(1.5 * size))
         cap.midleft = round(left), round(y)
         plate(surface, cap, 0.3 * size, PANEL_RAISED, 255, LINE)
         write(surface, label, cap.center, 0.92 * size, INK, "center", mono=True)
-        write(surface, about, (left + keys + 1.2 * size, y), size, INK, "midleft")
-        y += 1.75 * size
+        shade = FAINT if about.startswith("(") else INK  # the scene has the key
+        write(surface, about, (left + keys + 1.2 * size, y), size, shade, "midleft")
+        y += LINE_STEP * size

@@ -8,6 +8,7 @@ import pygame
 from sandbox.play.drawing.palette import FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.figures import clock
+from sandbox.play.icons import draw_disc
 from sandbox.play.plates import plate
 
 HEIGHT = 34
@@ -87,8 +88,8 @@ class Timeline:
         for x in {self._place(time, track) for time in keyframes if start <= time <= end}:
             pygame.draw.line(surface, ORANGE, (x, bar.bottom + 1), (x, bar.bottom + tick), max(round(unit), 1))
         radius = max(min(round((8 if self.held else 6.5) * unit), area.height // 2), 2)
-        pygame.draw.circle(surface, SKY, (at, area.centery), radius)
-        pygame.draw.circle(surface, INK, (at, area.centery), max(radius - round(2.5 * unit), 1))
+        draw_disc(surface, (at, area.centery), radius, SKY)
+        draw_disc(surface, (at, area.centery), max(radius - 2.4 * unit, 1), INK)
         self._draw_hover(surface, area, track, size)
 
     def _draw_hover(self, surface: pygame.Surface, area: pygame.Rect, track: pygame.Rect, size: float) -> None:

@@ -108,7 +108,7 @@ def _sprite(key: int, style: Style) -> pygame.Surface:
     blue, green, red = key >> 4 & 255, key >> 12 & 255, key >> 20 & 255
     radius = (key >> 28) / FINEST
     half = math.ceil(radius) + 1
-    along = np.arange(2 * half + 1) + 0.5
+    along = np.arange(2 * half + 1, dtype=np.float64) + 0.5
     # Coverage that falls off linearly over a pixel adds 1/12 px² to a disc's squared radius; tiny ones would show it.
     true = math.sqrt(max(radius**2 - 1.0 / 12.0, 0.04)) if style.antialias else radius
     distance = disc_distance(half + across / OFFSETS, half + down / OFFSETS, true)
@@ -118,7 +118,8 @@ def _sprite(key: int, style: Style) -> pygame.Surface:
 def _look(radius: float, colour: Colour, style: Style) -> Look:
     if style.hollow:
         return Look(None, colour, style.line, antialias=style.antialias)
-    return Look(colour, dark(colour), min(style.line, 0.16 * radius), antialias=style.antialias)
+    rim = min(0.16 * radius, style.line * min(1.0 + radius / 80.0, 2.5))
+    return Look(colour, dark(colour), rim, antialias=style.antialias)
 
 
 def _paint(

@@ -1,4 +1,4 @@
-"""Fixtures: planes, walls, posts and the world's bounds. They change with the camera alone, and are drawn once for it."""
+"""Fixtures: planes, walls, posts and the world's bounds, which change with the camera alone."""
 
 import math
 from itertools import pairwise
@@ -27,7 +27,9 @@ MOST_ROUND = 300
 """Segments of thick walls in sight that get round, shaded ends; where there are more, all are plain lines."""
 
 
-def draw_fixtures(surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True) -> None:
+def draw_fixtures(
+    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
+) -> None:
     """Draw what is fixed in a scene, as far as it is in sight."""
     for plane in scene.planes:
         _plane(surface, camera, plane, unit, antialias)
@@ -37,7 +39,9 @@ def draw_fixtures(surface: pygame.Surface, camera: Camera, scene: Scene, unit: f
         _post(surface, camera, post, unit, antialias)
 
 
-def draw_bounds(surface: pygame.Surface, camera: Camera, bounds: Box | None, unit: float = 1.0, antialias: bool = True) -> None:
+def draw_bounds(
+    surface: pygame.Surface, camera: Camera, bounds: Box | None, unit: float = 1.0, antialias: bool = True
+) -> None:
     """Draw the box outside which bodies are retired, dashed."""
     if bounds is not None:
         dashes(surface, outline(camera, bounds), FAINT, 8.0 * unit, antialias)
@@ -87,7 +91,10 @@ def _hatch(
     antialias: bool,
 ) -> None:
     """Draw short slanted lines behind a plane's edge; they move with the plane's point."""
-    ends = (foot[0] - along[0] * reach, foot[1] - along[1] * reach), (foot[0] + along[0] * reach, foot[1] + along[1] * reach)
+    ends = (
+        (foot[0] - along[0] * reach, foot[1] - along[1] * reach),
+        (foot[0] + along[0] * reach, foot[1] + along[1] * reach),
+    )
     part = clipped(*ends, surface.get_clip(), 20.0 * unit)
     if part is None:
         return

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Ball, Surfaced
+from sandbox.scene.model import Ball, Emitter, Surfaced
 
 Colour = tuple[int, int, int]
 """sRGB, 0 to 255 each."""
@@ -45,8 +45,18 @@ WARNING: Colour = (255, 92, 80)
 
 FEW = 8
 """A generator of no more balls gives each a colour of its own."""
-TINTS = (0.0, 0.4, 0.1, 0.5, 0.2, 0.3)
-"""How far the balls of a larger generator lean from its accent to the next: lively, but of one family."""
+COMPANIONS: dict[Colour, Colour] = {
+    SKY: BLUE,
+    ORANGE: VERMILION,
+    GREEN: BLUE,
+    YELLOW: ORANGE,
+    PURPLE: BLUE,
+    VERMILION: PURPLE,
+    BLUE: SKY,
+}
+TINTS = (0.0, 0.45, -0.3, 0.2, -0.15, 0.65)
+"""How far the balls of a larger generator lean from its accent to its companion, or if negative to white: lively, but
+of one family."""
 
 
 def hex_colour(text: str) -> Colour:
@@ -87,6 +97,11 @@ def colour_of(bodies: Bodies) -> ColourArray:
         elif end - start <= FEW:
             colours[start:end] = [accent(k + n) for n in range(end - start)]
         else:
-            tints = [mixed(accent(k), accent(k + 1), share) for share in TINTS]
-            colours[start:end] = np.asarray(tints, np.uint8)[np.arange(end - start) % len(tints)]
+            tints = np.asarray(_family(accent(k + isinstance(element, Emitter))), np.uint8)  # sparks begin with orange
+            colours[start:end] = tints[np.arange(end - start) % len(tints)]
+
+
+def _family(colour: Colour) -> list[Colour]:
+    """Return the tints of a larger generator."""
+    return [mixed(colour, COMPANIONS[colour] if share > 0 else (255, 255, 255), abs(share)) for share in TINTS]
     return colours

@@ -11,7 +11,7 @@ from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
 from sandbox.play.drawing.grid import draw_grid, draw_scale
 from sandbox.play.drawing.overlays import Overlays
 from sandbox.play.drawing.palette import BACKGROUND, CLEAR, TOUCHING, ColourArray, colour_of
-from sandbox.play.drawing.points import Packed, Points, packed
+from sandbox.play.drawing.points import LARGEST, Packed, Points, packed
 from sandbox.play.drawing.view import View
 from sandbox.play.sight import Sight
 from sandbox.scene.bodies import Bodies
@@ -22,6 +22,10 @@ from sandbox.trajectory import BoolArray
 
 POINT = 1.2
 """px, the radius below which a ball is a point"""
+
+
+CROWD = 20_000
+"""Bodies, of which many are points."""
 
 
 class Kept(NamedTuple):
@@ -36,6 +40,21 @@ class Kept(NamedTuple):
     format: tuple[object, ...]
 
 
+class Sizes(NamedTuple):
+    """Which bodies are points at a scale; N of them."""
+
+    bodies: Bodies
+    scale: float
+    unit: float
+    tiny: BoolArray
+    """(N,)"""
+    all_tiny: bool
+    large: IntArray
+    """numbers of those that are discs"""
+    side: int
+    """px, of a point: about the diameter of the median of them; 0 where there is none"""
+
+
 class Picture:
     """Draws pictures of scenes. One of them serves a window for its whole life; its caches are bounded."""
 
@@ -44,10 +63,11 @@ class Picture:
         self._points = Points()
         self._overlays = Overlays(self._discs, self._points)
         self._background: tuple[Kept, pygame.Surface] | None = None
-        self._bodies: Bodies | None = None
+        self._sizes: Sizes | None = None
+        self._known: tuple[Bodies, Scene] | None = None
         self._colours: ColourArray = np.empty((0, 3), np.uint8)
         self._turning: BoolArray = np.empty(0, np.bool_)
-        self._tones: tuple[tuple[object, ...], Packed] | None = None
+        self._tones: tuple[ColourArray, tuple[object, ...], Packed] | None = None
 
     def draw(
         self,
@@ -71,18 +91,14 @@ class Picture:
         """
         self._blit_background(surface, camera, sight, antialias, unit, foot)
         self._know(sight)
-        frame = sight.frame
-        count = min(len(frame.position), len(sight.bodies))
-        position, radius = frame.position[:count], sight.bodies.radius[:count]
-        with np.errstate(invalid="ignore", over="ignore"):  # what is far out of sight may overflow, or be nan
-            tiny = radius * camera.scale < POINT * max(unit, 1.0)
-        colours = self._colours if sight.overlapping is None else _by_contact(sight.overlapping, count)
-        if "shapes" in sight.overlays and tiny.any():
-            self._draw_points(surface, camera, sight, tiny, colours, unit)
+        sizes = self._sized(sight.bodies, camera.scale, unit)
+        colours = self._colours
+        if sight.overlapping is not None:
+            colours = _by_contact(sight.overlapping, len(sight.bodies))
+        if "shapes" in sight.overlays and sizes.side:
+            self._draw_points(surface, camera, sight, sizes, colours)
 
-        with np.errstate(invalid="ignore", over="ignore"):
-            seen = camera.in_sight(position, radius) & frame.present[:count]
-        shown = np.flatnonzero(seen)
+        shown = _in_sight(camera, sight, None if self._overlays.need_bodies(sight) else sizes.large)
         view = View(
             surface=surface,
             camera=camera,
@@ -90,13 +106,13 @@ class Picture:
             unit=unit,
             antialias=antialias,
             shown=shown,
-            centre=camera.to_screen(position[shown]),
-            radius=radius[shown] * camera.scale,
+            centre=camera.to_screen(sight.frame.position[shown]),
+            radius=sight.bodies.radius[shown] * camera.scale,
             colours=colours[shown],
         )
         self._overlays.below(view)
         if "shapes" in sight.overlays:
-            self._draw_discs(view, np.flatnonzero(~tiny[shown]) if tiny.any() else None)
+            self._draw_discs(view, np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None)
         self._overlays.above(view)
 
     def _draw_discs(self, view: View, which: IntArray | None) -> None:
@@ -112,36 +128,39 @@ class Picture:
             spokes(view.surface, centre, radius, view.sight.frame.angle[shown], colours, view.antialias)
 
     def _draw_points(
-        self,
-        surface: pygame.Surface,
-        camera: Camera,
-        sight: Sight,
-        tiny: BoolArray,
-        colours: ColourArray,
-        unit: float,
+        self, surface: pygame.Surface, camera: Camera, sight: Sight, sizes: "Sizes", colours: ColourArray
     ) -> None:
-        """Draw the bodies that are too small for discs, as points about as large as the median of them."""
-        frame, count = sight.frame, len(tiny)
-        form = (id(colours), surface.get_masks(), surface.get_bytesize())
-        if self._tones is None or self._tones[0] != form or sight.overlapping is not None:
-            self._tones = form, packed(colours, surface)
-        tones, position = self._tones[1], frame.position[:count]
-        present = frame.present[:count]
-        who = present if tiny.all() else present & tiny
-        diameter = 2.0 * float(np.median(sight.bodies.radius[:count][tiny])) * camera.scale
-        side = int(min(max(round(diameter), round(unit), 1), 3))
-        self._points.draw(surface, camera, position, tones, None if who.all() else who, side)
+        """Draw the bodies that are too small for discs."""
+        form = (surface.get_masks(), surface.get_bytesize())
+        if self._tones is None or self._tones[0] is not colours or self._tones[1] != form:
+            self._tones = colours, form, packed(colours, surface)
+        frame = sight.frame
+        count = min(len(frame.position), len(colours))
+        who = None if sizes.all_tiny and frame.present.all() else frame.present[:count] & sizes.tiny[:count]
+        self._points.draw(surface, camera, frame.position[:count], self._tones[2], who, sizes.side)
+
+    def _sized(self, bodies: Bodies, scale: float, unit: float) -> "Sizes":
+        """Return who is drawn how at a scale; it is worked out when that changes."""
+        known = self._sizes
+        if known is None or known.bodies is not bodies or known.scale != scale or known.unit != unit:
+            tiny = bodies.radius * scale < POINT * max(unit, 1.0)
+            side = 0
+            if tiny.any():
+                diameter = 2.0 * float(np.median(bodies.radius[tiny])) * scale
+                # Of a crowd one sees the gaps rather than the points: they are drawn no larger than they are.
+                side = int(diameter) if len(tiny) > CROWD else round(diameter)
+                side = min(max(side, round(unit), 1), LARGEST)
+            self._sizes = known = Sizes(bodies, scale, unit, tiny, bool(tiny.all()), np.flatnonzero(~tiny), side)
+        return known
 
     def _know(self, sight: Sight) -> None:
         """Work out what holds for bodies as long as they stay the same: their colours, and who can turn."""
-        if sight.bodies is self._bodies:
+        bodies, scene = sight.bodies, sight.scene
+        if self._known is not None and self._known[0] is bodies and self._known[1] is scene:
             return
-        bodies = sight.bodies
-        self._bodies, self._colours = bodies, colour_of(bodies)
-        turnable = meetings(sight.scene).turnable
-        self._turning = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
-        self._turning[: len(turnable)] |= turnable[: len(bodies)]
-        self._turning[len(turnable) :] = True  # spawned: it may meet anything
+        self._known, self._colours = (bodies, scene), colour_of(bodies)
+        turned = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
+        self._turning = turned | meetings(scene, bodies).turnable
 
     def _blit_background(
         self, surface: pygame.Surface, camera: Camera, sight: Sight, antialias: bool, unit: float, foot: float
@@ -159,6 +178,21 @@ class Picture:
             draw_scale(drawn, camera, unit, foot)
             self._background = known = (wanted, drawn)
         surface.blit(known[1], (0, 0))
+
+
+def _in_sight(camera: Camera, sight: Sight, among: IntArray | None) -> IntArray:
+    """Return the numbers of the bodies that are present and at least partly in the picture."""
+    frame = sight.frame
+    count = min(len(frame.position), len(sight.bodies))
+    position, radius, present = frame.position[:count], sight.bodies.radius[:count], frame.present[:count]
+    if among is not None and len(among) < count:
+        among = among[among < count]
+        position, radius, present = position[among], radius[among], present[among]
+    else:
+        among = None
+    with np.errstate(invalid="ignore", over="ignore"):  # what is far out of sight may overflow, or be nan
+        seen = np.flatnonzero(camera.in_sight(position, radius) & present)
+    return seen if among is None else among[seen]
 
 
 def _by_contact(overlapping: BoolArray, count: int) -> ColourArray:

@@ -16,6 +16,9 @@ from sandbox.trajectory import BoolArray, FloatArray
 PIECE = 16384
 """Particles at a time: what is worked on, some 500 kB, stays in cache."""
 
+LARGEST = 3
+"""px, the side of the largest point"""
+
 Packed = npt.NDArray[np.uint32]
 Index = npt.NDArray[np.intp]
 Write = Callable[[Index, Packed], None]

@@ -109,7 +109,7 @@ def paint(surface: pygame.Surface, distance: Distance, look: Look, within: pygam
     column, row = np.nonzero(edge)
     if not len(column):
         return
-    step = np.arange(TILE) + 0.5
+    step = np.arange(TILE, dtype=np.float64) + 0.5
     pixels = shaded(distance((left[column, None] + step)[:, :, None], (top[row, None] + step)[:, None, :]), look)
     strip = surface_of(pixels.reshape(-1, TILE), encoded=False)
     clip = surface.get_clip()

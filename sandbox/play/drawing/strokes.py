@@ -59,7 +59,15 @@ def stroke(
     if width < 1.5 or length < 1e-9:
         pygame.draw.aaline(surface, colour, start, end)
         return
-    half = width / 2.0 - 0.5  # the antialiased outline adds half a pixel
+    half = width / 2.0 - 0.5  # an antialiased line adds half a pixel
+    if width < 3.0:  # a polygon's corners lie at whole pixels: one so narrow would look wavy
+        shift = -(by - ay) / length * half, (bx - ax) / length * half
+        for side in (-1.0, 0.0, 1.0):
+            moved = side * shift[0], side * shift[1]
+            pygame.draw.aaline(
+                surface, colour, (start[0] + moved[0], start[1] + moved[1]), (end[0] + moved[0], end[1] + moved[1])
+            )
+        return
     across = -(by - ay) / length * half, (bx - ax) / length * half
     fill(
         surface,

@@ -1,0 +1,218 @@
+"""`sandbox export`: a stored run as csv, parquet, gif, mp4 or png."""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from sandbox.cli.exporting import TABLES, Options, check_options, check_times
+from sandbox.cli.reading import fault_rows, gathering, print_json
+from sandbox.cli.stored import find_run, read_run
+from sandbox.measure.run import Progress
+from sandbox.recording import Recording
+from sandbox.scene.faults import Fault, SceneError
+from sandbox.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from sandbox.play.film import Film
+
+
+@click.command(name="export")
+@click.argument("run")
+@click.option("--to", "targets", multiple=True, metavar="FILE", help="where: .csv, .parquet, .gif, .mp4 or .png")
+@click.option("--contacts", is_flag=True, help="tables of the contacts instead of the states")
+@click.option("--fps", type=float, metavar="N", help="pictures a second of a film; by default 30")
+@click.option("--width", type=int, metavar="PX", help="of pictures, 16:9; by default 960")
+@click.option("--size", metavar="WxH", help="of pictures, px")
+@click.option("--speed", type=float, metavar="X", help="of a film; by default 1, real time")
+@click.option("--from", "start", type=float, metavar="SECONDS", help="leave out what was before")
+@click.option("--until", type=float, metavar="SECONDS", help="leave out what comes after")
+@click.option("--at", type=float, metavar="SECONDS", help="the moment of a png; by default the end")
+@click.option("--overlay", "overlays", multiple=True, metavar="NAME", help="draw this too, such as velocities")
+@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
+@click.option("--quiet", is_flag=True, help="print nothing, no progress")
+def command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
+    """Write a stored run as csv, parquet, gif, mp4 or png. RUN is DIR/<id>, a folder of one run, or a recording."""
+    options = Options(**given)
+    faults: list[Fault] = []
+    with gathering(faults):
+        check_options(options)
+    source: Trajectory | Recording | None = None
+    with gathering(faults):
+        source = read_run(find_run(run), run)
+    if source is not None:
+        end = source.duration if isinstance(source, Recording) else float(source.time[-1]) if len(source.time) else None
+        with gathering(faults):
+            check_times(options, end)
+    if source is None or faults:
+        return _refuse(run, faults, as_json)
+
+    files: list[dict[str, Any]] = []
+    status = 0
+    try:
+        with gathering(faults), _progress(quiet or as_json) as told:
+            status, trajectory = _trajectory(run, source, told)
+            if len(trajectory.time):
+                _export(options, trajectory, files, told)
+            else:
+                click.echo(f"{run}: {trajectory.status}: {trajectory.reason}; there is nothing to export", err=True)
+                status = 1
+    except KeyboardInterrupt:
+        status = 130
+        click.echo(f"interrupted: {len(files)} of {len(options.targets)} files are finished and kept", err=True)
+    for fault in faults:
+        click.echo(str(fault), err=True)
+    if as_json:
+        print_json({"run": run, "files": files} | ({"faults": fault_rows(faults)} if faults else {}))
+    elif not quiet:
+        for file in files:
+            count = f"{file['rows']:,} rows" if "rows" in file else f"{file['frames']:,} frames"
+            click.echo(f"written: {file['path']} ({count.removesuffix('s') if count[:2] == '1 ' else count})")
+    return 2 if faults else status
+
+
+def _refuse(run: str, faults: list[Fault], as_json: bool) -> int:
+    for fault in faults:
+        click.echo(str(fault), err=True)
+    if as_json:
+        print_json({"run": run, "files": [], "faults": fault_rows(faults)})
+    return 2
+
+
+def _trajectory(run: str, source: Trajectory | Recording, told: "Told") -> tuple[int, Trajectory]:
+    """Return a stored run, or run a session; and status 1 where that did not go well.
+
+    Raises:
+        SceneError: the session cannot be run here.
+    """
+    if isinstance(source, Trajectory):
+        return 0, source
+    from sandbox.engines.registry import UnknownEngineError
+    from sandbox.measure.recorder import TooLargeError
+    from sandbox.measure.replay import rerun
+
+    try:
+        trajectory = rerun(source, audit=False, progress=told(f"running {run}"))
+    except (UnknownEngineError, TooLargeError) as error:
+        raise SceneError([Fault(run, None, "", str(error))]) from None
+    if trajectory.status == "ok" or not len(trajectory.time):
+        return 0, trajectory
+    click.echo(f"{run}: {trajectory.status}: {trajectory.reason}", err=True)
+    return 1, trajectory
+
+
+def _export(options: Options, trajectory: Trajectory, files: list[dict[str, Any]], told: "Told") -> None:
+    """Write every file, and enter each in the list once it is complete.
+
+    Raises:
+        SceneError: one cannot be written, or the run is damaged.
+    """
+    film: Film | None = None
+    for target in options.targets:
+        path = Path(target)
+        kind = path.suffix.lower()
+        if kind in TABLES:
+            rows = _write_table(options, trajectory, path)
+            files.append({"path": target, "format": kind[1:], "rows": rows})
+            continue
+        film = film or _film(trajectory)
+        frames = _shoot(options, film, path, told(f"drawing {target}"))
+        files.append({"path": target, "format": kind[1:], "frames": frames})
+
+
+def _write_table(options: Options, trajectory: Trajectory, path: Path) -> int:
+    from sandbox.report.tables import write_contacts, write_states
+    from sandbox.scene.file import from_document
+
+    part = _between(trajectory, options)
+    try:
+        if not options.contacts:
+            return write_states(part, path)
+        fixed = from_document(dict(trajectory.info["scene"]), "<run>").fixed_names
+        lowest, highest = -len(fixed), len(trajectory.names)
+        if len(part.contact_pair) and not (lowest <= part.contact_pair.min() <= part.contact_pair.max() < highest):
+            raise SceneError([Fault("<run>", None, "contact_pair", "names a thing that the scene does not have")])
+        return write_contacts(part, fixed, path)
+    except OSError as error:
+        raise SceneError([Fault("--to", None, "", f"{path}: {error.strerror or error}")]) from None
+
+
+def _between(run: Trajectory, options: Options) -> Trajectory:
+    """Return the frames and contacts of the time asked for, without copying them."""
+    if options.start is None and options.until is None:
+        return run
+    limits = options.start or 0.0, np.inf if options.until is None else options.until
+
+    def part(times: np.ndarray[Any, np.dtype[np.float64]], *names: str) -> dict[str, Any]:
+        begin, end = np.searchsorted(times, limits[0], "left"), np.searchsorted(times, limits[1], "right")
+        return {name: getattr(run, name)[begin:end] for name in names}
+
+    states = part(run.time, "time", "position", "velocity", "angle", "angular_velocity")
+    touches = part(
+        run.contact_time, "contact_time", "contact_pair", "contact_point", "contact_normal", "contact_impulse"
+    )
+    return replace(run, **states, **touches)
+
+
+def _film(trajectory: Trajectory) -> "Film":
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # standard output is for what was asked
+    from sandbox.play.film import Film
+
+    return Film(trajectory)
+
+
+def _shoot(options: Options, film: "Film", path: Path, progress: Progress | None) -> int:
+    from sandbox.play.filming import Shot, shoot
+    from sandbox.play.outfile import CaptureError
+
+    still = path.suffix.lower() == ".png"
+    last = film.duration if options.until is None else min(options.until, film.duration)
+    if still and options.at is not None:
+        last = min(options.at, film.duration)
+    shot = Shot(
+        start=min(options.start or 0.0, last),
+        end=last,
+        size=options.picture_size,
+        fps=options.fps or 30.0,
+        speed=options.speed or 1.0,
+        overlays=frozenset({"shapes", *options.overlays}),
+    )
+    try:
+        return shoot(film, shot, path, progress)
+    except CaptureError as error:
+        raise SceneError([Fault("--to", None, "", f"{path}: {error}")]) from None
+
+
+class Told:
+    """Who is told how far each part of the work is."""
+
+    def __init__(self, bars: Any = None) -> None:
+        self._bars = bars
+
+    def __call__(self, what: str) -> Progress | None:
+        """Begin a part of the work; return whom to tell its progress."""
+        if self._bars is None:
+            return None
+        bar = self._bars.add_task(what, total=1.0)
+        return lambda share: self._bars.update(bar, completed=share)
+
+
+@contextmanager
+def _progress(silent: bool) -> Iterator[Told]:
+    """Yield who is told: bars on a terminal, nobody elsewhere."""
+    if silent or not sys.stderr.isatty():
+        yield Told()
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
+
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn()
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+        yield Told(bars)

@@ -1,0 +1,181 @@
+"""Companions: runs beside the session, from the same state by the same actions: the ghost and the twin.
+
+The ghost is the scene as another engine has it, the twin the scene with one ball moved by 1e-12 m. Each begins when
+it is asked for, and again whenever the session goes back.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from sandbox.action import Action, ActionError, Switch
+from sandbox.engines.checkpoint import Checkpoint
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal
+from sandbox.engines.registry import ENGINES
+from sandbox.engines.relay import Relay
+from sandbox.measure.compare.comparing import usual_tolerance
+from sandbox.measure.compare.horizon import NUDGE, ULPS
+from sandbox.scene.meetings import meetings
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import FloatArray, Frame
+
+PATIENCE = 0.3
+"""s that one step of a companion may take to compute."""
+
+
+class Companion:
+    """A run beside a session. Where it fails it ends, and says why; the session goes on."""
+
+    def __init__(self, point: Checkpoint) -> None:
+        """Start.
+
+        Raises:
+            Refusal: its engine cannot begin from there.
+            ActionError: it cannot take over a steady force.
+        """
+        self.relay = Relay.resumed(point)
+        self.relay.patience = PATIENCE
+        self.frame: Frame | None = self.relay.frame()
+        self.ended: str | None = None
+
+    @property
+    def engine(self) -> str:
+        """Its engine's name."""
+        return self.relay.engine
+
+    def act(self, action: Action) -> None:
+        """Do what the session does; it keeps its own engine."""
+        if self.ended is None:
+            try:
+                self.relay.apply(action)
+                self.frame = self.relay.frame()
+            except ActionError as error:
+                self._end(str(error))
+
+    def advance(self, steps: int) -> None:
+        """Make steps."""
+        if self.ended is not None:
+            return
+        try:
+            for _ in range(steps):
+                self.relay.step()
+            self.frame = self.relay.frame()
+        except (Divergence, Exhaustion) as error:
+            self._end(str(error))
+
+    def _end(self, why: str) -> None:
+        self.ended, self.frame = why, None
+
+    def close(self) -> None:
+        """Release what its engine holds."""
+        self.relay.close()
+
+
+def ghost_of(point: Checkpoint) -> tuple[Companion, str]:
+    """Return the ghost of a session, and what is to be said of it: `exact` where it can, else another engine.
+
+    Raises:
+        ActionError: no other engine can go on from here.
+    """
+    why: list[str] = []
+    for name in ("exact", "reference", "pymunk", *ENGINES):
+        if name == point.engine or name not in ENGINES:
+            continue
+        try:
+            return Companion(replace(point, engine=name, wanted=common(point.wanted))), "; ".join(why)
+        except (Refusal, ActionError) as refusal:
+            why.append(str(refusal))
+    raise ActionError("; ".join(why) or "there is no other engine")
+
+
+def common(settings: Settings) -> Settings:
+    """Return settings with only what every engine knows."""
+    return Settings(
+        dt=settings.dt,
+        substeps=settings.substeps,
+        iterations=settings.iterations,
+        record_every=settings.record_every,
+    )
+
+
+class Trust:
+    """Whether what is seen can still be trusted: a twin, moved by 1e-12 m at first, is still at the same places.
+
+    Past that horizon the scene is chaotic: what is seen is one of many things that might as well have happened.
+    """
+
+    def __init__(self, point: Checkpoint) -> None:
+        """Start the twin.
+
+        Raises:
+            Refusal: the engine cannot begin from there.
+            ActionError: it cannot take over a steady force.
+        """
+        self.tolerance = usual_tolerance(point.scene)
+        self.horizon: float | None = None
+        self.spread: float | None = None
+        nudged = _nudged(point)
+        self.able = nudged is not None
+        """whether anything can grow at all"""
+        self._twin = Companion(nudged) if nudged is not None else None
+
+    def act(self, action: Action) -> None:
+        """Do what the session does."""
+        if self._twin is not None:
+            self._twin.act(action)
+
+    def advance(self, steps: int, frame: Frame) -> None:
+        """Make as many steps as the session, and look how far the two have come apart."""
+        if self._twin is None or self.horizon is not None:
+            return
+        self._twin.advance(steps)
+        if self._twin.frame is None:
+            self._twin.close()
+            self._twin = None
+            return
+        self.spread = apart(frame, self._twin.frame)
+        if self.spread is None or not self.spread <= self.tolerance:
+            self.horizon = frame.time
+
+    @property
+    def state(self) -> str:
+        """`trusted`, `lost`, or `unknown`."""
+        if self.horizon is not None:
+            return "lost"
+        return "trusted" if self._twin is not None or not self.able else "unknown"
+
+    def close(self) -> None:
+        """Release what its engine holds."""
+        if self._twin is not None:
+            self._twin.close()
+
+
+def apart(a: Frame, b: Frame) -> float | None:
+    """Return the largest distance between a body in one frame and in the other, m; None where none is in both."""
+    known = min(len(a.position), len(b.position))
+    both = a.present[:known] & b.present[:known]
+    with np.errstate(all="ignore"):
+        distance = np.hypot(*(a.position[:known][both] - b.position[:known][both]).T)
+    return float(distance.max()) if len(distance) else None
+
+
+def _nudged(point: Checkpoint) -> Checkpoint | None:
+    """Return the moment with the first ball that moves and can meet something a little elsewhere; None without one."""
+    free = meetings(point.scene, point.bodies).free
+    able = np.flatnonzero(~point.bodies.fixed & ~free & point.frame.present)
+    if not len(able):
+        return None
+    position: FloatArray = point.frame.position.copy()
+    place = position[able[0]]
+    position[able[0]] = place + np.maximum(NUDGE * np.sqrt(0.5), ULPS * np.spacing(np.abs(place)))
+    frame = point.frame
+    moved = Frame(frame.time, position, frame.velocity, frame.angle, frame.angular_velocity, frame.present)
+    return replace(point, frame=moved)
+
+
+def follows(action: Action) -> Action | None:
+    """Return a session's action as the ghost does it: the session's engine is not its own."""
+    if not isinstance(action, Switch):
+        return action
+    shared = {key: value for key, value in action.settings.items() if key in ("dt", "substeps", "iterations")}
+    return Switch(time=action.time, settings=shared) if shared else None

@@ -1,0 +1,61 @@
+"""Touches: where contacts are now. A contact's row tells where it began, and its bodies have moved on since."""
+
+import numpy as np
+
+from sandbox.play.drawing.view import View
+from sandbox.scene.model import Post, Wall
+from sandbox.trajectory import FloatArray
+
+MOST_CURVED = 400
+"""Contacts with walls and posts whose normals are worked out anew."""
+LONGEST = 256
+"""Points of a wall for which that is done."""
+
+
+def touches(view: View) -> tuple[FloatArray, FloatArray]:
+    """Return place (C, 2) m and normal (C, 2) of all contacts, from where their bodies are in the frame.
+
+    Where a contact's bodies are unknown, or nowhere, its row is taken at its word.
+    """
+    contacts, position, bodies = view.sight.contacts, view.sight.frame.position, view.sight.bodies
+    count = min(len(position), len(bodies))
+    first, second = contacts.pair[:, 0], contacts.pair[:, 1]
+    known = (first >= 0) & (first < count)
+    a = np.where(known, first, 0)
+    if not count:
+        return contacts.point, contacts.normal
+    normal = contacts.normal.copy()
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        balls = known & (second >= 0) & (second < count)
+        way = position[second[balls]] - position[a[balls]]
+        normal[balls] = way / np.hypot(way[:, 0], way[:, 1])[:, None]
+        _round(view, normal, np.flatnonzero(known & (second < 0))[:MOST_CURVED])
+        normal = np.where(np.isfinite(normal).all(1)[:, None], normal, contacts.normal)
+        place = position[a] + normal * bodies.radius[a][:, None]
+    sound = known & np.isfinite(place).all(1)
+    return np.where(sound[:, None], place, contacts.point), normal
+
+
+def _round(view: View, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]") -> None:
+    """Turn the normals of contacts with walls and posts, which change as a ball rolls around them."""
+    fixed, position = view.sight.scene.fixed, view.sight.frame.position
+    for row, (number, thing) in zip(rows.tolist(), view.sight.contacts.pair[rows].tolist(), strict=True):
+        if -1 - thing >= len(fixed):
+            continue
+        solid, centre = fixed[-1 - thing], position[number]
+        if isinstance(solid, Post):
+            way = np.asarray(solid.position) - centre
+        elif isinstance(solid, Wall) and len(solid.points) <= LONGEST:
+            way = _nearest(solid, centre) - centre
+        else:
+            continue
+        normal[row] = way / np.hypot(*way)
+
+
+def _nearest(wall: Wall, centre: FloatArray) -> FloatArray:
+    """Return the point of a wall's middle line that is nearest to a place, m."""
+    ends = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
+    start, along = ends[:-1], np.diff(ends, axis=0)
+    share = np.clip(((centre - start) * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
+    nearest = start + share[:, None] * along
+    return np.asarray(nearest[np.argmin(np.hypot(*(nearest - centre).T))])

@@ -1,0 +1,96 @@
+"""Framing: the part of the world that a scene is about, for the camera to begin with."""
+
+import numpy as np
+
+from sandbox.play.camera import Box
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.trajectory import FloatArray
+
+LOOKS = 17
+"""Moments of free flight that are looked at."""
+OUTLIERS = 0.5
+"""Per cent of the places at each side that need not be seen, where there are many."""
+MANY = 1000
+LARGEST = 1e15
+"""m: what lies beyond does not count"""
+FAR = 20.0
+"""Fixed things, and where bodies fly, count up to so many times the size of what is there at the start."""
+
+
+def framing(scene: Scene) -> Box:
+    """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there."""
+    bodies = scene.bodies
+    things = [corners for corners in _things(scene) if (np.abs(corners) < LARGEST).all()]
+    start = _around(bodies.position, bodies.radius)
+    if start is None:
+        start = _union([(corners.min(axis=0), corners.max(axis=0)) for corners in things] or [(-ONE, ONE)])
+    flown = _union([start, *_flight(scene, bodies)])
+    met = [(corners.min(axis=0), corners.max(axis=0)) for corners in things]
+    met = [each for each in met if (each[0] <= flown[1]).all() and (each[1] >= flown[0]).all()]
+    low, high = _union([start, *met]) if met else flown
+    if not (high - low).max() > 0.0:
+        low, high = low - ONE, high + ONE
+    for plane in scene.planes:  # the nearest bit of its surface, if it is not far
+        normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
+        middle = (low + high) / 2.0
+        foot = middle - ((middle - np.asarray(plane.point)) @ normal) * normal
+        if np.abs(foot - middle).max() <= FAR * float((high - low).max()):
+            low, high = np.minimum(low, foot), np.maximum(high, foot)
+    return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+
+
+ONE = np.ones(2)
+Corners = tuple[FloatArray, FloatArray]
+"""Lower left and upper right, (2,) m each."""
+
+
+def _union(boxes: list[Corners]) -> Corners:
+    return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+
+
+def _around(position: FloatArray, radius: FloatArray) -> Corners | None:
+    """Return the box around circles at (M, 2) m; of many, without the outermost."""
+    counts = (np.abs(position) < LARGEST).all(axis=1)
+    position, radius = position[counts], radius[counts]
+    if not len(position):
+        return None
+    if len(position) > MANY:
+        size = float(np.median(radius))
+        low, high = np.percentile(position, (OUTLIERS, 100.0 - OUTLIERS), axis=0)
+        return low - size, high + size
+    return (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
+
+
+def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
+    """Return the box in which the bodies fly, as far as planes and bounds let them."""
+    world = scene.world
+    chosen = np.flatnonzero(~bodies.fixed)
+    chosen = chosen[:: max(1, len(chosen) // 5000)]  # so many are enough to tell
+    time = np.linspace(0.0, world.duration, LOOKS)[:, None, None]
+    start, velocity = bodies.position[chosen], bodies.velocity[chosen]
+    with np.errstate(all="ignore"):
+        place = start + velocity * time + 0.5 * np.asarray(world.gravity) * time**2
+    radius = np.broadcast_to(bodies.radius[chosen], place.shape[:2])
+    with np.errstate(all="ignore"):
+        counts = (np.abs(place) < LARGEST).all(axis=2)
+        for plane in scene.planes:
+            normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
+            counts &= (place - np.asarray(plane.point)) @ normal >= -radius
+        if world.bounds is not None:
+            counts &= ((place >= world.bounds[0]) & (place <= world.bounds[1])).all(axis=2)
+    # Once stopped, it does not come out on the far side.
+    counts = np.logical_and.accumulate(counts, axis=0)
+    found = _around(place[counts], radius[counts])
+    return [] if found is None else [found]
+
+
+def _things(scene: Scene) -> list[FloatArray]:
+    """Return two or more corners (P, 2), m, of each wall and post."""
+    found = []
+    for wall in scene.walls:
+        points, half = np.asarray(wall.points), wall.thickness / 2.0
+        found.append(np.concatenate((points - half, points + half)))
+    sides = np.asarray([[-1.0, -1.0], [1.0, 1.0]])
+    found += [np.asarray(post.position) + post.radius * sides for post in scene.posts]
+    return found

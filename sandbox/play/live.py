@@ -1,0 +1,266 @@
+"""Live: a session with all that runs beside it, driven by real time."""
+
+from collections.abc import Iterator
+from time import perf_counter
+
+from sandbox.action import Action, ActionError, Launch
+from sandbox.engines.compiling import COMPILING
+from sandbox.measure.energy import energy_of
+from sandbox.play.between import between
+from sandbox.play.company import Company
+from sandbox.play.film import Film
+from sandbox.play.pace import Pace
+from sandbox.play.picking import overlapping
+from sandbox.play.session import Session, WrongWayError
+from sandbox.play.sight import Sight
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Contacts, Frame
+
+BUDGET = 0.012
+"""s of each picture that steps may take; where they need more, the scene is slower than asked"""
+SLICE = 0.012
+"""s of each picture that the way to another step may take"""
+
+
+class Live:
+    """A session that is being watched."""
+
+    def __init__(self, session: Session, ghost: Film | None = None) -> None:
+        """Start watching.
+
+        Args:
+            session: what is played.
+            ghost: a stored run to be seen beside it, instead of another engine.
+        """
+        self.session = session
+        self.pace = Pace()
+        self.company = Company(session, ghost)
+        self._seeking: Iterator[float] | None = None
+        self._share_done = 0.0
+        self._contacts, self._since = session.contacts(), session.settings.dt
+        self._seed = session.scene.world.seed
+        self._told_end = False
+        self._peek: tuple[int, Frame] | None = None
+
+    @property
+    def scene(self) -> Scene:
+        """What runs, with all that was set since."""
+        return self.session.scene
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies by number."""
+        return self.session.bodies
+
+    @property
+    def engine(self) -> str:
+        """The present engine's name."""
+        return self.session.engine
+
+    @property
+    def settings(self) -> Settings:
+        """The present settings, with every choice filled in."""
+        return self.session.settings
+
+    @property
+    def step_number(self) -> int:
+        """Steps made since the start; of the state that is shown."""
+        return self.session.step_number if self._peek is None else self._peek[0]
+
+    @property
+    def frame(self) -> Frame:
+        """The state that is shown, or that the picture is just short of."""
+        return self.session.frame if self._peek is None else self._peek[1]
+
+    @property
+    def busy(self) -> str | None:
+        """What it is doing instead of playing."""
+        return None if self._seeking is None else f"replaying {self._share_done:.0%}"
+
+    @property
+    def between_steps(self) -> float:
+        """Where the picture lies between the last two states."""
+        return self.pace.between(self.session.settings.dt)
+
+    def go_on(self, elapsed: float, paused: bool) -> None:
+        """Let real time pass, s: make the steps it is enough for, or some of the way to where we are going."""
+        if self._seeking is not None:
+            self._go_there()
+            return
+        if paused or self.session.ended is not None:
+            self.pace.rest()
+            return
+        dt = self.session.settings.dt
+        asked = self.pace.due(elapsed, dt)
+        compiled = COMPILING.seconds
+        made = self._advance(asked, perf_counter() + BUDGET) if asked else 0
+        if COMPILING.seconds > compiled:  # that time was not the scene's
+            self.pace.rest()
+        else:
+            self.pace.spent(elapsed, made, asked, dt)
+
+    def step(self) -> None:
+        """Make one step."""
+        self.pace.rest()
+        self._advance(1, None)
+
+    def _advance(self, steps: int, until: float | None) -> int:
+        before = self.session.time
+        try:
+            made = self.session.advance(steps, until)
+        except WrongWayError:
+            self.session.history.distrust()
+            self.seek(self.session.step_number)
+            return 0
+        if made:
+            self._contacts, self._since = self.session.contacts(), self.session.time - before
+            self.company.advance(made)
+        if self.session.ended is not None and not self._told_end:
+            self._told_end = True
+            self.company.notes.append(("error", self.session.ended))
+        return made
+
+    def act(self, action: Action) -> None:
+        """Do something now.
+
+        Raises:
+            ActionError: it cannot be done. Nothing has changed then.
+        """
+        if self._seeking is not None:
+            raise ActionError("wait until the way back is done")
+        done = self.session.act(action)
+        self.company.act(done)
+        self._contacts = self.session.contacts()
+
+    def relaunch(self, generator: str) -> None:
+        """Start the balls of a generator anew, each time with another seed.
+
+        Raises:
+            ActionError: it cannot be done.
+        """
+        self._seed = (self._seed + 1) % 2**63
+        self.act(Launch(time=0.0, generator=generator, seed=self._seed))
+        self.company.trails.clear()
+
+    def switch(self, engine: str) -> str | None:
+        """Go on with another engine; return what is to be said of it.
+
+        Raises:
+            ActionError: it cannot go on from here.
+        """
+        if self._seeking is not None:
+            raise ActionError("wait until the way back is done")
+        told = self.session.switch(engine)
+        self._begin()
+        return told
+
+    def seek(self, step: int) -> None:
+        """Set out for another step; it is reached in parts, one a picture."""
+        self.pace.rest()
+        self._share_done = 0.0
+        self._told_end = False
+        self._seeking = self.session.seek(step)
+        self._go_there()
+
+    def _begin(self) -> None:
+        """Begin what runs beside the session anew, from where it is."""
+        self._contacts, self._since = self.session.contacts(), self.session.settings.dt
+        self.company.begin()
+
+    def back(self) -> None:
+        """Set out for the step before."""
+        if self.session.step_number > 0 and self._seeking is None:
+            self.seek(self.session.step_number - 1)
+
+    def scrub(self, time: float) -> None:
+        """Look at the state seen nearest to a time, s; the session stays where it is until `settle`."""
+        self._peek = self.session.history.nearest(time)
+
+    def settle(self) -> None:
+        """Set out for the state that is being looked at."""
+        if self._peek is not None:
+            step, self._peek = self._peek[0], None
+            if step != self.session.step_number:
+                self.seek(step)
+
+    @property
+    def begin(self) -> float:
+        """The first time that can be gone to, s."""
+        return 0.0
+
+    @property
+    def end(self) -> float:
+        """The last time that was seen, s."""
+        return self.session.history.end
+
+    @property
+    def marks(self) -> tuple[float, ...]:
+        """Times of the checkpoints, s."""
+        return self.session.history.mark_times
+
+    def _go_there(self) -> None:
+        until = perf_counter() + SLICE
+        while self._seeking is not None and perf_counter() < until:
+            try:
+                self._share_done = next(self._seeking)
+            except StopIteration:
+                self._seeking = None
+        if self._seeking is None:
+            self._begin()
+
+    @property
+    def contacts(self) -> Contacts:
+        """Those of the last steps."""
+        return self._contacts
+
+    @property
+    def missed(self) -> int | None:
+        """Contacts missed so far; None where none can be."""
+        return self.company.missed
+
+    @property
+    def notes(self) -> list[tuple[str, str]]:
+        """(level, text) of what happened; whoever tells it empties the list."""
+        return self.company.notes
+
+    def energy(self) -> tuple[float, float, float]:
+        """Return the kinetic, potential and total energy, J."""
+        return energy_of(self.frame, self.session.bodies, self.session.scene.world.gravity)
+
+    def sight(
+        self,
+        overlays: frozenset[str],
+        picked: int | None = None,
+        pull: tuple[tuple[float, float], tuple[float, float]] | None = None,
+    ) -> Sight:
+        """Return what is drawn now.
+
+        Args:
+            overlays: of `sight.OVERLAYS`.
+            picked: number of the picked body.
+            pull: where a body is held, and the hand, m.
+        """
+        session, present = self.session, self._peek is None
+        frame = between(session.previous, session.frame, self.between_steps) if present else self.frame
+        shows = session.scene.play.show == "overlap"
+        return Sight(
+            scene=session.scene,
+            bodies=session.bodies,
+            frame=frame,
+            overlays=overlays,
+            contacts=self._contacts if present else Contacts.none(),
+            seconds=self._since,
+            ghost=self.company.ghost_frame if present else None,
+            trails=self.company.trails.pieces() if "trails" in overlays and present else (),
+            overlapping=overlapping(session.scene, session.bodies, frame) if shows else None,
+            flashes=self.company.flashes,
+            picked=picked,
+            pull=pull,
+        )
+
+    def close(self) -> None:
+        """Release all engines."""
+        self.company.close()
+        self.session.close()

@@ -1,0 +1,214 @@
+"""Collision sounds: their pitch and shape, which contacts are heard, and silence where there is no device."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import pygame
+import pytest
+
+from sandbox.play import sound
+from sandbox.play.chime import HIGHEST, LOWEST, RATE, SECONDS, STEPS, chime, pitch_of
+from sandbox.play.sound import A_CALL, SILENT, Sounds, loudness, volume
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.file import loads
+from sandbox.trajectory import Contacts
+
+PITCHES = [float(LOWEST * (HIGHEST / LOWEST) ** (k / (STEPS - 1))) for k in range(STEPS)]
+
+
+def bodies(radii: list[float], fixed: bool = False) -> Bodies:
+    """Balls of 1 kg in a row; the last one may be fixed."""
+    text = "".join(
+        f"[[ball]]\nposition = [{10 * k}, 0]\nradius = {radius}\nfixed = {str(fixed and k == len(radii) - 1).lower()}\n"
+        for k, radius in enumerate(radii)
+    )
+    return loads(text).bodies
+
+
+def touching(*rows: tuple[float, tuple[int, int], float]) -> Contacts:
+    """Contacts by time, pair, and the impulse's size."""
+    count = len(rows)
+    impulse = np.zeros((count, 2))
+    impulse[:, 1] = [row[2] for row in rows]
+    return Contacts(
+        np.array([row[0] for row in rows], np.float64),
+        np.array([row[1] for row in rows], np.int64).reshape(-1, 2),
+        np.zeros((count, 2)),
+        np.tile([0.0, 1.0], (count, 1)),
+        impulse,
+    )
+
+
+@pytest.fixture
+def sounds() -> Iterator[Sounds]:
+    made = Sounds()
+    assert made.enable()
+    yield made
+    made.disable()
+    assert pygame.mixer.get_init() is None
+
+
+@pytest.mark.parametrize("pitch", PITCHES)
+def test_spectrum_peaks_at_the_pitch(pitch: float) -> None:
+    samples = chime(pitch)
+    spectrum = np.abs(np.fft.rfft(samples))
+    peak = float(spectrum.argmax()) * RATE / len(samples)
+    assert abs(peak - pitch) <= 1.0 / SECONDS  # Hz, one line of this spectrum
+
+
+@pytest.mark.parametrize("pitch", PITCHES[::9])
+def test_samples_use_the_scale_and_stay_within(pitch: float) -> None:
+    samples = chime(pitch)
+    assert samples.dtype == np.int16
+    assert len(samples) == int(SECONDS * RATE)
+    assert int(np.abs(samples.astype(int)).max()) == round(0.6 * 32767)
+    assert samples[0] == samples[-1] == 0  # no step that clicks
+
+
+@pytest.mark.parametrize("pitch", PITCHES)
+def test_envelope_decays(pitch: float) -> None:
+    parts = np.abs(chime(pitch).astype(float)).reshape(10, -1).max(axis=1)
+    audible = parts[parts > 30]  # of 32,767: below, rounding to integers is what is seen
+    assert (np.diff(audible) < 0).all()
+    assert parts[-1] < 0.01 * parts[0]  # 40 dB
+
+
+def test_larger_bodies_sound_lower_and_all_can_be_heard() -> None:
+    pitches = [pitch_of(radius) for radius in (1e-9, 0.01, 0.028575, 0.1, 0.5, 2.0, 1e9)]
+    assert pitches == sorted(pitches, reverse=True)
+    assert all(higher > lower for higher, lower in pairwise(pitches[1:6]))
+    assert (pitches[0], pitches[-1]) == (pytest.approx(HIGHEST), pytest.approx(LOWEST))
+    assert pitch_of(0.5) == pytest.approx(220.0, rel=0.06)  # half a whole tone, to which pitches are rounded
+    assert len({pitch_of(radius) for radius in np.geomspace(1e-9, 1e9, 4000)}) == STEPS
+
+
+def test_same_pitch_is_the_same_sound() -> None:
+    assert np.array_equal(chime(440.0), chime(440.0))
+
+
+def test_loudness_is_of_the_lighter_body_that_moves() -> None:
+    balls = bodies([0.5, 0.2, 0.1], fixed=True)
+    balls.mass[1] = 0.25
+    contacts = touching((0.0, (0, 1), 1.0), (0.0, (1, 2), 1.0), (0.0, (0, -1), 1.0), (0.0, (0, -3), 2.0))
+    strength, radius = loudness(contacts, balls)
+    assert radius.tolist() == [0.2, 0.2, 0.5, 0.5]
+    falls = [0.25 * (2 * 9.81 * 0.2) ** 0.5] * 2 + [(2 * 9.81 * 0.5) ** 0.5] * 2
+    assert strength == pytest.approx(np.array([1.0, 1.0, 1.0, 2.0]) / falls, rel=1e-14)  # a few roundings
+
+
+def test_body_that_falls_its_radius_is_heard_and_one_at_rest_is_not() -> None:
+    fall, rest = 1.0 * (2 * 9.81 * 0.5) ** 0.5, 1.0 * 9.81 / 60
+    strength, _ = loudness(touching((0.0, (0, -1), fall), (0.0, (0, -1), rest)), bodies([0.5]))
+    assert strength[0] == pytest.approx(1.0, rel=1e-15)
+    assert strength[1] < SILENT
+    assert volume(4.0) == volume(1e9) == 1.0
+    assert 0.0 < volume(0.2) < volume(1.0) < 1.0
+
+
+def test_impulse_that_is_no_number_is_silent() -> None:
+    strength, _ = loudness(touching((0.0, (0, -1), np.nan), (0.0, (0, -1), np.inf)), bodies([0.5]))
+    assert strength.tolist() == [0.0, 0.0]
+
+
+def test_contact_is_heard_once_as_long_as_it_lasts(sounds: Sounds) -> None:
+    balls = bodies([0.5, 0.1])
+    first = (0.1, (0, -1), 5.0)
+    assert sounds.hits(touching(first), balls) == 1
+    assert sounds.hits(touching(first), balls) == 0
+    assert sounds.hits(touching(first, (0.2, (1, -1), 5.0)), balls) == 1
+    assert sounds.hits(Contacts.none(), balls) == 0
+    assert sounds.hits(touching((0.4, (0, -1), 5.0)), balls) == 1
+    assert sounds.hits(touching((0.4, (0, -2), 5.0)), balls) == 1  # at the same time, another thing
+
+
+def test_sounds_of_a_moment_are_few_different_and_the_loudest(sounds: Sounds) -> None:
+    radii = [float(r) for r in np.geomspace(0.01, 10.0, 12)]
+    balls = bodies([*radii, 0.01])
+    crowd = [(0.1, (k, -1), 40.0 * float(np.sqrt(radius))) for k, radius in enumerate(radii)]
+    assert sounds.hits(touching(*crowd), balls) == A_CALL
+    assert sounds.hits(touching((0.2, (0, -1), 5.0), (0.2, (12, -1), 5.0)), balls) == 1  # of one radius, one sound
+    assert len(sounds._sounds) <= A_CALL + 1
+
+
+def test_no_more_voices_than_there_are(sounds: Sounds, monkeypatch: pytest.MonkeyPatch) -> None:
+    pygame.mixer.set_num_channels(3)
+    balls = bodies([float(r) for r in np.geomspace(0.01, 10.0, 8)])
+    crowd = touching(*((0.1, (k, -1), 1e3) for k in range(8)))
+    assert sounds.hits(crowd, balls) == 3
+    assert sounds.hits(touching((0.2, (0, -1), 1e3)), balls) == 0
+
+
+def test_sounds_are_off_until_asked_for() -> None:
+    made = Sounds()
+    assert not made.enabled
+    assert made.hits(touching((0.1, (0, -1), 5.0)), bodies([0.5])) == 0
+    assert pygame.mixer.get_init() is None
+    made.disable()
+
+
+def test_disabling_falls_silent_and_enabling_plays_again(sounds: Sounds) -> None:
+    hit = touching((0.1, (0, -1), 5.0))
+    assert sounds.hits(hit, bodies([0.5])) == 1
+    sounds.disable()
+    assert sounds.hits(hit, bodies([0.5])) == 0
+    assert sounds.enable()
+    assert sounds.enable()
+    assert sounds.hits(hit, bodies([0.5])) == 1
+
+
+def test_mixer_that_somebody_else_opened_stays_open() -> None:
+    pygame.mixer.init(22_050, -16, 1, 512, allowedchanges=0)
+    try:
+        made = Sounds()
+        assert made.enable()
+        assert made.hits(touching((0.1, (0, -1), 5.0)), bodies([0.5])) == 1
+        (played,) = made._sounds.values()
+        assert played.get_length() == pytest.approx(SECONDS, abs=1e-3)  # s, a few samples
+        made.disable()
+        assert pygame.mixer.get_init() == (22_050, -16, 1)
+    finally:
+        pygame.mixer.quit()
+
+
+def test_mixer_that_is_missing_is_no_exception(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Missing:
+        def __getattr__(self, name: str) -> None:
+            raise NotImplementedError("mixer module not available")
+
+    monkeypatch.setattr(sound.pygame, "mixer", Missing())
+    made = Sounds()
+    assert not made.enable()
+    assert (made.available, made.why) == (False, "no sound: mixer module not available")
+    assert made.hits(touching((0.1, (0, -1), 5.0)), bodies([0.5])) == 0
+
+
+NO_DEVICE = """
+from sandbox.play.sound import Sounds
+from sandbox.scene.file import loads
+from sandbox.trajectory import Contacts
+sounds = Sounds()
+bodies = loads("[[ball]]\\nposition = [0, 0]\\nradius = 1").bodies
+print(sounds.enable(), sounds.available, sounds.hits(Contacts.none(), bodies))
+print(sounds.why)
+sounds.disable()
+"""
+
+
+def test_no_audio_device_is_no_exception() -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", NO_DEVICE],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"SDL_AUDIODRIVER": "impossible"},
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    first, why = done.stdout.splitlines()
+    assert first == "False False 0"
+    assert why.startswith("no sound: ")
+    assert len(why) > len("no sound: ")
