@@ -59,7 +59,7 @@ def command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
         with gathering(faults), _progress(quiet or as_json) as told:
             status, trajectory = _trajectory(run, source, told)
             if len(trajectory.time):
-                _export(options, trajectory, files, told)
+                _export(run, options, trajectory, files, told)
             else:
                 click.echo(f"{run}: {trajectory.status}: {trajectory.reason}; there is nothing to export", err=True)
                 status = 1
@@ -107,7 +107,7 @@ def _trajectory(run: str, source: Trajectory | Recording, told: "Told") -> tuple
     return 1, trajectory
 
 
-def _export(options: Options, trajectory: Trajectory, files: list[dict[str, Any]], told: "Told") -> None:
+def _export(run: str, options: Options, trajectory: Trajectory, files: list[dict[str, Any]], told: "Told") -> None:
     """Write every file, and enter each in the list once it is complete.
 
     Raises:
@@ -118,29 +118,41 @@ def _export(options: Options, trajectory: Trajectory, files: list[dict[str, Any]
         path = Path(target)
         kind = path.suffix.lower()
         if kind in TABLES:
-            rows = _write_table(options, trajectory, path)
+            rows = _write_table(run, options, trajectory, path)
             files.append({"path": target, "format": kind[1:], "rows": rows})
             continue
-        film = film or _film(trajectory)
+        film = film or _film(run, trajectory)
         frames = _shoot(options, film, path, told(f"drawing {target}"))
         files.append({"path": target, "format": kind[1:], "frames": frames})
 
 
-def _write_table(options: Options, trajectory: Trajectory, path: Path) -> int:
+def _write_table(run: str, options: Options, trajectory: Trajectory, path: Path) -> int:
     from sandbox.report.tables import write_contacts, write_states
-    from sandbox.scene.file import from_document
 
     part = _between(trajectory, options)
     try:
         if not options.contacts:
             return write_states(part, path)
-        fixed = from_document(dict(trajectory.info["scene"]), "<run>").fixed_names
-        lowest, highest = -len(fixed), len(trajectory.names)
-        if len(part.contact_pair) and not (lowest <= part.contact_pair.min() <= part.contact_pair.max() < highest):
-            raise SceneError([Fault("<run>", None, "contact_pair", "names a thing that the scene does not have")])
-        return write_contacts(part, fixed, path)
+        return write_contacts(part, _fixed_names(run, trajectory), path)
     except OSError as error:
         raise SceneError([Fault("--to", None, "", f"{path}: {error.strerror or error}")]) from None
+
+
+def _fixed_names(run: str, trajectory: Trajectory) -> tuple[str, ...]:
+    """Return the names of a run's fixed things.
+
+    Raises:
+        SceneError: the run does not tell its scene, or has contacts of other things.
+    """
+    from sandbox.scene.file import from_document
+
+    document, pair = trajectory.info.get("scene"), trajectory.contact_pair
+    if not isinstance(document, dict):
+        raise SceneError([Fault(run, None, "info.scene", "the run does not say which scene it is of")])
+    fixed = from_document(document, run).fixed_names
+    if len(pair) and not -len(fixed) <= pair.min() <= pair.max() < len(trajectory.names):
+        raise SceneError([Fault(run, None, "contact_pair", "names a thing that the scene does not have")])
+    return fixed
 
 
 def _between(run: Trajectory, options: Options) -> Trajectory:
@@ -160,11 +172,11 @@ def _between(run: Trajectory, options: Options) -> Trajectory:
     return replace(run, **states, **touches)
 
 
-def _film(trajectory: Trajectory) -> "Film":
+def _film(run: str, trajectory: Trajectory) -> "Film":
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # standard output is for what was asked
     from sandbox.play.film import Film
 
-    return Film(trajectory)
+    return Film(trajectory, run)
 
 
 def _shoot(options: Options, film: "Film", path: Path, progress: Progress | None) -> int:

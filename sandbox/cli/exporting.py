@@ -17,8 +17,6 @@ FASTEST = 240.0
 """pictures/s"""
 MOST_PICTURES = 1_000_000
 """of one film: nine hours at 30 a second"""
-WINDOW_ONLY = ("energy",)
-"""Overlays that are no part of the picture, but of the window around it."""
 
 
 @dataclass(frozen=True)
@@ -165,10 +163,9 @@ def _of_values(options: Options) -> list[tuple[str, str]]:
     if options.speed is not None and not 1e-6 <= options.speed <= 1e6:
         found.append(("--speed", f"{options.speed:g}; 1 is real time, and it lies between 1e-6 and 1e6"))
     found += _of_rate(options) + _of_size(options)
-    unknown = [name for name in options.overlays if name not in OVERLAYS or name in WINDOW_ONLY]
+    unknown = [name for name in options.overlays if name not in OVERLAYS]
     if unknown:
-        known = ", ".join(name for name in OVERLAYS if name not in WINDOW_ONLY)
-        found.append(("--overlay", f"{', '.join(map(repr, unknown))}; there are {known}"))
+        found.append(("--overlay", f"{', '.join(map(repr, unknown))}; there are {', '.join(OVERLAYS)}"))
     return found
 
 

@@ -25,7 +25,8 @@ def crowd(position: FloatArray, radius: FloatArray, anchors: FloatArray) -> Box:
         return (-1.0, -1.0), (1.0, 1.0)
     corners = np.concatenate((lower, upper)) if len(lower) else anchors
     middle = np.percentile(corners, (10.0, 90.0), axis=0)
-    reach = STRAY * max(float((middle[1] - middle[0]).max()), 1e-9)
+    with np.errstate(over="ignore"):  # of a run that diverged
+        reach = STRAY * max(float((middle[1] - middle[0]).max()), 1e-9)
     both = np.concatenate((corners, anchors))
     kept = both[((both >= middle[0] - reach) & (both <= middle[1] + reach)).all(axis=1)]
     if not len(kept):

@@ -55,7 +55,7 @@ class KnobSlider(Dial, Slider):  # type: ignore[misc]  # the library ships no ty
 
     def __init__(self, surface: pygame.Surface, knob: Knob) -> None:
         self.min, self.max, self.value = 0.0, 1.0, 0.0
-        self._before: Value = knob.value
+        self._changed = False
         self._grip = 0.0
         self.row = pygame.Rect(0, 0, 0, 0)
         """label, value and track together"""
@@ -107,7 +107,7 @@ class KnobSlider(Dial, Slider):  # type: ignore[misc]  # the library ships no ty
                 self.change(default, final=True)
             return
         self._pressed = now, at
-        self.held, self._before = True, self.now
+        self.held, self._changed = True, False
         handle = self.getX() + self.getValue() * self.getWidth()
         self._grip = at[0] - handle if abs(at[0] - handle) <= self.handleRadius else 0.0  # a grip does not jump
         if not self._grip:
@@ -115,15 +115,16 @@ class KnobSlider(Dial, Slider):  # type: ignore[misc]  # the library ships no ty
 
     def _follow(self, x: float) -> None:
         """Move to where the pointer is; where it has not moved since it gripped the handle, nothing changes."""
-        if x == self._pressed[1][0] and self._grip:
+        if x == self._pressed[1][0] and self._grip and not self._changed:
             return
         value = self.knob.at((x - self._grip - self.getX()) / max(self.getWidth(), 1))
         if value != self.now:
+            self._changed = True
             self.change(value, final=False)
 
     def release(self) -> None:
         """End a drag, with a final report if anything was changed."""
-        changed = self.held and self.now != self._before
+        changed = self.held and self._changed
         super().release()
         if changed:
             self.change(self.now, final=True)

@@ -20,23 +20,22 @@ def figure(value: float, unit: str = "") -> str:
         return ("?" if math.isnan(value) else "∞" if value > 0 else "−∞") + tail
     if value == 0:
         return f"0{tail}"
-    rounded = float(f"{value:.{DIGITS - 1}e}")  # first, so that 999.9 µm is 1.00 mm
-    power = math.floor(math.log10(abs(rounded)) + 1e-12)  # log10(1000) may lie an ulp below 3
+    mantissa, exponent = f"{value:.{DIGITS - 1}e}".split("e")  # rounded first, so that 999.9 µm is 1.00 mm
+    power = int(exponent)
     if unit in PREFIXED:
         thousands = 3 * (power // 3)
         if thousands in PREFIXES:
-            text = f"{rounded / 10.0**thousands:.{max(DIGITS - 1 - (power - thousands), 0)}f}"
-            return _signed(f"{text} {PREFIXES[thousands]}{unit}")
+            above = power - thousands
+            return _signed(f"{float(mantissa) * 10**above:.{max(DIGITS - 1 - above, 0)}f} {PREFIXES[thousands]}{unit}")
     elif -4 <= power < 6:
-        return _signed(f"{rounded:.{max(DIGITS - 1 - power, 0)}f}{tail}")
-    return _signed(f"{rounded:.{DIGITS - 1}e}{tail}")
+        return _signed(f"{float(mantissa) * 10.0**power:.{max(DIGITS - 1 - power, 0)}f}{tail}")
+    return _signed(f"{mantissa}e{power}{tail}")
 
 
 def percent(share: float) -> str:
     """Write a share as `63 %`, and one below a percent as `0.40 %`."""
-    if not math.isfinite(share):
-        return f"{figure(share)} %"
-    return f"{100 * share:.0f} %" if abs(share) >= 0.01 or share == 0 else f"{figure(100 * share)} %"
+    plain = share == 0 or 0.01 <= abs(share) < 1e6
+    return f"{100 * share:.0f} %" if plain else f"{figure(100 * share)} %"
 
 
 def clock(time: float, step: float = 0.01) -> str:

@@ -13,6 +13,8 @@ from sandbox.play.crowd import anchors_of, crowd
 from sandbox.play.drawing.palette import FAINT, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
+from sandbox.play.picking import overlapping
+from sandbox.play.run_graph import RunGraph
 from sandbox.play.sight import Flash, Sight
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.faults import Fault, SceneError
@@ -33,16 +35,18 @@ class Film:
 
     Args:
         trajectory: the run; it has at least one frame.
+        name: what faults call it.
 
     Raises:
         SceneError: the run does not say which scene and bodies it is of, or not correctly.
     """
 
-    def __init__(self, trajectory: Trajectory) -> None:
+    def __init__(self, trajectory: Trajectory, name: str = "<run>") -> None:
         self.trajectory = trajectory
-        self.scene = scene_of(trajectory)
-        self.bodies = bodies_of(trajectory, self.scene)
+        self.scene = scene_of(trajectory, name)
+        self.bodies = bodies_of(trajectory, self.scene, name)
         self._picture = Picture()
+        self._graph = RunGraph(trajectory, self.scene, self.bodies)
 
     @property
     def duration(self) -> float:
@@ -95,6 +99,7 @@ class Film:
         """
         frame = self.frame(time)
         linger = LINGER * speed
+        by_contact = self.scene.play.show == "overlap"
         return Sight(
             scene=self.scene,
             bodies=self.bodies,
@@ -104,6 +109,7 @@ class Film:
             seconds=linger,
             ghost=ghost,
             trails=self._trails(frame, TRAIL * speed) if "trails" in overlays else (),
+            overlapping=overlapping(self.scene, self.bodies, frame) if by_contact else None,
             flashes=tuple(self._flashes(time, FLASH * speed, speed)),
         )
 
@@ -159,6 +165,8 @@ class Film:
         """
         unit = unit_of(surface.get_size())
         self._picture.draw(surface, camera, self.sight(time, overlays, speed), unit=unit)
+        if "energy" in overlays:
+            self._graph.draw(surface, time, unit)
         if caption:
             self._write_caption(surface, time, unit)
 
@@ -194,7 +202,7 @@ def moments(start: float, end: float, fps: float, speed: float = 1.0) -> tuple[F
     return np.asarray(start + np.arange(count) * (speed / fps)), shown
 
 
-def scene_of(trajectory: Trajectory) -> Scene:
+def scene_of(trajectory: Trajectory, name: str = "<run>") -> Scene:
     """Return the scene that a run is of.
 
     Raises:
@@ -202,11 +210,11 @@ def scene_of(trajectory: Trajectory) -> Scene:
     """
     document = trajectory.info.get("scene")
     if not isinstance(document, dict):
-        raise SceneError([Fault("<run>", None, "info.scene", "the run does not say which scene it is of")])
-    return from_document(document, "<run>")
+        raise SceneError([Fault(name, None, "info.scene", "the run does not say which scene it is of")])
+    return from_document(document, name)
 
 
-def bodies_of(trajectory: Trajectory, scene: Scene) -> Bodies:
+def bodies_of(trajectory: Trajectory, scene: Scene, name: str = "<run>") -> Bodies:
     """Return the bodies of a run: its scene's, and those that were spawned.
 
     Raises:
@@ -216,11 +224,11 @@ def bodies_of(trajectory: Trajectory, scene: Scene) -> Bodies:
     try:
         actions = in_order(actions_from_json(json.dumps(trajectory.info.get("actions", []))))
     except ActionError as error:
-        raise SceneError([Fault("<run>", None, "info.actions", line) for line in str(error).splitlines()]) from None
+        raise SceneError([Fault(name, None, "info.actions", line) for line in str(error).splitlines()]) from None
     spawned = [action.ball for action in actions if isinstance(action, Spawn)]
     names = [str(name) for name in trajectory.names.tolist()]
-    for ball, name in zip(spawned, names[len(bodies) :], strict=False):  # those after a run's early end never came
-        bodies = bodies.joined_by(ball, name)
+    for ball, called in zip(spawned, names[len(bodies) :], strict=False):  # a run that ended early lacks the last
+        bodies = bodies.joined_by(ball, called)
     if list(bodies.names) != names:
-        raise SceneError([Fault("<run>", None, "names", "the bodies are not those of the run's scene and actions")])
+        raise SceneError([Fault(name, None, "names", "the bodies are not those of the run's scene and actions")])
     return bodies

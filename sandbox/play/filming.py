@@ -4,8 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from sandbox.batch.interrupt import uninterrupted
 from sandbox.play.camera import Camera
-from sandbox.play.capture import recorder_for, save
+from sandbox.play.capture import Recorder, recorder_for, save
 from sandbox.play.film import Film, moments
 from sandbox.play.outfile import Outfile
 from sandbox.play.still import Size, offscreen
@@ -46,8 +47,10 @@ def shoot(film: Film, shot: Shot, path: Path, progress: Progress | None = None) 
         save(surface, Outfile.at(path))
         return 1
     times, shown = moments(shot.start, shot.end, shot.fps, shot.speed)
-    recorder = recorder_for(path, shot.size, shot.fps)
+    recorder: Recorder | None = None
     try:
+        with uninterrupted():
+            recorder = recorder_for(path, shot.size, shot.fps)
         for k, (time, seconds) in enumerate(zip(times.tolist(), shown.tolist(), strict=True)):
             film.draw(surface, camera, time, shot.overlays, shot.speed)
             recorder.add(surface, seconds)
@@ -55,5 +58,7 @@ def shoot(film: Film, shot: Shot, path: Path, progress: Progress | None = None) 
                 progress((k + 1) / len(times))
         recorder.close()
     finally:
-        recorder.cancel()
+        if recorder is not None:
+            with uninterrupted():
+                recorder.cancel()
     return len(times)

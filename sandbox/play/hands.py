@@ -5,6 +5,7 @@ import math
 from sandbox.action import Impulse, Move, Pull, Remove, Spawn
 from sandbox.play.live import Live
 from sandbox.play.picking import picked
+from sandbox.play.stored import Stored
 from sandbox.scene.model import Ball
 
 Place = tuple[float, float]
@@ -28,6 +29,11 @@ class Hands:
     def holding(self) -> bool:
         """Whether a body is held."""
         return self._held is not None
+
+    def look(self, show: Stored, place: Place, reach: float) -> bool:
+        """Pick the body at a place of a stored run; return whether there is one."""
+        self.picked = picked(show.bodies, show.frame, place, reach)
+        return self.picked is not None
 
     def grasp(self, live: Live, place: Place, reach: float, paused: bool) -> bool:
         """Pick the body at a place, and take hold of it; return whether there is one.
@@ -79,6 +85,10 @@ class Hands:
         held, self._held = self._held, None
         if held is not None and not self._moving:
             live.act(Pull(time=0.0, body=held))
+
+    def drop(self) -> None:
+        """Let go without telling the session, which cannot be told; what was picked stays so."""
+        self._held = None
 
     def forget(self) -> None:
         """Let go without telling a session, which has gone or will be told by another way; nothing is picked."""

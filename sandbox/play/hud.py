@@ -111,12 +111,13 @@ def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int
     if status.faults:
         shown = tuple(row for row in shown if row.rank <= ESSENTIAL)
     elif status.messages:
-        room.height -= round(2.8 * size)  # the newest finds its place
+        room.height -= round(4.4 * size)  # the newest finds its place
     block = _draw_rows(surface, shown, room, size)
     _draw_rate(surface, status, free, block, size)
     if status.faults:
         top = block.bottom + _pad(size)
-        _draw_faults(surface, status.faults, pygame.Rect(free.left, top, free.width, free.bottom - top), size)
+        below = pygame.Rect(free.left, top, free.width, free.bottom - top)
+        _draw_faults(surface, status.faults, below if below.height > 6 * size else free, size)
         return
     box = _draw_picked(surface, status.picked, free, block, size)
     _draw_messages(surface, status.messages, free, (block, box), size)
@@ -129,7 +130,9 @@ def _pad(size: float) -> int:
 def _draw_rows(surface: pygame.Surface, shown: tuple[Row, ...], free: pygame.Rect, size: float) -> pygame.Rect:
     """Draw lines on a plate at the upper left, as many as fit, and return the plate."""
     pad, line = _pad(size), round(1.42 * size)
-    count = max((free.height - 2 * pad) // line, 1)
+    count = (free.height - 2 * pad) // line
+    if count < 1:
+        return pygame.Rect(free.topleft, (0, 0))
     least = sorted(row.rank for row in shown)[:count][-1]
     kept = [row for row in shown if row.rank <= least][:count]
     indent = round(1.3 * size)
@@ -177,7 +180,7 @@ def _draw_rate(surface: pygame.Surface, status: Status, free: pygame.Rect, block
     text, small = f"{status.frames_per_second:.0f} fps", max(0.8 * size, SMALLEST)
     wide, high = measure(text, small, mono=True)
     rect = pygame.Rect(free.right - wide, free.top, wide, high).inflate(_pad(size), 0)
-    if not rect.colliderect(block.inflate(size, 0)):
+    if rect.left >= free.left and rect.bottom <= free.bottom and not rect.colliderect(block.inflate(size, 0)):
         plate(surface, rect, 0.3 * size, opacity=120, edge=None)
         write(surface, text, rect.center, small, FAINT, "center", mono=True)
 
@@ -240,11 +243,14 @@ def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], free: pygame.
     head = "The scene file has a fault" if len(faults) == 1 else f"The scene file has {len(faults)} faults"
     heads = wrapped(f"{head}; the scene before it goes on", size, room - 1.6 * size, 2, bold=True)
     most = (free.height - 2 * pad) // line - len(heads)
-    if most < 1:
+    if most < 5:
+        most += len(heads) - 1
         heads = (shortened(head, size, room - 1.6 * size, bold=True),)
     lines = _fault_lines(faults, size, room, most)
     rect = pygame.Rect(0, 0, room + 2 * pad, (len(heads) + len(lines)) * line + 2 * pad)
     rect.center = free.center
+    if not free.contains(rect):
+        return
     plate(surface, rect, 0.6 * size, opacity=244, edge=WARNING)
     draw_mark(surface, "triangle", (rect.left + pad + 0.4 * size, rect.top + pad + line / 2), 0.5 * size, WARNING)
     left, y = rect.left + pad, rect.top + pad + line / 2
@@ -265,7 +271,10 @@ def _fault_lines(faults: tuple[str, ...], size: float, room: int, most: int) -> 
         first, *rest = wrapped(fault, size, room - indent, 4, mono=True) or ("",)
         last = number == len(faults) - 1
         if len(lines) + 1 + len(rest) + (not last) > most:
-            lines.append((0, f"… and {len(faults) - number} more" if number else first))
+            if number == 0:  # as much of it as there is room for
+                first, *rest = wrapped(fault, size, room - indent, max(most, 1), mono=True) or ("",)
+                return [(0, first), *((indent, text) for text in rest)][: max(most, 0)]
+            lines.append((0, f"… and {len(faults) - number} more"))
             break
         lines += [(0, first), *((indent, text) for text in rest)]
     return lines[: max(most, 0)]

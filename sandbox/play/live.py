@@ -27,12 +27,13 @@ SLICE = 0.012
 class Live:
     """A session that is being watched."""
 
-    def __init__(self, session: Session, ghost: Film | None = None) -> None:
+    def __init__(self, session: Session, ghost: Film | None = None, until: float | None = None) -> None:
         """Start watching.
 
         Args:
             session: what is played.
             ghost: a stored run to be seen beside it, instead of another engine.
+            until: when what was recorded ends, s; it pauses there, once.
         """
         self.session = session
         self.pace = Pace()
@@ -42,6 +43,9 @@ class Live:
         self._contacts, self._since = session.contacts(), session.settings.dt
         self._seed = session.scene.world.seed
         self._told_end = False
+        self._until = until
+        self.wants_pause = False
+        """It has come to the end of what was recorded; whoever pauses it takes this back."""
         self._peek: tuple[int, Frame] | None = None
 
     @property
@@ -94,6 +98,12 @@ class Live:
             return
         dt = self.session.settings.dt
         asked = self.pace.due(elapsed, dt)
+        if self._until is not None:
+            left = round((self._until - self.session.time) / dt)
+            if left <= asked:
+                asked = max(left, 0)
+                self._until, self.wants_pause = None, True
+                self.company.notes.append(("info", "what was recorded ends here; go on, and it is played further"))
         compiled = COMPILING.seconds
         made = self._advance(asked, perf_counter() + BUDGET) if asked else 0
         if COMPILING.seconds > compiled:  # that time was not the scene's

@@ -13,6 +13,7 @@ from sandbox.play.thumbnail import Found, read, thumbnail
 
 CARD = 236
 """px at unit 1, how wide a card is at least"""
+MOST_COLUMNS = 5
 SCROLL = 80
 """px at unit 1, a notch of the wheel"""
 LONGEST_FILTER = 60
@@ -169,7 +170,8 @@ class Picker:
     def _lay_out(self, shown: Sequence[Card], free: pygame.Rect, size: float) -> None:
         """Place the cards in a grid, scrolled so that the chosen one is in sight."""
         gap = round(1.1 * size)
-        self._columns = max(int((free.width + gap) // (CARD * size / 14 + gap)), 1)
+        least = max(CARD * size / 14, free.width / MOST_COLUMNS - gap)
+        self._columns = max(int((free.width + gap) // (least + gap)), 1)
         wide = (free.width - gap * (self._columns - 1)) // self._columns
         high = round(wide * 0.56 + 6.4 * size)
         self.chosen = min(max(self.chosen, 0), max(len(shown) - 1, 0))

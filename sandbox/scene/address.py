@@ -1,7 +1,7 @@
 """Addresses: any value of a scene by its path, as `--set` and sweeps name it.
 
-`solver.dt` · `world.gravity` · `ball.cue.velocity` · `ball.0.radius` · `ball."8 ball".mass`. An element of a
-list is named by its `name`, or by its number from 0.
+`solver.dt` · `world.gravity` · `ball.cue.velocity` · `ball.0.radius` · `ball."8 ball".mass` · `ball.*.restitution`.
+An element of a list is named by its `name`, or by its number from 0; `*` means every one, where none is called so.
 """
 
 import copy
@@ -9,6 +9,9 @@ import tomllib
 from typing import Any
 
 from sandbox.scene.faults import Location
+
+
+EVERY = "*"
 
 
 class AddressError(ValueError):
@@ -79,6 +82,8 @@ def parse_path(path: str) -> tuple[str, ...]:
 def assign(document: dict[str, Any], path: str, value: Any) -> tuple[dict[str, Any], Location]:
     """Return a copy of a scene document with one value set, and the location that was set.
 
+    Of `*` the location is that of the list.
+
     Raises:
         AddressError: the path leads nowhere.
     """
@@ -87,6 +92,18 @@ def assign(document: dict[str, Any], path: str, value: Any) -> tuple[dict[str, A
         result = copy.deepcopy(document)
     except RecursionError:
         raise AddressError(f"{path}: the scene's values are nested too deeply") from None
+    elements = result.get(parts[0]) if len(parts) > 2 and parts[1] == EVERY else None
+    if not isinstance(elements, list) or EVERY in _names(elements):
+        return result, _assign(result, parts, path, value)
+    if not elements:
+        raise AddressError(f"{path}: the scene has no [[{parts[0]}]]")
+    for index in range(len(elements)):
+        _assign(elements[index], parts[2:], path, value)
+    return result, (parts[0],)
+
+
+def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Location:
+    """Set a value in place and return its location."""
     here: Any = result
     location: Location = ()
     for k, part in enumerate(parts):
@@ -110,12 +127,12 @@ def assign(document: dict[str, Any], path: str, value: Any) -> tuple[dict[str, A
                 here = here[index]
         else:
             raise AddressError(f"{path}: {'.'.join(parts[:k])} is a single value, it has no {part!r}")
-    return result, location
+    return location
 
 
 def _index(elements: list[Any], part: str, path: str) -> int:
     """Return the index of a list's element, by its name or by its number."""
-    names = [e.get("name") for e in elements if isinstance(e, dict)]
+    names = _names(elements)
     if part in names:
         return next(k for k, e in enumerate(elements) if isinstance(e, dict) and e.get("name") == part)
     if part.isdecimal() and len(part) < 10 and int(part) < len(elements):
@@ -123,3 +140,7 @@ def _index(elements: list[Any], part: str, path: str) -> int:
     known = ", ".join(str(n) for n in names[:10] if n is not None)
     numbers = f"0 to {len(elements) - 1}" if elements else "none"
     raise AddressError(f"{path}: no element {part!r}; names: {known or 'none'}; numbers: {numbers}")
+
+
+def _names(elements: list[Any]) -> list[Any]:
+    return [e.get("name") for e in elements if isinstance(e, dict)]

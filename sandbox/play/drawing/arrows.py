@@ -39,9 +39,8 @@ def draw_velocities(view: View) -> None:
         way = way * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
     for k in np.flatnonzero((length > 2.0 * view.unit) & np.isfinite(length)).tolist():
         (x, y), (dx, dy) = some.centre[k].tolist(), way[k].tolist()
-        if len(some.shown) <= CROWD:  # a dark edge tells it from a bright ball
-            arrow(view.surface, (x, y), (x + dx, y + dy), BACKGROUND, 3.6 * view.unit, view.antialias)
-        arrow(view.surface, (x, y), (x + dx, y + dy), YELLOW, 2.0 * view.unit, view.antialias)
+        edge = BACKGROUND if len(some.shown) <= CROWD and length[k] > 16.0 * view.unit else None
+        arrow(view.surface, (x, y), (x + dx, y + dy), YELLOW, 2.0 * view.unit, view.antialias, edge)
 
 
 def _in_sight(view: View, most: int) -> tuple[IntArray, FloatArray, FloatArray]:

@@ -7,6 +7,7 @@ import numpy as np
 import pygame
 
 from sandbox.play.drawing.palette import BACKGROUND, Colour, ColourArray
+from sandbox.play.drawing.points import packed
 from sandbox.play.drawing.shade import Look, disc_distance, paint, shaded, surface_of
 from sandbox.play.drawing.strokes import stroke
 from sandbox.scene.near import IntArray
@@ -163,14 +164,17 @@ def spokes(
     """
     shown = np.flatnonzero((radius >= SHORTEST_SPOKE) & (radius < 1e6) & np.isfinite(angle))
     way = np.stack((np.cos(angle[shown]), -np.sin(angle[shown])), 1)
-    middle, reach = centre[shown], radius[shown, None]
-    start, end = middle + way * reach * 0.35, middle + way * (reach * 0.95 - 1.0)
+    middle, reach = centre[shown] - 0.5, radius[shown, None]  # SDL has a pixel's middle at a whole number
+    ends = np.concatenate((middle + way * reach * 0.35, middle + way * (reach * 0.95 - 1.0)), 1)
     tones = np.rint(colours[shown] * (1.0 - DARK) + np.asarray(BACKGROUND) * DARK).astype(np.uint8)
-    width = np.where(reach[:, 0] > THIN, np.minimum(0.08 * reach[:, 0], 6.0), 1.0)
+    thin = reach[:, 0] <= THIN
     line = pygame.draw.aaline if antialias else pygame.draw.line
-    rows = zip(start.tolist(), end.tolist(), tones.tolist(), width.tolist(), strict=True)
-    for a, b, tone, thick in rows:
-        if thick == 1.0:
-            line(surface, tone, (a[0] - 0.5, a[1] - 0.5), (b[0] - 0.5, b[1] - 0.5))
-        else:
-            stroke(surface, (a[0], a[1]), (b[0], b[1]), (tone[0], tone[1], tone[2]), thick, antialias)
+    # Flat lists of numbers: thousands of small ones would keep the garbage collector busy.
+    columns = (column.tolist() for column in (packed(tones[thin], surface), *ends[thin].T))
+    for tone, ax, ay, bx, by in zip(*columns, strict=True):
+        line(surface, tone, (ax, ay), (bx, by))
+    for k in np.flatnonzero(~thin).tolist():
+        ax, ay, bx, by = (ends[k] + 0.5).tolist()
+        red, green, blue = tones[k].tolist()
+        width = min(0.08 * float(reach[k, 0]), 6.0)
+        stroke(surface, (ax, ay), (bx, by), (red, green, blue), width, antialias)

@@ -99,9 +99,9 @@ def colour_of(bodies: Bodies) -> ColourArray:
         else:
             tints = np.asarray(_family(accent(k + isinstance(element, Emitter))), np.uint8)  # sparks begin with orange
             colours[start:end] = tints[np.arange(end - start) % len(tints)]
+    return colours
 
 
 def _family(colour: Colour) -> list[Colour]:
     """Return the tints of a larger generator."""
     return [mixed(colour, COMPANIONS[colour] if share > 0 else (255, 255, 255), abs(share)) for share in TINTS]
-    return colours

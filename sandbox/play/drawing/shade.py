@@ -98,7 +98,8 @@ def paint(surface: pygame.Surface, distance: Distance, look: Look, within: pygam
     if not area.width or not area.height:
         return
     left, top = np.arange(area.left, area.right, TILE), np.arange(area.top, area.bottom, TILE)
-    middle = distance(left[:, None] + TILE / 2.0, top[None, :] + TILE / 2.0)
+    across, along = (np.asarray(corner + TILE / 2.0, np.float64) for corner in (left, top))
+    middle = distance(across[:, None], along[None, :])
     reach = TILE / 2.0 * np.sqrt(2.0) + 1.0
     full = middle < -reach - look.line
     if look.fill is not None and look.opacity == 1.0:
@@ -109,8 +110,9 @@ def paint(surface: pygame.Surface, distance: Distance, look: Look, within: pygam
     column, row = np.nonzero(edge)
     if not len(column):
         return
-    step = np.arange(TILE, dtype=np.float64) + 0.5
-    pixels = shaded(distance((left[column, None] + step)[:, :, None], (top[row, None] + step)[:, None, :]), look)
+    x = np.asarray(left[column, None] + np.arange(TILE) + 0.5, np.float64)[:, :, None]
+    y = np.asarray(top[row, None] + np.arange(TILE) + 0.5, np.float64)[:, None, :]
+    pixels = shaded(distance(x, y), look)
     strip = surface_of(pixels.reshape(-1, TILE), encoded=False)
     clip = surface.get_clip()
     surface.set_clip(area)

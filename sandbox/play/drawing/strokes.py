@@ -90,20 +90,32 @@ def fill(surface: pygame.Surface, corners: list[Pixel], colour: Colour, antialia
 
 
 def arrow(
-    surface: pygame.Surface, a: Pixel, b: Pixel, colour: Colour, width: float = 2.0, antialias: bool = True
+    surface: pygame.Surface,
+    a: Pixel,
+    b: Pixel,
+    colour: Colour,
+    width: float = 2.0,
+    antialias: bool = True,
+    edge: Colour | None = None,
 ) -> None:
-    """Draw an arrow from `a` to `b`, with a head in proportion to its width."""
+    """Draw an arrow from `a` to `b`, with a head in proportion to its width, and an edge that sets it off."""
     length = math.hypot(b[0] - a[0], b[1] - a[1])
     if not 0.0 < length < math.inf:
         return
     along = (b[0] - a[0]) / length, (b[1] - a[1]) / length
     head = min(5.0 * width, 0.6 * length)
     neck = b[0] - along[0] * head, b[1] - along[1] * head
-    stroke(surface, a, (neck[0] + along[0], neck[1] + along[1]), colour, width, antialias)
+    end = neck[0] + along[0], neck[1] + along[1]
+    if edge is not None:
+        stroke(surface, a, end, edge, width + 2.0, antialias)
+    stroke(surface, a, end, colour, width, antialias)
     if clipped(b, neck, surface.get_clip(), 40.0) is not None:
         side = -along[1] * head * 0.42, along[0] * head * 0.42
         corners = [b, (neck[0] + side[0], neck[1] + side[1]), (neck[0] - side[0], neck[1] - side[1])]
         fill(surface, corners, colour, antialias)
+        if edge is not None and antialias:
+            wide = [(x + 1.2 * (x - neck[0]) / head - 0.5, y + 1.2 * (y - neck[1]) / head - 0.5) for x, y in corners]
+            pygame.draw.aalines(surface, edge, True, wide)
 
 
 def dashes(

@@ -30,10 +30,10 @@ def touches(view: View) -> tuple[FloatArray, FloatArray]:
         way = position[second[balls]] - position[a[balls]]
         normal[balls] = way / np.hypot(way[:, 0], way[:, 1])[:, None]
         _round(view, normal, np.flatnonzero(known & (second < 0))[:MOST_CURVED])
-        normal = np.where(np.isfinite(normal).all(1)[:, None], normal, contacts.normal)
+        normal = np.where(np.isfinite(normal).all(axis=1, keepdims=True), normal, contacts.normal)
         place = position[a] + normal * bodies.radius[a][:, None]
-    sound = known & np.isfinite(place).all(1)
-    return np.where(sound[:, None], place, contacts.point), normal
+    sound = known[:, None] & np.isfinite(place).all(axis=1, keepdims=True)
+    return np.where(sound, place, contacts.point), normal
 
 
 def _round(view: View, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]") -> None:

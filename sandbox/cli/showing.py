@@ -1,0 +1,106 @@
+"""Showing: what the commands with a window have in common."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from sandbox.play.sight import OVERLAYS
+
+if TYPE_CHECKING:
+    from sandbox.play.stage import Stage
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+LARGEST = 16384
+"""px"""
+
+
+class SizeType(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions of click alone
+    """`WIDTHxHEIGHT`, px."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Read a size."""
+        width, _, height = str(value).lower().partition("x")
+        if not (width.isdecimal() and height.isdecimal()) or not all(1 <= int(n) <= LARGEST for n in (width, height)):
+            self.fail(f"{value!r} is no size in pixels, such as 1280x800 (1 to {LARGEST:,} each)", param, ctx)
+        return int(width), int(height)
+
+
+def window_options(command: Command) -> Command:
+    """Add the options of every window."""
+    options = (
+        click.option("--size", type=SizeType(), metavar="WxH", help="of the window, in pixels"),
+        click.option("--paused", is_flag=True, help="begin paused"),
+        click.option("--film", type=click.Choice(["gif", "mp4"]), default="gif", help="what Ctrl+R records"),
+        click.option("--overlay", "overlays", multiple=True, type=click.Choice(OVERLAYS), help="begin with it on"),
+        click.option("--ghost", is_flag=True, help="begin with the ghost"),
+        click.option(
+            "--record",
+            type=click.Path(path_type=Path, dir_okay=False),
+            metavar="FILE",
+            help="save the session as JSON when the window closes",
+        ),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def show_stage(
+    stage: "Stage",
+    begin: Callable[[], object],
+    *,
+    size: tuple[int, int] | None,
+    paused: bool,
+    film: str,
+    overlays: tuple[str, ...],
+    ghost: bool,
+    record: Path | None,
+    pick: bool = False,
+) -> int:
+    """Open the window, play, and return the exit status.
+
+    Args:
+        stage: what is played.
+        begin: called once the window is open; what it puts on is seen first.
+        size: px.
+        paused: begin so.
+        film: `gif` or `mp4`.
+        overlays: to begin with.
+        ghost: begin with it.
+        record: where the session is saved at the end.
+        pick: begin with the picker.
+    """
+    from sandbox.play.screen import NoDisplayError
+    from sandbox.play.window import Window
+
+    if record is not None and not record.absolute().parent.is_dir():
+        click.echo(f"--record: {record}: there is no folder {record.parent}", err=True)
+        return 2
+    stage.paused = paused
+    try:
+        window = Window(stage, size=size, film=f".{film}", say=click.echo)
+    except NoDisplayError as error:
+        click.echo(f"{error}; `sandbox run` and `sandbox export` need none", err=True)
+        return 1
+    try:
+        begin()
+        window.desk.overlays |= set(overlays)
+        if ghost:
+            stage.toggle_ghost()
+        if pick:
+            window.desk.open_picker(None)
+        status = window.run()
+        if record is not None and stage.live is not None:
+            try:
+                stage.live.session.recording().save(record)
+                click.echo(f"session: {record}")
+            except OSError as error:
+                click.echo(f"--record: {record}: {error.strerror or error}", err=True)
+                status = status or 1
+        return status
+    finally:
+        window.close()

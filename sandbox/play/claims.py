@@ -1,0 +1,52 @@
+"""Claims: the keys that a scene takes for itself, and what they do."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import pygame
+
+from sandbox.play.hands import Hands
+from sandbox.play.live import Live
+from sandbox.scene.model import Scene
+
+ARROWS = {
+    pygame.K_LEFT: (-1.0, 0.0),
+    pygame.K_RIGHT: (1.0, 0.0),
+    pygame.K_UP: (0.0, 1.0),
+    pygame.K_DOWN: (0.0, -1.0),
+}
+
+Deed = Callable[[Live], object]
+
+
+class Claims(NamedTuple):
+    """What a scene's `[play]` asks for."""
+
+    deeds: dict[int, Deed]
+    """by key"""
+    told: tuple[tuple[str, str], ...]
+    """keys and what they do, as help names them"""
+
+
+def claims(scene: Scene, hands: Hands) -> Claims:
+    """Return the keys that a scene claims."""
+    deeds: dict[int, Deed] = {}
+    told: list[tuple[str, str]] = []
+    body, step, generator = scene.play.arrows, scene.play.arrow_step, scene.play.relaunch
+    if body is not None:
+        for key, (x, y) in ARROWS.items():
+            deeds[key] = partial(_shift, hands=hands, body=body, by=(x * step, y * step))
+        told.append(("Arrows", f"move {body} by {step:g} m"))
+    if generator is not None:
+        deeds[pygame.K_SPACE] = partial(_relaunch, generator=generator)
+        told.append(("Space", f"launch {generator} again"))
+    return Claims(deeds, tuple(told))
+
+
+def _shift(live: Live, hands: Hands, body: str, by: tuple[float, float]) -> None:
+    hands.shift(live, body, by)
+
+
+def _relaunch(live: Live, generator: str) -> None:
+    live.relaunch(generator)

@@ -1,0 +1,213 @@
+"""Desk: everything that is drawn, from the picture of the scene to the panel, and who takes which event first."""
+
+from pathlib import Path
+
+import pygame
+
+from sandbox.play.camera import Camera
+from sandbox.play.claims import Claims, claims
+from sandbox.play.drawing.palette import BACKGROUND
+from sandbox.play.drawing.picture import Picture
+from sandbox.play.facts import facts, told
+from sandbox.play.graph import EnergyGraph
+from sandbox.play.hud import draw_hud
+from sandbox.play.knobs import knobs
+from sandbox.play.live import Live
+from sandbox.play.manual import Manual
+from sandbox.play.panel import Panel
+from sandbox.play.picker import Picker
+from sandbox.play.shelf import to_pick
+from sandbox.play.sight import OVERLAYS, Status
+from sandbox.play.sound import Sounds
+from sandbox.play.stage import Stage
+from sandbox.play.timeline import HEIGHT, Timeline
+
+GRAPH = (300, 130)
+"""px at unit 1"""
+
+
+class Desk:
+    """What surrounds the picture, and what is switched on."""
+
+    def __init__(self, size: tuple[int, int], unit: float) -> None:
+        self.unit = unit
+        self.overlays: set[str] = {"shapes"}
+        """of `OVERLAYS`"""
+        self.antialias = True
+        self.panel = Panel(size, unit)
+        self.manual = Manual()
+        self.picker: Picker | None = None
+        self._timeline = Timeline()
+        self._graph = EnergyGraph()
+        self._picture = Picture()
+        self._sounds = Sounds()
+        self._size = size
+        self._claims: tuple[object, Claims] | None = None
+        self._heard: object = None
+
+    def renew(self, same: bool) -> None:
+        """Forget what was of the scene before."""
+        self._graph.clear()
+        if not same:
+            self._claims = None
+
+    def resize(self, size: tuple[int, int]) -> None:
+        """Fit all to a window of another size, px."""
+        self._size = size
+        self.panel.resize(size, self.unit)
+
+    @property
+    def _area(self) -> pygame.Rect:
+        """Where the timeline lies."""
+        height = round(HEIGHT * self.unit) if self.panel.visible else 0
+        return pygame.Rect(0, self._size[1] - height, self._size[0] - self.panel.width, height)
+
+    def claims(self, stage: Stage) -> Claims:
+        """Return the keys that the scene claims."""
+        if not isinstance(stage.show, Live):
+            return Claims({}, ())
+        key = stage.show.scene.play
+        if self._claims is None or self._claims[0] is not key:
+            self._claims = key, claims(stage.show.scene, stage.hands)
+        return self._claims[1]
+
+    def claimed(self, stage: Stage) -> frozenset[int]:
+        """Return the codes of those keys."""
+        return frozenset(self.claims(stage).deeds)
+
+    def open_picker(self, path: Path | None) -> None:
+        """Offer the scenes."""
+        self.picker = Picker(to_pick(path))
+        self.panel.release()
+
+    def toggle_help(self) -> None:
+        """Show help, or close it."""
+        self.manual.open = not self.manual.open
+
+    def toggle_sound(self) -> tuple[str, str]:
+        """Turn sound on or off; return what is to be said of it, and its level."""
+        if self._sounds.enabled:
+            self._sounds.disable()
+            return "sound off", "info"
+        return ("sound on", "info") if self._sounds.enable() else (self._sounds.why, "warning")
+
+    def handle(self, event: pygame.event.Event, stage: Stage) -> bool:
+        """Let what lies on top take an event in; return whether it was used up."""
+        if self.picker is not None and event.type != pygame.QUIT:
+            path = self.picker.handle(event)
+            if path is not None:
+                stage.take(path)
+            if path is not None or self.picker.closed:
+                self.picker = None
+            return True
+        if self.manual.handle(event) or self.panel.handle(event):
+            return True
+        show = stage.show
+        if show is not None and self._area.height:
+            held = self._timeline.held
+            time = self._timeline.handle(event, self._area)
+            if time is not None:
+                stage.paused = True
+                show.scrub(time)
+            if held and not self._timeline.held:
+                show.settle()
+            return held or self._timeline.held
+        return False
+
+    def draw(self, surface: pygame.Surface, camera: Camera, stage: Stage, rate: float, recording: str | None) -> None:
+        """Draw all."""
+        show = stage.show
+        if self.picker is not None:
+            self.picker.draw(surface, self.unit)
+            return
+        if show is None:
+            surface.fill(BACKGROUND)
+        else:
+            pull = stage.hands.line(show) if isinstance(show, Live) else None
+            sight = show.sight(frozenset(self.overlays), stage.hands.picked, pull)
+            foot = float(self._area.height)
+            self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=foot)
+            if show.contacts is not self._heard:
+                self._heard = show.contacts
+                self._sounds.hits(show.contacts, show.bodies)
+            self._draw_graph(surface, stage)
+            if self._area.height:
+                now = show.frame.time
+                self._timeline.draw(surface, self._area, show.begin, now, show.end, show.marks, self.unit)
+        status = self.status(stage, rate, recording)
+        draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self._area.height)
+        if self.panel.visible:
+            self._show_panel(stage, recording is not None)
+            self.panel.draw(surface)
+        if self.manual.open:
+            self.manual.draw(surface, self.unit, self.claims(stage).told)
+
+    def _draw_graph(self, surface: pygame.Surface, stage: Stage) -> None:
+        show = stage.show
+        if show is None or "energy" not in self.overlays:
+            return
+        self._graph.add(show.frame.time, *show.energy())
+        width, height = round(GRAPH[0] * self.unit), round(GRAPH[1] * self.unit)
+        margin = round(10 * self.unit)
+        free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self._area.height)
+        rect = pygame.Rect(free.right - width - margin, free.bottom - height - margin, width, height)
+        self._graph.draw(surface, rect.clip(free), self.unit)
+
+    def _show_panel(self, stage: Stage, recording: bool) -> None:
+        live = stage.live
+        shown = knobs(live, stage.file, stage.hands.picked) if live is not None and stage.file is not None else ()
+        toggles = {name: name in self.overlays for name in OVERLAYS}
+        if live is not None:
+            toggles |= {"ghost": live.company.ghosted, "trust": live.company.trust is not None}
+        toggles |= {"sound": self._sounds.enabled, "antialias": self.antialias}
+        buttons = (
+            "play" if stage.paused else "pause",
+            "back",
+            "step",
+            "restart",
+            "camera",
+            "stop" if recording else "record",
+            "save",
+            "picker",
+            "help",
+        )
+        self.panel.show(shown, toggles, buttons)
+
+    def status(self, stage: Stage, rate: float, recording: str | None) -> Status:
+        """Return what is told in words."""
+        show, messages = stage.show, stage.messages.shown()
+        if show is None:
+            return Status("", "", "", 0, 0.0, messages=messages, faults=stage.faults)
+        picked = stage.hands.picked
+        live = stage.live
+        company = live.company if live is not None else None
+        trust = company.trust if company is not None else None
+        return Status(
+            title=show.scene.title or (stage.path.stem if stage.path is not None else "scene"),
+            engine=show.engine,
+            settings=told(show.settings),
+            step=show.step_number,
+            time=show.frame.time,
+            paused=stage.paused,
+            replay=live is None,
+            speed=show.pace.speed,
+            real_speed=show.pace.real_speed,
+            frames_per_second=rate,
+            trust=trust.state if trust is not None else "unknown",
+            horizon=trust.horizon if trust is not None else None,
+            spread=trust.spread if trust is not None else None,
+            ghost=company.ghost_engine if company is not None else None,
+            distance=company.distance if company is not None else None,
+            missed=show.missed,
+            energy=None,
+            recording=recording,
+            busy=show.busy,
+            picked=facts(show.bodies, show.frame, show.contacts, picked) if picked is not None else (),
+            messages=messages,
+            faults=stage.faults,
+            claimed=self.claims(stage).told,
+        )
+
+    def close(self) -> None:
+        """Fall silent."""
+        self._sounds.disable()

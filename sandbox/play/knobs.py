@@ -1,0 +1,126 @@
+"""Knobs: what of a session can be turned while it runs, and by which actions."""
+
+from typing import get_args
+
+from sandbox.action import Action, SetParameter, Switch
+from sandbox.engines.registry import ENGINES
+from sandbox.play.knob import Knob, Value
+from sandbox.play.live import Live
+from sandbox.scene.model import Disc, Scene
+from sandbox.scene.settings import Detection, Integrator, Settings
+
+KINDS = ("ball", "grid", "scatter", "emitter")
+SETTINGS = ("dt", "substeps", "iterations", "integrator", "detection")
+
+
+def knobs(live: Live, file: Scene, picked: int | None) -> tuple[Knob, ...]:
+    """Return the knobs of a session as they now stand.
+
+    Args:
+        live: the session.
+        file: its scene as the file has it, for what a double click goes back to.
+        picked: number of the body that restitution and friction are of; else they are of all balls.
+    """
+    return (
+        Knob(
+            "gravity",
+            "gravity",
+            -30.0,
+            30.0,
+            live.scene.world.gravity[1],
+            step=0.1,
+            unit="m/s²",
+            default=file.world.gravity[1],
+        ),
+        _surface(live, file, picked, "restitution", 1.0),
+        _surface(live, file, picked, "friction", 2.0),
+        Knob("engine", "engine", value=live.engine, choices=tuple(ENGINES)),
+        Knob("dt", "dt", 1e-4, 0.1, live.settings.dt, log=True, step=0.1, unit="s", default=file.solver.dt),
+        *_counts(live, file),
+        _choice(live, "integrator", get_args(Integrator)),
+        _choice(live, "detection", get_args(Detection)),
+    )
+
+
+def _counts(live: Live, file: Scene) -> tuple[Knob, ...]:
+    steps = live.settings.integrator is not None
+    why = "" if steps else f"{live.engine} takes no steps"
+    settings, own = live.settings, file.solver
+    return (
+        Knob("substeps", "substeps", 1, 32, settings.substeps, step=1, enabled=steps, why=why, default=own.substeps),
+        Knob(
+            "iterations",
+            "iterations",
+            1,
+            100,
+            settings.iterations,
+            step=1,
+            enabled=steps,
+            why=why,
+            default=own.iterations,
+        ),
+    )
+
+
+def _surface(live: Live, file: Scene, picked: int | None, key: str, high: float) -> Knob:
+    """Return the knob of restitution or friction."""
+    discs = live.scene.discs
+    element = int(live.bodies.element[picked]) if picked is not None else 0
+    if not discs and picked is None:
+        return Knob(key, key, 0.0, high, 0.0, enabled=False, why="there is no ball")
+    if element >= len(discs):
+        value = getattr(live.bodies.elements[element], key) or 0.0
+        return Knob(key, key, 0.0, high, value, enabled=False, why="a ball added by hand keeps its own")
+    disc = discs[element]
+    label = key if picked is None else f"{key} of {disc.name or 'this'}"
+    default = stated(file, file.discs[element], key) if element < len(file.discs) else None
+    return Knob(key, label, 0.0, high, stated(live.scene, disc, key), default=default)
+
+
+def stated(scene: Scene, disc: Disc, key: str) -> float:
+    """Return the restitution or friction that a ball states itself, or its material; 0 for none."""
+    own: float | None = getattr(disc, key)
+    if own is None and disc.material is not None:
+        own = next((getattr(each, key) for each in scene.materials if each.name == disc.material), None)
+    return own or 0.0
+
+
+def _choice(live: Live, key: str, words: tuple[str, ...]) -> Knob:
+    """Return the knob of a choice, with those that the engine has."""
+    engine = ENGINES[live.engine]
+    able = tuple(word for word in words if not engine.missing(live.scene, _chosen(live, key, word)))
+    value = getattr(live.settings, key)
+    if len(able) < 2:
+        why = f"{live.engine} has no other" if able else f"{live.engine} has none"
+        return Knob(key, key, value=value or "none", choices=(value or "none",), enabled=False, why=why)
+    return Knob(key, key, value=value, choices=able)
+
+
+def _chosen(live: Live, key: str, word: str) -> Settings:
+    wanted: Settings = live.session.wanted.replace(**{key: word})
+    return wanted
+
+
+def turned(live: Live, key: str, value: Value, picked: int | None) -> list[Action]:
+    """Return the actions that a knob's new value asks for; those that are the engine's are `Live.switch`'s."""
+    if key == "gravity":
+        return [SetParameter(time=0.0, path="world.gravity", value=[live.scene.world.gravity[0], float(value)])]
+    if key in ("restitution", "friction"):
+        return [SetParameter(time=0.0, path=path, value=float(value)) for path in _paths(live, key, picked)]
+    if key in ("substeps", "iterations"):
+        return [Switch(time=0.0, settings={key: round(float(value))})]
+    return [Switch(time=0.0, settings={key: value})]
+
+
+def _paths(live: Live, key: str, picked: int | None) -> list[str]:
+    """Return where a figure stands: of the picked body's element, or of all balls and generators."""
+    scene = live.scene
+    counts = [len(scene.balls), len(scene.grids), len(scene.scatters), len(scene.emitters)]
+    if picked is None:
+        return [f"{kind}.*.{key}" for kind, count in zip(KINDS, counts, strict=True) if count]
+    element = int(live.bodies.element[picked])
+    for kind, count in zip(KINDS, counts, strict=True):
+        if element < count:
+            return [f"{kind}.{element}.{key}"]
+        element -= count
+    return []

@@ -1,0 +1,68 @@
+"""Mouse: what it does to the picture and the bodies in it."""
+
+from typing import TYPE_CHECKING
+
+import pygame
+
+if TYPE_CHECKING:
+    from sandbox.play.window import Window
+
+NOTCH = 1.15
+"""by which the wheel brings things closer"""
+REACH = 6.0
+"""px at unit 1 beside a body that still point at it"""
+
+
+class Mouse:
+    """Zooms, pans, picks, pulls and moves."""
+
+    def __init__(self, window: "Window") -> None:
+        self._window = window
+        self._panning = False
+        self.place = (0, 0)
+        """where it is, px"""
+
+    def take(self, event: pygame.event.Event) -> None:
+        """Take an event in that nobody else wanted."""
+        window = self._window
+        if event.type == pygame.MOUSEWHEEL:
+            notches = getattr(event, "precise_y", 0.0) or float(event.y)
+            window.camera = window.camera.zoomed(NOTCH**notches, pygame.mouse.get_pos())
+            window.at_home = False
+        elif event.type == pygame.MOUSEBUTTONDOWN:
+            self.place = event.pos
+            if event.button in (2, 3):
+                self._panning = True
+            elif event.button == 1:
+                reach = REACH * window.desk.unit / window.camera.scale
+                window.stage.grasp(window.camera.to_world(event.pos), reach)
+        elif event.type == pygame.MOUSEMOTION:
+            self._move(event)
+        elif event.type == pygame.MOUSEBUTTONUP:
+            if event.button in (2, 3):
+                self._panning = False
+            elif event.button == 1:
+                self._let_go()
+        elif event.type == pygame.WINDOWFOCUSLOST:  # the release goes elsewhere
+            self._panning = False
+            self._let_go()
+
+    def _move(self, event: pygame.event.Event) -> None:
+        window = self._window
+        self.place = event.pos
+        if self._panning:
+            window.camera = window.camera.panned(event.rel)
+            window.at_home = False
+        elif window.stage.hands.holding:
+            place = window.camera.to_world(event.pos)
+            if not window.stage.act(lambda live: window.stage.hands.drag(live, place)):
+                window.stage.hands.drop()
+
+    def _let_go(self) -> None:
+        stage = self._window.stage
+        if stage.hands.holding and not stage.act(stage.hands.let_go):
+            stage.hands.drop()
+
+    def world(self) -> tuple[float, float]:
+        """Return the place that it points at, m."""
+        return self._window.camera.to_world(self.place)

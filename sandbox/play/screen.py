@@ -1,0 +1,63 @@
+"""Screen: the display that the window opens, and how large things are on it."""
+
+import os
+
+import pygame
+
+SIZE = (1280, 800)
+SMALLEST = (160, 120)
+SHARE = 0.9
+"""of the desktop that a new window may take"""
+LINES = 1080
+"""of a display on which things are drawn at their own size"""
+
+
+class NoDisplayError(Exception):
+    """There is no display to open a window on; `str()` says why."""
+
+
+def open_screen(size: tuple[int, int] | None, title: str) -> pygame.Surface:
+    """Open the window.
+
+    Args:
+        size: px; by default what suits the desktop.
+        title: of the window.
+
+    Raises:
+        NoDisplayError: there is no display.
+    """
+    os.environ.setdefault("SDL_VIDEO_X11_WMCLASS", "sandbox")
+    asked = "SDL_VIDEODRIVER" in os.environ
+    try:
+        pygame.display.init()
+        pygame.font.init()
+        if not asked and pygame.display.get_driver() in ("dummy", "offscreen"):
+            raise pygame.error("no display was found")
+        surface = pygame.display.set_mode(size or _fitting(), pygame.RESIZABLE)
+    except (pygame.error, NotImplementedError) as error:
+        close_screen()
+        raise NoDisplayError(f"no window can be opened: {str(error) or 'there is no display'}") from None
+    pygame.display.set_caption(title, "sandbox")
+    pygame.key.set_repeat(350, 40)
+    return surface
+
+
+def close_screen() -> None:
+    """Close the window."""
+    pygame.quit()
+
+
+def unit() -> float:
+    """Return by how much things are larger than on a display of 1080 lines, in quarters; at least 1."""
+    try:
+        heights = [height for _, height in pygame.display.get_desktop_sizes()]
+    except pygame.error:
+        heights = []
+    return max(round(4.0 * min(heights, default=LINES) / LINES) / 4.0, 1.0)
+
+
+def _fitting() -> tuple[int, int]:
+    desktops = pygame.display.get_desktop_sizes() or [SIZE]
+    scale = unit()
+    width, height = (max(round(side * SHARE), 1) for side in desktops[0])
+    return max(min(round(SIZE[0] * scale), width), SMALLEST[0]), max(min(round(SIZE[1] * scale), height), SMALLEST[1])

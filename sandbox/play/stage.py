@@ -1,0 +1,263 @@
+"""Stage: what is on, where it came from, and all that can be asked of it; no pygame, so that it can be tried without.
+
+Whatever fails is told as a message, and what was on goes on.
+"""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from sandbox.action import ActionError
+from sandbox.engines.contract import Refusal
+from sandbox.engines.registry import ENGINES, able, engine_named
+from sandbox.play.hands import Hands, Place
+from sandbox.play.knob import Value
+from sandbox.play.knobs import SETTINGS, turned
+from sandbox.play.live import Live
+from sandbox.play.messages import Messages
+from sandbox.play.session import Session
+from sandbox.play.shelf import neighbour
+from sandbox.play.stored import Stored
+from sandbox.scene.document import to_document
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import Override, from_document, load
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+FEW = 64
+"""Bodies up to which a twin is watched from the beginning."""
+
+
+class Stage:
+    """What the window shows, and what is done to it."""
+
+    def __init__(self, engine: str = "pymunk", overrides: Iterable[Override] = ()) -> None:
+        """Start with nothing on.
+
+        Args:
+            engine: whose name is tried first for every scene.
+            overrides: values set in every scene that is opened.
+        """
+        self.show: Live | Stored | None = None
+        self.path: Path | None = None
+        self.file: Scene | None = None
+        """the scene as its file has it"""
+        self.paused = False
+        self.hands = Hands()
+        self.messages = Messages()
+        self.faults: tuple[str, ...] = ()
+        self.on_new: Callable[[bool], object] = bool
+        """Called when something else is on; with whether it is the same scene, for the camera to stay."""
+        self._engine, self._overrides = engine, tuple(overrides)
+        self._turned: dict[str, Value] = {}
+        self._ghosted = False
+        self._trusting: bool | None = None  # nobody has said
+
+    @property
+    def live(self) -> Live | None:
+        """What is on, where it can be changed."""
+        return self.show if isinstance(self.show, Live) else None
+
+    @property
+    def engine(self) -> str:
+        """The present engine's name."""
+        return self.show.engine if self.show is not None else self._engine
+
+    def put_on(self, show: Live | Stored, path: Path | None, file: Scene, same: bool = False) -> None:
+        """Show something, and let go of what was on."""
+        if self.show is not None:
+            self.show.close()
+        self.show, self.path, self.file = show, path, file
+        self.hands.forget()
+        self.faults = ()
+        if isinstance(show, Live):
+            self._engine = show.engine
+            few = len(show.bodies) <= FEW
+            show.company.show_trust(few if self._trusting is None else self._trusting)
+            if self._ghosted and not show.company.ghosted:
+                show.company.show_ghost(True)
+        self.on_new(same)
+
+    def open(self, path: Path, same: bool = False, engine: str | None = None) -> bool:
+        """Open a scene file; one with faults is told, and what was on goes on. Return whether it was opened."""
+        try:
+            scene = load(path, self._overrides)
+        except SceneError as error:
+            self.faults = tuple(map(str, error.faults))
+            return False
+        return self._start(scene, path, scene, engine or self._engine, None, same)
+
+    def _start(
+        self, scene: Scene, path: Path | None, file: Scene, engine: str, settings: Settings | None, same: bool
+    ) -> bool:
+        try:
+            session = Session(scene, engine, settings)
+        except Refusal as refusal:
+            others = able(scene)
+            if not others:
+                self.messages.tell(str(refusal), "error")
+                return False
+            self.messages.tell(f"{refusal}; {others[0]} plays it", "warning")
+            session = Session(scene, others[0])
+        self.put_on(Live(session), path, file, same)
+        return True
+
+    def restart(self) -> None:
+        """Start the same scene at 0, with what was turned, and with the same engine."""
+        if isinstance(self.show, Stored):
+            self.show.scrub(self.show.begin)
+        elif self.show is not None and self.file is not None:
+            try:
+                scene = from_document(to_document(self.file), "<scene>", self._lasting(self.file))
+            except SceneError as error:
+                self.messages.tell(str(error), "error")
+                return
+            self._start(scene, self.path, self.file, self.show.engine, self.show.session.wanted, same=True)
+
+    def _lasting(self, scene: Scene) -> list[tuple[str, Value | list[float]]]:
+        """Return what was turned, as values of the scene."""
+        kinds = {"ball": scene.balls, "grid": scene.grids, "scatter": scene.scatters, "emitter": scene.emitters}
+        found: list[tuple[str, Value | list[float]]] = []
+        for path, value in self._turned.items():
+            if path == "gravity":
+                found.append(("world.gravity", [scene.world.gravity[0], float(value)]))
+            else:
+                found += [(f"{kind}.*.{path}", value) for kind, those in kinds.items() if those]
+        return found
+
+    def reload(self) -> None:
+        """Read the scene's file again, and start it at 0."""
+        if self.path is None or not isinstance(self.show, Live):
+            self.messages.tell("there is no scene file to reload", "warning")
+            return
+        if self.open(self.path, same=True, engine=self.show.engine):
+            self._turned.clear()
+            self.messages.tell(f"{self.path.name} reloaded")
+
+    def walk(self, by: int) -> None:
+        """Open the scene file before or after the one that is on."""
+        path = neighbour(self.path, by)
+        if path is None:
+            self.messages.tell("there is no other scene", "warning")
+            return
+        self.take(path)
+
+    def take(self, path: Path) -> None:
+        """Open another scene file."""
+        if self.open(path):
+            self._turned.clear()
+
+    def toggle_ghost(self) -> None:
+        """Begin a ghost from here, or end it."""
+        if self.live is None:
+            self.messages.tell("a stored run has no ghost; replay it with --engine", "warning")
+            return
+        self._ghosted = not self.live.company.ghosted
+        self.live.company.show_ghost(self._ghosted)
+
+    def toggle_trust(self) -> None:
+        """Begin to watch a twin from here, or end it."""
+        if self.live is None:
+            self.messages.tell("a stored run has no twin; `sandbox play` plays its scene", "warning")
+            return
+        self._trusting = self.live.company.trust is None
+        self.live.company.show_trust(self._trusting)
+
+    def next_engine(self) -> None:
+        """Go on with the next engine that can, from the same state; who cannot says why."""
+        if not isinstance(self.show, Live):
+            self.messages.tell("a stored run cannot change its engine; replay it with --engine", "warning")
+            return
+        names = list(ENGINES)
+        here = names.index(self.show.engine)
+        for name in names[here + 1 :] + names[:here]:
+            if self.switch(name):
+                return
+
+    def switch(self, engine: str) -> bool:
+        """Go on with an engine; return whether it could."""
+        if not isinstance(self.show, Live) or engine == self.show.engine:
+            return False
+        try:
+            note = self.show.switch(engine)
+        except ActionError as error:
+            self.messages.tell(str(error), "warning")
+            return False
+        self._engine = engine
+        self.messages.tell(f"{engine}: {engine_named(engine).about}" + (f" ({note})" if note else ""))
+        return True
+
+    def turn(self, key: str, value: Value) -> None:
+        """Turn a knob."""
+        live = self.live
+        if live is None:
+            return
+        if key == "engine":
+            self.switch(str(value))
+            return
+
+        def turn(live: Live) -> None:
+            for action in turned(live, key, value, self.hands.picked):
+                live.act(action)
+
+        if self.act(turn) and key not in SETTINGS and (key == "gravity" or self.hands.picked is None):
+            self._turned[key] = value
+
+    def act(self, deed: Callable[[Live], object]) -> bool:
+        """Do something to what is on, and say so where it cannot be done; return whether it could."""
+        live = self.live
+        if live is None:
+            self.messages.tell("a stored run cannot be changed; `sandbox play` plays its scene", "warning")
+            return False
+        try:
+            deed(live)
+        except ActionError as error:
+            self.messages.tell(str(error), "warning")
+            return False
+        return True
+
+    def grasp(self, place: Place, reach: float) -> bool:
+        """Pick the body at a place, m, and take hold of it; return whether there is one."""
+        if isinstance(self.show, Stored):
+            return self.hands.look(self.show, place, reach)
+        return (
+            self.act(lambda live: self.hands.grasp(live, place, reach, self.paused)) and self.hands.picked is not None
+        )
+
+    def go_on(self, elapsed: float) -> None:
+        """Let real time pass, s."""
+        if self.show is None:
+            return
+        self.show.go_on(elapsed, self.paused)
+        if isinstance(self.show, Live) and self.show.wants_pause:
+            self.paused, self.show.wants_pause = True, False
+        for level, text in self.show.notes:
+            self.messages.tell(text, level)
+        self.show.notes.clear()
+
+    def step(self) -> None:
+        """Make one step; a running scene pauses."""
+        self.paused = True
+        if self.show is not None:
+            self.show.step()
+
+    def back(self) -> None:
+        """Go one step back; a running scene pauses."""
+        self.paused = True
+        if self.show is not None:
+            self.show.back()
+
+    def slower(self) -> None:
+        """Go one rung slower."""
+        if self.show is not None:
+            self.show.pace.slower()
+
+    def faster(self) -> None:
+        """Go one rung faster."""
+        if self.show is not None:
+            self.show.pace.faster()
+
+    def close(self) -> None:
+        """Let go of what is on."""
+        if self.show is not None:
+            self.show.close()
+            self.show = None

@@ -1,0 +1,171 @@
+"""Window: the loop that turns events into deeds, and what is on into pictures.
+
+One turn is: wait, take the events in, let time pass, draw, show. What a hand does is so seen in the very next
+picture.
+"""
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+
+import pygame
+
+from sandbox.engines.compiling import COMPILING
+from sandbox.play.camera import Camera
+from sandbox.play.commands import Commands
+from sandbox.play.desk import Desk
+from sandbox.play.framing import framing
+from sandbox.play.keys import Keyboard
+from sandbox.play.mouse import Mouse
+from sandbox.play.screen import close_screen, open_screen, unit
+from sandbox.play.stage import Stage
+from sandbox.play.taking import Taking
+
+RATE = 60
+"""pictures a second, at most"""
+TITLE = "sandbox"
+
+
+class Window:
+    """The window. It owns the display from `open` to `close`."""
+
+    def __init__(
+        self,
+        stage: Stage,
+        *,
+        size: tuple[int, int] | None = None,
+        folder: Path | None = None,
+        film: str = ".gif",
+        say: Callable[[str], None] = print,
+    ) -> None:
+        """Open the window.
+
+        Args:
+            stage: what is played.
+            size: px; by default what suits the desktop.
+            folder: where screenshots, films and sessions go; by default the working folder.
+            film: what Ctrl+R records, `.gif` or `.mp4`.
+            say: who prints a line on the terminal.
+
+        Raises:
+            NoDisplayError: there is no display.
+        """
+        self.surface = open_screen(size, TITLE)
+        self.stage, self._say = stage, say
+        self.taking = Taking(folder or Path(), film, self.tell)
+        self.desk = Desk(self.surface.get_size(), unit())
+        self.camera = Camera((0.0, 0.0), 100.0, self.surface.get_size())
+        self.at_home = True
+        """whether the camera is where Home puts it; a new scene is then seen whole"""
+        self.leaving: int | None = None
+        """the exit status, once the window is to close"""
+        self._keyboard = Keyboard()
+        self.commands = Commands(self)
+        self.mouse = Mouse(self)
+        self._clock = pygame.time.Clock()
+        stage.on_new = self.renew
+        if stage.show is not None:
+            self.renew(False)
+
+    def tell(self, text: str, level: str = "info") -> None:
+        """Say something in the window and on the terminal."""
+        self.stage.messages.tell(text, level)
+        self._say(text)
+
+    def renew(self, same: bool) -> None:
+        """Look at what is on now; the same scene as before is seen from where it was seen."""
+        if self.at_home:
+            self.home()
+        self.desk.renew(same)
+        show = self.stage.show
+        pygame.display.set_caption(f"{show.scene.title or self.name} – {TITLE}" if show is not None else TITLE)
+
+    @property
+    def name(self) -> str:
+        """What files of this scene are called by."""
+        return self.stage.path.stem if self.stage.path is not None else "scene"
+
+    def home(self) -> None:
+        """Show the scene whole."""
+        self.at_home = True
+        show = self.stage.show
+        if show is not None:
+            size = self.surface.get_size()
+            self.camera = Camera.fitting(framing(show.scene), size, inset=self.desk.panel.width)
+
+    def run(self) -> int:
+        """Play until the window is closed; return the exit status."""
+        with self._signals():
+            self._clock.tick()
+            while self.leaving is None:
+                self.turn(self._clock.tick(RATE) / 1000.0)
+        return self.leaving
+
+    def turn(self, elapsed: float) -> None:
+        """Take events in, let so much real time pass, s, draw, and show."""
+        for event in pygame.event.get():
+            self.take(event)
+        if self.leaving is not None:
+            return
+        compiled = COMPILING.seconds
+        self.stage.go_on(elapsed)
+        if COMPILING.seconds > compiled:
+            self._clock.tick()  # that time was not the scene's
+        self.draw()
+        pygame.display.flip()
+        self.taking.roll(self.surface, elapsed)
+
+    def draw(self) -> None:
+        """Draw what is on, and what surrounds it."""
+        self.desk.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
+
+    def take(self, event: pygame.event.Event) -> None:
+        """Take one event in."""
+        if event.type == pygame.QUIT:
+            self.leaving = 0
+        elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
+            self._resize()
+        command = self._keyboard.command(event, self.desk.claimed(self.stage))
+        if self.desk.handle(event, self.stage):
+            return
+        if command is not None:
+            self.commands.do(command)
+        elif event.type == pygame.KEYDOWN:
+            deed = self.desk.claims(self.stage).deeds.get(event.key)
+            if deed is not None and not event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
+                self.stage.act(deed)
+        else:
+            self.mouse.take(event)
+
+    def _resize(self) -> None:
+        surface = pygame.display.get_surface()
+        if surface is None or surface.get_size() == self.camera.size:
+            return
+        self.surface = surface
+        self.desk.resize(surface.get_size())
+        self.camera = self.camera.resized(surface.get_size())
+        if self.at_home:
+            self.home()
+
+    @contextmanager
+    def _signals(self) -> Iterator[None]:
+        """Close cleanly on Ctrl+C and SIGTERM."""
+
+        def leave(number: int, _: FrameType | None) -> None:
+            self.leaving = 130 if number == signal.SIGINT else 0
+
+        before = {number: signal.signal(number, leave) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def close(self) -> None:
+        """Finish what is being recorded, and close the window."""
+        self.taking.end_film()
+        self.desk.close()
+        self.stage.close()
+        close_screen()

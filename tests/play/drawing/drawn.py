@@ -1,0 +1,68 @@
+"""Small scenes, and what a picture of them holds."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pygame
+
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.palette import Colour
+from sandbox.play.drawing.picture import Picture
+from sandbox.play.sight import Sight
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Scene
+from sandbox.trajectory import Contacts, Frame
+
+SIZE = (200, 120)
+CAMERA = Camera((0.0, 0.0), 20.0, SIZE)
+"""10 m wide and 6 m high, the origin in the middle"""
+
+
+def scene(*, balls: Sequence[dict] = (), **tables: object) -> Scene:
+    return from_document({"ball": list(balls), **tables} if balls else dict(tables))
+
+
+def ball(x: float, y: float, radius: float = 1.0, **more: object) -> dict:
+    return {"position": [x, y], "radius": radius, **more}
+
+
+def frame(which: Scene, **changed: object) -> Frame:
+    bodies = which.bodies
+    arrays = {
+        "time": 0.0,
+        "position": bodies.position.copy(),
+        "velocity": bodies.velocity.copy(),
+        "angle": bodies.angle.copy(),
+        "angular_velocity": bodies.angular_velocity.copy(),
+        "present": np.ones(len(bodies), np.bool_),
+    }
+    return Frame(**(arrays | changed))
+
+
+def sight(which: Scene, *overlays: str, shapes: bool = True, **more: object) -> Sight:
+    shown = {"shapes", *overlays} if shapes else set(overlays)
+    return Sight(which, which.bodies, **({"frame": frame(which), "overlays": frozenset(shown)} | more))
+
+
+def contact(pair: tuple[int, int], point: tuple, normal: tuple, impulse: tuple = (0.0, 0.0)) -> Contacts:
+    return Contacts(
+        np.zeros(1), np.asarray([pair]), *(np.asarray([each], dtype=float) for each in (point, normal, impulse))
+    )
+
+
+def drawn(what: Sight, camera: Camera = CAMERA, *, picture: Picture | None = None, **how: object) -> np.ndarray:
+    """Return the picture of a sight as colours (W, H, 3)."""
+    surface = pygame.Surface(camera.size)
+    (picture or Picture()).draw(surface, camera, what, **how)
+    return pygame.surfarray.array3d(surface)
+
+
+def at(picture: np.ndarray, x: float, y: float, camera: Camera = CAMERA) -> Colour:
+    """Return the colour of the pixel that shows a place, m."""
+    column, row = np.floor(camera.to_screen(np.asarray((x, y)))).astype(int)
+    return tuple(int(channel) for channel in picture[column, row])
+
+
+def changed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return which pixels differ, (W, H)."""
+    return (a != b).any(axis=2)

@@ -1,0 +1,233 @@
+import math
+
+import numpy as np
+import pytest
+from drawn import CAMERA, SIZE, at, ball, changed, contact, drawn, frame, scene, sight
+
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.palette import WARNING, YELLOW
+from sandbox.play.sight import Flash
+from sandbox.trajectory import Contacts
+
+ONE = scene(balls=[ball(0, 0, velocity=[5.0, 0.0])])
+WEIGHT = 9.81
+HEAVY = scene(balls=[ball(0, 0)], world={"gravity": [0.0, -WEIGHT]}, plane=[{"point": [0, -1], "normal": [0, 1]}])
+
+
+def box(differ: np.ndarray) -> tuple[int, int, int, int]:
+    """Return left, top, right, bottom of the pixels that differ, in px; the last two are beyond them."""
+    column, row = np.nonzero(differ)
+    return int(column.min()), int(row.min()), int(column.max()) + 1, int(row.max()) + 1
+
+
+def effect(which, *overlays, camera=CAMERA, **more) -> np.ndarray:
+    """Return which pixels overlays change."""
+    return changed(drawn(sight(which), camera), drawn(sight(which, *overlays, **more), camera))
+
+
+def test_velocity_is_shown_as_the_way_of_a_tenth_of_a_second():
+    for velocity, tip in (([20.0, 0.0], (140, 60)), ([0.0, 15.0], (100, 30)), ([-20.0, 0.0], (60, 60))):
+        which = scene(balls=[ball(0, 0, 0.2, velocity=velocity)])
+        left, top, right, bottom = box(effect(which, "velocities"))
+        reached = left if tip[0] < 100 else right if tip[0] > 100 else top
+        assert reached == pytest.approx(tip[1] if tip[0] == 100 else tip[0], abs=2)  # the edge of the arrow's head
+        assert left >= min(tip[0], 100) - 8
+        assert bottom <= 68
+
+
+def test_a_body_at_rest_has_no_arrow():
+    assert not effect(scene(balls=[ball(0, 0)]), "velocities").any()
+
+
+def test_a_fast_body_has_an_arrow_that_ends_in_the_picture():
+    left, _, right, _ = box(effect(scene(balls=[ball(0, 0, velocity=[1e9, 0.0])]), "velocities"))
+    assert left >= 90
+    assert right == pytest.approx(100 + 120 / 3, abs=2)  # the edge of the arrow's head
+
+
+@pytest.mark.parametrize("overlay", ["joints", "energy"])
+def test_what_is_drawn_elsewhere_changes_nothing(overlay):
+    assert not effect(ONE, overlay).any()
+
+
+def test_contacts_are_shown_where_the_body_is_now():
+    stale = contact((0, -1), (-4.0, -1.0), (0.0, -1.0))
+    left, top, right, bottom = box(effect(HEAVY, "contacts", contacts=stale))
+    assert left >= 95
+    assert right <= 105
+    assert top >= 76
+    assert bottom == pytest.approx(80 + 16, abs=2)  # the normal is 16 px long
+
+
+def test_contacts_of_two_balls_lie_between_them():
+    pair = scene(balls=[ball(-1, 0), ball(1, 0)])
+    wrong = contact((0, 1), (9.0, 9.0), (0.0, 1.0))
+    left, top, right, bottom = box(effect(pair, "contacts", contacts=wrong))
+    assert 94 <= left < right <= 118
+    assert 54 <= top < bottom <= 66
+
+
+def test_contacts_around_a_post_turn_with_the_ball():
+    which = scene(balls=[ball(0, 1.5)], post=[{"position": [0.0, 0.0], "radius": 0.5}])
+    stale = contact((0, -1), (0.5, 0.0), (-1.0, 0.0))
+    left, top, right, bottom = box(effect(which, "contacts", contacts=stale))
+    assert 94 <= left < right <= 106
+    assert bottom == pytest.approx(60 - 10 + 16, abs=2)  # the normal is 16 px long
+
+
+def test_contacts_around_the_end_of_a_wall_turn_with_the_ball():
+    which = scene(balls=[ball(0, 1.5)], wall=[{"points": [[0.0, 0.0], [4.0, 0.0]], "thickness": 1.0}])
+    stale = contact((0, -1), (0.5, 0.0), (-1.0, 0.0))
+    left, _, right, _ = box(effect(which, "contacts", contacts=stale))
+    assert 94 <= left < right <= 106
+
+
+def force(newtons: float, which=HEAVY, seconds=0.01) -> np.ndarray:
+    row = contact((0, -1), (0.0, -1.0), (0.0, -1.0), (0.0, -newtons * seconds))
+    return effect(which, "impulses", contacts=row, seconds=seconds)
+
+
+def test_impulses_are_measured_by_weights():
+    lengths = []
+    for weights in (1.0, 2.0, 3.0):
+        differ = force(weights * WEIGHT)[96:104]
+        lengths.append(box(differ)[3] - box(differ)[1])
+    assert lengths == pytest.approx([26, 52, 78], abs=2.5)  # smooth ends
+
+
+def test_a_large_impulse_stays_in_the_picture():
+    differ = force(1e9)[96:104]
+    assert box(differ)[3] - box(differ)[1] == pytest.approx(80, abs=2.5)  # smooth ends
+
+
+def test_impulses_without_gravity_are_measured_by_the_largest():
+    which = scene(balls=[ball(-3, 0), ball(3, 0)], plane=[{"point": [0, -1], "normal": [0, 1]}])
+    rows = Contacts(
+        np.zeros(2),
+        np.asarray([(0, -1), (1, -1)]),
+        np.asarray([(-3.0, -1.0), (3.0, -1.0)]),
+        np.asarray([(0.0, -1.0), (0.0, -1.0)]),
+        np.asarray([(0.0, -4e-7), (0.0, -2e-7)]),
+    )
+    differ = effect(which, "impulses", contacts=rows, seconds=0.1)
+    left, right = box(differ[36:44]), box(differ[156:164])
+    assert (left[3] - left[1]) / (right[3] - right[1]) == pytest.approx(2.0, abs=0.15)  # smooth ends
+
+
+def test_impulses_in_no_time_are_not_shown():
+    assert not force(1.0, seconds=0.0).any()
+
+
+def test_bounds_surround_each_body():
+    left, top, right, bottom = box(effect(ONE, "bounds"))
+    assert (left, top, right, bottom) == pytest.approx((80, 40, 120, 80), abs=1)  # a line's width
+
+
+def test_centres_are_marked():
+    left, top, right, bottom = box(effect(ONE, "centres"))
+    assert (left + right) / 2 == pytest.approx(100, abs=1)  # whole pixels
+    assert (top + bottom) / 2 == pytest.approx(60, abs=1)  # the same
+    assert effect(scene(balls=[ball(0, 0, 0.001)]), "centres").any()
+
+
+def test_names_are_written_above():
+    which = scene(balls=[ball(0, -1, 1.0, name="cue")])
+    left, top, right, bottom = box(effect(which, "names"))
+    assert left < 100 < right
+    assert bottom <= 60 + 1, "above the ball, whose top is at 0"
+    assert bottom - top < 16
+
+
+def test_names_that_would_cover_each_other_are_left_out():
+    apart = scene(balls=[ball(-3, 0, 0.3, name="left"), ball(3, 0, 0.3, name="right")])
+    near = scene(balls=[ball(-0.1, 0, 0.3, name="left"), ball(0.1, 0, 0.3, name="right", collides="none")])
+    alone = scene(balls=[ball(-0.1, 0, 0.3, name="left")])
+    both = effect(apart, "names").any(1)
+    assert both[:100].any()
+    assert both[100:].any()
+    assert (effect(near, "names").sum() <= effect(alone, "names").sum() * 1.2).all()  # over other colours below
+
+
+def trail(count: int = 20) -> tuple[np.ndarray, ...]:
+    x = np.linspace(-4.0, 0.0, count)
+    return (np.stack((x, np.zeros(count)), 1)[:, None, :],)
+
+
+def test_trails_lead_to_the_body_and_fade():
+    differ = effect(ONE, "trails", trails=trail())
+    left, top, right, bottom = box(differ)
+    assert left == pytest.approx(20, abs=1)  # a line's width
+    assert right <= 80 + 2
+    assert bottom - top <= 3
+    picture = drawn(sight(ONE, "trails", trails=trail()))
+    assert picture[30, 58:62].sum() < picture[75, 58:62].sum(), "the older, the fainter"
+
+
+def test_trails_in_pieces_are_those_of_the_whole():
+    (whole,) = trail()
+    pieces = whole[:7], whole[7:8], whole[8:]
+    assert not changed(drawn(sight(ONE, "trails", trails=(whole,))), drawn(sight(ONE, "trails", trails=pieces))).any()
+
+
+def test_trails_break_where_a_body_was_nowhere():
+    (whole,) = trail()
+    whole[8:12] = math.nan
+    row = effect(ONE, "trails", trails=(whole,)).any(1)
+    assert row[22:50].all()
+    assert not row[55:68].any()
+
+
+def test_trails_of_a_crowd_are_points():
+    grid = {"origin": [-4.0, -2.0], "columns": 40, "rows": 20, "spacing": [0.2, 0.2], "radius": 0.05}
+    which = scene(grid=[grid])
+    past = which.bodies.position[None] + np.linspace(-0.1, 0.0, 5)[:, None, None]
+    assert effect(which, "trails", trails=(past,)).any()
+
+
+def test_a_ghost_is_hollow_and_joined_to_its_body():
+    ghost = frame(ONE, position=np.asarray([[3.0, 0.0]]))
+    differ = effect(ONE, ghost=ghost)
+    assert differ[160 + 19, 60], "its rim"
+    assert not differ[160 + 6, 60 + 6], "its inside"
+    assert differ[130, 58:62].any(), "the line that joins them"
+
+
+def test_a_ghost_that_agrees_has_no_line():
+    ghost = frame(ONE, position=np.asarray([[0.1, 0.0]]))
+    assert not effect(ONE, ghost=ghost)[95:105, 55:65].any()
+
+
+def test_a_ghost_may_know_fewer_bodies():
+    two = scene(balls=[ball(0, 0, velocity=[5.0, 0.0]), ball(4, 0, 0.5)])
+    ghost = frame(ONE, position=np.asarray([[0.0, 1.0]]))
+    assert effect(two, ghost=ghost).any()
+
+
+def test_a_missed_contact_flashes_grows_and_fades():
+    widths, brightness = [], []
+    for age in (0.0, 0.5, 1.0, 1.4):
+        differ = effect(ONE, flashes=(Flash((0.0, 0.0), age),), camera=Camera((0, 0), 20.0, SIZE))
+        left, _, right, _ = box(differ)
+        widths.append(right - left)
+        picture = drawn(sight(scene(world={}), flashes=(Flash((0.0, 0.0), age),)))
+        brightness.append(int(picture[..., 0].max()))
+    assert widths == sorted(set(widths))
+    assert brightness == sorted(set(brightness), reverse=True)
+    assert brightness[0] >= WARNING[0] - 2
+    assert not effect(ONE, flashes=(Flash((0.0, 0.0), 1.5),)).any()
+
+
+def test_the_hand_is_joined_to_the_body():
+    differ = effect(ONE, pull=((0.0, 0.0), (4.0, 0.0)))
+    left, top, right, bottom = box(differ)
+    assert left == pytest.approx(97, abs=1)  # a dot of 3 px
+    assert right == pytest.approx(186, abs=1)  # one of 6 px
+    assert differ[97:186].any(1).all()
+    assert at(drawn(sight(ONE, pull=((0.0, 0.0), (4.0, 0.0)))), 4.0, 0.0) == YELLOW
+
+
+def test_the_picked_body_has_a_ring():
+    differ = effect(ONE, picked=0)
+    assert box(differ) == pytest.approx((76, 36, 124, 84), abs=1)  # smooth edges
+    assert not differ[85:115, 45:75].any()
+    assert not effect(ONE, picked=5).any()

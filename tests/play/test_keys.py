@@ -1,0 +1,167 @@
+"""Keys: every binding that is promised, spelled out; claims; Ctrl; other layouts; held keys."""
+
+import pygame
+import pytest
+from pressing import FOCUS_LOST, key, key_up
+
+from sandbox.play.keys import BINDINGS, GLOBAL, Command, Keyboard, command_for
+from sandbox.play.sight import OVERLAYS
+
+CTRL = pygame.KMOD_LCTRL
+PLAIN = {
+    "p": Command.PAUSE,
+    " ": Command.PAUSE,
+    "o": Command.STEP,
+    ".": Command.STEP,
+    ",": Command.BACK,
+    "r": Command.RESTART,
+    "\b": Command.RESTART,
+    "[": Command.PREVIOUS,
+    "]": Command.NEXT,
+    "-": Command.SLOWER,
+    "=": Command.FASTER,
+    "e": Command.ENGINE,
+    "g": Command.GHOST,
+    "\t": Command.PANEL,
+    "h": Command.HELP,
+    "\x1b": Command.QUIT,
+    "t": Command.TRUST,
+    "m": Command.SOUND,
+    "b": Command.ADD_BALL,
+    "n": Command.NUDGE,
+    "\x7f": Command.DELETE,
+    "1": Command.SHAPES,
+    "2": Command.VELOCITIES,
+    "3": Command.CONTACTS,
+    "4": Command.IMPULSES,
+    "5": Command.BOUNDS,
+    "6": Command.JOINTS,
+    "7": Command.CENTRES,
+    "8": Command.NAMES,
+    "9": Command.TRAILS,
+    "0": Command.ENERGY,
+}
+WITH_CTRL = {
+    "o": Command.PICKER,
+    "p": Command.SCREENSHOT,
+    "r": Command.RECORD,
+    "l": Command.RELOAD,
+    "s": Command.SAVE,
+}
+NAMED = {
+    pygame.K_HOME: Command.HOME,
+    pygame.K_F1: Command.HELP,
+    pygame.K_KP_MINUS: Command.SLOWER,
+    pygame.K_KP_PLUS: Command.FASTER,
+}
+
+
+@pytest.mark.parametrize("letter", PLAIN)
+def test_plain_key_gives_its_command(letter: str) -> None:
+    assert command_for(key(ord(letter), unicode=letter)) == PLAIN[letter]
+    assert command_for(key(ord(letter))) == PLAIN[letter]
+
+
+@pytest.mark.parametrize("code", NAMED)
+def test_named_key_gives_its_command(code: int) -> None:
+    assert command_for(key(code)) == NAMED[code]
+
+
+@pytest.mark.parametrize("letter", "abcdefghijklmnopqrstuvwxyz0123456789-=.,[] ")
+def test_key_with_ctrl_gives_that_of_ctrl_or_nothing(letter: str) -> None:
+    for mod in (pygame.KMOD_LCTRL, pygame.KMOD_RCTRL, pygame.KMOD_LCTRL | pygame.KMOD_CAPS):
+        assert command_for(key(ord(letter), mod, unicode=letter)) == WITH_CTRL.get(letter)
+
+
+@pytest.mark.parametrize("mod", [pygame.KMOD_LALT, pygame.KMOD_LMETA, pygame.KMOD_LMETA | pygame.KMOD_LSHIFT])
+def test_key_with_alt_or_meta_is_left_to_the_system(mod: int) -> None:
+    for letter in PLAIN:
+        assert command_for(key(ord(letter), mod, unicode=letter)) is None
+
+
+@pytest.mark.parametrize("mod", [pygame.KMOD_LSHIFT, pygame.KMOD_CAPS, pygame.KMOD_NUM])
+def test_shift_and_locks_change_no_letter(mod: int) -> None:
+    assert command_for(key(pygame.K_p, mod, unicode="P")) == Command.PAUSE
+    assert command_for(key(pygame.K_g, mod, unicode="G")) == Command.GHOST
+    assert command_for(key(pygame.K_EQUALS, mod, unicode="+")) == Command.FASTER
+
+
+def test_claimed_key_gives_nothing_but_the_global_ones_stay() -> None:
+    every = frozenset(code for binding in BINDINGS for code in binding.keys)
+    kept = {code for code in every if command_for(key(code), every) is not None}
+    assert kept == GLOBAL == {pygame.K_p, pygame.K_o, pygame.K_F1, pygame.K_ESCAPE}
+
+
+def test_claim_on_space_leaves_the_other_pause_key() -> None:
+    claimed = frozenset({pygame.K_SPACE})
+    assert command_for(key(pygame.K_SPACE, unicode=" "), claimed) is None
+    assert command_for(key(pygame.K_p, unicode="p"), claimed) == Command.PAUSE
+
+
+def test_claimed_punctuation_is_not_found_by_its_character() -> None:
+    assert command_for(key(pygame.K_PERIOD, unicode="."), frozenset({pygame.K_PERIOD})) is None
+
+
+def test_claimed_letter_keeps_its_ctrl_command() -> None:
+    claimed = frozenset({pygame.K_s, pygame.K_r, pygame.K_l})
+    assert command_for(key(pygame.K_s, CTRL), claimed) == Command.SAVE
+    assert command_for(key(pygame.K_r, CTRL), claimed) == Command.RECORD
+    assert command_for(key(pygame.K_l, CTRL), claimed) == Command.RELOAD
+
+
+def test_bracket_behind_altgr_is_the_bracket_and_not_its_digit() -> None:
+    for mod in (pygame.KMOD_MODE, pygame.KMOD_RALT, pygame.KMOD_LCTRL | pygame.KMOD_RALT):
+        assert command_for(key(pygame.K_8, mod, unicode="[")) == Command.PREVIOUS
+        assert command_for(key(pygame.K_9, mod, unicode="]")) == Command.NEXT
+
+
+def test_digit_of_a_french_board_is_found_by_its_character() -> None:
+    assert command_for(key(pygame.K_AMPERSAND, pygame.KMOD_LSHIFT, unicode="1")) == Command.SHAPES
+
+
+def test_equals_and_plus_of_a_german_board_make_it_faster() -> None:
+    assert command_for(key(pygame.K_0, pygame.KMOD_LSHIFT, unicode="=")) == Command.FASTER
+    assert command_for(key(pygame.K_PLUS, unicode="+")) == Command.FASTER
+
+
+def test_letter_of_a_russian_board_is_found_by_its_place() -> None:
+    assert command_for(key(ord("з"), unicode="з", scancode=pygame.KSCAN_P)) == Command.PAUSE
+    assert command_for(key(ord("з"), CTRL, scancode=pygame.KSCAN_P)) == Command.SCREENSHOT
+    assert command_for(key(ord("х"), unicode="х", scancode=pygame.KSCAN_LEFTBRACKET)) == Command.PREVIOUS
+
+
+def test_other_events_and_keys_give_nothing() -> None:
+    assert command_for(key_up(pygame.K_p)) is None
+    assert command_for(pygame.event.Event(pygame.MOUSEMOTION, pos=(0, 0))) is None
+    assert command_for(key(pygame.K_F7)) is None
+    assert command_for(key(pygame.K_q, unicode="q")) is None
+
+
+def test_every_command_has_a_binding_and_no_key_two() -> None:
+    assert {binding.command for binding in BINDINGS} == set(Command)
+    bound = [(code, binding.modifiers) for binding in BINDINGS for code in binding.keys]
+    assert len(bound) == len(set(bound))
+
+
+def test_overlay_commands_are_the_overlays_in_their_order() -> None:
+    found = tuple(command.overlay for command in Command if command.overlay is not None)
+    assert found == OVERLAYS
+    assert Command.PAUSE.overlay is None
+
+
+def test_held_key_repeats_only_where_it_should() -> None:
+    repeating = {Command.STEP, Command.BACK, Command.SLOWER, Command.FASTER}
+    for binding in BINDINGS:
+        keyboard = Keyboard()
+        event = key(binding.keys[0], binding.modifiers)
+        assert keyboard.command(event) == binding.command
+        assert keyboard.command(event) == (binding.command if binding.command in repeating else None)
+        assert keyboard.command(key_up(binding.keys[0])) is None
+        assert keyboard.command(event) == binding.command
+
+
+def test_key_counts_as_new_after_the_focus_was_lost() -> None:
+    keyboard = Keyboard()
+    keyboard.command(key(pygame.K_p))
+    keyboard.command(FOCUS_LOST)
+    assert keyboard.command(key(pygame.K_p)) == Command.PAUSE

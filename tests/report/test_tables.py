@@ -1,0 +1,217 @@
+"""Tables of runs: every number as it was, bit for bit, and a whole file or none."""
+
+import csv
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+
+from sandbox.action import Remove, Spawn
+from sandbox.measure.run import run
+from sandbox.report import tables
+from sandbox.report.tables import CONTACTS, STATES, MissingExtraError, write_contacts, write_states
+from sandbox.scene.file import loads
+from sandbox.scene.model import Ball
+from sandbox.trajectory import Trajectory
+
+SCENE = loads("""
+[world]
+gravity = [0.1, -9.81]
+duration = 0.5
+[[plane]]
+name = "ground, the"
+point = [0, 0]
+normal = [0.01, 1]
+[[post]]
+name = 'a "peg"'
+position = [3, 0.3]
+radius = 0.3
+[[ball]]
+name = "a"
+position = [0, 0.6]
+radius = 0.5
+restitution = 0.3
+friction = 0.5
+[[ball]]
+name = "b"
+position = [3.1, 0.9]
+radius = 0.2
+[[ball]]
+name = "c"
+position = [0.3, 1.7]
+radius = 0.5
+""")
+
+ACTIONS = (
+    Spawn(time=0.1, ball=Ball(name="late", position=(9.0, 9.0), radius=0.1)),
+    Remove(time=0.2, body="b"),
+)
+
+
+def made() -> Trajectory:
+    """A run with three kinds of contact, a body that comes and one that goes."""
+    trajectory = run(SCENE, actions=ACTIONS)
+    assert {tuple(pair) for pair in trajectory.contact_pair.tolist()} >= {(0, 2), (0, -1), (1, -2)}
+    return trajectory
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def bits(values: object) -> list[int]:
+    """Floats by their bits; a nan is a nan, whatever its sign."""
+    array = np.asarray(values, np.float64)
+    return np.where(np.isnan(array), np.float64("nan"), array).view(np.int64).tolist()
+
+
+def test_states_as_csv_have_the_bits_of_the_run(tmp_path: Path) -> None:
+    trajectory, path = made(), tmp_path / "states.csv"
+    count = write_states(trajectory, path)
+    rows = rows_of(path)
+    frames, bodies = trajectory.angle.shape
+    assert (len(rows), tuple(rows[0])) == (count, STATES) == (frames * bodies, STATES)
+    assert [row["body"] for row in rows[:bodies]] == ["a", "b", "c", "late"]
+    columns = {
+        "time": np.repeat(trajectory.time, bodies),
+        "x": trajectory.position[..., 0],
+        "y": trajectory.position[..., 1],
+        "vx": trajectory.velocity[..., 0],
+        "vy": trajectory.velocity[..., 1],
+        "angle": trajectory.angle,
+        "angular_velocity": trajectory.angular_velocity,
+    }
+    for name, values in columns.items():
+        assert bits([float(row[name]) for row in rows]) == bits(values.ravel())
+
+
+def test_presence_says_who_is_there(tmp_path: Path) -> None:
+    trajectory, path = made(), tmp_path / "states.csv"
+    write_states(trajectory, path)
+    present = {name: [] for name in trajectory.names.tolist()}
+    for row in rows_of(path):
+        assert row["present"] in ("true", "false")
+        if row["present"] == "true":
+            present[row["body"]].append(float(row["time"]))
+    time = trajectory.time.tolist()
+    assert present["a"] == time
+    assert present["b"] == [t for t in time if t < trajectory.retired_time[1]]
+    assert 0 < len(present["b"]) < len(time)
+    assert present["late"] == time[time.index(present["late"][0]) :]
+    assert present["late"][0] == pytest.approx(0.11)  # the first frame after its step
+
+
+def test_contacts_as_csv_have_names_and_bits(tmp_path: Path) -> None:
+    trajectory, path = made(), tmp_path / "contacts.csv"
+    count = write_contacts(trajectory, SCENE.fixed_names, path)
+    rows = rows_of(path)
+    assert (len(rows), tuple(rows[0])) == (count, CONTACTS) == (len(trajectory.contact_time), CONTACTS)
+    fixed = {-1: "ground, the", -2: 'a "peg"'}
+    for row, pair in zip(rows, trajectory.contact_pair.tolist(), strict=True):
+        names = [fixed[number] if number < 0 else str(trajectory.names[number]) for number in pair]
+        assert [row["a"], row["b"]] == names
+    for column, values in (("point", trajectory.contact_point), ("impulse", trajectory.contact_impulse)):
+        for k, axis in enumerate("xy"):
+            assert bits([float(row[f"{column}_{axis}"]) for row in rows]) == bits(values[:, k])
+    assert bits([float(row["time"]) for row in rows]) == bits(trajectory.contact_time)
+    assert bits([float(row["normal_y"]) for row in rows]) == bits(trajectory.contact_normal[:, 1])
+
+
+@pytest.mark.parametrize("chunk", [3, 7, 1 << 16])
+def test_parquet_is_equal_to_csv(chunk: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tables, "CHUNK", chunk)  # 3 cuts a frame of 4 bodies in two
+    trajectory = made()
+    for suffix in (".csv", ".parquet"):
+        write_states(trajectory, tmp_path / f"states{suffix}")
+        write_contacts(trajectory, SCENE.fixed_names, tmp_path / f"contacts{suffix}")
+    for stem, columns in (("states", STATES), ("contacts", CONTACTS)):
+        rows = rows_of(tmp_path / f"{stem}.csv")
+        table = parquet.read_table(tmp_path / f"{stem}.parquet")
+        assert tuple(table.column_names) == columns
+        for column in columns:
+            values = table[column].to_pylist()
+            if column in ("body", "a", "b"):
+                assert values == [row[column] for row in rows]
+            elif column == "present":
+                assert values == [row[column] == "true" for row in rows]
+            else:
+                assert bits(values) == bits([float(row[column]) for row in rows])
+
+
+@pytest.mark.parametrize("value", [0.1 + 0.2, 5e-324, -0.0, 1.7976931348623157e308, np.pi, np.inf])
+def test_every_double_survives(value: float, tmp_path: Path) -> None:
+    trajectory = run(loads("[world]\nduration = 0.01\n[[ball]]\nposition = [0, 0]\nradius = 1"))
+    trajectory.angle[:] = value
+    write_states(trajectory, tmp_path / "a.csv")
+    write_states(trajectory, tmp_path / "a.parquet")
+    assert bits([float(row["angle"]) for row in rows_of(tmp_path / "a.csv")]) == bits([value, value])
+    assert bits(parquet.read_table(tmp_path / "a.parquet")["angle"].to_pylist()) == bits([value, value])
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_run_without_contacts_gives_a_table_of_no_rows(suffix: str, tmp_path: Path) -> None:
+    trajectory = run(loads("[world]\nduration = 0.01\n[[ball]]\nposition = [0, 0]\nradius = 1"))
+    path = tmp_path / f"contacts{suffix}"
+    assert write_contacts(trajectory, (), path) == 0
+    head = path.read_text().strip().split(",") if suffix == ".csv" else parquet.read_table(path).column_names
+    assert tuple(head) == CONTACTS
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_table_is_whole_or_not_there(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / f"states{suffix}"
+    path.write_bytes(b"old")
+    monkeypatch.setattr(tables, "CHUNK", 8)
+    real, calls = np.repeat, []
+
+    def interrupted(*args: object) -> object:
+        calls.append(args)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return real(*args)
+
+    trajectory = made()
+    monkeypatch.setattr(tables.np, "repeat", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_states(trajectory, path)
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+    assert path.read_bytes() == b"old"
+
+
+def test_parquet_without_its_extra_names_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tables, "can_write_parquet", lambda: False)
+    with pytest.raises(MissingExtraError, match=r'pip install "sandbox2d\[parquet\]"'):
+        write_states(made(), tmp_path / "states.parquet")
+    with pytest.raises(ValueError, match=r"ends in \.csv or \.parquet, not '\.txt'"):
+        write_states(made(), tmp_path / "states.txt")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_large_run_needs_little_memory_beside_itself(suffix: str, tmp_path: Path) -> None:
+    count, frames = 20_000, 40
+    trajectory = run(loads("[world]\nduration = 0.01\n[[ball]]\nposition = [0, 0]\nradius = 1"))
+    states = np.random.default_rng(1).normal(size=(6, frames, count))
+    large = Trajectory(
+        **{name: getattr(trajectory, name) for name in trajectory.__dataclass_fields__}
+        | {
+            "time": np.arange(float(frames)),
+            "position": np.moveaxis(states[:2], 0, 2),
+            "velocity": np.moveaxis(states[2:4], 0, 2),
+            "angle": states[4],
+            "angular_velocity": states[5],
+            "names": np.asarray([f"ball-{k}" for k in range(count)]),
+            "retired_time": np.full(count, np.nan),
+        }
+    )
+    write_states(trajectory, tmp_path / f"first{suffix}")  # imports are not what is measured
+    tracemalloc.start()
+    try:
+        assert write_states(large, tmp_path / f"states{suffix}") == count * frames
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < states.nbytes  # it is 38 MB, and grows with the chunk, not with the run
