@@ -2,7 +2,12 @@
 
 import numpy as np
 
-from sandbox.trajectory import Frame
+from sandbox.trajectory import FloatArray, Frame
+
+LEAP = 4.0
+"""Who is farther on than so many times what its speed explains was put there."""
+TINY = 1e-18
+"""m²: who hardly moves is no leaper"""
 
 
 def between(before: Frame, after: Frame, share: float) -> Frame:
@@ -14,14 +19,20 @@ def between(before: Frame, after: Frame, share: float) -> Frame:
         return after
     known = len(before.position)
     time = before.time + (after.time - before.time) * share
-    position, angle = after.position.copy(), after.angle.copy()
+    dt = abs(after.time - before.time)
     with np.errstate(all="ignore"):
         moved = after.position[:known] - before.position
-        turned = after.angle[:known] - before.angle
-        dt = abs(after.time - before.time)
-        speed = np.maximum(np.abs(before.velocity), np.abs(after.velocity[:known])).sum(axis=1)
-        flew = np.abs(moved).sum(axis=1) <= 4.0 * speed * dt + 1e-9
+        fastest = np.maximum(_squared(before.velocity), _squared(after.velocity[:known]))
+        flew = _squared(moved) <= (LEAP * dt) ** 2 * fastest + TINY
         flew &= before.present & after.present[:known]
-        position[:known][flew] -= moved[flew] * (1.0 - share)
-        angle[:known][flew] -= turned[flew] * (1.0 - share)
+        position = after.position.copy()
+        position[:known] -= moved * (flew * (1.0 - share))[:, None]
+        angle = after.angle
+        if before.angle is not after.angle:  # which those share who cannot turn
+            angle = after.angle.copy()
+            angle[:known] -= (after.angle[:known] - before.angle) * (flew * (1.0 - share))
     return Frame(time, position, after.velocity, angle, after.angular_velocity, after.present)
+
+
+def _squared(vectors: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum("nk,nk->n", vectors, vectors))

@@ -11,7 +11,7 @@ from sandbox.play.drawing.picture import Picture
 from sandbox.play.facts import facts, told
 from sandbox.play.graph import EnergyGraph
 from sandbox.play.hud import draw_hud
-from sandbox.play.knobs import knobs
+from sandbox.play.knobs import Knobs
 from sandbox.play.live import Live
 from sandbox.play.manual import Manual
 from sandbox.play.panel import Panel
@@ -41,6 +41,7 @@ class Desk:
         self._graph = EnergyGraph()
         self._picture = Picture()
         self._sounds = Sounds()
+        self._knobs = Knobs()
         self._size = size
         self._claims: tuple[object, Claims] | None = None
         self._heard: object = None
@@ -155,7 +156,9 @@ class Desk:
 
     def _show_panel(self, stage: Stage, recording: bool) -> None:
         live = stage.live
-        shown = knobs(live, stage.file, stage.hands.picked) if live is not None and stage.file is not None else ()
+        shown = (
+            self._knobs.of(live, stage.file, stage.hands.picked) if live is not None and stage.file is not None else ()
+        )
         toggles = {name: name in self.overlays for name in OVERLAYS}
         if live is not None:
             toggles |= {"ghost": live.company.ghosted, "trust": live.company.trust is not None}

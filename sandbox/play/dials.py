@@ -56,7 +56,7 @@ class KnobSlider(Dial, Slider):  # type: ignore[misc]  # the library ships no ty
     def __init__(self, surface: pygame.Surface, knob: Knob) -> None:
         self.min, self.max, self.value = 0.0, 1.0, 0.0
         self._changed = False
-        self._grip = 0.0
+        self._gripped, self._grip = False, 0.0
         self.row = pygame.Rect(0, 0, 0, 0)
         """label, value and track together"""
         self._pressed = -DOUBLE - 1, (0, 0)
@@ -109,13 +109,14 @@ class KnobSlider(Dial, Slider):  # type: ignore[misc]  # the library ships no ty
         self._pressed = now, at
         self.held, self._changed = True, False
         handle = self.getX() + self.getValue() * self.getWidth()
-        self._grip = at[0] - handle if abs(at[0] - handle) <= self.handleRadius else 0.0  # a grip does not jump
-        if not self._grip:
+        self._gripped = abs(at[0] - handle) <= self.handleRadius
+        self._grip = at[0] - handle if self._gripped else 0.0  # a gripped handle does not jump
+        if not self._gripped:
             self._follow(at[0])
 
     def _follow(self, x: float) -> None:
         """Move to where the pointer is; where it has not moved since it gripped the handle, nothing changes."""
-        if x == self._pressed[1][0] and self._grip and not self._changed:
+        if x == self._pressed[1][0] and self._gripped and not self._changed:
             return
         value = self.knob.at((x - self._grip - self.getX()) / max(self.getWidth(), 1))
         if value != self.now:

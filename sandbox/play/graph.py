@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
 import pygame
 
 from sandbox.play.drawing.palette import FAINT, INK, LINE, PURPLE, SKY, Colour
@@ -64,9 +65,9 @@ class EnergyGraph:
 
     def rescaled(self, shown: Sequence[Sample]) -> Limits:
         """Return limits that hold all lines and zero: the present ones while they fit and are not far too wide."""
-        values = [value for sample in shown for value in sample[1:] if math.isfinite(value)]
-        low, high = min(values, default=0.0), max(values, default=0.0)
-        low, high = min(low, 0.0), max(high, 0.0)
+        values = np.asarray(shown, np.float64).reshape(-1, 4)[:, 1:]
+        values = values[np.isfinite(values)]
+        low, high = float(values.min(initial=0.0)), float(values.max(initial=0.0))
         need = high / 2 - low / 2  # halves, as the difference of two floats may overflow
         if not 0 < need < 1e307:
             return self.limits if need == 0 else (-1e308, 1e308)
@@ -118,21 +119,22 @@ class EnergyGraph:
     def _draw_lines(self, surface: pygame.Surface, chart: pygame.Rect, shown: Sequence[Sample], unit: float) -> None:
         if len(shown) < 2:
             return
+        every = max(len(shown) // chart.width, 1)
+        kept = np.asarray([*shown[:-1:every], shown[-1]])
         first, last = shown[0][0], shown[-1][0]
-        every = max(len(shown) // (2 * chart.width), 1)
-        kept = [*shown[:-1:every], shown[-1]]
-        across = [chart.left + (sample[0] - first) / (last - first) * chart.width for sample in kept]
+        across = (chart.left + (kept[:, 0] - first) / (last - first) * chart.width).tolist()
+        bottom, top = self.limits
+        with np.errstate(all="ignore"):  # what is not finite is left out below
+            shares = np.clip((kept[:, 1:] / 2 - bottom / 2) / (top / 2 - bottom / 2), 0.0, 1.0)
+        finite = np.isfinite(kept[:, 1:])
+        heights = (chart.bottom - shares * chart.height).tolist()
         thickness = max(round(1.6 * unit), 1)
         for index, (_, colour) in enumerate(LINES):
-            piece: list[tuple[float, float]] = []
-            for x, sample in zip(across, kept, strict=True):
-                value = sample[index + 1]
-                if math.isfinite(value):
-                    piece.append((x, self._height(value, chart)))
-                else:
-                    _draw_piece(surface, piece, colour, thickness)
-                    piece = []
-            _draw_piece(surface, piece, colour, thickness)
+            points = [(x, row[index]) for x, row in zip(across, heights, strict=True)]
+            start = 0
+            for gap in [*np.flatnonzero(~finite[:, index]).tolist(), len(points)]:
+                _draw_piece(surface, points[start:gap], colour, thickness)
+                start = gap + 1
 
     def _draw_words(
         self, surface: pygame.Surface, chart: pygame.Rect, left: int, shown: Sequence[Sample], size: float

@@ -13,33 +13,57 @@ KINDS = ("ball", "grid", "scatter", "emitter")
 SETTINGS = ("dt", "substeps", "iterations", "integrator", "detection")
 
 
-def knobs(live: Live, file: Scene, picked: int | None) -> tuple[Knob, ...]:
-    """Return the knobs of a session as they now stand.
+class Knobs:
+    """The knobs of a session. What an engine can do is asked once for a scene and settings."""
 
-    Args:
-        live: the session.
-        file: its scene as the file has it, for what a double click goes back to.
-        picked: number of the body that restitution and friction are of; else they are of all balls.
-    """
-    return (
-        Knob(
-            "gravity",
-            "gravity",
-            -30.0,
-            30.0,
-            live.scene.world.gravity[1],
-            step=0.1,
-            unit="m/s²",
-            default=file.world.gravity[1],
-        ),
-        _surface(live, file, picked, "restitution", 1.0),
-        _surface(live, file, picked, "friction", 2.0),
-        Knob("engine", "engine", value=live.engine, choices=tuple(ENGINES)),
-        Knob("dt", "dt", 1e-4, 0.1, live.settings.dt, log=True, step=0.1, unit="s", default=file.solver.dt),
-        *_counts(live, file),
-        _choice(live, "integrator", get_args(Integrator)),
-        _choice(live, "detection", get_args(Detection)),
-    )
+    def __init__(self) -> None:
+        self._asked: tuple[Scene, str, Settings] | None = None
+        self._able: dict[str, tuple[str, ...]] = {}
+
+    def of(self, live: Live, file: Scene, picked: int | None) -> tuple[Knob, ...]:
+        """Return the knobs as they now stand.
+
+        Args:
+            live: the session.
+            file: its scene as the file has it, for what a double click goes back to.
+            picked: number of the body that restitution and friction are of; else they are of all balls.
+        """
+        scene, settings = live.scene, live.settings
+        return (
+            Knob(
+                "gravity",
+                "gravity",
+                -30.0,
+                30.0,
+                scene.world.gravity[1],
+                step=0.1,
+                unit="m/s²",
+                default=file.world.gravity[1],
+            ),
+            _surface(live, file, picked, "restitution", 1.0),
+            _surface(live, file, picked, "friction", 2.0),
+            Knob("engine", "engine", value=live.engine, choices=tuple(ENGINES)),
+            Knob("dt", "dt", 1e-4, 0.1, settings.dt, log=True, step=0.1, unit="s", default=file.solver.dt),
+            *_counts(live, file),
+            self._choice(live, "integrator", get_args(Integrator)),
+            self._choice(live, "detection", get_args(Detection)),
+        )
+
+    def _choice(self, live: Live, key: str, words: tuple[str, ...]) -> Knob:
+        """Return the knob of a choice, with those that the engine has."""
+        now = live.scene, live.engine, live.session.wanted
+        if self._asked is None or any(a is not b for a, b in zip(self._asked, now, strict=True)):
+            self._asked, self._able = now, {}
+        if key not in self._able:
+            engine = ENGINES[live.engine]
+            self._able[key] = tuple(
+                word for word in words if not engine.missing(live.scene, live.session.wanted.replace(**{key: word}))
+            )
+        able, value = self._able[key], getattr(live.settings, key)
+        if len(able) < 2:
+            why = f"{live.engine} has no other" if able else f"{live.engine} has none"
+            return Knob(key, key, value=value or "none", choices=(value or "none",), enabled=False, why=why)
+        return Knob(key, key, value=value, choices=able)
 
 
 def _counts(live: Live, file: Scene) -> tuple[Knob, ...]:
@@ -83,22 +107,6 @@ def stated(scene: Scene, disc: Disc, key: str) -> float:
     if own is None and disc.material is not None:
         own = next((getattr(each, key) for each in scene.materials if each.name == disc.material), None)
     return own or 0.0
-
-
-def _choice(live: Live, key: str, words: tuple[str, ...]) -> Knob:
-    """Return the knob of a choice, with those that the engine has."""
-    engine = ENGINES[live.engine]
-    able = tuple(word for word in words if not engine.missing(live.scene, _chosen(live, key, word)))
-    value = getattr(live.settings, key)
-    if len(able) < 2:
-        why = f"{live.engine} has no other" if able else f"{live.engine} has none"
-        return Knob(key, key, value=value or "none", choices=(value or "none",), enabled=False, why=why)
-    return Knob(key, key, value=value, choices=able)
-
-
-def _chosen(live: Live, key: str, word: str) -> Settings:
-    wanted: Settings = live.session.wanted.replace(**{key: word})
-    return wanted
 
 
 def turned(live: Live, key: str, value: Value, picked: int | None) -> list[Action]:

@@ -120,7 +120,7 @@ def _fitted(everything: Sequence[Group], free: pygame.Rect, unit: float) -> tupl
     for size in SIZES:
         columns = _columns(everything, free, size * unit)
         if columns is not None:
-            return size * unit, columns
+            return size * unit, _levelled(everything, free, size * unit, columns)
     smallest = SIZES[-1] * unit
     for times in (1.5, 2.0, 3.0, 5.0):
         columns = _columns(everything, pygame.Rect(free.topleft, (free.width, round(times * free.height))), smallest)
@@ -145,6 +145,16 @@ def _columns(everything: Sequence[Group], free: pygame.Rect, size: float) -> lis
         filled += tall
     total = sum(sum(_wide(column, size)) + 1.2 * size for column in columns) + 2.4 * size * (len(columns) - 1)
     return columns if total <= free.width else None
+
+
+def _levelled(everything: Sequence[Group], free: pygame.Rect, size: float, columns: list[Column]) -> list[Column]:
+    """Return as many columns, none taller than it has to be."""
+    for percent in range(40, 100, 4):
+        lower = pygame.Rect(free.left, free.top, free.width, free.height * percent // 100)
+        found = _columns(everything, lower, size)
+        if found is not None and len(found) == len(columns):
+            return found
+    return columns
 
 
 def _draw_columns(surface: pygame.Surface, columns: list[Column], free: pygame.Rect, size: float, hint: str) -> None:

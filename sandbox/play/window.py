@@ -80,7 +80,7 @@ class Window:
             self.home()
         self.desk.renew(same)
         show = self.stage.show
-        pygame.display.set_caption(f"{show.scene.title or self.name} – {TITLE}" if show is not None else TITLE)
+        pygame.display.set_caption(f"{show.scene.title or self.name} - {TITLE}" if show is not None else TITLE)
 
     @property
     def name(self) -> str:

@@ -41,7 +41,7 @@ def frame(which: Scene, **changed: object) -> Frame:
 
 def sight(which: Scene, *overlays: str, shapes: bool = True, **more: object) -> Sight:
     shown = {"shapes", *overlays} if shapes else set(overlays)
-    return Sight(which, which.bodies, **({"frame": frame(which), "overlays": frozenset(shown)} | more))
+    return Sight(which, **({"bodies": which.bodies, "frame": frame(which), "overlays": frozenset(shown)} | more))
 
 
 def contact(pair: tuple[int, int], point: tuple, normal: tuple, impulse: tuple = (0.0, 0.0)) -> Contacts:

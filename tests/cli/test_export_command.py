@@ -1,0 +1,446 @@
+"""`sandbox export`: tables, pictures and films of stored runs; every fault before the work."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+from calling import DROP, json_of, lines_of, process, written
+from films import gif_frames, mp4_frames
+from PIL import Image
+
+from sandbox.action import Impulse, Spawn
+from sandbox.cli.main import call
+from sandbox.measure.run import run
+from sandbox.play import limits
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.palette import SKY
+from sandbox.play.film import Film
+from sandbox.recording import Recording
+from sandbox.report import tables
+from sandbox.scene.file import loads
+from sandbox.scene.model import Ball
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Trajectory
+
+SCENE = loads(DROP)
+SMALL = ("--size", "160x90")
+
+
+@pytest.fixture
+def stored(tmp_path: Path) -> Path:
+    """A folder with one run of half a second, as `sandbox run --out` makes it."""
+    folder = tmp_path / "runs"
+    assert call(["run", written(tmp_path), "--out", str(folder), "--quiet"]) == 0
+    return folder
+
+
+def id_in(folder: Path) -> str:
+    (path,) = folder.glob("*.npz")
+    return path.stem
+
+
+def csv_rows(path: Path) -> list[list[str]]:
+    return [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def recorded(**changes: object) -> Recording:
+    parts = {"engine": "pymunk", "settings": Settings(), "actions": (), "duration": 0.3} | changes
+    return Recording(scene=SCENE, **parts)
+
+
+@pytest.mark.parametrize("way", ["{folder}/{id}.npz", "{folder}/{id}", "{folder}", "{folder}/"])
+def test_run_is_found_by_file_id_or_folder(
+    way: str, stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    name, target = way.format(folder=stored, id=id_in(stored)), tmp_path / "a.csv"
+    status, document, err = json_of(capfd, "export", name, "--to", str(target))
+    assert (status, err) == (0, [])
+    assert document == {"run": name, "files": [{"path": str(target), "format": "csv", "rows": 51}]}
+    assert len(csv_rows(target)) == 52
+
+
+def test_csv_and_parquet_hold_the_run(stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    targets = [tmp_path / "a.csv", tmp_path / "a.parquet"]
+    status, out, err = lines_of(capfd, "export", str(stored), *(f"--to={target}" for target in targets))
+    assert (status, err) == (0, [])
+    assert out == [f"written: {target} (51 rows)" for target in targets]
+    trajectory = Trajectory.load(stored / f"{id_in(stored)}.npz")
+    rows = csv_rows(targets[0])[1:]
+    assert [float(row[3]) for row in rows] == trajectory.position[:, 0, 1].tolist()
+    assert parquet.read_table(targets[1])["y"].to_pylist() == trajectory.position[:, 0, 1].tolist()
+
+
+def test_contacts_and_times_narrow_the_tables(stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "a.csv"
+    status, out, _ = lines_of(capfd, "export", str(stored), "--to", str(target), "--contacts")
+    assert (status, out) == (0, [f"written: {target} (1 row)"])
+    assert csv_rows(target)[1][1:3] == ["a", "ground"]
+    assert (
+        lines_of(capfd, "export", str(stored), "--to", str(target), "--contacts", "--until", "0.2", "--quiet")[0] == 0
+    )
+    assert len(csv_rows(target)) == 1
+    assert lines_of(capfd, "export", str(stored), "--to", str(target), "--from=0.1", "--until=0.2", "--quiet")[1] == []
+    times = [float(row[0]) for row in csv_rows(target)[1:]]
+    assert times == pytest.approx(np.arange(10, 21) * 0.01, rel=1e-12)  # summed in steps
+
+
+def test_gif_shows_the_ball_where_the_run_has_it(
+    stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "a.gif"
+    status, document, _ = json_of(capfd, "export", str(stored), "--to", str(target), "--fps", "20", *SMALL)
+    assert (status, document["files"]) == (0, [{"path": str(target), "format": "gif", "frames": 10}])
+    frames, shown = gif_frames(target)
+    assert (len(frames), sum(shown)) == (10, 500)
+    film = Film(Trajectory.load(stored / f"{id_in(stored)}.npz"))
+    camera = Camera.fitting(film.box, (160, 90))
+    for k, frame in enumerate(frames):
+        x, y = camera.to_screen(film.frame(k / 20).position[0])
+        assert np.abs(frame[int(y), int(x)] - SKY).max() <= 40  # of 255: a disc may be shaded
+
+
+@pytest.mark.parametrize(
+    ("words", "count", "milliseconds"),
+    [
+        ((), 15, 500),
+        (("--speed", "0.5"), 30, 1000),
+        (("--speed", "2", "--fps", "50"), 12, 250),
+        (("--from", "0.1", "--until", "0.35"), 8, 250),
+        (("--until", "99"), 15, 500),
+        (("--from", "0.5"), 1, 30),
+    ],
+)
+def test_gif_lasts_as_long_as_its_part_of_the_run(
+    words: tuple[str, ...], count: int, milliseconds: int, stored: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "a.gif"
+    assert call(["export", str(stored), "--to", str(target), *words, *SMALL, "--quiet"]) == 0
+    frames, shown = gif_frames(target)
+    assert len(frames) == count
+    assert abs(sum(shown) - milliseconds) <= 10  # ms, the grain of a gif
+
+
+def test_mp4_decodes_to_the_same_pictures(stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    targets = [str(tmp_path / "a.mp4"), str(tmp_path / "a.gif")]
+    words = ("--to", targets[0], "--to", targets[1], *SMALL)
+    status, document, _ = json_of(capfd, "export", str(stored), *words)
+    assert (status, [file["frames"] for file in document["files"]]) == (0, [15, 15])
+    films, about = mp4_frames(Path(targets[0]))
+    gifs, _ = gif_frames(Path(targets[1]))
+    assert "30 fps" in about
+    assert len(films) == 15
+    for film, gif in zip(films, gifs, strict=True):
+        assert np.abs(film - gif).mean() < 3  # of 255: one has fewer colours, the other softer edges
+
+
+def test_png_shows_the_end_or_another_moment(stored: Path, tmp_path: Path) -> None:
+    film = Film(Trajectory.load(stored / f"{id_in(stored)}.npz"))
+    camera = Camera.fitting(film.box, (160, 90))
+    for words, moment in (((), 0.5), (("--at", "0"), 0.0), (("--at", "0.25"), 0.25)):
+        target = tmp_path / "a.png"
+        assert call(["export", str(stored), "--to", str(target), *words, *SMALL, "--quiet"]) == 0
+        with Image.open(target) as image:
+            seen = np.asarray(image.convert("RGB")).astype(int)
+        assert seen.shape == (90, 160, 3)
+        x, y = camera.to_screen(film.frame(moment).position[0])
+        assert np.abs(seen[int(y), int(x)] - SKY).max() <= 40  # of 255: a disc may be shaded
+
+
+def test_width_and_overlays_are_honoured(stored: Path, tmp_path: Path) -> None:
+    plain, full = tmp_path / "a.png", tmp_path / "b.png"
+    assert call(["export", str(stored), "--to", str(plain), "--quiet"]) == 0
+    with Image.open(plain) as image:
+        assert image.size == (960, 540)
+    words = ("--width", "320", "--at", "0.2")
+    assert call(["export", str(stored), "--to", str(plain), *words, "--quiet"]) == 0
+    overlays = ("--overlay", "velocities", "--overlay", "energy", "--overlay", "names")
+    assert call(["export", str(stored), "--to", str(full), *words, *overlays, "--quiet"]) == 0
+    with Image.open(plain) as first, Image.open(full) as second:
+        assert first.size == second.size == (320, 180)
+        assert first.tobytes() != second.tobytes()
+
+
+def test_recording_is_run_first(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    session = recorded(
+        actions=(
+            Impulse(time=0.0, body="a", impulse=(1.0, 0.0)),
+            Spawn(time=0.1, ball=Ball(name="late", position=(4.0, 4.0), radius=0.25)),
+        )
+    )
+    name = str(session.save(tmp_path / "session.json"))
+    targets = ("--to", str(tmp_path / "a.csv"), "--to", str(tmp_path / "a.png"))
+    status, document, err = json_of(capfd, "export", name, *targets)
+    assert (status, err, [file["format"] for file in document["files"]]) == (0, [], ["csv", "png"])
+    rows = csv_rows(tmp_path / "a.csv")[1:]
+    assert {row[1] for row in rows} == {"a", "late"}
+    last = [row for row in rows if row[1] == "a"][-1]
+    assert float(last[0]) == 0.3
+    assert float(last[2]) == pytest.approx(0.3, rel=1e-12)  # 1 m/s for as long, summed in steps
+
+
+def test_recording_that_diverges_is_exported_as_far_as_it_goes_with_status_1(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    text = DROP.replace("gravity = [0.0, -10.0]", "gravity = [1e9, 0.0]")
+    session = Recording(loads(text), "pymunk", Settings(dt=0.1), (), 10.0)
+    name = str(session.save(tmp_path / "session.json"))
+    status, document, err = json_of(capfd, "export", name, "--to", str(tmp_path / "a.csv"))
+    assert (status, len(document["files"]), len(err)) == (1, 1, 1)
+    assert err[0].startswith(f"{name}: diverged: at ")
+
+
+def test_recording_that_is_refused_exports_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    session = recorded(settings=Settings(broad_phase="oriented"))
+    name = str(session.save(tmp_path / "session.json"))
+    status, document, err = json_of(capfd, "export", name, "--to", str(tmp_path / "a.csv"))
+    assert (status, document) == (1, {"run": name, "files": []})
+    assert len(err) == 1
+    assert err[0].startswith(f"{name}: refused: pymunk refuses: ")
+    assert err[0].endswith("there is nothing to export")
+    assert not (tmp_path / "a.csv").exists()
+
+
+def test_folder_of_several_runs_lists_them(stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    call(["run", written(tmp_path), "--seeds", "2", "--out", str(stored), "--quiet"])
+    ids = sorted(path.stem for path in stored.glob("*.npz"))
+    status, out, err = lines_of(capfd, "export", str(stored), "--to", str(tmp_path / "a.csv"))
+    assert (status, out) == (2, [])
+    assert err == [f"{stored}: holds {len(ids)} runs; name one as {stored}/<id>: {', '.join(ids)}"]
+
+
+def test_all_faults_are_told_at_once_and_nothing_is_written(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    words = ("--to", "a.txt", "--to", f"{tmp_path}/nowhere/a.gif", "--fps=60", "--speed=0", "--size=big", "--from=-1")
+    status, document, err = json_of(capfd, "export", str(tmp_path / "none"), *words, "--overlay", "glitter")
+    assert (status, document["files"]) == (2, [])
+    assert [fault["file"] for fault in document["faults"]] == [
+        "--to", "--to", "--from", "--speed", "--fps", "--size", "--overlay", str(tmp_path / "none"),
+    ]  # fmt: skip
+    assert [line.partition(": ")[0] for line in err] == [fault["file"] for fault in document["faults"]]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "--to: says where the run goes; give --to FILE, once or several times"),
+        (("--to=a",), "--to: a: the name ends in .csv, .parquet, .gif, .mp4 or .png"),
+        (("--to=a.csv", "--to=./a.csv"), "--to: ./a.csv: named twice"),
+        (("--to=no/a.csv",), "--to: no/a.csv: there is no folder no"),
+        (("--to=runs.csv",), "--to: runs.csv: is a folder"),
+        ((f"--to={'a' * 300}.csv",), "File name too long"),
+        (("--to=a.csv", "--fps=10"), "--fps: is for .gif, .mp4, and no --to FILE is one"),
+        (("--to=a.csv", "--overlay=names"), "--overlay: is for .gif, .mp4, .png, and no --to FILE is one"),
+        (("--to=a.gif", "--at=0"), "--at: is for .png, and no --to FILE is one"),
+        (("--to=a.png", "--contacts"), "--contacts: is for .csv, .parquet, and no --to FILE is one"),
+        (("--to=a.gif", "--fps=51"), "--fps: 51; a gif shows at most 50 pictures a second"),
+        (("--to=a.mp4", "--fps=nan"), "--fps: nan; it lies between 0.01 and 240 pictures a second"),
+        (("--to=a.mp4", "--fps=-1"), "--fps: -1; it lies between 0.01 and 240 pictures a second"),
+        (("--to=a.mp4", "--speed=nan"), "--speed: nan; 1 is real time"),
+        (("--to=a.png", "--width=10"), "--width: 10x6; sizes go from 16x16 to 7680x4320 pixels"),
+        (("--to=a.png", "--size=99999x10"), "--size: 99999x10; sizes go from"),
+        (("--to=a.png", "--size=9x9x9"), "--size: '9x9x9'; a size is written like 960x540"),
+        (("--to=a.png", "--size=90x90", "--width=90"), "--width: gives the size, and so does --size"),
+        (("--to=a.mp4", "--size=91x90"), "--size: 91x90; both sides of an mp4 are even"),
+        (("--to=a.png", "--at=0.6"), "--at: 0.6 s; the run ends at 0.5 s"),
+        (("--to=a.png", "--at=inf"), "--at: inf s; a time is 0 or more"),
+        (("--to=a.csv", "--from=0.6"), "--from: 0.6 s; the run ends at 0.5 s"),
+        (("--to=a.csv", "--from=0.3", "--until=0.2"), "--until: 0.2 s comes before --from, 0.3 s"),
+        (("--to=a.png", "--overlay=glitter"), "--overlay: 'glitter'; there are shapes, velocities, "),
+        (
+            ("--to=a.gif", "--speed=0.001"),
+            "--to: 15,000 pictures, and a film holds at most 3,000: give a higher --speed",
+        ),
+    ],
+)
+def test_fault_is_one_line_that_says_what_is_right(
+    words: tuple[str, ...],
+    message: str,
+    stored: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(stored.parent)
+    Path("runs.csv").mkdir()
+    before = sorted(Path.cwd().iterdir())
+    status, out, err = lines_of(capfd, "export", str(stored), *words)
+    assert (status, out, len(err)) == (2, [], 1)
+    assert message in err[0]
+    assert sorted(Path.cwd().iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "no such run; `sandbox run SCENE --out DIR` stores one as DIR/<id>.npz"),
+        (b"", "neither a stored run (.npz) nor a recording (.json)"),
+        (b'title = "A scene"', "neither a stored run (.npz) nor a recording (.json)"),
+        (b"PK\x03\x04damaged", "is no stored run: "),
+        (b"{}", "cannot be read: no recording of format 1"),
+        (b'{"format": 1, "scene": {}}', "cannot be read: "),
+    ],
+)
+def test_what_is_no_run_is_told(
+    content: bytes | None, message: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run"
+    if content is not None:
+        path.write_bytes(content)
+    status, out, err = lines_of(capfd, "export", str(path), "--to", str(tmp_path / "a.csv"))
+    assert (status, out, len(err)) == (2, [], 1)
+    assert err[0].startswith(f"{path}: ")
+    assert message in err[0]
+
+
+def test_empty_folder_and_impossible_names_are_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    for name, message in ((str(tmp_path), "holds no run"), ("x" * 5000, "too long"), ("a\0b", "null")):
+        status, _, err = lines_of(capfd, "export", name, "--to", str(tmp_path / "a.csv"))
+        assert (status, len(err)) == (2, 1)
+        assert message in err[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"position": np.zeros((3, 1, 3))}, "position is 3 x 1 x 3 of float64, not 51 x 1 x 2"),
+        ({"angle": np.zeros((51, 1), np.int64)}, "angle is 51 x 1 of int64"),
+        ({"names": np.asarray(["a", "b"])}, "position is 51 x 1 x 2 of float64, not 51 x 2 x 2"),
+        ({"time": np.linspace(1.0, 0.0, 51)}, "its times do not rise"),
+        ({"info": {"scene": {}}}, "does not say `engine`"),
+        ({"contact_pair": np.asarray([[0, -9]])}, "contact_pair: names a thing that the scene does not have"),
+    ],
+)
+def test_run_that_is_inconsistent_is_told(
+    changes: dict[str, object], message: str, stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = stored / f"{id_in(stored)}.npz"
+    trajectory = Trajectory.load(path)
+    parts = {name: getattr(trajectory, name) for name in trajectory.__dataclass_fields__}
+    Trajectory(**(parts | changes)).save(path)
+    status, out, err = lines_of(capfd, "export", str(path), "--contacts", "--to", str(tmp_path / "a.csv"))
+    assert (status, out, len(err)) == (2, [], 1)
+    assert err[0].startswith(f"{path}: ")
+    assert message in err[0]
+    assert not (tmp_path / "a.csv").exists()
+
+
+def test_missing_extras_are_named_before_the_work(
+    stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "can_make_mp4", lambda: False)
+    monkeypatch.setattr(tables, "can_write_parquet", lambda: False)
+    words = [f"--to={tmp_path}/a{suffix}" for suffix in (".csv", ".parquet", ".mp4")]
+    status, _, err = lines_of(capfd, "export", str(stored), *words)
+    assert (status, len(err)) == (2, 2)
+    assert 'pip install "sandbox2d[parquet]"' in err[0]
+    assert 'pip install "sandbox2d[video]"' in err[1]
+    assert not (tmp_path / "a.csv").exists()
+
+
+def test_recording_of_an_unknown_engine_is_a_fault(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    name = str(recorded(engine="perpetuum").save(tmp_path / "session.json"))
+    status, document, err = json_of(capfd, "export", name, "--to", str(tmp_path / "a.csv"))
+    assert (status, document["files"], len(err)) == (2, [], 1)
+    assert err[0].startswith(f"{name}: ")
+    assert "perpetuum" in err[0]
+
+
+def test_disk_that_is_full_is_one_line(
+    stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(tables, "_write_csv", full)
+    status, document, err = json_of(
+        capfd, "export", str(stored), "--to", str(tmp_path / "a.png"), "--to", str(tmp_path / "a.csv")
+    )
+    assert (status, [file["format"] for file in document["files"]]) == (2, ["png"])
+    assert err == [f"--to: {tmp_path / 'a.csv'}: No space left on device"]
+
+
+# As a process: what it loads, what it prints, and that it needs no display.
+NO_DISPLAY = """
+import sys
+from sandbox.cli.main import call
+status = call(sys.argv[1:])
+pygame = sys.modules.get("pygame")
+print(status, pygame is not None and pygame.display.get_init(), "SDL_VIDEODRIVER" in __import__("os").environ)
+"""
+
+
+def test_pictures_need_no_display_and_print_nothing_else(stored: Path, tmp_path: Path) -> None:
+    env = {key: value for key, value in os.environ.items() if not key.startswith(("SDL_", "DISPLAY", "PYGAME"))}
+    done = subprocess.run(
+        [sys.executable, "-c", NO_DISPLAY, "export", str(stored), "--to", str(tmp_path / "a.png"), "--quiet"],
+        capture_output=True,
+        text=True,
+        env=env,
+        timeout=120,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("0 False False\n", "")
+
+
+def test_process_prints_one_document(stored: Path, tmp_path: Path) -> None:
+    done = process("export", "runs", "--to", "a.png", "--json", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout) == {"run": "runs", "files": [{"path": "a.png", "format": "png", "frames": 1}]}
+
+
+LOADED = """
+import sys
+from sandbox.cli.main import call
+status = call(sys.argv[1:])
+print(status, *(name for name in ("pygame", "pyarrow", "PIL", "matplotlib", "pymunk", "rich") if name in sys.modules))
+"""
+
+
+def test_table_loads_nothing_that_draws(stored: Path, tmp_path: Path) -> None:
+    words = ["export", str(stored), "--to", str(tmp_path / "a.csv"), "--quiet"]
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, *words], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert (done.stdout, done.stderr) == ("0\n", "")
+
+
+# A shell may start its children with SIGINT ignored, and they would inherit that.
+INTERRUPTIBLE = """
+import runpy, signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+runpy.run_module("sandbox", run_name="__main__", alter_sys=True)
+"""
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".mp4", ".csv", ".parquet"])
+def test_interrupt_keeps_what_is_finished_and_leaves_no_half_file(suffix: str, tmp_path: Path) -> None:
+    text = DROP.replace("duration = 0.5", "duration = 1500.0")
+    run(loads(text), audit=False).save(tmp_path / "run.npz")
+    out = tmp_path / "out"
+    out.mkdir()
+    words = ["export", "run.npz", "--to", "out/first.png", "--to", f"out/film{suffix}", "--to", "out/last.png"]
+    film = ["--fps", "2"] if suffix in (".gif", ".mp4") else []
+    command = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTIBLE, *words, *film],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+    )
+    try:
+        while not ((out / "first.png").exists() and list(out.glob(".*.tmp"))):
+            assert command.poll() is None
+            time.sleep(0.001)
+        command.send_signal(signal.SIGINT)
+        printed, err = command.communicate(timeout=120)
+    finally:
+        command.kill()
+    assert (command.returncode, err) == (130, "interrupted: 1 of 3 files are finished and kept\n")
+    assert printed == "written: out/first.png (1 frame)\n"
+    assert [path.name for path in out.iterdir()] == ["first.png"]

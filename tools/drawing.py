@@ -1,0 +1,108 @@
+"""Drawing: what the benches time of the window's pictures, and peers that draw the same. No display is opened."""
+
+import os
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+
+import pygame
+import pymunk
+import pymunk.pygame_util
+
+from sandbox.engines.registry import start
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.palette import BACKGROUND, colour_of
+from sandbox.play.drawing.picture import Picture
+from sandbox.play.sight import Sight
+from sandbox.scene.model import Scene
+
+SIZE = (1280, 720)
+PICTURES = 20
+"""Drawn for one timing."""
+
+
+def moment(which: Scene, steps: int) -> Sight:
+    """Return what a scene looks like after some steps."""
+    simulation = start(which, "pymunk")
+    for _ in range(steps):
+        simulation.step()
+    return Sight(which, simulation.bodies, simulation.frame())
+
+
+def fitting(sight: Sight) -> Camera:
+    """Return a camera that shows all bodies."""
+    low, high = sight.frame.position.min(0), sight.frame.position.max(0)
+    return Camera.fitting(((float(low[0]), float(low[1])), (float(high[0]), float(high[1]))), SIZE)
+
+
+def _each(draw: Callable[[], object]) -> float:
+    """Return the seconds that one picture takes."""
+    draw()
+    began = time.perf_counter()
+    for _ in range(PICTURES):
+        draw()
+    return (time.perf_counter() - began) / PICTURES
+
+
+def drawing(which: Scene, steps: int, antialias: bool) -> Callable[[], float]:
+    """Time pictures of a scene after some steps."""
+
+    def work() -> float:
+        sight, surface, picture = moment(which, steps), pygame.Surface(SIZE), Picture()
+        camera = fitting(sight)
+        return _each(lambda: picture.draw(surface, camera, sight, antialias=antialias))
+
+    return work
+
+
+def debug_drawing(which: Scene, steps: int) -> Callable[[], float]:
+    """Time pymunk's own drawing of the same balls, in the same places and of the same size, in px."""
+
+    def work() -> float:
+        sight, surface, space = moment(which, steps), pygame.Surface(SIZE), pymunk.Space()
+        camera = fitting(sight)
+        for (x, y), angle, radius in zip(
+            camera.to_screen(sight.frame.position).tolist(),
+            sight.frame.angle.tolist(),
+            (sight.bodies.radius * camera.scale).tolist(),
+            strict=True,
+        ):
+            body = pymunk.Body(1.0, 1.0)
+            body.position, body.angle = (x, y), angle
+            space.add(body, pymunk.Circle(body, radius))
+        options = pymunk.pygame_util.DrawOptions(surface)
+
+        def draw() -> None:
+            surface.fill(BACKGROUND)
+            space.debug_draw(options)
+
+        return _each(draw)
+
+    return work
+
+
+def particles(which: Scene, steps: int) -> Callable[[], float]:
+    """Return how many pictures a second there are of a scene after some steps."""
+    whole = drawing(which, steps, antialias=True)
+    return lambda: 1.0 / whole()
+
+
+def particles_by_array(which: Scene, steps: int) -> Callable[[], float]:
+    """Return the same for numpy as one would write it: all places at once, those outside dropped, `pixels3d` set."""
+
+    def work() -> float:
+        sight, surface = moment(which, steps), pygame.Surface(SIZE)
+        camera, colours = fitting(sight), colour_of(sight.bodies)
+
+        def draw() -> None:
+            surface.fill(BACKGROUND)
+            pixel = np.floor(camera.to_screen(sight.frame.position)).astype(int)
+            inside = ((pixel >= 0) & (pixel < SIZE)).all(axis=1)
+            pygame.surfarray.pixels3d(surface)[pixel[inside, 0], pixel[inside, 1]] = colours[inside]
+
+        return 1.0 / _each(draw)
+
+    return work
