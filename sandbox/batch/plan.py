@@ -3,16 +3,21 @@
 import math
 import tomllib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
+from sandbox.recording import Recording
 from sandbox.scene.address import AddressError, parse_assignment, parse_value, split_assignment
+from sandbox.scene.document import to_document
 from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import Override, load
+from sandbox.scene.file import Override, from_document, load
 from sandbox.scene.model import Scene
 
 MOST_POINTS = 1_000_000
+
+USUAL = "pymunk"
+"""The engine that runs what nobody has chosen one for."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,7 @@ class Job:
 
 def plan(
     scenes: Sequence[tuple[str, str]],
-    engines: Sequence[str],
+    engines: Sequence[str] | None,
     overrides: Sequence[Override] = (),
     sweeps: Sequence[str] = (),
     seeds: int | None = None,
@@ -38,8 +43,8 @@ def plan(
     """Lay out every run, in order: scene by scene, the last sweep changing fastest, then seeds, then engines.
 
     Args:
-        scenes: label and path of each.
-        engines: names.
+        scenes: label and path of each; a `.json` is a recorded session.
+        engines: names; none for the usual, which is a session's own.
         overrides: `KEY=VALUE`, set in every run.
         sweeps: `KEY=A,B,C` or `KEY=LOW:HIGH:N[:log]`.
         seeds: how many, from 1 on; without, each scene's own.
@@ -58,14 +63,31 @@ def plan(
     for label, path in scenes:
         for point in product(*axes):
             try:
-                scene = load(path, (*overrides, *point))
+                session = _read(path, (*overrides, *point))
             except SceneError as error:
                 faults |= dict.fromkeys(error.faults)
                 continue
-            jobs += [Job(label, scene, engine, point=point) for engine in engines]
+            for engine in engines or (session.engine,):
+                played = session if engine == session.engine else session.on(engine)
+                jobs.append(Job(label, played.scene, engine, played.actions, point))
     if faults:
         raise SceneError(tuple(faults))
     return jobs
+
+
+def _read(path: str, overrides: Sequence[Override]) -> Recording:
+    """Return what a file holds as a session; a scene is one in which nobody does anything.
+
+    Raises:
+        SceneError: it has faults.
+    """
+    if not path.lower().endswith(".json"):
+        scene = load(path, overrides)
+        return Recording(scene, USUAL, scene.solver, (), scene.world.duration)
+    session = Recording.load(path)
+    document = to_document(session.whole_scene)
+    document["solver"] = session.settings.model_dump(mode="json", exclude_defaults=True)
+    return replace(session, scene=from_document(document, path, overrides))
 
 
 def parse_sweep(text: str) -> tuple[str, list[Any]]:

@@ -76,7 +76,7 @@ def check_times(options: Options, end: float | None) -> None:
     """
     faults: list[tuple[str, str]] = []
     for option, time in (("--from", options.start), ("--at", options.at)):
-        if time is not None and end is not None and time > end:
+        if time is not None and end is not None and end < time < math.inf:
             faults.append((option, f"{time:g} s; the run ends at {end:g} s"))
     if end is not None and not faults:
         last = end if options.until is None else min(options.until, end)

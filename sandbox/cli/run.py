@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from sandbox.action import Spawn
 from sandbox.batch.outcome import Outcome, execute
 from sandbox.batch.plan import Job, parse_sweep, plan
 from sandbox.batch.store import Store, StoreError
@@ -21,7 +22,13 @@ from sandbox.scene.faults import Fault, SceneError
 
 @click.command(name="run")
 @click.argument("scenes", nargs=-1, required=True)
-@click.option("--engine", "--engines", "engines", default="pymunk", metavar="NAME[,NAME]", help="which engine(s)")
+@click.option(
+    "--engine",
+    "--engines",
+    "engines",
+    metavar="NAME[,NAME]",
+    help="which engine(s); by default pymunk, or a session's own",
+)
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
 @click.option("--sweep", "sweeps", multiple=True, metavar="KEY=A,B,C", help="run each value; or KEY=LOW:HIGH:N[:log]")
 @click.option("--seeds", type=click.IntRange(1, 1_000_000), metavar="N", help="run the seeds 1 to N")
@@ -33,7 +40,7 @@ from sandbox.scene.faults import Fault, SceneError
 @click.option("--quiet", is_flag=True, help="no table, no progress")
 def command(
     scenes: tuple[str, ...],
-    engines: str,
+    engines: str | None,
     overrides: tuple[str, ...],
     sweeps: tuple[str, ...],
     seeds: int | None,
@@ -44,10 +51,13 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Run scenes headless and tell how they went. SCENES are files, or names of shipped scenes."""
+    """Run scenes headless and tell how they went.
+
+    SCENES are files, names of shipped scenes, or sessions that the window has recorded (.json).
+    """
     faults: list[Fault] = []
-    names = list(dict.fromkeys(name.strip() for name in engines.split(",")))
-    for name in names:
+    names = None if engines is None else list(dict.fromkeys(name.strip() for name in engines.split(",")))
+    for name in names or ():
         with gathering(faults, "--engine", (UnknownEngineError,)):
             engine_named(name)
     found: list[tuple[str, str]] = []
@@ -151,7 +161,8 @@ def _check_memory(jobs: list[Job]) -> None:
     faults = []
     for job in jobs:
         try:
-            require_memory(job.scene, job.scene.solver, len(job.scene.bodies))
+            spawned = sum(isinstance(action, Spawn) for action in job.actions)
+            require_memory(job.scene, job.scene.solver, len(job.scene.bodies) + spawned, job.actions)
         except TooLargeError as error:
             faults.append(Fault(job.label, None, "solver.record_every", str(error)))
     if faults:

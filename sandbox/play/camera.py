@@ -27,7 +27,7 @@ class Camera:
     """of the picture, px"""
 
     @classmethod
-    def fitting(cls, box: Box, size: tuple[int, int], margin: float = 0.06, inset: int = 0) -> Self:
+    def fitting(cls, box: Box, size: tuple[int, int], margin: float = 0.06, inset: int = 0, foot: int = 0) -> Self:
         """Return the camera that shows a box whole.
 
         Args:
@@ -35,14 +35,15 @@ class Camera:
             size: of the picture, px.
             margin: share of the picture left free on each side.
             inset: px at the right that something else covers.
+            foot: px at the bottom that something else covers.
         """
         (left, bottom), (right, top) = box
-        free = max(size[0] - inset, size[0] // 3, 1), max(size[1], 1)
+        free = max(size[0] - inset, size[0] // 3, 1), max(size[1] - foot, size[1] // 3, 1)
         room = 1.0 - 2.0 * margin
         width, height = max(right - left, 1e-9), max(top - bottom, 1e-9)
         scale = min(max(min(free[0] * room / width, free[1] * room / height), FARTHEST), CLOSEST)
-        shift = (size[0] - free[0]) / 2.0 / scale
-        return cls(((left + right) / 2.0 + shift, (bottom + top) / 2.0), scale, size)
+        aside, down = (size[0] - free[0]) / 2.0 / scale, (size[1] - free[1]) / 2.0 / scale
+        return cls(((left + right) / 2.0 + aside, (bottom + top) / 2.0 - down), scale, size)
 
     def to_screen(self, points: FloatArray) -> FloatArray:
         """Return where points (…, 2), m, lie in the picture, (…, 2) px from its upper left corner."""

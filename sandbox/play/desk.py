@@ -58,10 +58,14 @@ class Desk:
         self.panel.resize(size, self.unit)
 
     @property
+    def foot(self) -> int:
+        """What the timeline covers at the bottom of the window, px."""
+        return round(HEIGHT * self.unit) if self.panel.visible else 0
+
+    @property
     def _area(self) -> pygame.Rect:
         """Where the timeline lies."""
-        height = round(HEIGHT * self.unit) if self.panel.visible else 0
-        return pygame.Rect(0, self._size[1] - height, self._size[0] - self.panel.width, height)
+        return pygame.Rect(0, self._size[1] - self.foot, self._size[0] - self.panel.width, self.foot)
 
     def claims(self, stage: Stage) -> Claims:
         """Return the keys that the scene claims."""
@@ -131,12 +135,13 @@ class Desk:
             if show.contacts is not self._heard:
                 self._heard = show.contacts
                 self._sounds.hits(show.contacts, show.bodies)
+        status = self.status(stage, rate, recording)
+        draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot)
+        if show is not None:
             self._draw_graph(surface, stage)
-            if self._area.height:
+            if self.foot:
                 now = show.frame.time
                 self._timeline.draw(surface, self._area, show.begin, now, show.end, show.marks, self.unit)
-        status = self.status(stage, rate, recording)
-        draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self._area.height)
         if self.panel.visible:
             self._show_panel(stage, recording is not None)
             self.panel.draw(surface)

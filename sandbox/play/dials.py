@@ -35,6 +35,11 @@ class Dial(Control):
         if not self.held:
             self.now = knob.value
 
+    @property
+    def look(self) -> tuple[object, ...]:
+        """All that its drawing depends on."""
+        return (*super().look, self.knob, self.now)
+
     def change(self, value: Value, final: bool) -> None:
         """Report a new value."""
         self.now = value

@@ -1,6 +1,7 @@
 """Film: a stored run as pictures. It knows the state at any time of the run, and draws it as the window does."""
 
 import json
+import math
 from collections.abc import Iterator
 from functools import cached_property
 
@@ -26,6 +27,8 @@ LINGER = 0.12
 """s of the film that a contact stays in sight after its first touch; one picture would be too short to see"""
 FLASH = 0.6
 """s of the film that a missed contact is marked"""
+NARROW = 320
+"""px: a caption would cover too much of what is smaller"""
 TRAIL, TRAIL_PLACES = 1.0, 60
 """How far back a trail goes, s of the film, and through how many stored frames at most."""
 
@@ -161,13 +164,13 @@ class Film:
             time: of the run.
             overlays: of `sight.OVERLAYS`.
             speed: of the film, as a share of real time.
-            caption: write title, engine and time into the upper left corner.
+            caption: write title, engine and time into the upper left corner, where there is room for them.
         """
         unit = unit_of(surface.get_size())
         self._picture.draw(surface, camera, self.sight(time, overlays, speed), unit=unit)
         if "energy" in overlays:
             self._graph.draw(surface, time, unit)
-        if caption:
+        if caption and surface.get_width() >= NARROW:
             self._write_caption(surface, time, unit)
 
     def _write_caption(self, surface: pygame.Surface, time: float, unit: float) -> None:
@@ -195,7 +198,7 @@ def moments(start: float, end: float, fps: float, speed: float = 1.0) -> tuple[F
         speed: seconds of the run a second.
     """
     seconds = (end - start) / speed
-    count = max(1, round(seconds * fps))
+    count = max(1, math.floor(seconds * fps + 0.5 + 1e-9))  # a half counts up, however it was rounded
     shown: FloatArray = np.full(count, 1.0 / fps)
     if seconds > 0.0:
         shown[-1] = seconds - (count - 1) / fps

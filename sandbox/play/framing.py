@@ -29,6 +29,8 @@ def framing(scene: Scene) -> Box:
     met = [(corners.min(axis=0), corners.max(axis=0)) for corners in things]
     met = [each for each in met if (each[0] <= flown[1]).all() and (each[1] >= flown[0]).all()]
     low, high = _union([start, *met]) if met else flown
+    if scene.play.arrows is not None:  # room to move it
+        low, high = low - 2.0 * scene.play.arrow_step, high + 2.0 * scene.play.arrow_step
     if not (high - low).max() > 0.0:
         low, high = low - ONE, high + ONE
     for plane in scene.planes:  # the nearest bit of its surface, if it is not far

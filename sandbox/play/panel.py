@@ -53,6 +53,8 @@ class Panel:
         self._layout = Layout((), (), 0)
         self._scroll = 0
         self._sheet = pygame.Surface((1, 1))
+        self._drawn: tuple[object, ...] = ()
+        """what the sheet shows"""
         self._pointer: tuple[int, int] | None = None
         self._pressed: set[int] = set()
         self._bar_held = False
@@ -87,6 +89,7 @@ class Panel:
         """Fit it to a window of another size, px."""
         self.size, self.unit = size, unit
         self._sheet = pygame.Surface((self._full, max(size[1], 1)))
+        self._drawn = ()
         self._lay_out()
 
     def show(self, knobs: Sequence[Knob], toggles: Mapping[str, bool], buttons: Sequence[str] = ()) -> None:
@@ -221,6 +224,15 @@ class Panel:
         """Draw it at the right of the window, if it is visible."""
         if not self._visible:
             return
+        look = (self._scroll, self._bar_held, self._layout.headings, *(widget.look for widget in self.widgets))
+        if look != self._drawn:
+            self._draw_sheet()
+            self._drawn = look
+        surface.blit(self._sheet, (self.size[0] - self._full, 0))
+        self._draw_hint(surface)
+
+    def _draw_sheet(self) -> None:
+        """Draw the whole column, off the window, as most pictures show it unchanged."""
         sheet, unit = self._sheet, self.unit
         sheet.fill(PANEL)
         for text, top in self._layout.headings:
@@ -238,8 +250,6 @@ class Panel:
             wide = round(5 * unit)
             bar = pygame.Rect(self._full - wide - round(2 * unit), top, wide, high)
             pygame.draw.rect(sheet, LINE if self._bar_held else PANEL_RAISED, bar, border_radius=wide)
-        surface.blit(sheet, (self.size[0] - self._full, 0))
-        self._draw_hint(surface)
 
     def _draw_hint(self, surface: pygame.Surface) -> None:
         hint = next((widget.hint for widget in self.widgets if widget.hovered and widget.hint), "")

@@ -76,6 +76,11 @@ class Control(WidgetBase):  # type: ignore[misc]  # the library ships no types
         self.held = self.hovered = False
 
     @property
+    def look(self) -> tuple[object, ...]:
+        """All that its drawing depends on."""
+        return (*self.rect, self.unit, self.held, self.hovered, self.isEnabled())
+
+    @property
     def ink(self) -> Colour:
         """The colour of its words."""
         return INK if self.isEnabled() else mixed(FAINT, BACKGROUND, 0.35)
@@ -87,6 +92,11 @@ class Switch(Control):
     def __init__(self, surface: pygame.Surface, name: str, on: bool, label: str = "", key: str = "") -> None:
         super().__init__(surface)
         self.name, self.on, self.label, self.key = name, on, label or name, key
+
+    @property
+    def look(self) -> tuple[object, ...]:
+        """All that its drawing depends on."""
+        return (*super().look, self.name, self.on, self.label, self.key)
 
     def click(self, event: pygame.event.Event) -> None:
         """Turn it."""
@@ -120,6 +130,11 @@ class PushButton(Control):
     def __init__(self, surface: pygame.Surface, name: str, hint: str = "") -> None:
         super().__init__(surface)
         self.name, self.hint = name, hint
+
+    @property
+    def look(self) -> tuple[object, ...]:
+        """All that its drawing depends on."""
+        return (*super().look, self.name)
 
     def click(self, event: pygame.event.Event) -> None:
         """Report it."""

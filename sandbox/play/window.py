@@ -93,7 +93,7 @@ class Window:
         show = self.stage.show
         if show is not None:
             size = self.surface.get_size()
-            self.camera = Camera.fitting(framing(show.scene), size, inset=self.desk.panel.width)
+            self.camera = Camera.fitting(framing(show.scene), size, inset=self.desk.panel.width, foot=self.desk.foot)
 
     def run(self) -> int:
         """Play until the window is closed; return the exit status."""

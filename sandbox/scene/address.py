@@ -10,7 +10,6 @@ from typing import Any
 
 from sandbox.scene.faults import Location
 
-
 EVERY = "*"
 
 

@@ -188,6 +188,27 @@ def test_reason_is_shown_beside_a_disabled_knob() -> None:
     assert not pygame.surfarray.array3d(plain)[:left].any()
 
 
+@pytest.mark.parametrize("change", ["hover", "knob", "toggle", "button", "scroll", "label"])
+def test_kept_picture_is_drawn_anew_when_something_changes(change: str) -> None:
+    noted = Noted((640, 420))  # lower than its content; the switches are partly in sight
+    panel = noted.panel
+    before, same, after = (pygame.Surface((640, 420)) for _ in range(3))
+    panel.draw(before)
+    panel.draw(same)
+    assert pygame.image.tobytes(before, "RGB") == pygame.image.tobytes(same, "RGB")
+    if change == "hover":
+        panel.handle(move(*noted.middle("gravity")))
+    elif change == "scroll":
+        panel.handle(press(637, 419))
+    else:
+        name = "height" if change == "label" else "gravity"
+        knob = Knob("gravity", name, -30, 30, 5.0 if change == "knob" else -9.8, step=0.1, unit="m/s²")
+        buttons = ("pause" if change == "button" else "play", *BUTTONS[1:])
+        panel.show((knob, *KNOBS[1:]), {**TOGGLES, "shapes": change == "toggle"}, buttons)
+    panel.draw(after)
+    assert pygame.image.tobytes(before, "RGB") != pygame.image.tobytes(after, "RGB")
+
+
 def test_callback_may_show_something_else() -> None:
     noted = Noted()
     noted.panel.on_button = lambda name: noted.panel.show((), {}, ())

@@ -25,6 +25,11 @@ WEIGHT = 26.0
 """px, of a force of one weight m·g"""
 LARGEST = 80.0
 """px, of the largest force where weights would make it longer"""
+_COOL = mixed(BACKGROUND, SKY, 0.8)
+HEAT: tuple[Colour, ...] = tuple(
+    mixed(_COOL, YELLOW, k / 16) if k < 16 else mixed(YELLOW, (255, 255, 255), k / 16 - 1.0) for k in range(33)
+)
+"""For shares of the largest force, in 32nds: from blue through yellow to white."""
 LABELS = 12
 """Up to so many forces are told in newtons."""
 
@@ -92,18 +97,11 @@ def draw_impulses(view: View) -> None:
         (x, y), (nx, ny), half = place[k].tolist(), normal[k].tolist(), float(length[k]) / 2.0
         ends = (x - nx * half, y - ny * half), (x + nx * half, y + ny * half)
         width = (1.0 + 2.6 * float(share[k])) * view.unit
-        stroke(view.surface, *ends, _heat(float(share[k])), width, view.antialias)
+        stroke(view.surface, *ends, HEAT[int(32.0 * float(share[k]))], width, view.antialias)
         if len(drawn) <= LABELS:
             text, (right, down) = f"{float(force[k]):.3g} N", (10.0 * view.unit, 12.0 * view.unit)
             write(view.surface, text, (x + right + 1, y + down + 1), 12 * view.unit, BACKGROUND, "midleft", mono=True)
             write(view.surface, text, (x + right, y + down), 12 * view.unit, INK, "midleft", mono=True)
-
-
-def _heat(strength: float) -> Colour:
-    """Return a colour for a share of the largest force: from blue through yellow to white."""
-    if strength < 0.5:
-        return mixed(mixed(BACKGROUND, SKY, 0.8), YELLOW, 2.0 * strength)
-    return mixed(YELLOW, (255, 255, 255), 2.0 * strength - 1.0)
 
 
 def _lighter(view: View, pair: IntArray) -> FloatArray:

@@ -27,6 +27,8 @@ SHORTEST_SPOKE = 4.0
 """px, the radius from which a spoke is drawn"""
 THIN = 14.0
 """px, the radius up to which a spoke is one pixel wide"""
+THICK = 300
+"""Of more spokes, all are one pixel wide."""
 DARK = 0.5
 """How far a rim or spoke leans to the background."""
 
@@ -167,7 +169,7 @@ def spokes(
     middle, reach = centre[shown] - 0.5, radius[shown, None]  # SDL has a pixel's middle at a whole number
     ends = np.concatenate((middle + way * reach * 0.35, middle + way * (reach * 0.95 - 1.0)), 1)
     tones = np.rint(colours[shown] * (1.0 - DARK) + np.asarray(BACKGROUND) * DARK).astype(np.uint8)
-    thin = reach[:, 0] <= THIN
+    thin = (reach[:, 0] <= THIN) | (len(shown) > THICK)
     line = pygame.draw.aaline if antialias else pygame.draw.line
     # Flat lists of numbers: thousands of small ones would keep the garbage collector busy.
     columns = (column.tolist() for column in (packed(tones[thin], surface), *ends[thin].T))

@@ -16,15 +16,18 @@ def clipped(a: Pixel, b: Pixel, area: pygame.Rect, margin: float = 4.0) -> tuple
 
     Liang and Barsky's way, 1984: each edge narrows the share of the segment that is left.
     """
+    left, top, right, bottom = area.left, area.top, area.right, area.bottom
+    if left <= a[0] <= right and left <= b[0] <= right and top <= a[1] <= bottom and top <= b[1] <= bottom:
+        return a, b
     dx, dy = b[0] - a[0], b[1] - a[1]
     if not (math.isfinite(dx) and math.isfinite(dy) and math.isfinite(a[0]) and math.isfinite(a[1])):
         return None
     first, last = 0.0, 1.0
     for move, gap in (
-        (-dx, a[0] - area.left + margin),
-        (dx, area.right + margin - a[0]),
-        (-dy, a[1] - area.top + margin),
-        (dy, area.bottom + margin - a[1]),
+        (-dx, a[0] - left + margin),
+        (dx, right + margin - a[0]),
+        (-dy, a[1] - top + margin),
+        (dy, bottom + margin - a[1]),
     ):
         if move == 0.0:
             if gap < 0.0:

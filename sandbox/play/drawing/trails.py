@@ -22,7 +22,7 @@ MOST_POINTS = 200_000
 
 def draw_trails(view: View, points: Points) -> None:
     """Draw the last places of the bodies in sight, the older the fainter."""
-    if not len(view.shown) or not sum(len(piece) for piece in view.sight.trails):
+    if not len(view.shown) or sum(len(piece) for piece in view.sight.trails) < 2:
         return
     crowd = len(view.shown) > LINES
     some = view.first(MOST_POINTS // 16)
@@ -62,13 +62,13 @@ def _lines(view: View, places: FloatArray, tints: ColourArray) -> None:
         x, y = pixels[..., 0], pixels[..., 1]
         near = (np.abs(x - width / 2) < 4 * width + 100) & (np.abs(y - height / 2) < 4 * height + 100)
     draw = pygame.draw.aalines if view.antialias and len(tints) <= LINES // 4 else pygame.draw.lines
-    for k, tint in enumerate(tints.tolist()):
-        good = near[:, k]
-        if good.all():
-            runs = [pixels[:, k]]
-        else:
-            turns = np.concatenate(([0], np.flatnonzero(np.diff(good)) + 1, [len(good)])).tolist()
-            runs = [pixels[a:b, k] for a, b in pairwise(turns) if good[a]]
-        for run in runs:
-            if len(run) > 1:
-                draw(view.surface, tint, False, run.tolist())
+    whole = near.all(axis=0).tolist()
+    for k, (tint, trail) in enumerate(zip(tints.tolist(), pixels.transpose(1, 0, 2).tolist(), strict=True)):
+        if whole[k]:
+            draw(view.surface, tint, False, trail)
+            continue
+        sound = near[:, k]
+        turns = np.concatenate(([0], np.flatnonzero(np.diff(sound)) + 1, [len(sound)])).tolist()
+        for first, last in pairwise(turns):
+            if sound[first] and last - first > 1:
+                draw(view.surface, tint, False, trail[first:last])
