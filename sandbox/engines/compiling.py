@@ -1,8 +1,11 @@
 """Compiling: how long it took, and who is told. Light to import: what compiles is `kernel.py`."""
 
 import sys
+from collections.abc import Callable
 from functools import cache
 from time import perf_counter
+
+ANNOUNCEMENT = "compiling the solver's kernels: up to half a minute, this once"
 
 
 @cache
@@ -19,6 +22,8 @@ class Compiling:
     def __init__(self) -> None:
         self.seconds = 0.0
         """s, of this process, so that who times a run can leave it out"""
+        self.on_begin: Callable[[str], None] | None = None
+        """told of each kernel that is about to be compiled, by whoever else wants to say so"""
         self._depth, self._began = 0, 0.0
 
     def begin(self, module: str) -> None:
@@ -27,7 +32,9 @@ class Compiling:
             self._began = perf_counter()
         self._depth += 1
         if module.startswith("sandbox."):
-            say("compiling the solver's kernels: up to half a minute, this once")
+            say(ANNOUNCEMENT)
+            if self.on_begin is not None:
+                self.on_begin(ANNOUNCEMENT)
 
     def end(self) -> None:
         """Note that it is done."""

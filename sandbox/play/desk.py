@@ -6,8 +6,9 @@ import pygame
 
 from sandbox.play.camera import Camera
 from sandbox.play.claims import Claims, claims
-from sandbox.play.drawing.palette import BACKGROUND
+from sandbox.play.drawing.palette import BACKGROUND, INK
 from sandbox.play.drawing.picture import Picture
+from sandbox.play.drawing.text import measure, write
 from sandbox.play.facts import facts, told
 from sandbox.play.graph import EnergyGraph
 from sandbox.play.hud import draw_hud
@@ -16,6 +17,7 @@ from sandbox.play.live import Live
 from sandbox.play.manual import Manual
 from sandbox.play.panel import Panel
 from sandbox.play.picker import Picker
+from sandbox.play.plates import plate
 from sandbox.play.shelf import to_pick
 from sandbox.play.sight import OVERLAYS, Status
 from sandbox.play.sound import Sounds
@@ -147,6 +149,15 @@ class Desk:
             self.panel.draw(surface)
         if self.manual.open:
             self.manual.draw(surface, self.unit, self.claims(stage).told)
+
+    def draw_wait(self, surface: pygame.Surface, what: str) -> None:
+        """Say over whatever was drawn what everything waits for."""
+        size = 15 * self.unit
+        width, height = measure(what, size)
+        rect = pygame.Rect(0, 0, round(width + 3 * size), round(height + 2 * size))
+        rect.center = surface.get_rect().center
+        plate(surface, rect, round(0.5 * size))
+        write(surface, what, rect.center, size, INK, "center")
 
     def _draw_graph(self, surface: pygame.Surface, stage: Stage) -> None:
         show = stage.show

@@ -198,7 +198,7 @@ def moments(start: float, end: float, fps: float, speed: float = 1.0) -> tuple[F
         speed: seconds of the run a second.
     """
     seconds = (end - start) / speed
-    count = max(1, math.floor(seconds * fps + 0.5 + 1e-9))  # a half counts up, however it was rounded
+    count = max(1, math.ceil(seconds * fps - 0.5 - 1e-9))  # half a picture counts down, however it was rounded
     shown: FloatArray = np.full(count, 1.0 / fps)
     if seconds > 0.0:
         shown[-1] = seconds - (count - 1) / fps

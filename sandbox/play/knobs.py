@@ -10,7 +10,6 @@ from sandbox.scene.model import Disc, Scene
 from sandbox.scene.settings import Detection, Integrator, Settings
 
 KINDS = ("ball", "grid", "scatter", "emitter")
-SETTINGS = ("dt", "substeps", "iterations", "integrator", "detection")
 
 
 class Knobs:
@@ -87,18 +86,36 @@ def _counts(live: Live, file: Scene) -> tuple[Knob, ...]:
 
 
 def _surface(live: Live, file: Scene, picked: int | None, key: str, high: float) -> Knob:
-    """Return the knob of restitution or friction."""
-    discs = live.scene.discs
+    """Return the knob of restitution or friction.
+
+    Where pairs of materials state it, they are turned: they outrank what a ball states.
+    """
+    scene = live.scene
     element = int(live.bodies.element[picked]) if picked is not None else 0
-    if not discs and picked is None:
-        return Knob(key, key, 0.0, high, 0.0, enabled=False, why="there is no ball")
-    if element >= len(discs):
+    if element >= len(scene.discs):
+        if picked is None:
+            return Knob(key, key, 0.0, high, 0.0, enabled=False, why="there is no ball")
         value = getattr(live.bodies.elements[element], key) or 0.0
         return Knob(key, key, 0.0, high, value, enabled=False, why="a ball added by hand keeps its own")
-    disc = discs[element]
+    disc = scene.discs[element]
     label = key if picked is None else f"{key} of {disc.name or 'this'}"
-    default = stated(file, file.discs[element], key) if element < len(file.discs) else None
-    return Knob(key, label, 0.0, high, stated(live.scene, disc, key), default=default)
+    default = None
+    pairs = _pairs(scene, disc if picked is not None else None)
+    if pairs:
+        value = getattr(scene.pairs[pairs[0]], key) or 0.0
+        if pairs[0] < len(file.pairs):
+            default = getattr(file.pairs[pairs[0]], key) or 0.0
+        if picked is not None:
+            label = f"{key} of {disc.material}"
+        return Knob(key, label, 0.0, high, value, default=default)
+    if element < len(file.discs):
+        default = stated(file, file.discs[element], key)
+    return Knob(key, label, 0.0, high, stated(scene, disc, key), default=default)
+
+
+def _pairs(scene: Scene, disc: Disc | None) -> list[int]:
+    """Return the numbers of the pairs that a ball's material is in; without a ball, of all."""
+    return [n for n, pair in enumerate(scene.pairs) if disc is None or disc.material in pair.between]
 
 
 def stated(scene: Scene, disc: Disc, key: str) -> float:
@@ -121,12 +138,16 @@ def turned(live: Live, key: str, value: Value, picked: int | None) -> list[Actio
 
 
 def _paths(live: Live, key: str, picked: int | None) -> list[str]:
-    """Return where a figure stands: of the picked body's element, or of all balls and generators."""
+    """Return where a figure stands: of the picked body or its material, or of all pairs, balls and generators."""
     scene = live.scene
+    element = int(live.bodies.element[picked]) if picked is not None else 0
+    if element < len(scene.discs):
+        pairs = _pairs(scene, scene.discs[element] if picked is not None else None)
+        if pairs:
+            return [f"pair.{n}.{key}" for n in pairs] if picked is not None else [f"pair.*.{key}"]
     counts = [len(scene.balls), len(scene.grids), len(scene.scatters), len(scene.emitters)]
     if picked is None:
         return [f"{kind}.*.{key}" for kind, count in zip(KINDS, counts, strict=True) if count]
-    element = int(live.bodies.element[picked])
     for kind, count in zip(KINDS, counts, strict=True):
         if element < count:
             return [f"{kind}.{element}.{key}"]

@@ -78,7 +78,9 @@ class Sounds:
             return 0
         strength, radius = loudness(contacts, bodies)
         loud = np.flatnonzero(strength > SILENT)
-        loud = loud[np.argsort(-strength[loud], kind="stable")][:CANDIDATES]
+        if len(loud) > CANDIDATES:
+            loud = loud[np.argpartition(-strength[loud], CANDIDATES)[:CANDIDATES]]
+        loud = loud[np.argsort(-strength[loud], kind="stable")]
         played: set[float] = set()
         for row in loud.tolist():
             if len(played) == A_CALL:
@@ -134,5 +136,7 @@ def _numbers(side: IntArray) -> IntArray:
 
 def _is_among(contacts: Contacts, row: int, others: Contacts) -> bool:
     """Tell whether a contact was there before; it keeps its first time, so the same is known by that."""
-    same = others.time == contacts.time[row]
-    return bool((same & (others.pair == contacts.pair[row]).all(axis=1)).any())
+    first, second = contacts.pair[row]
+    same = np.flatnonzero(others.pair[:, 0] == first)
+    same = same[others.pair[same, 1] == second]
+    return bool((others.time[same] == contacts.time[row]).any())

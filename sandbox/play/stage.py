@@ -5,13 +5,14 @@ Whatever fails is told as a message, and what was on goes on.
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
-from sandbox.action import ActionError
+from sandbox.action import ActionError, SetParameter
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, able, engine_named
 from sandbox.play.hands import Hands, Place
 from sandbox.play.knob import Value
-from sandbox.play.knobs import SETTINGS, turned
+from sandbox.play.knobs import turned
 from sandbox.play.live import Live
 from sandbox.play.messages import Messages
 from sandbox.play.session import Session
@@ -48,7 +49,7 @@ class Stage:
         self.on_new: Callable[[bool], object] = bool
         """Called when something else is on; with whether it is the same scene, for the camera to stay."""
         self._engine, self._overrides = engine, tuple(overrides)
-        self._turned: dict[str, Value] = {}
+        self._turned: dict[str, Any] = {}  # values of the scene by path, for a restart to keep
         self._ghosted = False
         self._trusting: bool | None = None  # nobody has said
 
@@ -107,22 +108,11 @@ class Stage:
             self.show.scrub(self.show.begin)
         elif self.show is not None and self.file is not None:
             try:
-                scene = from_document(to_document(self.file), "<scene>", self._lasting(self.file))
+                scene = from_document(to_document(self.file), "<scene>", self._turned.items())
             except SceneError as error:
                 self.messages.tell(str(error), "error")
                 return
             self._start(scene, self.path, self.file, self.show.engine, self.show.session.wanted, same=True)
-
-    def _lasting(self, scene: Scene) -> list[tuple[str, Value | list[float]]]:
-        """Return what was turned, as values of the scene."""
-        kinds = {"ball": scene.balls, "grid": scene.grids, "scatter": scene.scatters, "emitter": scene.emitters}
-        found: list[tuple[str, Value | list[float]]] = []
-        for path, value in self._turned.items():
-            if path == "gravity":
-                found.append(("world.gravity", [scene.world.gravity[0], float(value)]))
-            else:
-                found += [(f"{kind}.*.{path}", value) for kind, those in kinds.items() if those]
-        return found
 
     def reload(self) -> None:
         """Read the scene's file again, and start it at 0."""
@@ -198,9 +188,10 @@ class Stage:
         def turn(live: Live) -> None:
             for action in turned(live, key, value, self.hands.picked):
                 live.act(action)
+                if isinstance(action, SetParameter):
+                    self._turned[action.path] = action.value
 
-        if self.act(turn) and key not in SETTINGS and (key == "gravity" or self.hands.picked is None):
-            self._turned[key] = value
+        self.act(turn)
 
     def act(self, deed: Callable[[Live], object]) -> bool:
         """Do something to what is on, and say so where it cannot be done; return whether it could."""

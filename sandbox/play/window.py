@@ -66,6 +66,7 @@ class Window:
         self.mouse = Mouse(self)
         self._clock = pygame.time.Clock()
         stage.on_new = self.renew
+        COMPILING.on_begin = self._show_wait
         if stage.show is not None:
             self.renew(False)
 
@@ -121,6 +122,12 @@ class Window:
         """Draw what is on, and what surrounds it."""
         self.desk.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
 
+    def _show_wait(self, what: str) -> None:
+        """Say what the next picture has to wait for; it takes no events in."""
+        self.desk.draw_wait(self.surface, what)
+        pygame.display.flip()
+        pygame.event.pump()  # so that the desktop does not think that nobody is there
+
     def take(self, event: pygame.event.Event) -> None:
         """Take one event in."""
         if event.type == pygame.QUIT:
@@ -151,9 +158,11 @@ class Window:
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
-        """Close cleanly on Ctrl+C and SIGTERM."""
+        """Close cleanly on Ctrl+C and SIGTERM; told a second time, do not wait for what is being computed."""
 
         def leave(number: int, _: FrameType | None) -> None:
+            if self.leaving is not None:
+                raise KeyboardInterrupt
             self.leaving = 130 if number == signal.SIGINT else 0
 
         before = {number: signal.signal(number, leave) for number in (signal.SIGINT, signal.SIGTERM)}
@@ -165,6 +174,7 @@ class Window:
 
     def close(self) -> None:
         """Finish what is being recorded, and close the window."""
+        COMPILING.on_begin = None
         self.taking.end_film()
         self.desk.close()
         self.stage.close()

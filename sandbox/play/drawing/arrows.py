@@ -29,7 +29,7 @@ _COOL = mixed(BACKGROUND, SKY, 0.8)
 HEAT: tuple[Colour, ...] = tuple(
     mixed(_COOL, YELLOW, k / 16) if k < 16 else mixed(YELLOW, (255, 255, 255), k / 16 - 1.0) for k in range(33)
 )
-"""For shares of the largest force, in 32nds: from blue through yellow to white."""
+"""For a line's length, in 32nds of the largest: from blue through yellow to white."""
 LABELS = 12
 """Up to so many forces are told in newtons."""
 
@@ -96,8 +96,9 @@ def draw_impulses(view: View) -> None:
     for k in drawn.tolist():
         (x, y), (nx, ny), half = place[k].tolist(), normal[k].tolist(), float(length[k]) / 2.0
         ends = (x - nx * half, y - ny * half), (x + nx * half, y + ny * half)
-        width = (1.0 + 2.6 * float(share[k])) * view.unit
-        stroke(view.surface, *ends, HEAT[int(32.0 * float(share[k]))], width, view.antialias)
+        strength = min(2.0 * half / (LARGEST * view.unit), 1.0)
+        width = (1.0 + 2.6 * strength) * view.unit
+        stroke(view.surface, *ends, HEAT[int(32.0 * strength)], width, view.antialias)
         if len(drawn) <= LABELS:
             text, (right, down) = f"{float(force[k]):.3g} N", (10.0 * view.unit, 12.0 * view.unit)
             write(view.surface, text, (x + right + 1, y + down + 1), 12 * view.unit, BACKGROUND, "midleft", mono=True)

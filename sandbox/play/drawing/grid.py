@@ -6,7 +6,7 @@ import numpy as np
 import pygame
 
 from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import FAINT, GRID, GRID_STRONG
+from sandbox.play.drawing.palette import BACKGROUND, FAINT, GRID, GRID_STRONG
 from sandbox.play.drawing.text import write
 
 NARROWEST = 56.0
@@ -62,4 +62,6 @@ def draw_scale(surface: pygame.Surface, camera: Camera, unit: float = 1.0, foot:
     surface.fill(FAINT, pygame.Rect(left, base - thick, length, thick))
     for x in (left, left + length - thick):
         surface.fill(FAINT, pygame.Rect(x, base - thick - tick, thick, tick))
-    write(surface, length_text(step), (left + length / 2.0, base - tick - 3 * unit), 12 * unit, FAINT, "midbottom")
+    text, x, y = length_text(step), left + length / 2.0, base - tick - 3 * unit
+    write(surface, text, (x + 1, y + 1), 12 * unit, BACKGROUND, "midbottom")  # it may lie over a bright ball
+    write(surface, text, (x, y), 12 * unit, FAINT, "midbottom")

@@ -90,11 +90,13 @@ def draw_verdicts(view: View) -> None:
     for number, (x, y), radius in zip(some.shown.tolist(), some.centre.tolist(), some.radius.tolist(), strict=True):
         touching = number < len(overlapping) and bool(overlapping[number])
         word, size = "overlap" if touching else "clear", min(max(0.28 * radius, 11.0 * view.unit), 26.0 * view.unit)
-        if measure(word, size, bold=True)[0] > 1.8 * radius:
+        place = y - 0.4 * radius  # above the mark of its centre and its name
+        if measure(word, size, bold=True)[0] > 1.6 * radius:
+            place = y
             word, size = "!", min(max(1.2 * radius, 9.0 * view.unit), 20.0 * view.unit)
             if not touching:
                 continue
-        write(view.surface, word, (x, y), size, INK, "center", bold=True)
+        write(view.surface, word, (x, place), size, INK, "center", bold=True)
 
 
 def draw_flashes(view: View) -> None:

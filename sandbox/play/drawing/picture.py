@@ -36,7 +36,6 @@ class Kept(NamedTuple):
     bounds: bool
     antialias: bool
     unit: float
-    foot: float
     format: tuple[object, ...]
 
 
@@ -89,7 +88,7 @@ class Picture:
             unit: px, of a line that is one pixel wide on a 1080p display; all widths and letters grow with it.
             foot: px at the lower edge that something else will cover.
         """
-        self._blit_background(surface, camera, sight, antialias, unit, foot)
+        self._blit_background(surface, camera, sight, antialias, unit)
         self._know(sight)
         sizes = self._sized(sight.bodies, camera.scale, unit)
         colours = self._colours
@@ -114,6 +113,7 @@ class Picture:
         if "shapes" in sight.overlays:
             self._draw_discs(view, np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None)
         self._overlays.above(view)
+        draw_scale(surface, camera, unit, foot)
 
     def _draw_discs(self, view: View, which: IntArray | None) -> None:
         """Draw the bodies that are no points: all, or those at some places of the view."""
@@ -163,10 +163,10 @@ class Picture:
         self._turning = turned | meetings(scene, bodies).turnable
 
     def _blit_background(
-        self, surface: pygame.Surface, camera: Camera, sight: Sight, antialias: bool, unit: float, foot: float
+        self, surface: pygame.Surface, camera: Camera, sight: Sight, antialias: bool, unit: float
     ) -> None:
         form = (surface.get_size(), surface.get_masks(), surface.get_bytesize())
-        wanted = Kept(sight.scene, camera, "bounds" in sight.overlays, antialias, unit, foot, form)
+        wanted = Kept(sight.scene, camera, "bounds" in sight.overlays, antialias, unit, form)
         known = self._background
         if known is None or known[0].scene is not wanted.scene or known[0][1:] != wanted[1:]:
             drawn = pygame.Surface(surface.get_size(), 0, surface)
@@ -175,7 +175,6 @@ class Picture:
             draw_fixtures(drawn, camera, sight.scene, unit, antialias)
             if wanted.bounds:
                 draw_bounds(drawn, camera, sight.scene.world.bounds, unit, antialias)
-            draw_scale(drawn, camera, unit, foot)
             self._background = known = (wanted, drawn)
         surface.blit(known[1], (0, 0))
 

@@ -56,13 +56,15 @@ def _joined(pieces: tuple[FloatArray, ...], shown: IntArray, most: int) -> Float
 
 def _lines(view: View, places: FloatArray, tints: ColourArray) -> None:
     """Draw one shade of every trail; a trail is broken where its body was nowhere, or far out of the picture."""
+    if len(places) < 2:
+        return
     width, height = view.camera.size
     with np.errstate(invalid="ignore", over="ignore"):
         pixels = view.camera.to_screen(places) - 0.5
         x, y = pixels[..., 0], pixels[..., 1]
         near = (np.abs(x - width / 2) < 4 * width + 100) & (np.abs(y - height / 2) < 4 * height + 100)
     draw = pygame.draw.aalines if view.antialias and len(tints) <= LINES // 4 else pygame.draw.lines
-    whole = near.all(axis=0).tolist()
+    whole = np.asarray(near.all(axis=0), np.bool_)
     for k, (tint, trail) in enumerate(zip(tints.tolist(), pixels.transpose(1, 0, 2).tolist(), strict=True)):
         if whole[k]:
             draw(view.surface, tint, False, trail)

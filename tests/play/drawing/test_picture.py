@@ -86,9 +86,9 @@ def test_small_bodies_are_points_where_they_are():
 def test_contact_is_shown_by_colour_and_by_word():
     what = scene(balls=[ball(-2, 0, 1.5), ball(2, 0, 1.5)])
     picture = drawn(sight(what, overlapping=np.asarray([True, False])))
-    assert at(picture, -2.0, 1.1) == TOUCHING
-    assert at(picture, 2.0, 1.1) == CLEAR
-    words = [(picture[a:b, 50:70].reshape(-1, 3) > 200).all(1).sum() for a, b in ((35, 85), (115, 165))]
+    assert at(picture, -2.0, -0.5) == TOUCHING
+    assert at(picture, 2.0, -0.5) == CLEAR
+    words = [(picture[a:b, 38:58].reshape(-1, 3) > 200).all(1).sum() for a, b in ((35, 85), (115, 165))]
     assert min(words) > 20, "words"
     assert words[0] != words[1], "different ones"
 

@@ -1,0 +1,86 @@
+"""What is to be seen, and where: colours within regions, by the arithmetic of the camera and of the panel."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+from driving import SIZE, Shot
+
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.palette import Colour
+from sandbox.play.stage import Stage
+from sandbox.play.window import Window
+
+NEAR = 6
+"""How far a channel may be from its colour: shading and antialiasing change what is beside an edge by more."""
+HUD = pygame.Rect(10, 10, 360, 150)
+"""Where the state of things is told."""
+PICTURE = pygame.Rect(0, 0, 636, 566)
+"""What neither the panel nor the timeline covers."""
+ENGINE_ROW = pygame.Rect(12, 36, 330, 20)
+STEP_ROW = pygame.Rect(12, 56, 330, 20)
+
+
+class Laid(NamedTuple):
+    """Where things lie in a window that shows a scene, px."""
+
+    widgets: dict[str, pygame.Rect]
+    camera: Camera
+
+
+def laid_out(path: Path) -> Laid:
+    """Return where a window of the usual size has its widgets, and what its camera shows first: from one without
+    a display.
+    """
+    stage = Stage()
+    window = Window(stage, size=SIZE, say=lambda _: None)
+    try:
+        assert stage.open(path)
+        window.turn(0.0)
+        left = SIZE[0] - window.desk.panel.width
+        rects = {}
+        for widget in window.desk.panel.widgets:
+            name = widget.knob.key if hasattr(widget, "knob") else widget.name
+            rects[name] = widget.rect.move(left, 0)
+        return Laid(rects, window.camera)
+    finally:
+        window.close()
+
+
+def mask(shot: Shot, colour: Colour, box: pygame.Rect = PICTURE) -> "np.ndarray[tuple[int, int], np.dtype[np.bool_]]":
+    """Tell which pixels of a region have a colour, (height, width)."""
+    part = shot[box.top : box.bottom, box.left : box.right].astype(np.int16)
+    return np.asarray((np.abs(part - np.asarray(colour)) <= NEAR).all(axis=2))
+
+
+def count(shot: Shot, colour: Colour, box: pygame.Rect = PICTURE) -> int:
+    """Return how many pixels of a region have a colour."""
+    return int(mask(shot, colour, box).sum())
+
+
+def middle(shot: Shot, colour: Colour, box: pygame.Rect = PICTURE) -> tuple[float, float]:
+    """Return the middle of all pixels of a colour in a region, px in the window; nan where there are none."""
+    rows, columns = np.nonzero(mask(shot, colour, box))
+    if not len(rows):
+        return float("nan"), float("nan")
+    return float(columns.mean()) + box.left + 0.5, float(rows.mean()) + box.top + 0.5
+
+
+def near(a: tuple[float, float], b: tuple[float, float], within: float) -> bool:
+    """Tell whether two places are no farther apart than so many px."""
+    return bool(np.hypot(a[0] - b[0], a[1] - b[1]) <= within)
+
+
+def on_screen(camera: Camera, place: tuple[float, float]) -> tuple[float, float]:
+    """Return where a place, m, is seen, px."""
+    x, y = camera.to_screen(np.asarray(place)).tolist()
+    return x, y
+
+
+def differ(a: Shot, b: Shot, box: pygame.Rect = PICTURE) -> bool:
+    """Tell whether two pictures differ in a region."""
+    there = np.s_[box.top : box.bottom, box.left : box.right]
+    return not np.array_equal(a[there], b[there])
+
+
