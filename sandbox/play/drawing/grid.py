@@ -62,6 +62,6 @@ def draw_scale(surface: pygame.Surface, camera: Camera, unit: float = 1.0, foot:
     surface.fill(FAINT, pygame.Rect(left, base - thick, length, thick))
     for x in (left, left + length - thick):
         surface.fill(FAINT, pygame.Rect(x, base - thick - tick, thick, tick))
-    text, x, y = length_text(step), left + length / 2.0, base - tick - 3 * unit
-    write(surface, text, (x + 1, y + 1), 12 * unit, BACKGROUND, "midbottom")  # it may lie over a bright ball
-    write(surface, text, (x, y), 12 * unit, FAINT, "midbottom")
+    text, middle, above = length_text(step), left + length / 2.0, base - tick - 3 * unit
+    write(surface, text, (middle + 1, above + 1), 12 * unit, BACKGROUND, "midbottom")  # it may lie on a bright ball
+    write(surface, text, (middle, above), 12 * unit, FAINT, "midbottom")

@@ -4,7 +4,7 @@ import pytest
 from drawn import CAMERA, SIZE, at, ball, changed, drawn, frame, scene, sight
 
 from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import ACCENTS, BACKGROUND, CLEAR, SOLID, TOUCHING
+from sandbox.play.drawing.palette import ACCENTS, BACKGROUND, CLEAR, FAINT, SOLID, TOUCHING
 from sandbox.play.drawing.picture import Picture
 
 FLOOR = [{"point": [0.0, -2.0], "normal": [0.0, 1.0]}]
@@ -100,6 +100,13 @@ def test_only_what_can_turn_has_a_spoke():
     assert len(column)
     assert column.min() > 100, "at angle 0 it lies to the right"
     assert changed(drawn(sight(scene(balls=[ball(0, 0)]))), drawn(sight(scene(balls=[ball(0, 0, angle=1.0)])))).any()
+
+
+def test_the_scale_bar_lies_over_the_bodies():
+    everywhere, nowhere = (drawn(sight(scene(balls=[ball(x, 0, 50.0)]))) for x in (0, 1000))
+    bar = (nowhere[18:118, 120 - 18 - 1] == FAINT).all(1)
+    assert bar.all()
+    assert (everywhere[18:118, 120 - 18 - 1] == FAINT).all()
 
 
 def test_units_scale_the_marks():

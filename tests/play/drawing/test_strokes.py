@@ -1,0 +1,80 @@
+import math
+
+import numpy as np
+import pygame
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from sandbox.play.drawing.strokes import arrow, clipped, dashes, stroke
+
+AREA = pygame.Rect(10, 20, 200, 100)
+WHITE = (255, 255, 255)
+PLACE = st.tuples(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5))
+ANYWHERE = st.tuples(*(st.floats(allow_nan=True, allow_infinity=True),) * 2)
+
+
+def covered(surface: pygame.Surface) -> np.ndarray:
+    return pygame.surfarray.array3d(surface)[..., 0] / 255.0
+
+
+@given(a=PLACE, b=PLACE, margin=st.floats(1.0, 50.0))
+def test_a_clipped_segment_is_what_lies_in_the_area(a, b, margin):
+    part = clipped(a, b, AREA, margin)
+    share = np.linspace(0.0, 1.0, 2001)[:, None]
+    points = np.asarray(a) * (1 - share) + np.asarray(b) * share
+    low, high = np.asarray(AREA.topleft) - margin, np.asarray(AREA.bottomright) + margin
+    inside = ((points > low + 1e-6) & (points < high - 1e-6)).all(1)
+    if part is None:
+        assert not inside.any()
+        return
+    start, end = np.asarray(part)
+    assert (np.minimum(start, end) >= low - 1e-6).all()  # px; rounding of products of 1e5 px
+    assert (np.maximum(start, end) <= high + 1e-6).all()  # the same
+    along = np.asarray(b) - np.asarray(a)
+    length = math.hypot(*along)
+    assume(length > 1e-3)
+    for point in (start, end):
+        across = (point - np.asarray(a)) @ np.asarray((-along[1], along[0])) / length
+        assert abs(across) < 1e-6  # the same
+    if inside.any():
+        reach = (points[inside] - start) @ along / length
+        assert reach.min() >= -1e-6  # the same
+        assert reach.max() <= math.dist(start, end) + 1e-6  # the same
+
+
+@given(a=ANYWHERE, b=ANYWHERE, width=st.sampled_from([1.0, 2.0, 9.0]), antialias=st.booleans())
+def test_no_line_is_too_long(a, b, width, antialias):
+    surface = pygame.Surface((30, 20))
+    stroke(surface, a, b, WHITE, width, antialias)
+    arrow(surface, a, b, WHITE, width, antialias, edge=(9, 9, 9))
+    dashes(surface, [(a, b)], WHITE, 4.0, antialias)
+    assert surface.get_size() == (30, 20)
+
+
+@pytest.mark.parametrize("width", [1.0, 2.0, 4.0, 7.0])
+@pytest.mark.parametrize("antialias", [True, False])
+def test_a_stroke_is_as_wide_as_asked(width, antialias):
+    surface = pygame.Surface((60, 40))
+    stroke(surface, (5.0, 20.5), (55.0, 20.5), WHITE, width, antialias)
+    assert covered(surface)[30].sum() == pytest.approx(width, abs=1.0)  # whole pixels at the two edges
+    assert not covered(surface)[:3].any()
+    assert not covered(surface)[58:].any()
+
+
+def test_an_arrow_ends_at_its_tip_and_is_widest_at_its_head():
+    surface = pygame.Surface((100, 60))
+    arrow(surface, (10.0, 30.5), (80.0, 30.5), WHITE, 2.0)
+    across = covered(surface).sum(1)
+    assert np.flatnonzero(across).max() == pytest.approx(80, abs=1)  # whole pixels
+    assert 67 <= np.argmax(across) <= 73
+    assert across.max() > 3 * across[30]
+
+
+def test_dashes_keep_their_place_while_the_edge_of_the_picture_passes():
+    pictures = []
+    for left in (-1000.0, 5.0):
+        surface = pygame.Surface((100, 20))
+        dashes(surface, [((left - 5.0 + 5.0 if left > 0 else left + 5.0, 10.5), (300.0, 10.5))], WHITE, 5.0, False)
+        pictures.append(covered(surface)[20:, 10])
+    assert (np.abs(np.diff(pictures[0])).sum(), np.abs(np.diff(pictures[1])).sum()) == (15.0, 15.0)
