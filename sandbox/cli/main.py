@@ -14,13 +14,13 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 COMMANDS = {
     "run": "run scenes headless and tell how they went",
     "play": "the window: play a scene, or pick one",
-    "replay": "a stored run or a recorded session in the window",
-    "check": "check scenes: faults, what they demand, who can run them, what would go wrong",
     "compare": "one scene on several engines, against the best known truth",
-    "export": "a stored run as csv, parquet, gif, mp4 or png",
+    "check": "check scenes: faults, what they demand, who can run them, what would go wrong",
     "scenes": "list the scenes that ship",
     "engines": "list the engines",
     "schema": "print the JSON Schema of a scene file",
+    "export": "a stored run as csv, parquet, gif, mp4 or png",
+    "replay": "a stored run or a recorded session in the window",
 }
 """Each command's line of help stands here, so that help needs to import none of them."""
 

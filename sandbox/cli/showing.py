@@ -35,7 +35,14 @@ def window_options(command: Command) -> Command:
         click.option("--size", type=SizeType(), metavar="WxH", help="of the window, in pixels"),
         click.option("--paused", is_flag=True, help="begin paused"),
         click.option("--film", type=click.Choice(["gif", "mp4"]), default="gif", help="what Ctrl+R records"),
-        click.option("--overlay", "overlays", multiple=True, type=click.Choice(OVERLAYS), help="begin with it on"),
+        click.option(
+            "--overlay",
+            "overlays",
+            multiple=True,
+            type=click.Choice(OVERLAYS),
+            metavar="NAME",
+            help=f"begin with it on: {', '.join(OVERLAYS)}",
+        ),
         click.option("--ghost", is_flag=True, help="begin with the ghost"),
         click.option(
             "--record",

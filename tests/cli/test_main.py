@@ -15,7 +15,7 @@ from sandbox.scene.shipped import shipped
 
 
 def test_commands_are_those_promised() -> None:
-    assert list(COMMANDS) == ["run", "check", "compare", "scenes", "engines", "schema"]
+    assert list(COMMANDS) == ["run", "play", "compare", "check", "scenes", "engines", "schema", "export", "replay"]
 
 
 @pytest.mark.parametrize("command", [None, *COMMANDS])

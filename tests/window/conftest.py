@@ -2,19 +2,17 @@
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from driving import Driven, start_server
+from driving import Driven, Play, start_server
 from xclient import LIBRARY
 
 # For what tests draw in this process to compare with; the windows that they drive say x11 themselves.
 os.environ["SDL_VIDEODRIVER"] = "dummy"
 os.environ["SDL_AUDIODRIVER"] = "dummy"
 os.environ["PYGAME_HIDE_SUPPORT_PROMPT"] = "1"
-
-Play = Callable[..., Driven]
 
 
 @pytest.fixture(scope="session")

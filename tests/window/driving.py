@@ -7,7 +7,7 @@ with a limit so generous that it only ends what would never come.
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from time import monotonic, sleep
 from typing import TypeVar
@@ -220,4 +220,5 @@ def start_server() -> tuple[subprocess.Popen[bytes], str]:
     return server, f":{number}"
 
 
-Changes = Mapping[str, str | None]
+Play = Callable[..., Driven]
+"""Opens a window by the words of a command line; keywords change its environment."""

@@ -8,7 +8,7 @@ import pygame
 from driving import SIZE, Shot
 
 from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import Colour
+from sandbox.play.drawing.palette import WARNING, Colour
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
 
@@ -19,6 +19,9 @@ HUD = pygame.Rect(10, 10, 360, 150)
 PICTURE = pygame.Rect(0, 0, 636, 566)
 """What neither the panel nor the timeline covers."""
 ENGINE_ROW = pygame.Rect(12, 36, 330, 20)
+ARENA = pygame.Rect(0, 165, 636, 290)
+"""What words do not cover either: the state of things lies above, messages below."""
+MESSAGES = pygame.Rect(0, 458, 636, 106)
 STEP_ROW = pygame.Rect(12, 56, 330, 20)
 
 
@@ -48,18 +51,29 @@ def laid_out(path: Path) -> Laid:
         window.close()
 
 
-def mask(shot: Shot, colour: Colour, box: pygame.Rect = PICTURE) -> "np.ndarray[tuple[int, int], np.dtype[np.bool_]]":
+def mask(shot: Shot, colour: Colour, box: pygame.Rect = ARENA) -> "np.ndarray[tuple[int, int], np.dtype[np.bool_]]":
     """Tell which pixels of a region have a colour, (height, width)."""
     part = shot[box.top : box.bottom, box.left : box.right].astype(np.int16)
     return np.asarray((np.abs(part - np.asarray(colour)) <= NEAR).all(axis=2))
 
 
-def count(shot: Shot, colour: Colour, box: pygame.Rect = PICTURE) -> int:
+def paused(shot: Shot) -> bool:
+    """Tell whether PAUSED is seen in red."""
+    return count(shot, WARNING, HUD) > 60
+
+
+def at(shot: Shot, place: tuple[float, float]) -> Colour:
+    """Return the colour of a pixel."""
+    red, green, blue = map(int, shot[round(place[1]), round(place[0])])
+    return red, green, blue
+
+
+def count(shot: Shot, colour: Colour, box: pygame.Rect = ARENA) -> int:
     """Return how many pixels of a region have a colour."""
     return int(mask(shot, colour, box).sum())
 
 
-def middle(shot: Shot, colour: Colour, box: pygame.Rect = PICTURE) -> tuple[float, float]:
+def middle(shot: Shot, colour: Colour, box: pygame.Rect = ARENA) -> tuple[float, float]:
     """Return the middle of all pixels of a colour in a region, px in the window; nan where there are none."""
     rows, columns = np.nonzero(mask(shot, colour, box))
     if not len(rows):
@@ -78,7 +92,7 @@ def on_screen(camera: Camera, place: tuple[float, float]) -> tuple[float, float]
     return x, y
 
 
-def differ(a: Shot, b: Shot, box: pygame.Rect = PICTURE) -> bool:
+def differ(a: Shot, b: Shot, box: pygame.Rect = ARENA) -> bool:
     """Tell whether two pictures differ in a region."""
     there = np.s_[box.top : box.bottom, box.left : box.right]
     return not np.array_equal(a[there], b[there])
