@@ -1,7 +1,7 @@
 """Drawing: what the benches time of the window's pictures, and peers that draw the same. No display is opened."""
 
 import os
-import time
+import statistics
 from collections.abc import Callable
 
 import numpy as np
@@ -11,6 +11,7 @@ os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 import pygame
 import pymunk
 import pymunk.pygame_util
+from workloads import timed
 
 from sandbox.engines.registry import start
 from sandbox.play.camera import Camera
@@ -39,12 +40,9 @@ def fitting(sight: Sight) -> Camera:
 
 
 def _each(draw: Callable[[], object]) -> float:
-    """Return the seconds that one picture takes."""
+    """Return the seconds that one picture takes: the median of some, as others use the machine too."""
     draw()
-    began = time.perf_counter()
-    for _ in range(PICTURES):
-        draw()
-    return (time.perf_counter() - began) / PICTURES
+    return statistics.median(timed(draw) for _ in range(PICTURES))
 
 
 def drawing(which: Scene, steps: int, antialias: bool) -> Callable[[], float]:

@@ -64,7 +64,7 @@ class Relay:
             origin=self._leg.origin,
             steps=self._leg.steps,
             retired=dict(self.retired),
-            forces=dict(self._forces),
+            forces=self._acting(),
             pulls=self._hands.pulls,
         )
 
@@ -157,6 +157,9 @@ class Relay:
             self._leg.simulation.finish(part)
         except Divergence as divergence:
             raise self._later(divergence) from None
+        except Exhaustion:
+            self._leg.steps -= part
+            raise
 
     def _later(self, divergence: Divergence) -> Divergence:
         return Divergence(self.time, divergence.body, divergence.what)
@@ -188,12 +191,19 @@ class Relay:
                     self._leg.bodies = replace(self._leg.bodies, elements=self._leg.simulation.bodies.elements)
 
     def _spawn(self, action: Spawn) -> None:
-        name = action.ball.name or default_name("spawned", len(self.bodies))
+        name = action.ball.name or self._new_name()
         if name in self.bodies.names:
             raise ActionError(f"a body or fixed thing is called {name!r} already")
         ball = action.ball.model_copy(update={"name": name})
         self._leg.simulation.apply(Spawn(time=action.time, ball=ball))
         self._leg.joined_by(self.bodies.joined_by(ball, name))
+
+    def _new_name(self) -> str:
+        """Return a name for a ball without one, that nobody has."""
+        taken, number = {*self.bodies.names, *self.scene.fixed_names}, len(self.bodies)
+        while (name := default_name("spawned", number)) in taken:
+            number += 1
+        return name
 
     def _switch(self, action: Switch) -> None:
         try:
@@ -210,10 +220,12 @@ class Relay:
             ActionError: the engine cannot go on from it. Nothing has changed then.
         """
         try:
-            leg = begun(self.scene, engine, wanted, self.bodies, frame, self._forces)
+            leg = begun(self.scene, engine, wanted, self.bodies, frame, self._acting())
         except (Refusal, UnknownEngineError) as refusal:
             raise ActionError(str(refusal)) from None
         old = self._leg
+        if leg.simulation.settings.dt == old.simulation.settings.dt:  # so that frames go on to lie at k·dt
+            leg.origin, leg.steps = old.origin, old.steps
         leg.simulation.patience = old.simulation.patience
         if self._kept is not None:
             self._kept.append(old.contacts())
@@ -225,6 +237,13 @@ class Relay:
         self._leg = leg
         if self._observer is not None:
             self._leg.watched_by(self._observer)
+
+    def _acting(self) -> dict[str, Force]:
+        """Return the steady forces on bodies that are there; on who has left they have ended."""
+        if self._forces:
+            present = dict(zip(self.bodies.names, self.frame().present.tolist(), strict=True))
+            self._forces = {name: force for name, force in self._forces.items() if present[name]}
+        return dict(self._forces)
 
     def frame(self) -> Frame:
         """Return the present state."""

@@ -17,20 +17,20 @@ def between(before: Frame, after: Frame, share: float) -> Frame:
     """
     if share >= 1.0 or before is after:
         return after
-    known = len(before.position)
+    known = min(len(before.position), len(after.position))
     time = before.time + (after.time - before.time) * share
     dt = abs(after.time - before.time)
     with np.errstate(all="ignore"):
-        moved = after.position[:known] - before.position
-        fastest = np.maximum(_squared(before.velocity), _squared(after.velocity[:known]))
+        moved = after.position[:known] - before.position[:known]
+        fastest = np.maximum(_squared(before.velocity[:known]), _squared(after.velocity[:known]))
         flew = _squared(moved) <= (LEAP * dt) ** 2 * fastest + TINY
-        flew &= before.present & after.present[:known]
+        flew &= before.present[:known] & after.present[:known]
         position = after.position.copy()
         position[:known] -= moved * (flew * (1.0 - share))[:, None]
         angle = after.angle
         if before.angle is not after.angle:  # which those share who cannot turn
             angle = after.angle.copy()
-            angle[:known] -= (after.angle[:known] - before.angle) * (flew * (1.0 - share))
+            angle[:known] -= (after.angle[:known] - before.angle[:known]) * (flew * (1.0 - share))
     return Frame(time, position, after.velocity, angle, after.angular_velocity, after.present)
 
 

@@ -30,6 +30,10 @@ class Hands:
         """Whether a body is held."""
         return self._held is not None
 
+    def picked_of(self, live: Live) -> int | None:
+        """Return the picked body's number, unless that body has not come yet: the session may have gone back."""
+        return self.picked if self.picked is not None and self.picked < len(live.bodies) else None
+
     def look(self, show: Stored, place: Place, reach: float) -> bool:
         """Pick the body at a place of a stored run; return whether there is one."""
         self.picked = picked(show.bodies, show.frame, place, reach)
@@ -113,8 +117,9 @@ class Hands:
         Raises:
             ActionError: it cannot be.
         """
-        if self.picked is not None:
-            live.act(Remove(time=0.0, body=live.bodies.names[self.picked]))
+        number = self.picked_of(live)
+        if number is not None:
+            live.act(Remove(time=0.0, body=live.bodies.names[number]))
             self.forget()
 
     def nudge(self, live: Live) -> None:
@@ -123,11 +128,12 @@ class Hands:
         Raises:
             ActionError: it cannot be.
         """
-        if self.picked is None:
+        number = self.picked_of(live)
+        if number is None:
             return
-        mass, radius = float(live.bodies.mass[self.picked]), float(live.bodies.radius[self.picked])
+        mass, radius = float(live.bodies.mass[number]), float(live.bodies.radius[number])
         kick = mass * min(NUDGE, 10.0 * radius)
-        live.act(Impulse(time=0.0, body=live.bodies.names[self.picked], impulse=(0.6 * kick, 0.8 * kick)))
+        live.act(Impulse(time=0.0, body=live.bodies.names[number], impulse=(0.6 * kick, 0.8 * kick)))
 
     def add(self, live: Live, place: Place, size: float) -> None:
         """Put a new ball at a place: like the picked one, or like the first, else of a size that suits the view.
@@ -141,7 +147,8 @@ class Hands:
             ActionError: there is no room, or the engine cannot.
         """
         bodies = live.bodies
-        like = self.picked if self.picked is not None else (0 if len(bodies) else None)
+        picked = self.picked_of(live)
+        like = picked if picked is not None else (0 if len(bodies) else None)
         if like is None:
             ball = Ball(position=place, radius=min(max(size / 40.0, 1e-9), 1e9), restitution=0.5, friction=0.5)
         else:

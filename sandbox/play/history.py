@@ -115,6 +115,10 @@ class History:
             half = len(self._marks) // 2
             self._marks = self._marks[:half:2] + self._marks[half:]
 
+    def inserted(self, step: int) -> None:
+        """Take note that one more action was done by a step, and so by all later ones."""
+        self._marks = [m._replace(actions=m.actions + 1) if m.step >= step else m for m in self._marks]
+
     def before(self, step: int) -> Mark | None:
         """Return the last checkpoint at or before a step."""
         found = [mark for mark in self._marks if mark.step <= step]

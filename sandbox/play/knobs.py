@@ -1,5 +1,6 @@
 """Knobs: what of a session can be turned while it runs, and by which actions."""
 
+from collections.abc import Sequence
 from typing import get_args
 
 from sandbox.action import Action, SetParameter, Switch
@@ -28,6 +29,8 @@ class Knobs:
             picked: number of the body that restitution and friction are of; else they are of all balls.
         """
         scene, settings = live.scene, live.settings
+        if picked is not None and picked >= len(live.bodies):  # the session has gone back to before it came
+            picked = None
         return (
             Knob(
                 "gravity",
@@ -145,11 +148,29 @@ def _paths(live: Live, key: str, picked: int | None) -> list[str]:
         pairs = _pairs(scene, scene.discs[element] if picked is not None else None)
         if pairs:
             return [f"pair.{n}.{key}" for n in pairs] if picked is not None else [f"pair.*.{key}"]
-    counts = [len(scene.balls), len(scene.grids), len(scene.scatters), len(scene.emitters)]
+    lists: list[tuple[str, Sequence[Disc]]] = list(
+        zip(KINDS, (scene.balls, scene.grids, scene.scatters, scene.emitters), strict=True)
+    )
     if picked is None:
-        return [f"{kind}.*.{key}" for kind, count in zip(KINDS, counts, strict=True) if count]
-    for kind, count in zip(KINDS, counts, strict=True):
-        if element < count:
-            return [f"{kind}.{element}.{key}"]
-        element -= count
+        return [f"{kind}.{each}.{key}" for kind, discs in lists if discs for each in _every(discs)]
+    for kind, discs in lists:
+        if element < len(discs):
+            return [f"{kind}.{_part(discs, element)}.{key}"]
+        element -= len(discs)
     return []
+
+
+def _every(discs: Sequence[Disc]) -> list[str]:
+    """Return what addresses all elements of a list: `*`, unless one is called so."""
+    return [_part(discs, k) for k in range(len(discs))] if any(disc.name == "*" for disc in discs) else ["*"]
+
+
+def _part(discs: Sequence[Disc], index: int) -> str:
+    """Return what addresses an element of a list: its number, unless another is called so, as names go first."""
+    name = discs[index].name
+    if name is None or all(disc.name != str(index) for disc in discs):
+        return str(index)
+    if "." not in name and name[0] not in "\"'":
+        return name
+    quote = "'" if '"' in name else '"'
+    return f"{quote}{name}{quote}"

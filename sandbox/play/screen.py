@@ -26,7 +26,7 @@ def open_screen(size: tuple[int, int] | None, title: str) -> pygame.Surface:
     Raises:
         NoDisplayError: there is no display.
     """
-    os.environ.setdefault("SDL_VIDEO_X11_WMCLASS", "sandbox")
+    os.environ["SDL_VIDEO_X11_WMCLASS"] = "sandbox"  # pygame, when imported, names it after the script
     asked = "SDL_VIDEODRIVER" in os.environ
     try:
         pygame.display.init()

@@ -4,12 +4,15 @@ A session is its scene and its actions; going back is to go there again. From a 
 state does not hold what an engine remembers of contacts: so checkpoints are made where nothing has touched for a
 while, and wherever a state is known from before, its hash must be the same. Where it is not, the way from the start
 is taken, which is the same every time.
+
+What nobody has seen before cannot be checked so. Whatever is new on a way from a checkpoint therefore makes taking it
+up part of the session, as a switch that changes nothing: who replays the session hands over there too.
 """
 
 from collections.abc import Iterator
 from time import perf_counter
 
-from sandbox.action import Action, ActionError, Switch, Value
+from sandbox.action import Action, ActionError, Pull, Switch, Value
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.relay import Relay, joined
 from sandbox.play.history import History, Mark
@@ -63,6 +66,9 @@ class Session:
         self._done = 0
         self._step = 0
         self._calm = 0
+        self._mark: Mark | None = None  # that the relay was taken up from, as long as all that followed was known
+        self._astray = False
+        self._exhausted = False
         self._contacts: list[Contacts] = []
         self.history = History()
         self.ended: str | None = None
@@ -145,18 +151,22 @@ class Session:
             if not self._one():
                 break
             made += 1
+            if self._mark is not None and not last:
+                self._check(None)
         if made:
             self._see()
         return made
 
     def _one(self) -> bool:
         """Make a step, and do what is to be done then; tell whether the step was made."""
+        if self._step >= self.history.furthest:
+            self._own_up()
         try:
             self._relay.step()
         except Divergence as divergence:
             self.ended = str(divergence)
         except Exhaustion as exhaustion:
-            self.ended = f"at {self._relay.time:g} s: {exhaustion}"
+            self.ended, self._exhausted = f"at {self._relay.time:g} s: {exhaustion}", True
             return False
         self._step += 1
         if self.ended is None:
@@ -182,13 +192,32 @@ class Session:
             self._calm = 0
         else:
             self._calm += self._relay.settings.substeps
-        known = self.history.known(self._step)
-        if known is not None and known.state_hash() != self._frame.state_hash():
-            raise WrongWayError(f"step {self._step} led elsewhere than before")
+        if self._exhausted:  # within the step after this one: that state is none of the session's
+            return
+        self._check(self._frame)
         self.history.keep(self._step, self._frame)
         calm = self._calm >= max(CALM, 2 * (self._relay.settings.persistence or 1))
         if calm and self.ended is None and self.history.wants_mark(self._step):
             self.history.mark(Mark(self._step, self._done, self._relay.checkpoint()))
+
+    def _check(self, frame: Frame | None) -> None:
+        """Hold the present state against what was seen before."""
+        known = self.history.known(self._step)
+        if known is not None and known.state_hash() != (frame or self._relay.frame()).state_hash():
+            self._astray = True
+            raise WrongWayError(f"step {self._step} led elsewhere than before")
+
+    def _own_up(self) -> None:
+        """Make the taking up of the checkpoint part of the session: from here on, what comes is new."""
+        if self._mark is None:
+            return
+        mark, self._mark = self._mark, None
+        handed_over = Switch(time=mark.point.frame.time)
+        if self._actions[: mark.actions][-1:] == [handed_over]:  # it is already
+            return
+        self._actions.insert(mark.actions, handed_over)
+        self._done += 1
+        self.history.inserted(mark.step)
 
     def contacts(self) -> Contacts:
         """Return the contacts that were open since the last call."""
@@ -208,13 +237,25 @@ class Session:
             raise ActionError("the scene has ended here; go back, or restart")
         timed = action.model_copy(update={"time": self._relay.time})
         self._relay.apply(timed)
-        self._actions[self._done :] = [timed]
+        self._own_up()
+        later, self._actions[self._done :] = self._actions[self._done :], []
+        self._let_go(later, timed)
+        self._actions.append(timed)
         self._done += 1
         self.history.cut(self._step - 1)
         self._frame = self._previous = self._relay.frame()
         self.history.keep(self._step, self._frame)
         self._calm = 0
         return timed
+
+    def _let_go(self, forgotten: list[Action], now: Action) -> None:
+        """Let go of who is pulled by a hand that was to let go later, which is forgotten now."""
+        for each in forgotten:
+            if isinstance(each, Pull) and each.target is None and not (isinstance(now, Pull) and now.body == each.body):
+                release = each.model_copy(update={"time": now.time})
+                self._relay.apply(release)
+                self._actions.append(release)
+                self._done += 1
 
     def switch(self, engine: str) -> str | None:
         """Go on with another engine from the state as it is.
@@ -245,9 +286,8 @@ class Session:
         The session is in between while this is not finished; a caller may give up, and ask for another step.
         """
         step = max(0, step)
-        if step < self._step:
-            mark = self.history.before(step)
-            self._restore(mark)
+        if step < self._step or self._astray:
+            self._restore(self.history.before(step))
         try:
             yield from self._forth(step)
         except WrongWayError:
@@ -274,9 +314,12 @@ class Session:
         if relay is None or mark is None:
             self._relay = Relay(self._scene, self._engine, self._settings)
             self._step = self._done = 0
+            self._mark = None
         else:
             self._relay, self._step, self._done = relay, mark.step, mark.actions
+            self._mark = mark
         self.ended = None
+        self._astray = self._exhausted = False
         self._calm = 0
         self._contacts.clear()
         self._relay.contacts()
@@ -291,7 +334,7 @@ class Session:
             settings=self._settings,
             actions=self.actions,
             duration=self._relay.time,
-            state_hash=self._relay.state_hash(),
+            state_hash=None if self._exhausted else self._relay.state_hash(),
         )
 
     def close(self) -> None:

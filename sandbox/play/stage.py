@@ -186,9 +186,10 @@ class Stage:
             return
 
         def turn(live: Live) -> None:
-            for action in turned(live, key, value, self.hands.picked):
+            for action in turned(live, key, value, self.hands.picked_of(live)):
                 live.act(action)
                 if isinstance(action, SetParameter):
+                    self._turned.pop(action.path, None)  # what is turned last is set last
                     self._turned[action.path] = action.value
 
         self.act(turn)

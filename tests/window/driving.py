@@ -18,7 +18,7 @@ from PIL import Image, ImageGrab
 
 from sandbox.recording import Recording
 
-LIMIT = 100.0
+LIMIT = 20.0
 """s, after which what is waited for will never come"""
 SCREEN = (1024, 768)
 SIZE = (900, 600)
@@ -72,7 +72,7 @@ class Driven:
             )
         found = self.wait_for(lambda: self._find(), "a window")
         self.window = int(found)
-        self._xdotool("windowfocus", found)
+        self.focus()
         self.wait_until(lambda shot: len(np.unique(shot.reshape(-1, 3)[::97], axis=0)) > 2, "anything in the window")
 
     def _find(self) -> str:
@@ -92,14 +92,14 @@ class Driven:
 
     def key(self, *names: str) -> None:
         """Press keys one after the other, as xdotool names them."""
-        self._xdotool("key", "--delay", 0, *names)
+        self._xdotool("key", "--delay", 5, *names)
 
-    def hold(self, name: str) -> None:
-        """Press a key down."""
-        self._xdotool("keydown", name)
+    def focus(self) -> None:
+        """Give the window the keyboard."""
+        self._xdotool("windowfocus", self.window)
 
     def type(self, text: str) -> None:
-        self._xdotool("type", "--delay", 0, text)
+        self._xdotool("type", "--delay", 5, text)
 
     def mouse(self, at: tuple[float, float]) -> None:
         """Move the mouse to a place in the window, px."""
@@ -210,8 +210,9 @@ def start_server() -> tuple[subprocess.Popen[bytes], str]:
     """Start an X server on a display that is free; return it, and the display's name."""
     read, write = os.pipe()
     screen = f"{SCREEN[0]}x{SCREEN[1]}x24"
-    # -r: no key repeats by itself, however late its release comes on a busy machine.
-    words = ["Xvfb", "-displayfd", str(write), "-screen", "0", screen, "-nolisten", "tcp", "-r"]
+    # -r: no key repeats by itself, however late its release comes on a busy machine. -noreset: it stays as it is
+    # between one window and the next, who might come while it starts anew.
+    words = ["Xvfb", "-displayfd", str(write), "-screen", "0", screen, "-nolisten", "tcp", "-r", "-noreset"]
     server = subprocess.Popen(words, pass_fds=[write], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(write)
     with os.fdopen(read) as answer:

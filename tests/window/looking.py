@@ -19,9 +19,9 @@ HUD = pygame.Rect(10, 10, 360, 150)
 PICTURE = pygame.Rect(0, 0, 636, 566)
 """What neither the panel nor the timeline covers."""
 ENGINE_ROW = pygame.Rect(12, 36, 330, 20)
-ARENA = pygame.Rect(0, 165, 636, 290)
+ARENA = pygame.Rect(0, 165, 636, 235)
 """What words do not cover either: the state of things lies above, messages below."""
-MESSAGES = pygame.Rect(0, 458, 636, 106)
+MESSAGES = pygame.Rect(0, 400, 636, 164)
 STEP_ROW = pygame.Rect(12, 56, 330, 20)
 
 
@@ -33,9 +33,7 @@ class Laid(NamedTuple):
 
 
 def laid_out(path: Path) -> Laid:
-    """Return where a window of the usual size has its widgets, and what its camera shows first: from one without
-    a display.
-    """
+    """Return where a window of the usual size has its widgets and its camera, from one without a display."""
     stage = Stage()
     window = Window(stage, size=SIZE, say=lambda _: None)
     try:
@@ -96,5 +94,3 @@ def differ(a: Shot, b: Shot, box: pygame.Rect = ARENA) -> bool:
     """Tell whether two pictures differ in a region."""
     there = np.s_[box.top : box.bottom, box.left : box.right]
     return not np.array_equal(a[there], b[there])
-
-

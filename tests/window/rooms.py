@@ -51,7 +51,7 @@ title = "Resting"
 [world]
 gravity = [0.0, -10.0]
 duration = 1.0
-bounds = [[-3.0, -1.0], [3.0, 4.0]]
+bounds = [[-3.0, -0.5], [3.0, 4.0]]
 [solver]
 dt = 0.01
 [[plane]]
@@ -59,11 +59,11 @@ point = [0.0, 0.0]
 normal = [0.0, 1.0]
 [[ball]]
 name = "a"
-position = [-1.0, 0.5]
-velocity = [0.2, 0.0]
-radius = 0.5
+position = [-1.0, 0.3]
+velocity = [1.0, 0.0]
+radius = 0.3
 """
-"""A ball that lies on the ground, pressed to it by its weight, and slides along."""
+"""A ball that lies on the ground, pressed to it by its weight, and slides along, a metre a second."""
 
 
 def written(folder: Path, text: str, name: str = "room.toml") -> Path:

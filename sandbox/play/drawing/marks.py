@@ -1,6 +1,7 @@
 """Marks: centres, names, boxes, the picked body, the hand that pulls, missed contacts, words on contact."""
 
 import math
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -47,7 +48,9 @@ def draw_centres(view: View) -> None:
         view.surface.fill(INK, (x, y, 2, 2))
 
 
+@lru_cache(maxsize=8)
 def _quartered(size: float) -> pygame.Surface:
+    """Return the mark of a centre of mass."""
     side = 2 * math.ceil(size) + 2
     mark = pygame.Surface((side, side), pygame.SRCALPHA)
     middle = side / 2.0

@@ -16,7 +16,7 @@ from sandbox.trajectory import FloatArray
 Distance = Callable[[FloatArray, FloatArray], FloatArray]
 """Takes x and y, px, that broadcast, and returns the signed distance there; it changes by no more than 1 a pixel."""
 
-TILE = 32
+TILE = 16
 """px; edges are shaded in squares of this side, the rest is filled"""
 OUTSIDE = 1e6
 

@@ -145,4 +145,4 @@ def dashes(
 
 
 def _whole(point: Pixel) -> tuple[int, int]:
-    return round(point[0]), round(point[1])
+    return math.floor(point[0] + 0.5), math.floor(point[1] + 0.5)  # `round` would send halves to even numbers

@@ -73,7 +73,7 @@ def test_an_arrow_ends_at_its_tip_and_is_widest_at_its_head():
 
 def test_dashes_keep_their_place_while_the_edge_of_the_picture_passes():
     rows = []
-    for start in (-1003.0, -3.0):  # a whole number of dashes and gaps, of 5 px each, apart
+    for start in (-1003.25, -3.25):  # a whole number of dashes and gaps, of 5 px each, apart
         surface = pygame.Surface((100, 20))
         dashes(surface, [((start, 10.5), (300.0, 10.5))], WHITE, 5.0, antialias=False)
         rows.append(covered(surface)[:, 10])
