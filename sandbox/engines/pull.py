@@ -8,6 +8,8 @@ is implicit, so that it is stable at any h, where a spring force would not be be
 import math
 from collections.abc import Mapping
 
+from pydantic import ValidationError
+
 from sandbox.action import ActionError, Impulse, Pull
 from sandbox.engines.contract import Simulation
 
@@ -115,5 +117,5 @@ class Hands:
             )
             try:
                 simulation.apply(Impulse(time=0.0, body=name, impulse=impulse, angular=angular))
-            except ActionError:  # beyond the greatest speed there may be: the hand slips
+            except (ActionError, ValidationError):  # beyond the greatest speed or amount there may be: the hand slips
                 del self._pulls[name]

@@ -196,11 +196,16 @@ def test_two_hands_pull_two_bodies_and_one_that_is_gone_lets_go_of_nobody_else()
     assert set(relay.checkpoint().pulls) == {"b"}
 
 
-def test_hand_slips_where_no_speed_would_be_enough() -> None:
-    """The cap is 100 times a weight that may be immense; the speed limit is not."""
-    relay = started(dt=10.0, gravity=-1e9)
+@pytest.mark.parametrize(
+    ("ball", "grip"),
+    [({"velocity": [5e11, 0.0]}, (0.0, 0.0)), ({"mass": 1e30, "radius": 1e9}, (0.0, 1e9))],
+    ids=["speed", "torque"],
+)
+def test_hand_slips_where_it_would_take_more_than_there_may_be(ball: dict[str, Any], grip: tuple[float, float]) -> None:
+    """The cap is 100 times a weight that may be immense."""
+    relay = started(dt=10.0, **ball)
     relay.apply(SetParameter(time=0.0, path="world.gravity", value=[-1e9, 0.0]))
-    relay.apply(pull(1e16, 0.0))
+    relay.apply(pull(1e16, 0.0, grip))
     relay.step()
     assert not relay.checkpoint().pulls
     assert np.isfinite(relay.frame().velocity).all()

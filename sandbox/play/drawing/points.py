@@ -1,6 +1,7 @@
 """Points: particles written straight into the pixels of a surface, some hundred thousand a picture.
 
-Numpy alone, in pieces that stay in the processor's cache, into arrays that are kept.
+In one compiled pass where numba is there; else by numpy, in pieces that stay in the processor's cache, into arrays
+that are kept. Both draw the same.
 """
 
 from collections.abc import Callable
@@ -15,6 +16,9 @@ from sandbox.trajectory import BoolArray, FloatArray
 
 PIECE = 16384
 """Particles at a time: what is worked on, some 500 kB, stays in cache."""
+
+MANY = 20_000
+"""Particles from which on a compiled pass is worth its import."""
 
 LARGEST = 3
 """px, the side of the largest point"""
@@ -55,6 +59,8 @@ class Points:
         area = surface.get_clip()
         if not area.width or not area.height:
             return
+        if len(position) >= MANY and self._compiled(surface, camera, position, colours, present, area, side):
+            return
         write, stride = _writer(surface)
         # What is far beyond the picture may overflow, and nan is no place; the comparisons leave both out.
         with np.errstate(invalid="ignore", over="ignore"):
@@ -65,6 +71,31 @@ class Points:
                 self._whole(x, y, colours[piece], who, area, side, write, stride)
                 if side > 1:
                     _cut(x, y, colours[piece], who, area, side, write, stride)
+
+    def _compiled(
+        self,
+        surface: pygame.Surface,
+        camera: Camera,
+        position: FloatArray,
+        colours: Packed,
+        present: BoolArray | None,
+        area: pygame.Rect,
+        side: int,
+    ) -> bool:
+        """Draw all in one compiled pass; return whether that could be done."""
+        from sandbox.engines.kernel import COMPILED
+
+        if not COMPILED or not _is_flat(surface):
+            return False
+        from sandbox.play.drawing.scatter import scatter
+
+        flat = _flat(surface)
+        there = np.ones(len(position), np.bool_) if present is None else present
+        edges = area.left, area.top, area.right, area.bottom
+        middle = camera.size[0] / 2.0, camera.size[1] / 2.0
+        stride = surface.get_pitch() // 4
+        scatter(flat, stride, edges, position, colours, there, camera.centre, camera.scale, middle, side)
+        return True
 
     def _placed(self, camera: Camera, position: FloatArray, side: int) -> tuple[FloatArray, FloatArray]:
         """Return column and row of the upper left pixel of each, as floats: some are too far for whole numbers."""
@@ -138,9 +169,8 @@ def _cut(
 
 def _writer(surface: pygame.Surface) -> tuple[Write, int]:
     """Return what writes into a surface's pixels, and how many of them its rows count, with what pads them."""
-    if surface.get_bytesize() == 4 and surface.get_pitch() % 4 == 0 and surface.get_parent() is None:
-        flat = np.frombuffer(memoryview(surface.get_buffer()), np.uint32)  # type: ignore[arg-type]  # it is a buffer, which its stub leaves out
-        return flat.__setitem__, surface.get_pitch() // 4
+    if _is_flat(surface):
+        return _flat(surface).__setitem__, surface.get_pitch() // 4
     width, three = surface.get_width(), surface.get_bytesize() == 3
     table = pygame.surfarray.pixels3d(surface) if three else pygame.surfarray.pixels2d(surface)
 
@@ -148,6 +178,16 @@ def _writer(surface: pygame.Surface) -> tuple[Write, int]:
         table[index % width, index // width] = _apart(tones) if three else tones
 
     return write, width
+
+
+def _is_flat(surface: pygame.Surface) -> bool:
+    """Tell whether a surface's pixels are whole numbers of 32 bits, in one row after the other."""
+    return surface.get_bytesize() == 4 and surface.get_pitch() % 4 == 0 and surface.get_parent() is None
+
+
+def _flat(surface: pygame.Surface) -> Packed:
+    """Return a surface's pixels, to be written to."""
+    return np.frombuffer(memoryview(surface.get_buffer()), np.uint32)  # type: ignore[arg-type]  # it is a buffer, which its stub leaves out
 
 
 def _apart(tones: Packed) -> ColourArray:
