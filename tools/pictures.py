@@ -1,6 +1,6 @@
 """Pictures of the README, made by what they show: the window itself, and `sandbox export`.
 
-    python tools/pictures.py
+python tools/pictures.py
 """
 
 import os

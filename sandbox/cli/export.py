@@ -20,7 +20,7 @@ from sandbox.scene.faults import Fault, SceneError
 from sandbox.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from sandbox.play.film import Film
+    from sandbox.play.footage.film import Film
 
 
 @click.command(name="export")
@@ -174,14 +174,14 @@ def _between(run: Trajectory, options: Options) -> Trajectory:
 
 def _film(run: str, trajectory: Trajectory) -> "Film":
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # standard output is for what was asked
-    from sandbox.play.film import Film
+    from sandbox.play.footage.film import Film
 
     return Film(trajectory, run)
 
 
 def _shoot(options: Options, film: "Film", path: Path, progress: Progress | None) -> int:
-    from sandbox.play.filming import Shot, shoot
-    from sandbox.play.outfile import CaptureError
+    from sandbox.play.footage.filming import Shot, shoot
+    from sandbox.play.footage.outfile import CaptureError
 
     still = path.suffix.lower() == ".png"
     last = film.duration if options.until is None else min(options.until, film.duration)

@@ -92,7 +92,7 @@ def check_times(options: Options, end: float | None) -> None:
 
 def _most_pictures(options: Options) -> int | None:
     if ".gif" in options.suffixes:
-        from sandbox.play.limits import MOST_GIF_PICTURES
+        from sandbox.play.footage.limits import MOST_GIF_PICTURES
 
         return MOST_GIF_PICTURES
     return MOST_PICTURES if ".mp4" in options.suffixes else None
@@ -128,7 +128,7 @@ def _of_targets(options: Options) -> list[tuple[str, str]]:
 
         found += [] if can_write_parquet() else [("--to", NEEDS_PARQUET)]
     if ".mp4" in options.suffixes:
-        from sandbox.play.limits import NEEDS_VIDEO, can_make_mp4
+        from sandbox.play.footage.limits import NEEDS_VIDEO, can_make_mp4
 
         found += [] if can_make_mp4() else [("--to", NEEDS_VIDEO)]
     return found
@@ -170,7 +170,7 @@ def _of_values(options: Options) -> list[tuple[str, str]]:
 
 
 def _of_rate(options: Options) -> list[tuple[str, str]]:
-    from sandbox.play.limits import FASTEST_GIF
+    from sandbox.play.footage.limits import FASTEST_GIF
 
     if options.fps is None:
         return []

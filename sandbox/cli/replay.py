@@ -80,7 +80,7 @@ def _stored(run: Trajectory) -> "Stored":
     """
     from pydantic import ValidationError
 
-    from sandbox.play.film import Film
+    from sandbox.play.footage.film import Film
     from sandbox.play.stored import Stored
 
     try:
@@ -100,7 +100,7 @@ def _computed(source: Trajectory | Recording, engine: str | None) -> "Live":
     import json
 
     from sandbox.action import ActionError, actions_from_json
-    from sandbox.play.film import Film
+    from sandbox.play.footage.film import Film
     from sandbox.play.live import Live
     from sandbox.play.session import Session
 

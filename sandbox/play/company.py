@@ -3,7 +3,7 @@
 from sandbox.action import Action, ActionError
 from sandbox.engines.contract import Refusal
 from sandbox.play.companions import Companion, Trust, apart, follows, ghost_of
-from sandbox.play.film import Film
+from sandbox.play.footage.film import Film
 from sandbox.play.session import Session
 from sandbox.play.sight import Flash
 from sandbox.play.trails import Trails

@@ -10,19 +10,19 @@ from sandbox.play.drawing.palette import BACKGROUND, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.facts import facts, told
-from sandbox.play.graph import EnergyGraph
-from sandbox.play.hud import draw_hud
+from sandbox.play.instruments.graph import EnergyGraph
+from sandbox.play.instruments.hud import draw_hud
+from sandbox.play.instruments.manual import Manual
+from sandbox.play.instruments.panel import Panel
+from sandbox.play.instruments.picker import Picker
+from sandbox.play.instruments.plates import plate
+from sandbox.play.instruments.timeline import HEIGHT, Timeline
 from sandbox.play.knobs import Knobs
 from sandbox.play.live import Live
-from sandbox.play.manual import Manual
-from sandbox.play.panel import Panel
-from sandbox.play.picker import Picker
-from sandbox.play.plates import plate
 from sandbox.play.shelf import to_pick
 from sandbox.play.sight import OVERLAYS, Status
 from sandbox.play.sound import Sounds
 from sandbox.play.stage import Stage
-from sandbox.play.timeline import HEIGHT, Timeline
 
 GRAPH = (300, 130)
 """px at unit 1"""

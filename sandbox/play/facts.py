@@ -2,7 +2,7 @@
 
 import math
 
-from sandbox.play.figures import figure
+from sandbox.play.instruments.figures import figure
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, Frame

@@ -8,7 +8,7 @@ from sandbox.engines.compiling import COMPILING
 from sandbox.measure.energy import energy_of
 from sandbox.play.between import between
 from sandbox.play.company import Company
-from sandbox.play.film import Film
+from sandbox.play.footage.film import Film
 from sandbox.play.pace import Pace
 from sandbox.play.picking import overlapping
 from sandbox.play.session import Session, WrongWayError

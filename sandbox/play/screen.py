@@ -1,6 +1,8 @@
 """Screen: the display that the window opens, and how large things are on it."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pygame
 
@@ -29,7 +31,8 @@ def open_screen(size: tuple[int, int] | None, title: str) -> pygame.Surface:
     os.environ["SDL_VIDEO_X11_WMCLASS"] = "sandbox"  # pygame, when imported, names it after the script
     asked = "SDL_VIDEODRIVER" in os.environ
     try:
-        pygame.display.init()
+        with _silenced():
+            pygame.display.init()
         pygame.font.init()
         if not asked and pygame.display.get_driver() in ("dummy", "offscreen"):
             raise pygame.error("no display was found")
@@ -40,6 +43,24 @@ def open_screen(size: tuple[int, int] | None, title: str) -> pygame.Surface:
     pygame.display.set_caption(title, "sandbox")
     pygame.key.set_repeat(350, 40)
     return surface
+
+
+@contextmanager
+def _silenced() -> Iterator[None]:
+    """Keep standard error from what libraries below SDL print as it looks for a display; a failure is raised."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # it is closed
+        yield
+        return
+    hole = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(hole, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(hole)
+        os.close(kept)
 
 
 def close_screen() -> None:

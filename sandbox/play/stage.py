@@ -11,7 +11,7 @@ from sandbox.action import ActionError, SetParameter
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, able, engine_named
 from sandbox.play.hands import Hands, Place
-from sandbox.play.knob import Value
+from sandbox.play.instruments.knob import Value
 from sandbox.play.knobs import turned
 from sandbox.play.live import Live
 from sandbox.play.messages import Messages

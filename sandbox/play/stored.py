@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from sandbox.measure.energy import energy_of
-from sandbox.play.film import Film
+from sandbox.play.footage.film import Film
 from sandbox.play.pace import Pace
 from sandbox.play.picking import overlapping
 from sandbox.play.sight import Sight

@@ -16,12 +16,12 @@ from sandbox.engines.compiling import COMPILING
 from sandbox.play.camera import Camera
 from sandbox.play.commands import Commands
 from sandbox.play.desk import Desk
+from sandbox.play.footage.taking import Taking
 from sandbox.play.framing import framing
 from sandbox.play.keys import Keyboard
 from sandbox.play.mouse import Mouse
 from sandbox.play.screen import close_screen, open_screen, unit
 from sandbox.play.stage import Stage
-from sandbox.play.taking import Taking
 
 RATE = 60
 """pictures a second, at most"""

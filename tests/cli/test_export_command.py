@@ -19,10 +19,10 @@ from PIL import Image
 from sandbox.action import Impulse, Spawn
 from sandbox.cli.main import call
 from sandbox.measure.run import run
-from sandbox.play import limits
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import SKY
-from sandbox.play.film import Film
+from sandbox.play.footage import limits
+from sandbox.play.footage.film import Film
 from sandbox.recording import Recording
 from sandbox.report import tables
 from sandbox.scene.file import loads

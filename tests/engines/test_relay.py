@@ -122,7 +122,7 @@ def test_free_flight_is_closed_form_through_any_change_of_step(engine: str, part
 
 @pytest.mark.parametrize(("first", "second"), OTHERS)
 def test_numbers_names_and_times_are_those_of_the_whole(first: str, second: str) -> None:
-    """a is removed, b flies out of the bounds, d comes, then c: through four legs."""
+    """A is removed, b flies out of the bounds, d comes, then c: through four legs."""
     scene = scene_of(
         ball("a", -20, 30, collides="none"),
         ball("b", 49, 30, velocity=[15, 0], collides="none"),

@@ -146,3 +146,43 @@ def test_element_of_any_name_is_reached_in_quotes(name: str) -> None:
         int(name != "other"),
         "mass",
     )
+
+
+def test_star_sets_every_element_of_a_list_and_is_the_list() -> None:
+    before = copy.deepcopy(DOCUMENT)
+    changed, where = assign(DOCUMENT, "ball.*.restitution", 0.5)
+    assert where == ("ball",)
+    assert before == DOCUMENT
+    assert changed == {**DOCUMENT, "ball": [{**each, "restitution": 0.5} for each in DOCUMENT["ball"]]}
+
+
+def test_star_reaches_into_values() -> None:
+    document = {"ball": [{"position": [0.0, 1.0]}, {"position": [2.0, 3.0]}]}
+    assert assign(document, "ball.*.position.1", 9)[0] == {"ball": [{"position": [0.0, 9]}, {"position": [2.0, 9]}]}
+    assert assign(document, 'ball."*".mass', 9)[0]["ball"][1] == {"position": [2.0, 3.0], "mass": 9}
+
+
+def test_element_called_star_is_the_one_that_is_meant() -> None:
+    document = {"ball": [{"name": "a"}, {"name": "*"}]}
+    changed, where = assign(document, "ball.*.mass", 2)
+    assert where == ("ball", 1, "mass")
+    assert changed == {"ball": [{"name": "a"}, {"name": "*", "mass": 2}]}
+
+
+@pytest.mark.parametrize(
+    ("document", "path", "words"),
+    [
+        ({"ball": []}, "ball.*.mass", r"no \[\[ball\]\]"),
+        ({"title": "t"}, "ball.*.mass", "no ball"),
+        ({"ball": [{"position": [0, 0]}]}, "ball.*.position.2", "no element '2'"),
+        ({"ball": [{"mass": 1}]}, "ball.*.mass.x", "single value"),
+        ({"ball": [{"mass": 1}]}, "ball.*", "no element"),
+        ({"world": {"gravity": [0, 0]}}, "world.*.x", "no world"),
+        ({"ball": [3]}, "ball.*.mass", r"\w"),
+    ],
+)  # fmt: skip
+def test_star_that_leads_nowhere_is_refused(document: dict[str, Any], path: str, words: str) -> None:
+    before = copy.deepcopy(document)
+    with pytest.raises(AddressError, match=words):
+        assign(document, path, 1)
+    assert before == document

@@ -91,15 +91,15 @@ class Driven:
     # What a person does
 
     def key(self, *names: str) -> None:
-        """Press keys one after the other, as xdotool names them."""
-        self._xdotool("key", "--delay", 5, *names)
+        """Press keys one after the other, as xdotool names them; in a hurry, SDL takes them for one that repeats."""
+        self._xdotool("key", "--delay", 20, *names)
 
     def focus(self) -> None:
         """Give the window the keyboard."""
         self._xdotool("windowfocus", self.window)
 
     def type(self, text: str) -> None:
-        self._xdotool("type", "--delay", 5, text)
+        self._xdotool("type", "--delay", 20, text)
 
     def mouse(self, at: tuple[float, float]) -> None:
         """Move the mouse to a place in the window, px."""

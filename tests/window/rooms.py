@@ -2,9 +2,6 @@
 
 from pathlib import Path
 
-from sandbox.scene.file import load
-from sandbox.scene.model import Scene
-
 _WALLS = """
 [solver]
 dt = 0.01
@@ -60,10 +57,27 @@ normal = [0.0, 1.0]
 [[ball]]
 name = "a"
 position = [-1.0, 0.3]
-velocity = [1.0, 0.0]
+velocity = [3.0, 0.0]
 radius = 0.3
 """
-"""A ball that lies on the ground, pressed to it by its weight, and slides along, a metre a second."""
+"""A ball that lies on the ground, pressed to it by its weight, and slides along."""
+
+LEAVING = """
+title = "Leaving"
+[world]
+duration = 1.0
+[solver]
+dt = 0.1
+[[plane]]
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+[[ball]]
+name = "a"
+position = [0.0, 1.0]
+velocity = [2e6, 0.0]
+radius = 0.5
+"""
+"""After 0.3 s the ball is where pymunk's half-planes have ended."""
 
 
 def written(folder: Path, text: str, name: str = "room.toml") -> Path:
@@ -71,8 +85,3 @@ def written(folder: Path, text: str, name: str = "room.toml") -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def scene_of(folder: Path, text: str) -> Scene:
-    """Write a scene's file and read it."""
-    return load(written(folder, text))

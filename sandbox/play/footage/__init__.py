@@ -1,0 +1,1 @@
+"""Footage: pictures and films as files, and stored runs as pictures."""

@@ -1,0 +1,280 @@
+"""Head-up display: what the window tells in words, over the picture."""
+
+import math
+from typing import Literal, NamedTuple
+
+import pygame
+
+from sandbox.play.drawing.palette import FAINT, GREEN, INK, ORANGE, PANEL, SKY, VERMILION, WARNING, Colour
+from sandbox.play.drawing.text import measure, write
+from sandbox.play.instruments.figures import clock, figure, percent
+from sandbox.play.instruments.icons import draw_disc
+from sandbox.play.instruments.plates import plate, shortened, wrapped
+from sandbox.play.sight import Status
+
+APART = 0.10
+"""How far real speed may be from the asked before it is told."""
+MESSAGES = 4
+"""The newest are shown."""
+FULL = 460, 320
+"""px at unit 1: a smaller picture gets smaller letters."""
+SMALLEST = 9.0
+"""px, letters that can still be read"""
+
+ESSENTIAL = 2
+"""The rank of what is shown even beside the faults of a file."""
+
+Mark = Literal["", "disc", "triangle", "ring", "bars"]
+
+
+class Row(NamedTuple):
+    """One line about the state of things."""
+
+    text: str
+    colour: Colour = INK
+    mark: Mark = ""
+    """a shape before it, so that no state rests on colour alone"""
+    bold: bool = False
+    mono: bool = False
+    rank: int = 5
+    """where there is no room for all, the lowest stay"""
+
+
+def rows(status: Status) -> tuple[Row, ...]:
+    """Return the lines at the top left, in the order in which they are shown."""
+    title = f"{status.title}  ·  replay" if status.replay else status.title
+    step = status.time / status.step if status.step else 0.01
+    found = [
+        Row(title, bold=True, rank=4),
+        Row(f"{status.engine}  ·  {status.settings}", FAINT, rank=1),
+        Row(f"step {status.step:,}   {clock(status.time, step)}".replace(",", " "), mono=True, rank=0),
+    ]
+    if status.paused:
+        space_claimed = any("space" in key.lower() for key, _ in status.claimed)
+        keys = "P" if space_claimed else "P or Space"
+        found.append(Row(f"PAUSED  ({keys})", WARNING, "bars", bold=True, rank=2))
+    found += _speed(status) + _doubts(status)
+    if status.recording is not None:
+        found.append(Row(f"recording {status.recording}", WARNING, "disc", rank=3))
+    if status.busy is not None:
+        found.append(Row(status.busy, SKY, "ring", rank=3))
+    return tuple(found)
+
+
+def _speed(status: Status) -> list[Row]:
+    asked, real = status.speed, status.real_speed
+    apart = not status.paused and math.isfinite(real) and abs(real - asked) > APART * abs(asked)
+    if apart:
+        return [Row(f"speed {percent(asked)}, really {percent(real)}", ORANGE, rank=4)]
+    return [] if asked == 1 else [Row(f"speed {percent(asked)}", rank=5)]
+
+
+def _doubts(status: Status) -> list[Row]:
+    """Return what is known of how far the picture can be believed."""
+    found = []
+    if status.trust == "trusted":
+        found.append(Row("trusted", GREEN, "disc", rank=6))
+    elif status.trust == "lost":
+        since = "" if status.horizon is None else f" since {clock(status.horizon)}"
+        found.append(Row(f"past the horizon{since}", WARNING, "triangle", rank=3))
+    if status.ghost is not None:
+        away = "" if status.distance is None else f": {figure(status.distance, 'm')} away"
+        found.append(Row(f"ghost {status.ghost}{away}", INK, "ring", rank=6))
+    if status.missed is not None:
+        noun = "contact" if status.missed == 1 else "contacts"
+        missing = status.missed > 0
+        text = f"{status.missed} missed {noun}" if missing else "no missed contacts"
+        found.append(
+            Row(text, VERMILION if missing else FAINT, "triangle" if missing else "", rank=4 if missing else 8)
+        )
+    return found
+
+
+def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int = 0, bottom: int = 0) -> None:
+    """Draw the state of things over a picture; what finds no room is left out, the least important first.
+
+    Args:
+        surface: the picture.
+        status: what to tell.
+        unit: px of a pixel at 1080 lines.
+        right: px at the right that something else covers.
+        bottom: px at the bottom that something else covers.
+    """
+    width, height = surface.get_width() - right, surface.get_height() - bottom
+    scale = unit * min(max(min(width / (FULL[0] * unit), height / (FULL[1] * unit)), 0.4), 1.0)
+    size = max(13.5 * scale, SMALLEST)
+    margin = round(max(10 * scale, 3))
+    free = pygame.Rect(margin, margin, width - 2 * margin, height - 2 * margin)
+    if free.width < 2 * size or free.height < size:
+        return
+    shown, room = rows(status), free.copy()
+    if status.faults:
+        shown = tuple(row for row in shown if row.rank <= ESSENTIAL)
+    elif status.messages:
+        room.height -= round(4.4 * size)  # the newest finds its place
+    block = _draw_rows(surface, shown, room, size)
+    _draw_rate(surface, status, free, block, size)
+    if status.faults:
+        top = block.bottom + _pad(size)
+        below = pygame.Rect(free.left, top, free.width, free.bottom - top)
+        _draw_faults(surface, status.faults, below if below.height > 6 * size else free, size)
+        return
+    box = _draw_picked(surface, status.picked, free, block, size)
+    _draw_messages(surface, status.messages, free, (block, box), size)
+
+
+def _pad(size: float) -> int:
+    return round(0.6 * size)
+
+
+def _draw_rows(surface: pygame.Surface, shown: tuple[Row, ...], free: pygame.Rect, size: float) -> pygame.Rect:
+    """Draw lines on a plate at the upper left, as many as fit, and return the plate."""
+    pad, line = _pad(size), round(1.42 * size)
+    count = (free.height - 2 * pad) // line
+    if count < 1:
+        return pygame.Rect(free.topleft, (0, 0))
+    least = sorted(row.rank for row in shown)[:count][-1]
+    kept = [row for row in shown if row.rank <= least][:count]
+    indent = round(1.3 * size)
+    room = free.width - 2 * pad
+    texts = [shortened(row.text, size, room - (indent if row.mark else 0), row.bold, row.mono) for row in kept]
+    widest = max(
+        measure(text, size, row.bold, row.mono)[0] + (indent if row.mark else 0)
+        for row, text in zip(kept, texts, strict=True)
+    )
+    grain = round(2 * size)  # so that the plate does not tremble with its figures
+    rect = pygame.Rect(free.topleft, (min(-(-widest // grain) * grain, room) + 2 * pad, len(kept) * line + 2 * pad))
+    plate(surface, rect, 0.5 * size)
+    for k, (row, text) in enumerate(zip(kept, texts, strict=True)):
+        middle = rect.top + pad + (k + 0.5) * line
+        left = rect.left + pad
+        if row.mark:
+            draw_mark(surface, row.mark, (left + 0.42 * size, middle), 0.4 * size, row.colour)
+            left += indent
+        colour = INK if row.colour == GREEN else row.colour
+        write(surface, text, (left, middle), size, colour, "midleft", row.bold, row.mono)
+    return rect
+
+
+def draw_mark(surface: pygame.Surface, mark: Mark, at: tuple[float, float], radius: float, colour: Colour) -> None:
+    """Draw the small shape that stands before a line."""
+    x, y = at
+    wide = max(round(0.4 * radius), 1)
+    if mark == "disc":
+        draw_disc(surface, at, radius, colour)
+    elif mark == "ring":
+        draw_disc(surface, at, radius, colour, 0.55 * radius)
+    elif mark == "triangle":
+        corners = [(x, y - radius), (x + 1.1 * radius, y + 0.9 * radius), (x - 1.1 * radius, y + 0.9 * radius)]
+        pygame.draw.polygon(surface, colour, corners)
+        pygame.draw.aalines(surface, colour, True, corners)
+        pygame.draw.line(surface, PANEL, (x, y - 0.35 * radius), (x, y + 0.3 * radius), wide)
+    elif mark == "bars":
+        for side in (-0.75, 0.2):
+            pygame.draw.rect(surface, colour, (x + side * radius, y - radius, 0.65 * radius, 2 * radius))
+
+
+def _draw_rate(surface: pygame.Surface, status: Status, free: pygame.Rect, block: pygame.Rect, size: float) -> None:
+    if not (math.isfinite(status.frames_per_second) and status.frames_per_second > 0):
+        return
+    text, small = f"{status.frames_per_second:.0f} fps", max(0.8 * size, SMALLEST)
+    wide, high = measure(text, small, mono=True)
+    rect = pygame.Rect(free.right - wide, free.top, wide, high).inflate(_pad(size), 0)
+    if rect.left >= free.left and rect.bottom <= free.bottom and not rect.colliderect(block.inflate(size, 0)):
+        plate(surface, rect, 0.3 * size, opacity=120, edge=None)
+        write(surface, text, rect.center, small, FAINT, "center", mono=True)
+
+
+def _draw_picked(
+    surface: pygame.Surface, lines: tuple[str, ...], free: pygame.Rect, block: pygame.Rect, size: float
+) -> pygame.Rect:
+    """Draw the figures of the picked body at the upper right, or below the block; return what they cover."""
+    nothing = pygame.Rect(0, 0, 0, 0)
+    if not lines:
+        return nothing
+    small, pad = max(0.93 * size, SMALLEST), _pad(size)
+    line = round(1.4 * small)
+    texts = [shortened(text, small, free.width - 2 * pad, k == 0, k > 0) for k, text in enumerate(lines)]
+    wide = max(measure(text, small, k == 0, k > 0)[0] for k, text in enumerate(texts)) + 2 * pad
+    top = free.top + round(1.6 * size)
+    rect = pygame.Rect(free.right - wide, top, wide, len(texts) * line + 2 * pad)
+    if rect.colliderect(block.inflate(size, size)):
+        rect.topleft = block.left, block.bottom + pad
+    if rect.bottom > free.bottom:
+        return nothing
+    plate(surface, rect, 0.5 * size)
+    for k, text in enumerate(texts):
+        at = rect.left + pad, rect.top + pad + (k + 0.5) * line
+        write(surface, text, at, small, INK, "midleft", bold=k == 0, mono=k > 0)
+    return rect
+
+
+def _draw_messages(
+    surface: pygame.Surface,
+    messages: tuple[tuple[str, str], ...],
+    free: pygame.Rect,
+    taken: tuple[pygame.Rect, pygame.Rect],
+    size: float,
+) -> None:
+    """Draw the newest messages at the lower left, as many as there is room for."""
+    pad, line = _pad(size), round(1.35 * size)
+    bottom = free.bottom
+    for level, text in reversed(messages[-MESSAGES:]):
+        colour = {"warning": ORANGE, "error": WARNING}.get(level, SKY)
+        mark: Mark = "triangle" if level in ("warning", "error") else "disc"
+        room = min(free.width, round(44 * size)) - 2 * pad - round(1.6 * size)
+        lines = wrapped(text, size, room, 2)
+        wide = max((measure(part, size)[0] for part in lines), default=0)
+        rect = pygame.Rect(free.left, 0, wide + 2 * pad + round(1.6 * size), len(lines) * line + 2 * pad)
+        rect.bottom = bottom
+        if not lines or rect.top < free.top or rect.collidelist(taken) >= 0:
+            return
+        plate(surface, rect, 0.5 * size)
+        draw_mark(surface, mark, (rect.left + pad + 0.5 * size, rect.top + pad + line / 2), 0.42 * size, colour)
+        for k, part in enumerate(lines):
+            write(surface, part, (rect.right - pad - wide, rect.top + pad + (k + 0.5) * line), size, INK, "midleft")
+        bottom = rect.top - round(0.4 * size)
+
+
+def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], free: pygame.Rect, size: float) -> None:
+    """Draw the faults of the scene file in a box in the middle; those that find no room are counted."""
+    pad, line = round(min(1.1 * size, 0.04 * free.width)), round(1.45 * size)
+    room = min(free.width, round(62 * size)) - 2 * pad
+    head = "The scene file has a fault" if len(faults) == 1 else f"The scene file has {len(faults)} faults"
+    heads = wrapped(f"{head}; the scene before it goes on", size, room - 1.6 * size, 2, bold=True)
+    most = (free.height - 2 * pad) // line - len(heads)
+    if most < 5:
+        most += len(heads) - 1
+        heads = (shortened(head, size, room - 1.6 * size, bold=True),)
+    lines = _fault_lines(faults, size, room, most)
+    rect = pygame.Rect(0, 0, room + 2 * pad, (len(heads) + len(lines)) * line + 2 * pad)
+    rect.center = free.center
+    if not free.contains(rect):
+        return
+    plate(surface, rect, 0.6 * size, opacity=244, edge=WARNING)
+    draw_mark(surface, "triangle", (rect.left + pad + 0.4 * size, rect.top + pad + line / 2), 0.5 * size, WARNING)
+    left, y = rect.left + pad, rect.top + pad + line / 2
+    for text in heads:
+        write(surface, text, (left + round(1.6 * size), y), size, INK, "midleft", bold=True)
+        y += line
+    for indent, text in lines:
+        colour = FAINT if indent else INK
+        write(surface, text, (left + indent, y), size, colour, "midleft", mono=True)
+        y += line
+
+
+def _fault_lines(faults: tuple[str, ...], size: float, room: int, most: int) -> list[tuple[int, str]]:
+    """Return lines with their indents, px: each fault begins at the left, and the last line counts what is missing."""
+    indent = round(1.4 * size)
+    lines: list[tuple[int, str]] = []
+    for number, fault in enumerate(faults):
+        first, *rest = wrapped(fault, size, room - indent, 4, mono=True) or ("",)
+        last = number == len(faults) - 1
+        if len(lines) + 1 + len(rest) + (not last) > most:
+            if number == 0:  # as much of it as there is room for
+                first, *rest = wrapped(fault, size, room - indent, max(most, 1), mono=True) or ("",)
+                return [(0, first), *((indent, text) for text in rest)][: max(most, 0)]
+            lines.append((0, f"… and {len(faults) - number} more"))
+            break
+        lines += [(0, first), *((indent, text) for text in rest)]
+    return lines[: max(most, 0)]

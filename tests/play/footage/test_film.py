@@ -1,0 +1,267 @@
+"""Films of stored runs: the state at any time, what a picture shows, and pixels where the run says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sandbox.action import Action, Move, Remove, Spawn
+from sandbox.measure.run import run
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.palette import BACKGROUND, SKY
+from sandbox.play.footage.crowd import crowd
+from sandbox.play.footage.film import LINGER, Film, bodies_of, moments, scene_of
+from sandbox.play.footage.still import offscreen, pixels
+from sandbox.play.sight import OVERLAYS
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import loads
+from sandbox.scene.model import Ball
+from sandbox.trajectory import Trajectory
+
+FALL = """
+title = "Fall"
+[world]
+gravity = [0, -10]
+duration = 1.0
+[solver]
+dt = 0.1
+[[ball]]
+name = "a"
+position = [0, 0]
+velocity = [2, 0]
+angular_velocity = 3
+radius = 0.5
+[[ball]]
+name = "b"
+position = [5, 0]
+velocity = [2, 0]
+radius = 0.5
+"""
+
+BOUNCE = """
+[world]
+gravity = [0, -10]
+duration = 1.0
+[[plane]]
+point = [0, 0]
+normal = [0, 1]
+[[ball]]
+position = [0, 1]
+radius = 0.5
+restitution = 1
+"""
+
+
+def film_of(text: str = FALL, *actions: Action) -> Film:
+    return Film(run(loads(text), actions=actions))
+
+
+def test_frames_are_the_stored_ones_at_their_times() -> None:
+    film = film_of()
+    stored = film.trajectory
+    for k, time in enumerate(stored.time.tolist()):
+        frame = film.frame(time)
+        assert frame.time == time
+        assert np.array_equal(frame.position, stored.position[k])
+        assert np.array_equal(frame.velocity, stored.velocity[k])
+        assert np.array_equal(frame.angle, stored.angle[k])
+        assert frame.present.all()
+
+
+def test_frames_between_are_linear_in_place_and_angle() -> None:
+    film = film_of()
+    stored = film.trajectory
+    frame = film.frame(0.325)
+    middle = stored.position[3] + 0.25 * (stored.position[4] - stored.position[3])
+    assert frame.position == pytest.approx(middle, rel=1e-12)  # a few roundings of 0.325, 0.3 and 0.4
+    assert frame.angle[0] == pytest.approx(3 * 0.325, rel=1e-12)  # as above
+    assert frame.velocity[0] == pytest.approx((2, -3.25), rel=1e-12)  # as above
+    assert np.array_equal(film.frame(-1.0).position, stored.position[0])
+    assert np.array_equal(film.frame(99.0).position, stored.position[-1])
+
+
+def test_body_that_is_removed_stays_until_then_and_is_gone_after() -> None:
+    film = film_of(FALL, Remove(time=0.45, body="b"))
+    stored = film.trajectory
+    retired = float(stored.retired_time[1])
+    assert retired == pytest.approx(0.5)
+    before, after = film.frame(retired - 0.01), film.frame(retired + 0.01)
+    assert before.present.tolist() == [True, True]
+    assert np.array_equal(before.position[1], stored.position[4, 1])
+    assert after.present.tolist() == [True, False]
+    assert after.velocity[1].tolist() == [0.0, 0.0]
+    assert after.position[0] != pytest.approx(stored.position[5, 0], abs=1e-3)  # m: the other one goes on
+
+
+def test_body_that_appears_is_not_there_before() -> None:
+    film = film_of(FALL, Spawn(time=0.2, ball=Ball(position=(3.0, 3.0), radius=0.25)))
+    assert film.bodies.names == ("a", "b", "spawned-3")
+    assert film.bodies.radius.tolist() == [0.5, 0.5, 0.25]
+    first = int(np.flatnonzero(np.isfinite(film.trajectory.position[:, 2, 0]))[0])
+    earlier, time = film.trajectory.time[first - 1 : first + 1].tolist()
+    assert film.frame((earlier + time) / 2).present.tolist() == [True, True, False]
+    assert film.frame(time).present.all()
+
+
+def test_body_that_is_put_elsewhere_does_not_slide_there() -> None:
+    film = film_of(FALL, Move(time=0.3, body="a", position=(50.0, 0.0)))
+    jump = int(np.argmax(np.abs(np.diff(film.trajectory.position[:, 0, 0]))))
+    time = float(film.trajectory.time[jump]) + 0.05
+    frame = film.frame(time)
+    assert np.array_equal(frame.position[0], film.trajectory.position[jump, 0])
+    assert frame.position[1] == pytest.approx(film.trajectory.position[jump : jump + 2, 1].mean(axis=0))
+
+
+def test_state_that_is_no_number_is_not_there() -> None:
+    stored = run(loads(FALL))
+    position = stored.position.copy()
+    position[5:, 0] = np.nan, np.inf
+    film = Film(replace(stored, position=position))
+    assert film.frame(0.44).present.all()
+    assert np.array_equal(film.frame(0.44).position[0], position[4, 0])
+    assert film.frame(0.55).present.tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "fps", "speed", "count"),
+    [(0.0, 3.0, 30.0, 1.0, 90), (0.5, 1.0, 24.0, 0.25, 48), (0.0, 1.0, 30.0, 4.0, 7), (1.0, 1.0, 30.0, 1.0, 1)],
+)
+def test_moments_lie_at_k_over_fps_and_fill_the_time(
+    start: float, end: float, fps: float, speed: float, count: int
+) -> None:
+    times, shown = moments(start, end, fps, speed)
+    assert len(times) == len(shown) == count
+    assert times == pytest.approx(start + np.arange(count) / fps * speed, rel=1e-14)  # a few roundings
+    assert shown[:-1] == pytest.approx(1 / fps, rel=1e-14)  # as above
+    assert shown.sum() == pytest.approx((end - start) / speed or 1 / fps, rel=1e-12)  # of up to 90 roundings
+
+
+def test_contacts_linger_for_a_moment_of_the_film() -> None:
+    film = film_of(BOUNCE)
+    (first, *_) = film.trajectory.contact_time.tolist()
+    everything = frozenset(OVERLAYS)
+    assert len(film.sight(first - 1e-6, everything).contacts) == 0
+    assert film.sight(first, everything).contacts.time.tolist() == [first]
+    assert len(film.sight(first + 0.9 * LINGER, everything).contacts) == 1
+    assert len(film.sight(first + 1.1 * LINGER, everything).contacts) == 0
+    assert len(film.sight(first + 0.5 * LINGER, everything, speed=0.25).contacts) == 0
+
+
+def test_trails_end_where_the_bodies_are() -> None:
+    film = film_of(FALL, Remove(time=0.45, body="b"))
+    past, now = film.sight(0.75, frozenset({"trails"})).trails
+    assert np.array_equal(past[:, 0], film.trajectory.position[: len(past), 0])
+    assert len(past) == 8
+    assert np.isnan(past[5:, 1]).all()
+    assert np.isnan(now[0, 1]).all()
+    assert np.array_equal(now[0, 0], film.frame(0.75).position[0])
+    assert film.sight(0.75, frozenset({"shapes"})).trails == ()
+
+
+def test_missed_contact_flashes_where_it_was_missed() -> None:
+    text = (
+        "[world]\nduration = 0.1\n[solver]\ndt = 0.01\n[[wall]]\npoints = [[1, -1], [1, 1]]\n"
+        "[[ball]]\nposition = [0.5, 0]\nvelocity = [90, 0]\nradius = 0.01\n"
+    )
+    film = film_of(text)
+    (missed,) = film.trajectory.missed_time.tolist()
+    (flash,) = film.sight(missed + 0.02, frozenset()).flashes
+    assert flash.age == pytest.approx(0.02)
+    assert flash.position == tuple(film.frame(missed).position[0])
+    assert film.sight(missed - 1e-9, frozenset()).flashes == ()
+
+
+@pytest.mark.parametrize("time", [0.0, 0.33, 1.0])
+def test_pixels_of_a_body_are_where_the_run_says(time: float) -> None:
+    film, size = film_of(), (320, 180)
+    surface, camera = offscreen(size), Camera.fitting(film.box, size)
+    film.draw(surface, camera, time, caption=False)
+    seen = pixels(surface, size).astype(int)
+    x, y = camera.to_screen(film.frame(time).position[0])
+    reach = 0.5 * camera.scale
+    for dx, dy in ((0.0, 0.6), (-0.6, 0.0), (0.0, -0.6)):  # not on the spoke that shows its angle
+        spot = seen[int(y + dy * reach), int(x + dx * reach)]
+        assert np.abs(spot - SKY).max() <= 40  # of 255: a disc may be shaded
+    for dx, dy in ((1.3, 0.0), (-1.3, 0.0), (0.0, 1.3), (0.0, -1.3)):
+        column, row = int(x + dx * reach), int(y + dy * reach)
+        if 0 <= column < size[0] and 0 <= row < size[1]:
+            assert np.abs(seen[row, column] - BACKGROUND).max() <= 40  # of 255: a grid line may lie there
+
+
+def test_caption_is_written_into_the_corner_alone() -> None:
+    film, size = film_of(), (480, 270)
+    camera = Camera.fitting(film.box, size)
+    pictures = []
+    for caption in (False, True):
+        surface = offscreen(size)
+        film.draw(surface, camera, 0.5, caption=caption)
+        pictures.append(pixels(surface, size).astype(int))
+    rows, columns = np.nonzero(np.abs(pictures[1] - pictures[0]).sum(axis=2))
+    assert len(rows) > 100  # a few letters
+    assert rows.max() < 60
+    assert columns.max() < 240
+
+
+def test_energy_is_drawn_into_its_corner_at_any_time() -> None:
+    film, size = film_of(BOUNCE), (960, 540)
+    camera = Camera.fitting(film.box, size)
+    for time in (1.0, 0.0, 0.5):  # also backwards
+        plain, graph = offscreen(size), offscreen(size)
+        film.draw(plain, camera, time)
+        film.draw(graph, camera, time, frozenset({"shapes", "energy"}))
+        rows, columns = np.nonzero((pixels(plain, size) != pixels(graph, size)).any(axis=2))
+        assert rows.min() > 540 / 2
+        assert columns.min() > 960 / 2
+
+
+def test_every_overlay_can_be_drawn() -> None:
+    film, size = film_of(BOUNCE, Spawn(time=0.2, ball=Ball(position=(3.0, 3.0), radius=0.25))), (320, 180)
+    plain, full = offscreen(size), offscreen(size)
+    camera = Camera.fitting(film.box, size)
+    film.draw(plain, camera, 0.35)
+    film.draw(full, camera, 0.35, frozenset(OVERLAYS))
+    assert not np.array_equal(pixels(plain, size), pixels(full, size))
+
+
+def test_crowd_is_all_of_a_few_and_without_strays_of_many() -> None:
+    rng = np.random.default_rng(3)
+    position = rng.uniform(-1.0, 1.0, (50, 40, 2))
+    low, high = crowd(position, np.full(40, 0.1), np.empty((0, 2)))
+    assert np.array([low, high]) == pytest.approx(
+        np.array([position.min(axis=(0, 1)) - 0.1, position.max(axis=(0, 1)) + 0.1])
+    )
+    position[:, 7] = np.linspace(0.0, 1e6, 50)[:, None]
+    position[3, 8], position[9, 9] = np.nan, np.inf
+    low, high = crowd(position, np.full(40, 0.1), np.array([[-1.5, 0.0], [1e9, 0.0]]))
+    assert (low[0], high[0]) == (-1.5, pytest.approx(1.1, abs=0.05))  # m: the last bit is one of 38 bodies' extremes
+    single = np.zeros((3, 1, 2))
+    single[:, 0, 1] = 0.0, 5.0, 10.0
+    assert crowd(single, np.array([0.5]), np.empty((0, 2))) == ((-0.5, -0.5), (0.5, 10.5))
+    assert crowd(np.empty((1, 0, 2)), np.empty(0), np.empty((0, 2))) == ((-1.0, -1.0), (1.0, 1.0))
+
+
+def damaged(**info: object) -> Trajectory:
+    stored = run(loads(FALL))
+    return replace(stored, info={**stored.info, **info})
+
+
+@pytest.mark.parametrize(
+    ("info", "path"),
+    [
+        ({"scene": None}, "info.scene"),
+        ({"scene": {"nonsense": 1}}, "nonsense"),
+        ({"actions": [{"kind": "nonsense"}]}, "info.actions"),
+        ({"scene": {"ball": [{"position": [0, 0], "radius": 1}]}}, "names"),
+    ],
+)
+def test_run_that_does_not_tell_what_it_is_of_is_refused(info: dict[str, object], path: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        Film(damaged(**info), "my run")
+    assert {(fault.file, fault.path) for fault in caught.value.faults} == {("my run", path)}
+
+
+def test_scene_and_bodies_are_those_of_the_run() -> None:
+    scene = loads(FALL)
+    stored = run(scene)
+    assert scene_of(stored) == scene
+    assert bodies_of(stored, scene) is scene.bodies

@@ -1,0 +1,68 @@
+"""Figures: three significant digits, prefixes, and whatever a float can be."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sandbox.play.instruments.figures import clock, figure, percent
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.0, "m", "0 m"),
+        (1.2345e-9, "m", "1.23 nm"),
+        (4.56e-5, "m", "45.6 µm"),
+        (0.00123, "m", "1.23 mm"),
+        (0.9999e-3, "m", "1.00 mm"),
+        (999.9e-6, "m", "1.00 mm"),
+        (999.4e-6, "m", "999 µm"),
+        (3.0, "m", "3.00 m"),
+        (1000.0, "m", "1.00 km"),
+        (0.01, "s", "10.0 ms"),
+        (-0.165, "J", "−165 mJ"),
+        (-9.81, "m/s²", "−9.81 m/s²"),
+        (0.5, "m/s²", "0.500 m/s²"),
+        (0.8, "", "0.800"),
+        (1e-20, "m", "1.00e-20 m"),
+        (1e17, "J", "1.00e17 J"),
+        (math.nan, "m", "? m"),
+        (math.inf, "J", "∞ J"),
+        (-math.inf, "J", "−∞ J"),
+    ],
+)
+def test_figure_has_three_digits_and_a_prefix(value: float, unit: str, text: str) -> None:
+    assert figure(value, unit) == text
+
+
+@given(st.floats(1e-12, 9.99e11))
+def test_figure_says_the_value_to_half_its_last_digit(value: float) -> None:
+    number, unit = figure(value, "m").split()
+    power = {"p": -12, "n": -9, "µ": -6, "m": -3, "k": 3, "M": 6, "G": 9}[unit[0]] if len(unit) > 1 else 0
+    # half of the third digit is at most 0.5 %, reached at 1.00
+    assert math.isclose(float(number) * 10.0**power, value, rel_tol=0.00501)
+    assert len(number.replace(".", "")) == 3
+
+
+@given(st.floats(), st.sampled_from(["", "m", "m/s²", "%"]))
+def test_figures_of_any_float_are_short(value: float, unit: str) -> None:
+    assert len(figure(value, unit)) < 20
+    assert len(percent(value)) < 20
+    assert len(clock(value, abs(value))) < 24
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(1.0, "100 %"), (0.63, "63 %"), (0.004, "0.400 %"), (0.0, "0 %"), (math.inf, "∞ %")]
+)
+def test_percent_keeps_small_shares_apart_from_nothing(share: float, text: str) -> None:
+    assert percent(share) == text
+
+
+@pytest.mark.parametrize(
+    ("time", "step", "text"),
+    [(12.3, 0.01, "12.30 s"), (1.5, 1e-4, "1.5000 s"), (3.0, 1.0, "3.00 s"), (0.5, 0.0, "0.50 s")],
+)
+def test_clock_shows_each_step(time: float, step: float, text: str) -> None:
+    assert clock(time, step) == text

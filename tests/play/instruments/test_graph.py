@@ -1,0 +1,137 @@
+"""Energy graph: what it keeps, rewinds, the scale, and drawing of whatever a float can be."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pygame
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sandbox.play.drawing.palette import INK, PURPLE, SKY
+from sandbox.play.instruments.graph import MOST, EnergyGraph, spread
+
+RECT = pygame.Rect(10, 10, 340, 150)
+
+
+def filled(seconds: float = 5.0) -> EnergyGraph:
+    graph = EnergyGraph()
+    for time in np.arange(0.0, seconds, 0.02):
+        kinetic = 10.0 * math.sin(time) ** 2
+        graph.add(float(time), kinetic, 10.0 - kinetic, 10.0)
+    return graph
+
+
+def test_time_that_goes_back_cuts_what_lies_after_it() -> None:
+    graph = filled(5.0)
+    graph.add(2.0, 1.0, 2.0, 3.0)
+    times = [sample[0] for sample in graph.samples]
+    assert times == sorted(times)
+    assert graph.samples[-1] == (2.0, 1.0, 2.0, 3.0)
+
+
+def test_same_time_again_replaces_the_sample() -> None:
+    graph = EnergyGraph()
+    graph.add(0.0, 1.0, 1.0, 2.0)
+    graph.add(0.0, 3.0, 4.0, 7.0)
+    assert graph.samples == [(0.0, 3.0, 4.0, 7.0)]
+
+
+def test_restart_leaves_only_the_start() -> None:
+    graph = filled(5.0)
+    graph.add(0.0, 1.0, 2.0, 3.0)
+    assert len(graph.samples) == 1
+
+
+def test_clear_forgets_everything() -> None:
+    graph = filled()
+    graph.draw(pygame.Surface((400, 200)), RECT)
+    graph.clear()
+    assert graph.samples == []
+    assert graph.limits == EnergyGraph().limits
+
+
+def test_samples_stay_bounded_and_the_span_stays_covered() -> None:
+    graph = EnergyGraph()
+    for k in range(5 * MOST):
+        graph.add(k * 1e-4, 1.0, 1.0, 2.0)
+    assert len(graph.samples) <= MOST
+    assert graph.samples[0][0] == 0.0  # all within the last 10 s
+    for k in range(5 * MOST):
+        graph.add(100.0 + k * 0.01, 1.0, 1.0, 2.0)
+    assert len(graph.samples) <= MOST
+    newest = graph.samples[-1][0]
+    assert min(sample[0] for sample in graph.samples if sample[0] >= newest - 10.0) < newest - 9.9  # within 10 steps
+
+
+def test_scale_keeps_still_while_the_lines_need_most_of_it() -> None:
+    graph = EnergyGraph()
+    first = graph.rescaled([(0.0, 9.0, 0.0, 9.0)])
+    graph.limits = first
+    assert first[0] == 0.0
+    assert first[1] >= 9.0
+    assert graph.rescaled([(0.0, 5.0, 0.0, 5.0)]) == first
+    assert graph.rescaled([(0.0, 1.0, 0.0, 1.0)])[1] < first[1]
+    assert graph.rescaled([(0.0, 90.0, 0.0, 90.0)])[1] >= 90.0
+
+
+@given(st.lists(st.tuples(st.just(0.0), st.floats(), st.floats(), st.floats()), max_size=8))
+def test_limits_hold_all_finite_values_and_zero(samples: list[tuple[float, float, float, float]]) -> None:
+    low, high = EnergyGraph().rescaled(samples)
+    assert low <= 0.0 <= high
+    assert low < high
+    values = [value for sample in samples for value in sample[1:] if abs(value) < 1e306]
+    if len(values) == 3 * len(samples):
+        assert all(low <= value <= high for value in values)
+
+
+def test_three_lines_are_drawn_in_their_colours() -> None:
+    surface = pygame.Surface((400, 200))
+    filled().draw(surface, RECT)
+    colours = {tuple(colour) for colour in pygame.surfarray.array3d(surface).reshape(-1, 3).tolist()}
+    assert {SKY, PURPLE, INK} <= colours
+
+
+def test_gap_in_the_figures_is_a_gap_in_the_lines() -> None:
+    graph = EnergyGraph()
+    for k in range(200):
+        value = math.nan if 80 <= k < 120 else 5.0
+        graph.add(k * 0.05, value, value, value)
+    surface = pygame.Surface((200, 60))  # too small for words: the chart alone
+    graph.draw(surface, surface.get_rect())
+    above = pygame.surfarray.array3d(surface)[:, :40]  # the zero line lies below
+    lit = (above > 110).all(axis=2).any(axis=1)  # the total's, smoothed over two rows, is brighter than any grid line
+    assert lit[30:70].any()
+    assert lit[130:170].any()
+    assert not lit[90:110].any()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 200), (200, 3), (30, 30), (1200, 500)])
+def test_graph_draws_on_any_rectangle(size: tuple[int, int]) -> None:
+    surface = pygame.Surface((1200, 500))
+    filled().draw(surface, pygame.Rect((0, 0), size), 2.0)
+    outside = pygame.surfarray.array3d(surface)
+    outside[: size[0], : size[1]] = 0
+    assert not outside.any()
+
+
+@given(st.lists(st.tuples(st.floats(), st.floats(), st.floats(), st.floats()), max_size=20))
+@settings(deadline=None)
+def test_any_energies_are_drawn(samples: list[tuple[float, float, float, float]]) -> None:
+    graph = EnergyGraph()
+    for sample in samples:
+        graph.add(*sample)
+    graph.draw(pygame.Surface((400, 200)), RECT)
+    times = [sample[0] for sample in graph.samples]
+    assert times == sorted(set(times))
+
+
+@given(st.lists(st.floats(0, 100), min_size=1, max_size=4))
+def test_labels_keep_apart_and_in_order(wanted: list[float]) -> None:
+    places = spread(wanted, 15.0, 0.0, 100.0)
+    ordered = sorted(places)
+    assert all(b - a >= 15.0 - 1e-9 for a, b in pairwise(ordered))  # rounding of sums
+    assert all(-1e-9 <= place <= 100.0 for place in places)  # rounding of sums; 4 labels fit
+    for a, b in pairwise(range(len(wanted))):
+        assert wanted[a] == wanted[b] or (places[a] < places[b]) == (wanted[a] < wanted[b])

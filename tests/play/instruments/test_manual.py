@@ -1,0 +1,101 @@
+"""Manual: help lists every key, claims first, and fits any window."""
+
+import pygame
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pressing import key, press, wheel
+
+from sandbox.play.instruments.manual import CLAIMED, Manual, groups
+from sandbox.play.keys import BINDINGS
+
+CLAIMS = (("S (hold)", "stroke"), ("Space", "shoot"), ("G", "ball in hand"))
+
+
+def test_help_lists_every_binding() -> None:
+    listed = {line for group in groups() for line in group.lines}
+    assert {(binding.label, binding.about) for binding in BINDINGS} <= listed
+
+
+def test_help_names_every_key_of_the_table() -> None:
+    named = {name for group in groups() for label, _ in group.lines for name in label.split(" or ")}
+    letters = {"P", "Space", "O", ".", ",", "R", "Backspace", "[", "]", "Ctrl+O", "-", "=", "E", "G", "Home", "Tab"}
+    assert letters <= named
+    assert {"F1", "H", "Ctrl+P", "Ctrl+R", "Ctrl+L", "Ctrl+S", "Esc", "T", "M", "B", "N", "Delete"} <= named
+    assert set("1234567890") <= named
+
+
+def test_help_tells_what_the_mouse_does() -> None:
+    mouse = dict(groups()[-1].lines)
+    assert mouse["wheel"] == "zoom about the cursor"
+    assert mouse["right-drag"] == "pan"
+    assert mouse["left-drag"] == "pull a body"
+    assert mouse["left-drag, paused"] == "move a body"
+
+
+def test_claimed_keys_come_first_and_are_taken_from_ours() -> None:
+    found = groups(CLAIMS)
+    assert found[0].title == CLAIMED
+    assert found[0].lines == CLAIMS
+    ours = {about: label for group in found[1:] for label, about in group.lines}
+    assert ours["pause, go on"] == "P"
+    assert ours["(ghost of the reference)"] == "G"
+    assert "ghost of the reference" not in ours
+
+
+def test_claim_on_a_global_key_takes_nothing() -> None:
+    ours = {about: label for group in groups((("P", "x"), ("Esc", "y")))[1:] for label, about in group.lines}
+    assert ours["pause, go on"] == "P or Space"
+    assert ours["quit"] == "Esc"
+
+
+def test_any_key_or_click_closes_and_is_used_up() -> None:
+    for event in (key(pygame.K_p), key(pygame.K_F1), key(pygame.K_ESCAPE), press(5, 5)):
+        manual = Manual()
+        assert not manual.handle(event)
+        manual.open = True
+        assert manual.handle(event)
+        assert not manual.open
+
+
+def test_wheel_scrolls_where_the_window_is_too_small() -> None:
+    manual = Manual()
+    manual.open = True
+    first, later = pygame.Surface((300, 200)), pygame.Surface((300, 200))
+    manual.draw(first, 1.0, CLAIMS)
+    assert manual.handle(wheel(-2))
+    assert manual.handle(press(5, 5, button=5))  # the same notch, told the old way
+    assert manual.open
+    manual.draw(later, 1.0, CLAIMS)
+    assert pygame.image.tobytes(first, "RGB") != pygame.image.tobytes(later, "RGB")
+
+
+def test_wheel_changes_nothing_where_all_is_seen() -> None:
+    manual = Manual()
+    manual.open = True
+    first, later = pygame.Surface((1280, 800)), pygame.Surface((1280, 800))
+    manual.draw(first, 1.0, CLAIMS)
+    manual.handle(wheel(-9))
+    manual.draw(later, 1.0, CLAIMS)
+    assert pygame.image.tobytes(first, "RGB") == pygame.image.tobytes(later, "RGB")
+
+
+@pytest.mark.parametrize(
+    ("size", "unit"), [((640, 480), 1.0), ((1280, 800), 1.0), ((1920, 1080), 1.0), ((3840, 2160), 2.0)]
+)
+def test_help_is_whole_in_common_windows(size: tuple[int, int], unit: float) -> None:
+    surface = pygame.Surface(size)
+    surface.fill((1, 2, 3))
+    Manual().draw(surface, unit)
+    edge = pygame.surfarray.array3d(surface)[:, [0, 1, -2, -1]]
+    assert len({tuple(colour) for colour in edge.reshape(-1, 3).tolist()}) == 1  # no words at the upper or lower edge
+
+
+@given(
+    st.integers(1, 700), st.integers(1, 500), st.floats(0.25, 4), st.lists(st.tuples(st.text(), st.text()), max_size=30)
+)
+@settings(max_examples=30, deadline=None)
+def test_help_is_drawn_on_any_size(width: int, height: int, unit: float, claimed: list[tuple[str, str]]) -> None:
+    surface = pygame.Surface((width, height))
+    Manual().draw(surface, unit, claimed)
+    assert surface.get_at((0, 0)) != (0, 0, 0)

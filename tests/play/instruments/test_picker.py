@@ -1,0 +1,169 @@
+"""Picker: choosing by keys and mouse, filtering, faulty files, and one picture each time it is drawn."""
+
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+from pressing import key, move, press, release, wheel
+
+from sandbox.play.drawing.palette import BACKGROUND
+from sandbox.play.drawing.picture import Picture
+from sandbox.play.instruments.picker import Picker
+from sandbox.play.instruments.thumbnail import read, thumbnail
+from sandbox.scene.file import loads
+from sandbox.scene.shipped import shipped
+
+BALL = 'title = "{title}"\nabout = "{about}"\n[world]\ngravity = [0, -9.81]\n[[ball]]\nposition = [0, 0]\nradius = 1\n'
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[tuple[str, Path]]:
+    found = []
+    for k in range(12):
+        path = tmp_path / f"s{k}.toml"
+        path.write_text(BALL.format(title=f"Scene {k}", about="even" if k % 2 == 0 else "odd"))
+        found.append((f"mine/s{k}", path))
+    (tmp_path / "bad.toml").write_text("[[ball]]\nposition = [0, 0]\nradius = -1\n")
+    return [*found, ("mine/bad", tmp_path / "bad.toml")]
+
+
+def drawn(files: list[tuple[str, Path]], size: tuple[int, int] = (900, 700), times: int = 40) -> Picker:
+    picker = Picker(files)
+    for _ in range(times):
+        picker.draw(pygame.Surface(size), 1.0)
+    return picker
+
+
+def typed(picker: Picker, text: str) -> None:
+    for letter in text:
+        picker.handle(key(ord(letter), unicode=letter))
+
+
+def place(picker: Picker, number: int) -> tuple[int, int]:
+    return picker._places[number][1].center
+
+
+def test_one_file_is_read_or_pictured_each_time(files: list[tuple[str, Path]]) -> None:
+    picker = Picker(files)
+    done = 0
+    for _ in range(10):
+        picker.draw(pygame.Surface((900, 700)), 1.0)
+        now = sum((card.found is not None) + (card.picture is not None) for card in picker.cards)
+        assert now == done + 1
+        done = now
+
+
+def test_all_files_are_read_and_those_in_sight_pictured(files: list[tuple[str, Path]]) -> None:
+    picker = drawn(files)
+    assert all(card.found is not None for card in picker.cards)
+    assert picker.cards[0].picture is not None
+    assert picker.cards[-1].picture is None
+    assert (picker.cards[3].title, picker.cards[3].folder, picker.cards[3].about) == ("Scene 3", "mine", "odd")
+
+
+def test_faulty_file_tells_its_first_fault(files: list[tuple[str, Path]]) -> None:
+    found = read(files[-1][1])
+    assert found.scene is None
+    assert found.fault.startswith("line 3: ball[0].radius")
+
+
+def test_missing_file_tells_that(tmp_path: Path) -> None:
+    assert "cannot be read" in read(tmp_path / "none.toml").fault
+
+
+def test_crowded_scatter_tells_that_it_does_not_fit(tmp_path: Path) -> None:
+    path = tmp_path / "crowd.toml"
+    path.write_text("[[scatter]]\ncount = 50\nlower = [0, 0]\nupper = [1, 1]\nradius = 0.5\n")
+    assert read(path).fault
+
+
+def test_arrows_and_enter_choose(files: list[tuple[str, Path]]) -> None:
+    picker = drawn(files)
+    columns = picker._columns
+    assert columns > 1
+    picker.handle(key(pygame.K_RIGHT))
+    picker.handle(key(pygame.K_DOWN))
+    assert picker.handle(key(pygame.K_RETURN)) == files[1 + columns][1]
+    for _ in range(30):
+        picker.handle(key(pygame.K_LEFT))
+    assert picker.handle(key(pygame.K_KP_ENTER)) == files[0][1]
+    picker.handle(key(pygame.K_END))
+    assert picker.handle(key(pygame.K_RETURN)) == files[-1][1]
+
+
+def test_chosen_card_is_scrolled_into_sight(files: list[tuple[str, Path]]) -> None:
+    picker = drawn(files, (400, 400))
+    picker.handle(key(pygame.K_END))
+    picker.draw(pygame.Surface((400, 400)), 1.0)
+    assert picker._places[-1][1].bottom <= 400
+
+
+def test_typing_filters_by_title_and_about(files: list[tuple[str, Path]]) -> None:
+    picker = drawn(files)
+    typed(picker, "ODD scene 1")
+    assert [card.title for card in picker.shown] == ["Scene 1", "Scene 11"]
+    assert picker.handle(key(pygame.K_RETURN)) == files[1][1]
+    picker.handle(key(pygame.K_BACKSPACE))
+    assert len(picker.shown) == 6
+    picker.handle(key(pygame.K_BACKSPACE, pygame.KMOD_LCTRL))
+    assert len(picker.shown) == len(files)
+
+
+def test_enter_chooses_nothing_where_nothing_fits(files: list[tuple[str, Path]]) -> None:
+    picker = drawn(files)
+    typed(picker, "teapot")
+    picker.draw(pygame.Surface((900, 700)), 1.0)
+    assert picker.handle(key(pygame.K_RETURN)) is None
+    assert not picker.closed
+
+
+def test_click_chooses_the_card_below(files: list[tuple[str, Path]]) -> None:
+    picker = drawn(files)
+    assert picker.handle(press(*place(picker, 2))) is None
+    assert picker.handle(release(*place(picker, 2))) == files[2][1]
+    picker.handle(press(*place(picker, 2)))
+    assert picker.handle(release(*place(picker, 3))) is None
+    picker.handle(move(*place(picker, 4)))
+    assert picker.chosen == 4
+
+
+def test_wheel_scrolls(files: list[tuple[str, Path]]) -> None:
+    picker = drawn(files, (400, 400))
+    top = picker._places[0][1].top
+    picker.handle(wheel(-1))
+    picker.draw(pygame.Surface((400, 400)), 1.0)
+    assert picker._places[0][1].top < top
+
+
+@pytest.mark.parametrize("event", [key(pygame.K_ESCAPE), key(pygame.K_o, pygame.KMOD_LCTRL)])
+def test_escape_and_its_own_key_close(files: list[tuple[str, Path]], event: pygame.event.Event) -> None:
+    picker = Picker(files)
+    assert picker.handle(event) is None
+    assert picker.closed
+
+
+@pytest.mark.parametrize("size", [(1, 1), (30, 20), (200, 150), (640, 480)])
+def test_picker_is_drawn_on_any_size(files: list[tuple[str, Path]], size: tuple[int, int]) -> None:
+    picker = drawn(files, size, 5)
+    assert picker.handle(key(pygame.K_DOWN)) is None
+    drawn([], size, 2)
+
+
+def test_thumbnails_of_all_shipped_scenes_show_something() -> None:
+    scenes = shipped()
+    assert scenes
+    for name, path in scenes:
+        scene = read(path).scene
+        assert scene is not None, name
+        made = thumbnail(scene, (200, 112), Picture(), 0.7)
+        assert np.ptp(pygame.surfarray.array3d(made).astype(int), axis=(0, 1)).max() > 60, name
+
+
+def test_burst_is_shown_in_flight() -> None:
+    burst = "[world]\nduration = 2\n[[emitter]]\nposition = [0, 0]\ncount = 200\nradius = 0.05\n"
+    scene = loads(burst + "velocity_min = [-5, -5]\nvelocity_max = [5, 5]\n")
+    made = pygame.surfarray.array3d(thumbnail(scene, (200, 200), Picture(), 1.0)).astype(int)
+    away = np.abs(made - np.asarray(BACKGROUND)).max(axis=2) > 60
+    assert away[:80].any()
+    assert away[120:].any()

@@ -1,0 +1,93 @@
+"""Timeline: pressing and dragging ask for times, exact at the ends; drawing never raises."""
+
+import math
+
+import pygame
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pressing import FOCUS_LOST, move, press, release
+
+from sandbox.play.drawing.palette import ORANGE
+from sandbox.play.instruments.timeline import Timeline
+
+AREA = pygame.Rect(10, 100, 600, 34)
+
+
+def drawn(start: float = 0.0, now: float = 5.0, end: float = 10.0) -> Timeline:
+    timeline = Timeline()
+    timeline.draw(pygame.Surface((620, 150)), AREA, start, now, end)
+    return timeline
+
+
+def test_press_in_the_middle_asks_for_the_middle() -> None:
+    asked = drawn().handle(press(AREA.centerx, AREA.centery), AREA)
+    assert asked == pytest.approx(5.0, abs=0.02)  # a pixel of the line is 0.02 s or less
+
+
+def test_ends_are_exact_and_the_drag_holds_outside() -> None:
+    timeline = drawn(start=0.1, end=9.7)
+    assert timeline.handle(press(*AREA.center), AREA) is not None
+    assert timeline.held
+    assert timeline.handle(move(-500, 900, held=True), AREA) == 0.1
+    assert timeline.handle(move(5000, -900, held=True), AREA) == 9.7
+    assert timeline.handle(release(5000, -900), AREA) == 9.7
+    assert not timeline.held
+
+
+def test_press_and_release_at_once_ask_for_one_time() -> None:
+    timeline = drawn()
+    asked = timeline.handle(press(300, 110), AREA)
+    assert asked == timeline.handle(release(300, 110), AREA)
+    assert timeline.handle(move(400, 110), AREA) is None
+
+
+def test_press_outside_and_other_buttons_ask_for_nothing() -> None:
+    timeline = drawn()
+    for event in (press(300, 50), press(300, 110, button=3), move(300, 110), release(300, 110)):
+        assert timeline.handle(event, AREA) is None
+    assert not timeline.held
+
+
+def test_lost_focus_ends_the_drag() -> None:
+    timeline = drawn()
+    timeline.handle(press(300, 110), AREA)
+    timeline.handle(FOCUS_LOST, AREA)
+    assert not timeline.held
+
+
+def test_session_without_length_has_one_time() -> None:
+    timeline = drawn(0.0, 0.0, 0.0)
+    assert timeline.handle(press(300, 110), AREA) == 0.0
+
+
+def test_keyframes_are_marked_where_they_lie() -> None:
+    surface = pygame.Surface((620, 150))
+    Timeline().draw(surface, AREA, 0.0, 0.0, 10.0, [5.0, 99.0])
+    marked = {x for x in range(620) for y in range(150) if surface.get_at((x, y))[:3] == ORANGE}
+    assert marked == {AREA.centerx}
+
+
+def test_hover_shows_the_time_above_the_bar() -> None:
+    timeline = drawn()
+    timeline.handle(move(*AREA.center), AREA)
+    surface = pygame.Surface((620, 150))
+    timeline.draw(surface, AREA, 0.0, 5.0, 10.0)
+    assert pygame.surfarray.array3d(surface)[:, : AREA.top].any()
+
+
+@given(
+    st.floats(), st.floats(), st.floats(), st.lists(st.floats(), max_size=5), st.integers(1, 300), st.integers(1, 80)
+)
+@settings(deadline=None)
+def test_any_times_are_drawn_and_asked_times_lie_between(
+    start: float, now: float, end: float, keyframes: list[float], width: int, height: int
+) -> None:
+    area = pygame.Rect(0, 0, width, height)
+    timeline = Timeline()
+    timeline.draw(pygame.Surface((300, 90)), area, start, now, end, keyframes, 1.5)
+    asked = timeline.handle(press(width // 2, height // 2), area)
+    assert asked is not None
+    low = start if math.isfinite(start) else 0.0
+    high = max(end if math.isfinite(end) else 0.0, low)
+    assert low <= asked <= high

@@ -1,0 +1,206 @@
+"""Widgets: clicks and drags by events alone, in one frame or many; nothing is left in the library's global list."""
+
+import gc
+import weakref
+
+import pygame
+import pytest
+from pressing import move, press, release
+from pygame_widgets.slider import Slider
+from pygame_widgets.widget import WidgetHandler
+
+from sandbox.play.instruments.dials import DOUBLE, Choice, KnobSlider
+from sandbox.play.instruments.icons import NAMES, icon
+from sandbox.play.instruments.knob import Knob
+from sandbox.play.instruments.widgets import Control, PushButton, Report, Switch
+
+ROW = pygame.Rect(20, 20, 214, 34)  # a slider's track is then 200 px long
+KNOB = Knob("friction", "friction", 0.0, 2.0, 0.5, step=0.01, default=0.3)
+
+
+def slider(knob: Knob = KNOB) -> KnobSlider:
+    made = KnobSlider(pygame.Surface((300, 100)), knob)
+    made.place(ROW, 1.0)
+    made.show_knob(knob)
+    return made
+
+
+def placed(widget: Control) -> Control:
+    widget.place(ROW, 1.0)
+    return widget
+
+
+def at(made: KnobSlider, share: float) -> tuple[float, float]:
+    track = made.rect
+    return track.left + share * track.width, track.centery
+
+
+def changes(widget: Control) -> list[tuple[object, bool]]:
+    return [(report.value, report.final) for report in widget.reports]
+
+
+def test_slider_is_one_of_the_library_and_not_in_its_list() -> None:
+    made = slider()
+    assert isinstance(made, Slider)
+    assert made not in WidgetHandler.getWidgets()
+
+
+def test_press_and_release_in_one_frame_change_the_value() -> None:
+    made = slider()
+    made.listen([press(*at(made, 0.75)), release(*at(made, 0.75))])
+    assert changes(made) == [(1.5, False), (1.5, True)]
+    assert not made.held
+
+
+def test_press_on_the_handle_without_moving_changes_nothing() -> None:
+    made = slider()
+    x, y = at(made, 0.25)
+    made.listen([press(x + 3, y), release(x + 3, y)])
+    assert changes(made) == []
+
+
+def test_drag_goes_on_outside_and_ends_exactly_at_the_ends() -> None:
+    made = slider()
+    made.listen([press(*at(made, 0.5)), move(5000, 900, held=True)])
+    made.listen([move(-5000, -900, held=True)])
+    made.listen([release(5000, 900)])
+    assert changes(made) == [(1.0, False), (2.0, False), (0.0, False), (2.0, False), (2.0, True)]
+
+
+def test_grip_beside_the_middle_of_the_handle_does_not_jump() -> None:
+    made = slider()
+    x, y = at(made, 0.25)
+    made.listen([press(x + 4, y), move(x + 5, y, held=True), release(x + 5, y)])
+    assert changes(made) == [(0.51, False), (0.51, True)]
+
+
+def test_drag_back_to_the_start_ends_with_a_final_report_too() -> None:
+    made = slider()
+    x, y = at(made, 0.25)
+    made.listen([press(x, y), move(x + 40, y, held=True), move(x, y, held=True), release(x, y)])
+    assert changes(made) == [(0.9, False), (0.5, False), (0.5, True)]
+
+
+def test_logarithmic_slider_hits_its_ends() -> None:
+    made = slider(Knob("dt", "dt", 1e-4, 0.1, 0.01, log=True, step=0.1, unit="s"))
+    made.listen([press(*at(made, 0.5)), move(-900, 0, held=True), move(900, 0, held=True), release(900, 0)])
+    assert [value for value, _ in changes(made)][1:] == [1e-4, 0.1, 0.1]
+
+
+def test_double_click_goes_back_to_the_default() -> None:
+    made = slider()
+    made.listen([press(*at(made, 0.9)), release(*at(made, 0.9))])
+    made.reports.clear()
+    made.listen([press(*at(made, 0.9)), release(*at(made, 0.9))])
+    assert changes(made) == [(0.3, True)]
+    assert made.getValue() == 0.15
+
+
+def test_slow_second_click_is_no_double_click(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = slider()
+    monkeypatch.setattr(pygame.time, "get_ticks", lambda: 1000)
+    made.listen([press(*at(made, 0.9)), release(*at(made, 0.9))])
+    monkeypatch.setattr(pygame.time, "get_ticks", lambda: 1001 + DOUBLE)
+    made.listen([press(*at(made, 0.9)), release(*at(made, 0.9))])
+    assert made.now == 1.8
+
+
+def test_disabled_slider_keeps_its_value_and_says_why() -> None:
+    made = slider(Knob("friction", "friction", 0, 2, 0.5, enabled=False, why="nothing rubs"))
+    made.listen([press(*at(made, 0.9)), release(*at(made, 0.9))])
+    assert not made.turn(1, (round(at(made, 0.5)[0]), made.rect.centery))
+    assert changes(made) == []
+    assert made.hint == "nothing rubs"
+
+
+def test_showing_a_value_reports_nothing_and_leaves_a_drag_alone() -> None:
+    made = slider()
+    made.show_knob(Knob("friction", "friction", 0, 2, 1.0))
+    assert (made.now, changes(made), made.getValue()) == (1.0, [], 0.5)
+    made.listen([press(*at(made, 0.75))])
+    made.show_knob(Knob("friction", "friction", 0, 2, 0.1))
+    assert made.now == 1.5
+
+
+def test_wheel_over_the_track_changes_by_one_step() -> None:
+    made = slider()
+    x, y = (round(part) for part in at(made, 0.5))
+    assert made.turn(1, (x, y))
+    assert not made.turn(1, (x, ROW.top + 2))  # over the label
+    assert changes(made) == [(0.51, True)]
+
+
+def test_choice_goes_on_and_back() -> None:
+    made = Choice(pygame.Surface((300, 100)), Knob("i", "integrator", value="b", choices=("a", "b", "c")))
+    placed(made)
+    right, left = (ROW.right - 5, ROW.centery), (ROW.right - round(0.66 * ROW.width), ROW.centery)
+    made.listen([press(*right), release(*right)])
+    made.listen([press(*left), release(*left)])
+    made.listen([press(*right, button=3), release(*right, button=3)])
+    made.listen([press(ROW.left + 2, ROW.centery), release(ROW.left + 2, ROW.centery)])
+    assert changes(made) == [("c", True), ("b", True), ("a", True)]
+
+
+def test_switch_turns_by_a_click_in_one_frame() -> None:
+    made = Switch(pygame.Surface((300, 100)), "trails", False)
+    placed(made)
+    made.listen([press(*ROW.center), release(*ROW.center), press(*ROW.center), release(*ROW.center)])
+    assert made.reports == [Report("toggle", "trails", True), Report("toggle", "trails", False)]
+
+
+def test_click_that_ends_elsewhere_counts_nowhere() -> None:
+    for widget in (PushButton(pygame.Surface((300, 100)), "play"), Switch(pygame.Surface((300, 100)), "trails", False)):
+        placed(widget)
+        widget.listen([press(*ROW.center), release(ROW.right + 9, ROW.bottom + 9)])
+        widget.listen([press(ROW.right + 9, ROW.bottom + 9), release(*ROW.center)])
+        widget.listen([press(*ROW.center, button=3), release(*ROW.center, button=3)])
+        assert widget.reports == []
+
+
+def test_button_reports_its_name() -> None:
+    made = PushButton(pygame.Surface((300, 100)), "play", "Go on")
+    placed(made)
+    made.listen([press(*ROW.center), release(*ROW.center)])
+    assert made.reports == [Report("button", "play")]
+
+
+def test_widgets_go_away_with_the_last_that_holds_them() -> None:
+    before = len(WidgetHandler.getWidgets())
+    surface = pygame.Surface((9, 9))
+    made = [slider(), Choice(surface, KNOB), Switch(surface, "a", True), PushButton(surface, "b")]
+    known = [weakref.ref(widget) for widget in made]
+    assert len(WidgetHandler.getWidgets()) == before
+    del made
+    gc.collect()
+    assert [ref() for ref in known] == [None] * 4
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_icon_has_a_shape_of_its_own(name: str) -> None:
+    made = icon(name, 24, (255, 255, 255))
+    assert made is not None
+    lit = pygame.surfarray.array_alpha(made)
+    assert 0.08 < (lit > 127).mean() < 0.8
+    others = [icon(other, 24, (255, 255, 255)) for other in NAMES if other != name]
+    assert all(other is not None and (pygame.surfarray.array_alpha(other) != lit).any() for other in others)
+
+
+def test_unknown_icon_is_none() -> None:
+    assert icon("teapot", 24, (255, 255, 255)) is None
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 40), (40, 3), (200, 34), (900, 90)])
+@pytest.mark.parametrize("unit", [0.3, 1.0, 3.0])
+def test_widgets_draw_at_any_size(size: tuple[int, int], unit: float) -> None:
+    surface = pygame.Surface((1000, 100))
+    words = Knob("i", "integrator", value="b", choices=("a", "b"), enabled=False)
+    for widget in (
+        KnobSlider(surface, KNOB),
+        Choice(surface, words),
+        Switch(surface, "trails", True, key="9"),
+        PushButton(surface, "play"),
+        PushButton(surface, "some name"),
+    ):
+        widget.place(pygame.Rect((0, 0), size), unit)
+        widget.draw()
+    assert pygame.surfarray.array3d(surface).any()

@@ -1,0 +1,149 @@
+"""History: what was seen, within its memory, and the checkpoints."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sandbox.engines.checkpoint import Checkpoint
+from sandbox.engines.relay import Relay
+from sandbox.play import history as module
+from sandbox.play.history import APART, BYTES_PER_BODY, MOST, History, Mark
+from sandbox.scene.file import from_document
+from sandbox.trajectory import Frame
+
+
+def frame(time: float, bodies: int = 1) -> Frame:
+    two, one = np.zeros((bodies, 2)), np.zeros(bodies)
+    return Frame(time, two.copy(), two.copy(), one.copy(), one.copy(), np.ones(bodies, np.bool_))
+
+
+def point() -> Checkpoint:
+    return Relay(from_document({"ball": [{"position": [0, 0], "radius": 1}]})).checkpoint()
+
+
+def filled(steps: int, dt: float = 0.01) -> History:
+    history = History()
+    for k in range(steps):
+        history.keep(k, frame(k * dt))
+    return history
+
+
+def test_what_is_kept_is_known_and_stays_as_it_was() -> None:
+    history = filled(5)
+    first = history.known(3)
+    history.keep(3, frame(99.0))
+    assert history.known(3) is first
+    assert history.known(5) is None
+    assert history.furthest == 4
+    assert history.end == 0.04
+    assert (history.next_known(2), history.next_known(4)) == (3, None)
+
+
+def test_empty_history_has_nothing() -> None:
+    history = History()
+    assert (history.furthest, history.end, history.marks, history.mark_times) == (0, 0.0, (), ())
+    assert history.known(0) is None
+    assert history.next_known(0) is None
+    assert history.before(9) is None
+    with pytest.raises(LookupError):
+        history.nearest(0.0)
+
+
+@pytest.mark.parametrize(
+    ("time", "step"), [(-1.0, 0), (0.0, 0), (0.014, 1), (0.016, 2), (0.03, 3), (0.04, 4), (99.0, 4)]
+)
+def test_nearest_state_is_found(time: float, step: int) -> None:
+    history = filled(5)
+    found, state = history.nearest(time)
+    assert found == step
+    assert state is history.known(step)
+
+
+@given(st.integers(1, 40), st.integers(2, 400))
+def test_memory_stays_within_its_budget_and_first_and_last_stay(most: int, steps: int) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "BUDGET", most * 100 * BYTES_PER_BODY)
+        history = History()
+        for k in range(steps):
+            history.keep(k, frame(float(k), 100))
+            known = [j for j in range(k + 1) if history.known(j) is not None]
+            assert len(known) <= max(most, 2)
+            assert known[0] == 0
+            assert known[-1] == k == history.furthest
+
+
+def test_what_was_long_ago_is_thinned_out_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "BUDGET", 64 * BYTES_PER_BODY)
+    history = filled(300)
+    known = [k for k in range(300) if history.known(k) is not None]
+    gaps = [b - a for a, b in pairwise(known)]
+    assert gaps[0] > gaps[-1] == 1
+    assert gaps == sorted(gaps, reverse=True)
+
+
+def test_hundred_thousand_bodies_keep_within_256_megabytes() -> None:
+    one = frame(0.0, 100_000)
+    history = History()
+    for k in range(200):
+        history.keep(k, one)
+    assert sum(history.known(k) is not None for k in range(200)) * 100_000 * BYTES_PER_BODY <= module.BUDGET
+
+
+def test_cut_forgets_what_came_later_and_makes_room_for_it() -> None:
+    history = filled(10)
+    for step in (2, 5, 8):
+        history.mark(Mark(step, 0, point()))
+    history.cut(5)
+    assert history.furthest == 5
+    assert history.marks == (2, 5)
+    history.keep(6, frame(9.0))
+    assert history.end == 9.0
+    history.cut(-1)
+    assert history.furthest == 0
+    assert history.marks == ()
+
+
+def test_checkpoints_stand_apart_and_are_found() -> None:
+    history = History()
+    for k in range(200):
+        history.keep(k, frame(float(k)))
+        if history.wants_mark(k):
+            history.mark(Mark(k, 0, point()))
+    assert len(history.marks) >= 5
+    assert all(b - a >= APART for a, b in pairwise((0, *history.marks)))
+    for step in (0, 40, 100, 199):
+        mark = history.before(step)
+        assert (mark.step if mark else None) == max((m for m in history.marks if m <= step), default=None)
+
+
+def test_checkpoints_are_no_more_than_there_may_be_and_go_on_over_all_time() -> None:
+    history = History()
+    for k in range(0, 10_000, 10):
+        history.mark(Mark(k, 0, point_of_nothing))
+    assert len(history.marks) <= MOST
+    assert list(history.marks) == sorted(history.marks)
+    assert history.marks[0] == 0
+    assert history.marks[-1] == 9990
+
+
+point_of_nothing = point()
+
+
+def test_distrust_is_for_good() -> None:
+    history = filled(100)
+    history.mark(Mark(50, 0, point()))
+    history.distrust()
+    assert history.marks == ()
+    assert not history.wants_mark(99)
+
+
+def test_action_that_is_put_in_counts_for_its_step_and_all_later() -> None:
+    history = filled(100)
+    for step, actions in ((10, 1), (40, 2), (70, 2)):
+        history.mark(Mark(step, actions, point()))
+    history.inserted(40)
+    found = [history.before(step) for step in (10, 40, 70)]
+    assert [mark.actions for mark in found if mark is not None] == [1, 3, 3]

@@ -1,0 +1,283 @@
+"""The window's loop without a display: what is posted before a turn is seen at the end of that same turn."""
+
+import math
+import os
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+from pressing import FOCUS_LOST, key, key_up, move, press, release
+
+from sandbox.play.drawing.palette import SKY, WARNING, Colour
+from sandbox.play.live import Live
+from sandbox.play.screen import NoDisplayError, open_screen
+from sandbox.play.stage import Stage
+from sandbox.play.stored import Stored
+from sandbox.play.window import Window
+
+SIZE = (900, 600)
+PICTURE = pygame.Rect(0, 165, 630, 235)
+"""What neither words, nor the panel, nor the timeline cover."""
+HUD = pygame.Rect(10, 10, 360, 150)
+DT = 0.01  # s
+ROOM = """
+title = "Room"
+[world]
+duration = 5.0
+[solver]
+dt = 0.01
+[[wall]]
+points = [[-2.0, -1.5], [2.0, -1.5], [2.0, 1.5], [-2.0, 1.5]]
+closed = true
+[[ball]]
+name = "a"
+position = [-1.0, 0.0]
+radius = 0.4
+"""
+BALL, THERE = (-1.0, 0.0), (1.2, 0.2)
+
+Open = Callable[[str], Window]
+
+
+@pytest.fixture
+def said() -> list[str]:
+    """What the window prints."""
+    return []
+
+
+@pytest.fixture
+def opened(tmp_path: Path, said: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
+    """Open a window on a scene. However slow the machine is, no picture gives up steps for it."""
+    monkeypatch.setattr("sandbox.play.live.BUDGET", math.inf)
+    windows: list[Window] = []
+
+    def open_on(text: str) -> Window:
+        path = tmp_path / "room.toml"
+        path.write_text(text, encoding="utf-8")
+        window = Window(Stage(), size=SIZE, folder=tmp_path, say=said.append)
+        windows.append(window)
+        assert window.stage.open(path)
+        pygame.event.clear()  # those of its opening
+        return window
+
+    yield open_on
+    for window in windows:
+        window.close()
+
+
+@pytest.fixture
+def window(opened: Open) -> Window:
+    """A window on a ball at rest."""
+    return opened(ROOM)
+
+
+def turn(window: Window, *events: pygame.event.Event, elapsed: float = 0.0) -> None:
+    """Post events, and let the window make one turn."""
+    for event in events:
+        pygame.event.post(event)
+    window.turn(elapsed)
+
+
+def live(window: Window) -> Live:
+    assert window.stage.live is not None
+    return window.stage.live
+
+
+def places(
+    surface: pygame.Surface, colour: Colour, box: pygame.Rect
+) -> "np.ndarray[tuple[int, int], np.dtype[np.intp]]":
+    """Return the pixels of a colour in a region, (P, 2)."""
+    part = pygame.surfarray.array3d(surface.subsurface(box)).astype(np.int16)
+    return np.argwhere((np.abs(part - np.asarray(colour)) <= 6).all(axis=2)) + np.asarray(box.topleft)
+
+
+def ball_seen(window: Window) -> tuple[float, float]:
+    x, y = (places(window.surface, SKY, PICTURE).mean(axis=0) + 0.5).tolist()
+    return x, y
+
+
+def on_screen(window: Window, place: tuple[float, float]) -> tuple[float, float]:
+    x, y = window.camera.to_screen(np.asarray(place)).tolist()
+    return x, y
+
+
+def paused(window: Window) -> bool:
+    """Tell whether PAUSED stands there in red."""
+    return len(places(window.surface, WARNING, HUD)) > 60
+
+
+def test_key_is_seen_in_the_picture_of_the_same_turn(window: Window) -> None:
+    turn(window)
+    assert not paused(window)
+    turn(window, key(pygame.K_p), key_up(pygame.K_p))
+    assert paused(window)
+    assert pygame.display.get_surface() is window.surface
+    turn(window, key(pygame.K_SPACE), key_up(pygame.K_SPACE))
+    assert not paused(window)
+
+
+def test_ball_moved_while_paused_is_seen_there_in_the_same_turn(window: Window) -> None:
+    window.stage.paused = True
+    turn(window)
+    here, there = on_screen(window, BALL), on_screen(window, THERE)
+    assert ball_seen(window) == pytest.approx(here, abs=1.0)  # a pixel
+    turn(window, press(*here), move(*there, held=True))
+    assert ball_seen(window) == pytest.approx(there, abs=4.0)  # what is told of the picked ball covers some pixels
+    turn(window, release(*there))
+    assert ball_seen(window) == pytest.approx(there, abs=4.0)  # as above
+    assert live(window).step_number == 0
+
+
+def test_pull_moves_the_ball_in_the_same_turn(window: Window) -> None:
+    turn(window)
+    before = live(window).frame.position[0, 0]
+    turn(window, press(*on_screen(window, BALL)), move(*on_screen(window, THERE), held=True), elapsed=2 * DT)
+    assert live(window).frame.position[0, 0] > before
+    assert [action.kind for action in live(window).session.actions] == ["pull", "pull"]
+
+
+def test_pull_ends_when_the_window_loses_the_keyboard(window: Window) -> None:
+    turn(window, press(*on_screen(window, BALL)), move(*on_screen(window, THERE), held=True), elapsed=DT)
+    assert window.stage.hands.holding
+    turn(window, FOCUS_LOST)
+    assert not window.stage.hands.holding
+    assert getattr(live(window).session.actions[-1], "target", 0) is None
+
+
+def test_press_and_release_within_one_turn_pull_nothing_further(window: Window) -> None:
+    here = on_screen(window, BALL)
+    turn(window, press(*here), release(*here), elapsed=DT)
+    assert not window.stage.hands.holding
+    assert window.stage.hands.picked == 0
+
+
+@pytest.mark.parametrize("pictures", [1, 3, 7])
+def test_steps_follow_from_time_and_not_from_pictures(window: Window, pictures: int) -> None:
+    for _ in range(pictures):
+        turn(window, elapsed=0.07 / pictures)
+    # 0.07 / 3 three times may fall short of 7 steps by rounding
+    assert live(window).step_number in ((7,) if pictures == 1 else (6, 7))
+
+
+def test_time_the_machine_lost_is_not_caught_up_with(window: Window) -> None:
+    turn(window, elapsed=1000.0)
+    assert live(window).step_number == round(0.1 / DT)
+
+
+def test_step_keys_make_one_step_each_however_many_come_in_a_turn(window: Window) -> None:
+    strokes = [event for _ in range(5) for event in (key(pygame.K_o), key_up(pygame.K_o))]
+    turn(window, *strokes, elapsed=1.0)
+    assert live(window).step_number == 5
+    assert window.stage.paused
+
+
+def test_picture_of_a_step_is_that_step(opened: Open) -> None:
+    window = opened(ROOM + "velocity = [20.0, 0.0]\n")
+    window.stage.paused = True
+    turn(window)
+    for number in (1, 2, 3):
+        turn(window, key(pygame.K_PERIOD, unicode="."), key_up(pygame.K_PERIOD))
+        assert live(window).step_number == number
+        place = on_screen(window, (-1.0 + 20.0 * DT * number, 0.0))
+        assert ball_seen(window) == pytest.approx(place, abs=1.0)  # a pixel; a step is 28
+    turn(window, key(pygame.K_COMMA, unicode=","), key_up(pygame.K_COMMA))
+    assert ball_seen(window) == pytest.approx(on_screen(window, (-1.0 + 20.0 * DT * 2, 0.0)), abs=1.0)  # a pixel
+
+
+def test_picture_of_a_pause_is_the_state_that_is_told(opened: Open) -> None:
+    window = opened(ROOM + "velocity = [20.0, 0.0]\n")
+    turn(window, elapsed=2.5 * DT)
+    turn(window, key(pygame.K_p), key_up(pygame.K_p), elapsed=0.4 * DT)
+    x, y = live(window).frame.position[0].tolist()
+    assert ball_seen(window) == pytest.approx(on_screen(window, (x, y)), abs=1.0)  # a pixel; a step is 28
+
+
+def test_held_key_pauses_once(window: Window) -> None:
+    turn(window, key(pygame.K_p))
+    for _ in range(4):
+        turn(window, key(pygame.K_p))
+    assert window.stage.paused
+    turn(window, key_up(pygame.K_p), key(pygame.K_p))
+    assert not window.stage.paused
+
+
+def test_camera_stays_where_it_was_put_and_home_brings_it_back(window: Window) -> None:
+    home = window.camera
+    turn(
+        window,
+        press(300, 300, 3),
+        pygame.event.Event(pygame.MOUSEMOTION, pos=(340, 330), rel=(40, 30), buttons=(0, 0, 1)),
+    )
+    turn(window, release(340, 330, 3))
+    moved = window.camera
+    assert moved == home.panned((40, 30))
+    turn(window, key(pygame.K_r), key_up(pygame.K_r))
+    assert window.camera == moved
+    turn(window, key(pygame.K_HOME), key_up(pygame.K_HOME))
+    assert window.camera == home
+
+
+def test_resized_window_is_drawn_whole(window: Window) -> None:
+    for size in ((200, 150), (1, 1), (1500, 400), SIZE):
+        pygame.display.set_mode(size, pygame.RESIZABLE)
+        turn(window, pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
+        assert window.surface.get_size() == window.camera.size == size
+    assert ball_seen(window) == pytest.approx(on_screen(window, BALL), abs=1.0)  # a pixel
+
+
+def test_files_are_told_in_the_window_and_on_the_terminal(window: Window, said: list[str], tmp_path: Path) -> None:
+    turn(window)
+    turn(window, key(pygame.K_p, pygame.KMOD_CTRL), key_up(pygame.K_p))
+    path = tmp_path / "sandbox-room-1.png"
+    assert said == [f"screenshot: {path}"]
+    assert ("info", said[0]) in window.stage.messages.shown()
+    assert pygame.image.load(path).get_size() == SIZE
+
+
+def test_window_of_a_stored_run_tells_what_cannot_be_done(opened: Open, tmp_path: Path) -> None:
+    import sandbox
+    from sandbox.play.footage.film import Film
+
+    window = opened(ROOM)
+    show = Stored(Film(sandbox.run(sandbox.load(tmp_path / "room.toml"))))
+    window.stage.put_on(show, None, show.scene)
+    for code in (pygame.K_e, pygame.K_g, pygame.K_t, pygame.K_b, pygame.K_n, pygame.K_DELETE):
+        turn(window, key(code), key_up(code))
+        assert window.stage.messages.shown()[-1][0] == "warning"
+    assert window.stage.show is show
+
+
+def test_quit_and_escape_end_the_loop(window: Window) -> None:
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    assert window.run() == 0
+    window.leaving = None
+    pygame.event.post(key(pygame.K_ESCAPE))
+    assert window.run() == 0
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 0)])
+def test_signal_ends_the_loop_and_leaves_others_handlers_alone(
+    window: Window, number: signal.Signals, status: int
+) -> None:
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    draw = window.draw
+
+    def interrupted() -> None:
+        draw()
+        signal.raise_signal(number)
+
+    window.draw = interrupted  # type: ignore[method-assign]  # a signal comes while a picture is drawn
+    assert window.run() == status
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+def test_no_display_is_told(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    pygame.quit()
+    monkeypatch.setitem(os.environ, "SDL_VIDEODRIVER", "none-such")
+    with pytest.raises(NoDisplayError, match="no window can be opened"):
+        open_screen(None, "none")
+    assert not pygame.display.get_init()
+    assert capfd.readouterr().err == ""

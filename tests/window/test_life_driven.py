@@ -1,0 +1,119 @@
+"""How a real window comes and goes, and what it outlives."""
+
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+from driving import LIMIT, Play, command, environment
+from looking import MESSAGES, count, differ, laid_out, on_screen
+from rooms import AT_REST, LEAVING, MOVING, written
+from xclient import XClient
+
+from sandbox.cli.main import call
+from sandbox.play.drawing.palette import ORANGE, WARNING
+
+
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)], ids=["terminated", "interrupted"]
+)
+def test_signal_closes_the_window_cleanly(drive: Play, tmp_path: Path, number: int, status: int) -> None:
+    record = tmp_path / "all.json"
+    window = drive("play", str(written(tmp_path, MOVING)), "--record", str(record))
+    window.process.send_signal(number)
+    assert window.status() == status
+    assert window.said() == [f"session: {record}"]
+    assert window.complained() == ""
+
+
+def test_escape_and_the_cross_close_the_window(drive: Play, display: str, tmp_path: Path) -> None:
+    path = str(written(tmp_path, MOVING))
+    window = drive("play", path)
+    window.key("Escape")
+    assert window.status() == 0
+    window = drive("play", path)
+    with XClient(display) as client:
+        client.ask_to_close(window.window)
+    assert window.status() == 0
+    assert window.complained() == ""
+
+
+@pytest.mark.parametrize("driver", [None, "x11"])
+def test_no_display_is_one_line(tmp_path: Path, driver: str | None) -> None:
+    display = None if driver is None else ":4095"
+    hidden: dict[str, str | None] = {"WAYLAND_DISPLAY": None, "XDG_RUNTIME_DIR": None}
+    done = subprocess.run(
+        command("play", str(written(tmp_path, AT_REST))),
+        env=environment(DISPLAY=display, SDL_VIDEODRIVER=driver, **hidden),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("no window can be opened: ")
+
+
+def test_no_audio_is_told_and_the_window_stays(drive: Play, tmp_path: Path) -> None:
+    window = drive("play", str(written(tmp_path, MOVING)), SDL_AUDIODRIVER="none-such")
+    window.key("m")
+    told = window.wait_until(lambda shot: count(shot, ORANGE, MESSAGES) > 30, "a warning")
+    window.wait_until(lambda shot: differ(shot, told), "the scene going on")
+    assert window.complained() == ""
+
+
+def test_scene_that_diverges_is_told_and_the_window_stays(drive: Play, tmp_path: Path) -> None:
+    window = drive("play", str(written(tmp_path, LEAVING)))
+    window.wait_until(lambda shot: count(shot, WARNING, MESSAGES) > 30, "what happened")
+    ended = window.step_number()
+    assert ended > 0
+    assert window.step_number() == ended
+    window.key("comma")
+    assert window.step_number() == ended - 1
+    assert window.complained() == ""
+
+
+def test_what_a_hand_cannot_do_is_told_and_the_window_stays(drive: Play, tmp_path: Path) -> None:
+    path = written(tmp_path, AT_REST)
+    window = drive("play", str(path), "--paused", "--engine", "exact")
+    window.mouse(on_screen(laid_out(path).camera, (-1.0, 0.0)))
+    window.key("b")
+    window.wait_until(lambda shot: count(shot, ORANGE, MESSAGES) > 30, "that there is no room for another ball")
+    window.key("o")
+    assert window.step_number() == 1
+    assert window.session().actions == ()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (("play", "none-such"), "none-such: "),
+        (("play", "room.toml", "--engine", "none-such"), "--engine: "),
+        (("play", "room.toml", "--set", "ball.a.radius=-1"), "room.toml: ball.a.radius (set): "),
+        (("play", "--set", "world.seed=2"), "--set: "),
+        (("play", "room.toml", "--size", "none"), "sandbox play: "),
+        (("play", "room.toml", "--record", "no/where.json"), "--record: "),
+        (("play", "faulty.toml"), "faulty.toml:3: ball.a.position"),
+        (("replay", "none-such"), "none-such: "),
+        (("replay", "room.toml"), "room.toml: "),
+        (("replay", "."), ".: "),
+    ],
+)
+def test_wrong_input_is_a_line_a_fault(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    line: str,
+) -> None:
+    written(tmp_path, AT_REST)
+    written(tmp_path, '[[ball]]\nname = "a"\nposition = [0.0]\nradius = 1.0\n', "faulty.toml")
+    monkeypatch.chdir(tmp_path)
+    assert call(list(arguments)) == 2
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert err.startswith(line)
