@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import drawing
 import peers
+from turning import turns
 from workloads import Timed, command, events, running, scene, staged, stepping
 
 from sandbox.measure.versions import machine, versions
@@ -136,6 +137,12 @@ BENCHES = (
             lambda: staged(BOUNCE, "step"),
         )
         for name, about in (("move", "forces and advance"), ("look", "detect"), ("resolve", "resolve"))
+    ),
+    Bench(
+        "turn",
+        "a turn of the window in which a body is dragged, and seen where the hand is at its end / one with no event",
+        lambda: turns("gas", hand=True),
+        lambda: turns("gas", hand=False),
     ),
     Bench(
         "check-start",

@@ -23,7 +23,7 @@ radius = 0.4
 AT_REST = f'title = "Rest"\n[world]\nduration = 5.0\n{_WALLS}{_REST}'
 """A ball at rest, without gravity."""
 
-MOVING = f'title = "Moving"\n[world]\nduration = 5.0\n{_WALLS}{_REST}velocity = [1.0, 0.0]\nrestitution = 1.0\n'
+MOVING = f'title = "Moving"\n[world]\nduration = 1.5\n{_WALLS}{_REST}velocity = [1.0, 0.0]\nrestitution = 1.0\n'
 """It goes to and fro between two walls, a metre a second, for ever."""
 
 FALLING = """
