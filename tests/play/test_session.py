@@ -69,7 +69,7 @@ def assert_replays(session: Session) -> None:
 @pytest.mark.parametrize("acting", [False, True], ids=["untouched", "acted on"])
 def test_way_back_and_forth_leads_through_the_same_states(name: str, engine: str, acting: bool) -> None:
     session = Session(SCENES[name], engine)
-    part = 3 if (name, engine) == ("pile", "exact") else 20  # rigid balls in a heap soon touch without end
+    part = 2 if (name, engine) == ("pile", "exact") else 20  # rigid balls in a heap soon touch without end
     for k in range(7):
         played(session, part)
         if acting and k in (1, 3, 4):

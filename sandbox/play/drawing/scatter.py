@@ -35,20 +35,21 @@ def scatter(
         side: of a square, px.
     """
     left, top, right, bottom = area
-    back = float(side // 2)
+    back = side // 2
     for i in range(len(position)):
         if not present[i]:
             continue
-        # In the order of Camera.to_screen, so that both say the same pixel. What is cut off counts from 0 on, where
-        # rounding down and cutting off are one; nan is on no side of anything.
+        # In the order of Camera.to_screen, so that both say the same pixel.
         x = (position[i, 0] - centre[0]) * scale + middle[0]
         y = (position[i, 1] - centre[1]) * -scale + middle[1]
-        if side == 1:
-            if x >= left and x < right and y >= top and y < bottom:
-                pixels[int(y) * stride + int(x)] = colours[i]
-            continue
-        x, y = np.floor(x) - back, np.floor(y) - back
-        if x > left - side and x < right and y > top - side and y < bottom:
-            for row in range(max(int(y), top), min(int(y) + side, bottom)):
-                for column in range(max(int(x), left), min(int(x) + side, right)):
+        # From 0 on, cutting off is rounding down. nan is on no side of anything.
+        if x >= left + back and x < right - side + back + 1 and y >= top + back and y < bottom - side + back + 1:
+            corner = (int(y) - back) * stride + int(x) - back
+            for row in range(side):
+                for column in range(side):
+                    pixels[corner + row * stride + column] = colours[i]
+        elif side > 1 and x > left - side and x < right + side and y > top - side and y < bottom + side:
+            first, above = int(np.floor(x)) - back, int(np.floor(y)) - back
+            for row in range(max(above, top), min(above + side, bottom)):
+                for column in range(max(first, left), min(first + side, right)):
                     pixels[row * stride + column] = colours[i]

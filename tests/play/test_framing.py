@@ -1,0 +1,181 @@
+"""Framing, picking, and trails: where the camera looks, what the hand meets, where bodies were."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import scenes
+
+from sandbox.measure.run import run
+from sandbox.play.framing import framing
+from sandbox.play.picking import overlapping, picked
+from sandbox.play.trails import LENGTH, MOST, Trails
+from sandbox.scene.file import from_document, load
+from sandbox.scene.model import Scene
+from sandbox.scene.shipped import find, shipped
+from sandbox.trajectory import Frame
+
+SHIPPED = [each.name for each in shipped()]
+
+
+def frame_of(scene: Scene, time: float = 0.0) -> Frame:
+    bodies = scene.bodies
+    present = np.ones(len(bodies), np.bool_)
+    state = (bodies.position, bodies.velocity, bodies.angle, bodies.angular_velocity)
+    return Frame(time, *(array.copy() for array in state), present)
+
+
+def ball(name: str, x: float, y: float, radius: float = 1.0, **more: Any) -> dict[str, Any]:
+    return {"name": name, "position": [x, y], "radius": radius, **more}
+
+
+def scene_of(*balls: dict[str, Any], **document: Any) -> Scene:
+    return from_document({"ball": list(balls), **document})
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_bodies_of_shipped_scenes_are_in_sight_at_the_start(name: str) -> None:
+    scene = load(find(name))
+    low, high = map(np.asarray, framing(scene))
+    assert (low < high).all()
+    inside = ((scene.bodies.position >= low) & (scene.bodies.position <= high)).all(axis=1)
+    assert inside.mean() >= (1.0 if len(inside) <= 1000 else 0.97)  # of many, 0.5 % at each of four sides need not be
+
+
+def test_free_flight_is_in_sight_to_its_end() -> None:
+    scene = scene_of(ball("a", 0, 0, velocity=[3, 10]), world={"gravity": [0, -9.81], "duration": 2.0})
+    low, high = framing(scene)
+    position = run(scene, "exact").position[:, 0]
+    assert low[0] <= position[:, 0].min()
+    assert high[0] >= position[:, 0].max()
+    assert high[1] >= position[:, 1].max()
+    assert low[1] <= position[:, 1].min()
+
+
+def test_flight_behind_a_plane_or_out_of_bounds_does_not_count() -> None:
+    for more in (
+        {"plane": [{"point": [0, 0], "normal": [0, 1]}], "world": {"gravity": [0, -9.81], "duration": 100.0}},
+        {"world": {"gravity": [0, -9.81], "duration": 100.0, "bounds": [[-5, -5], [5, 5]]}},
+    ):
+        low, high = framing(scene_of(ball("a", 0, 4), **more))
+        assert -6.0 <= low[1] < high[1] <= 6.0
+
+
+ODD: dict[str, dict[str, Any]] = {
+    "empty": {"title": "t"},
+    "planes": {"plane": [{"point": [1e16, -1e16], "normal": [1e-9, 1]}, {"point": [0, 0], "normal": [0, 1]}]},
+    "far": {"ball": [ball("a", 1e16, -1e16, 1e-9)]},
+    "very large": {"ball": [ball("a", 0, 0, 1e9), ball("b", 1e15, 1e15, 1e-9)]},
+    "far and fast": {"ball": [ball("a", 9e14, 0, velocity=[7e11, 7e11])], "world": {"duration": 1e9}},
+    "one point": {"ball": [ball("a", 1e14, 1e14, 1e-9, fixed=True)]},
+    "steep": {"ball": [ball("a", 0, 0)], "world": {"gravity": [1e9, -1e9], "duration": 1e9}},
+    "walls alone": {"wall": [{"points": [[0, 0], [0, 3]]}]},
+    "posts far": {"post": [{"position": [1e16, 0], "radius": 1}]},
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_scenes_have_a_finite_frame(name: str) -> None:
+    (x0, y0), (x1, y1) = framing(from_document(ODD[name]))
+    assert all(map(math.isfinite, (x0, y0, x1, y1)))
+    assert x0 <= x1
+    assert y0 <= y1
+    assert max(x1 - x0, y1 - y0) > 0.0
+
+
+@given(scenes())
+def test_any_scene_has_a_finite_frame(scene: Scene) -> None:
+    (x0, y0), (x1, y1) = framing(scene)
+    assert all(map(math.isfinite, (x0, y0, x1, y1)))
+    assert x0 <= x1
+    assert y0 <= y1
+    assert max(x1 - x0, y1 - y0) > 0.0
+
+
+def test_picked_is_who_lies_under_the_hand() -> None:
+    scene = scene_of(ball("a", 0, 0), ball("b", 3, 0, 0.5), ball("c", 0.5, 0, 0.2))
+    frame = frame_of(scene)
+    for place, number in (((-0.5, 0.0), 0), ((0.0, 0.0), 0), ((0.5, 0.1), 2), ((3.4, 0.0), 1), ((3.6, 0.0), None)):
+        assert picked(scene.bodies, frame, place) == number
+    assert picked(scene.bodies, frame, (3.6, 0.0), reach=0.2) == 1
+    assert picked(scene.bodies, frame, (math.nan, 0.0)) is None
+    empty = from_document({"title": "t"})
+    assert picked(empty.bodies, frame_of(empty), (0.0, 0.0), reach=9.0) is None
+
+
+def test_who_is_gone_or_has_not_come_is_not_picked() -> None:
+    scene = scene_of(ball("a", 0, 0), ball("b", 5, 0))
+    frame = frame_of(scene)
+    present = np.asarray([False, True])
+    gone = Frame(0.0, frame.position, frame.velocity, frame.angle, frame.angular_velocity, present)
+    assert picked(scene.bodies, gone, (0.0, 0.0)) is None
+    early = Frame(0.0, *(a[:1] for a in (frame.position, frame.velocity, frame.angle, frame.angular_velocity)),
+                  np.ones(1, np.bool_))  # fmt: skip
+    assert picked(scene.bodies, early, (5.0, 0.0)) is None
+
+
+@pytest.mark.parametrize(
+    ("height", "over"),
+    [(2.0, False), (1.001, False), (1.0, False), (0.999, True), (0.009, True), (0.0, True), (-1.0, True)],
+)
+def test_circle_overlaps_the_half_plane_as_the_tutorial_has_it(height: float, over: bool) -> None:
+    scene = load(find("circle_half_plane"), [("ball.circle.position", [0.0, height])])
+    assert overlapping(scene, scene.bodies, frame_of(scene)).tolist() == [over]
+
+
+def test_overlaps_with_walls_posts_and_one_another() -> None:
+    scene = scene_of(
+        ball("a", 0, 0), ball("b", 1.9, 0), ball("c", 10, 0), ball("d", 20, 0), ball("e", 30, 0), ball("f", 32, 0),
+        wall=[{"points": [[9, 1.05], [11, 1.05]], "thickness": 0.2}], post=[{"position": [20, 1.5], "radius": 0.6}],
+    )  # fmt: skip
+    assert overlapping(scene, scene.bodies, frame_of(scene)).tolist() == [True, True, True, True, False, False]
+    frame = frame_of(scene)
+    present = np.asarray([False, True, True, True, True, True])
+    gone = Frame(0.0, frame.position, frame.velocity, frame.angle, frame.angular_velocity, present)
+    assert overlapping(scene, scene.bodies, gone).tolist() == [False, False, True, True, False, False]
+
+
+def test_overlaps_of_many_are_those_of_few() -> None:
+    """A grid with an overlap here and there, large enough for pairs to be sought by cells."""
+    document = {
+        "grid": [{"origin": [0, 0], "columns": 60, "rows": 50, "spacing": [2.5, 2.5], "radius": 1, "jitter": 0.6}],
+        "ball": [ball("nan", -50, 0)],
+    }
+    scene = from_document(document)
+    frame = frame_of(scene)
+    position = frame.position.copy()
+    position[0] = np.nan
+    frame = Frame(0.0, position, frame.velocity, frame.angle, frame.angular_velocity, frame.present)
+    found = overlapping(scene, scene.bodies, frame)
+    gap = np.hypot(*(position[:, None] - position[None]).transpose(2, 0, 1)) + 9.0 * np.eye(len(position))
+    assert found.tolist() == (gap < 2.0).any(axis=1).tolist()
+    assert 0 < found.sum() < len(found)
+
+
+def test_trails_are_the_last_places_of_those_who_are_there() -> None:
+    trails = Trails()
+    assert trails.pieces() == ()
+    scene = scene_of(ball("a", 0, 0), ball("b", 5, 0))
+    for k in range(LENGTH + 50):
+        trails.keep(frame_of(scene, float(k)))
+    (piece,) = trails.pieces()
+    assert piece.shape == (LENGTH, 2, 2)
+    trails.keep(frame_of(scene_of(ball("a", 0, 0), ball("b", 5, 0), ball("c", 9, 0)), 1e3))
+    assert [piece.shape for piece in trails.pieces()] == [(LENGTH - 1, 2, 2), (1, 3, 2)]
+    trails.keep(frame_of(scene, 10.0))  # back in time
+    assert [piece.shape for piece in trails.pieces()] == [(1, 2, 2)]
+    trails.keep(frame_of(scene_of(ball("a", 1, 0), ball("b", 5, 0)), 10.0))  # the same time again
+    assert [piece.tolist() for piece in trails.pieces()] == [[[[1.0, 0.0], [5.0, 0.0]]]]
+    frame = frame_of(scene, 11.0)
+    trails.keep(Frame(11.0, frame.position, frame.velocity, frame.angle, frame.angular_velocity, np.zeros(2, np.bool_)))
+    assert np.isnan(trails.pieces()[0][-1]).all()
+
+
+def test_of_too_many_bodies_none_leaves_a_trail() -> None:
+    trails, many = Trails(), np.zeros((MOST + 1, 2))
+    one = np.zeros(MOST + 1)
+    trails.keep(Frame(0.0, many, many, one, one, np.ones(MOST + 1, np.bool_)))
+    assert trails.pieces() == ()
