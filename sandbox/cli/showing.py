@@ -101,13 +101,22 @@ def show_stage(
         if pick:
             window.desk.open_picker(None)
         status = window.run()
-        if record is not None and stage.live is not None:
-            try:
-                stage.live.session.recording().save(record)
-                click.echo(f"session: {record}")
-            except OSError as error:
-                click.echo(f"--record: {record}: {error.strerror or error}", err=True)
-                status = status or 1
+        if record is not None and not _saved(stage, record):
+            status = status or 1
         return status
     finally:
         window.close()
+
+
+def _saved(stage: "Stage", record: Path) -> bool:
+    """Save the session that is on, and say so; return whether that could be done."""
+    if stage.live is None:
+        click.echo(f"--record: {record}: there is no session to save", err=True)
+        return False
+    try:
+        stage.live.session.recording().save(record)
+    except OSError as error:
+        click.echo(f"--record: {record}: {error.strerror or error}", err=True)
+        return False
+    click.echo(f"session: {record}")
+    return True

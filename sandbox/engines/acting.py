@@ -11,10 +11,13 @@ from sandbox.action import (
     ActionError,
     Force,
     Impulse,
+    Launch,
     Move,
+    Pull,
     Remove,
     SetParameter,
     Spawn,
+    Switch,
     is_settable,
     speed_limit,
 )
@@ -109,8 +112,10 @@ def perform(action: Action, cast: Cast) -> int | None:
             return _number(action.body, cast)
         case SetParameter():
             _set(action, cast)
-        case _:
+        case Pull() | Launch() | Switch():
             raise ActionError(f"{action!r} is nothing that an engine does by itself; sandbox.start gives one that can")
+        case _:
+            raise ActionError(f"{action!r} is no action")
     return None
 
 
@@ -209,7 +214,12 @@ def _set(action: SetParameter, cast: Cast) -> None:
         raise ActionError(f"{action.path!r} cannot be changed while a scene runs; what can: {SETTABLE}")
     try:
         document, _ = assign(to_document(cast.scene), action.path, action.value)
+        world = cast.scene.world
+        if world.duration == 0.0:  # of a session that has only just begun, as no scene's is
+            document["world"]["duration"] = cast.scene.solver.dt
         scene = from_document(document)
+        if world.duration == 0.0:
+            scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.0})})
     except AddressError as error:
         raise ActionError(str(error)) from None
     except SceneError as error:

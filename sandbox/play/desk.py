@@ -196,7 +196,7 @@ class Desk:
         """Return what is told in words."""
         show, messages = stage.show, stage.messages.shown()
         if show is None:
-            return Status("", "", "", 0, 0.0, messages=messages, faults=stage.faults)
+            return Status("No scene", "Ctrl+O", "pick one", 0, 0.0, messages=messages, faults=stage.faults)
         picked = stage.hands.picked
         live = stage.live
         company = live.company if live is not None else None

@@ -55,8 +55,8 @@ class Live:
 
     @property
     def bodies(self) -> Bodies:
-        """The bodies by number."""
-        return self.session.bodies
+        """The bodies by number; of the state that is shown."""
+        return self.session.bodies if self._peek is None else self.session.bodies_in(self._peek[1])
 
     @property
     def engine(self) -> str:
@@ -237,7 +237,7 @@ class Live:
 
     def energy(self) -> tuple[float, float, float]:
         """Return the kinetic, potential and total energy, J."""
-        return energy_of(self.frame, self.session.bodies, self.session.scene.world.gravity)
+        return energy_of(self.frame, self.bodies, self.session.scene.world.gravity)
 
     def sight(
         self,
@@ -257,14 +257,14 @@ class Live:
         shows = session.scene.play.show == "overlap"
         return Sight(
             scene=session.scene,
-            bodies=session.bodies,
+            bodies=self.bodies,
             frame=frame,
             overlays=overlays,
             contacts=self._contacts if present else Contacts.none(),
             seconds=self._since,
             ghost=self.company.ghost_frame if present else None,
             trails=self.company.trails.pieces() if "trails" in overlays and present else (),
-            overlapping=overlapping(session.scene, session.bodies, frame) if shows else None,
+            overlapping=overlapping(session.scene, self.bodies, frame) if shows else None,
             flashes=self.company.flashes,
             picked=picked,
             pull=pull,

@@ -19,8 +19,8 @@ class Mouse:
     def __init__(self, window: "Window") -> None:
         self._window = window
         self._panning = False
-        self.place = (0, 0)
-        """where it is, px"""
+        self.place: tuple[int, int] | None = None
+        """where it is, px; None before it was over the picture"""
 
     def take(self, event: pygame.event.Event) -> None:
         """Take an event in that nobody else wanted."""
@@ -64,5 +64,6 @@ class Mouse:
             stage.hands.drop()
 
     def world(self) -> tuple[float, float]:
-        """Return the place that it points at, m."""
-        return self._window.camera.to_world(self.place)
+        """Return the place that it points at, m; before it points at any, the middle of the picture."""
+        camera = self._window.camera
+        return camera.centre if self.place is None else camera.to_world(self.place)

@@ -6,6 +6,7 @@ import numpy as np
 
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
+from sandbox.scene.near import near_pairs
 from sandbox.trajectory import BoolArray, FloatArray, Frame
 
 
@@ -30,10 +31,7 @@ def picked(bodies: Bodies, frame: Frame, place: tuple[float, float], reach: floa
 
 
 def overlapping(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
-    """Tell which bodies overlap a plane, wall, post or one another, (N,); what just touches does not.
-
-    O(N²): for scenes of a few bodies.
-    """
+    """Tell which bodies overlap a plane, wall, post or one another, (N,); what just touches does not."""
     position, radius, there = frame.position, bodies.radius[: len(frame.position)], frame.present
     found = np.zeros(len(position), np.bool_)
     with np.errstate(all="ignore"):
@@ -46,9 +44,12 @@ def overlapping(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
                 found |= _to_segment(position, a, b) < radius + wall.thickness / 2.0
         for post in scene.posts:
             found |= np.hypot(*(position - np.asarray(post.position)).T) < radius + post.radius
-        gap = np.hypot(*(position[:, None] - position[None]).transpose(2, 0, 1)) - radius[:, None] - radius[None]
-        pair = (gap < 0.0) & there[:, None] & there[None] & ~np.eye(len(position), dtype=np.bool_)
-        found |= pair.any(axis=1)
+    able = np.flatnonzero(there & np.isfinite(position).all(axis=1))
+    reach = 2.0 * float(radius[able].max()) if len(able) else 0.0
+    for i, j in near_pairs(position[able], reach):
+        a, b = able[i], able[j]
+        over = np.hypot(*(position[a] - position[b]).T) < radius[a] + radius[b]
+        found[a[over]] = found[b[over]] = True
     return found & there
 
 

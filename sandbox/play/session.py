@@ -70,6 +70,7 @@ class Session:
         self._astray = False
         self._exhausted = False
         self._contacts: list[Contacts] = []
+        self._everyone = self._relay.bodies
         self.history = History()
         self.ended: str | None = None
         """why it cannot go on: it diverged, or asks for more than can be had"""
@@ -102,6 +103,10 @@ class Session:
     def bodies(self) -> Bodies:
         """The bodies by number; spawned ones at the end."""
         return self._relay.bodies
+
+    def bodies_in(self, frame: Frame) -> Bodies:
+        """Return the bodies by number, with those of a state that was seen; it may lie ahead and have more."""
+        return self._everyone if len(frame.position) > len(self.bodies) else self.bodies
 
     @property
     def relay(self) -> Relay:
@@ -186,6 +191,8 @@ class Session:
     def _see(self) -> None:
         """Look at the present state: keep it, hold it against what was seen before, and make a checkpoint if due."""
         self._frame = self._relay.frame()
+        if len(self.bodies) >= len(self._everyone):
+            self._everyone = self.bodies
         self._contacts.append(self._relay.contacts())
         del self._contacts[:-64]  # nobody asks
         if len(self._contacts[-1]):
@@ -243,6 +250,7 @@ class Session:
         self._actions.append(timed)
         self._done += 1
         self.history.cut(self._step - 1)
+        self._everyone = self.bodies
         self._frame = self._previous = self._relay.frame()
         self.history.keep(self._step, self._frame)
         self._calm = 0

@@ -85,8 +85,11 @@ class Window:
 
     @property
     def name(self) -> str:
-        """What files of this scene are called by."""
-        return self.stage.path.stem if self.stage.path is not None else "scene"
+        """What files of this scene are called by: its file, or where it has none, its title."""
+        if self.stage.path is not None:
+            return self.stage.path.stem
+        show = self.stage.show
+        return (show.scene.title if show is not None else "") or "scene"
 
     def home(self) -> None:
         """Show the scene whole."""

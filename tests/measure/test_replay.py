@@ -100,7 +100,7 @@ plans = st.lists(st.tuples(st.integers(0, 25), st.none() | st.integers(0, 30), d
 
 @pytest.mark.parametrize("engine", ENGINES)
 @given(plan=plans)
-@settings(max_examples=25)
+@settings(max_examples=12)
 def test_session_replays_to_the_same_state_through_json(engine: str, plan: Played) -> None:
     session = played(engine, plan)
     recording = session.recording()
@@ -159,6 +159,11 @@ def test_session_that_was_just_started_replays(engine: str) -> None:
     found = rerun(recording)
     assert found.info["state_hash"] == recording.state_hash
     assert found.velocity[-1, 0, 0] == 4.0
+    session.act(SetParameter(time=0.0, path="world.gravity", value=[0.0, 1.0]))
+    recording = session.recording()
+    found = rerun(recording)
+    assert (found.status, found.reason) == ("ok", None)
+    assert found.info["state_hash"] == recording.state_hash
 
 
 @pytest.mark.parametrize("engine", ENGINES)

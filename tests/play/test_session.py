@@ -26,7 +26,7 @@ from sandbox.trajectory import Frame
 def shipped(name: str) -> Scene:
     scene = load(find(name))
     if name == "pile":  # as it is, but smaller
-        scene = load(find(name), [("grid.ball.rows", 4), ("grid.ball.columns", 25)])
+        scene = load(find(name), [("grid.ball.rows", 3), ("grid.ball.columns", 10)])
     return scene
 
 

@@ -91,7 +91,8 @@ def places(
 ) -> "np.ndarray[tuple[int, int], np.dtype[np.intp]]":
     """Return the pixels of a colour in a region, (P, 2)."""
     part = pygame.surfarray.array3d(surface.subsurface(box)).astype(np.int16)
-    return np.argwhere((np.abs(part - np.asarray(colour)) <= 6).all(axis=2)) + np.asarray(box.topleft)
+    found = (np.abs(part - np.asarray(colour)) <= 6).all(axis=2)
+    return np.asarray(np.argwhere(found) + np.asarray(box.topleft))
 
 
 def ball_seen(window: Window) -> tuple[float, float]:

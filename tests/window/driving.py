@@ -18,7 +18,7 @@ from PIL import Image, ImageGrab
 
 from sandbox.recording import Recording
 
-LIMIT = 20.0
+LIMIT = 100.0
 """s, after which what is waited for will never come"""
 SCREEN = (1024, 768)
 SIZE = (900, 600)
@@ -88,32 +88,37 @@ class Driven:
         assert done.returncode == 0, f"xdotool {arguments}: {done.stderr}"
         return done.stdout.strip()
 
+    def _do(self, *words: object) -> None:
+        """Do something, and make sure that the server has taken it in: it may serve who comes later first."""
+        self._xdotool(*words, "getmouselocation")  # which it answers
+
     # What a person does
 
     def key(self, *names: str) -> None:
         """Press keys one after the other, as xdotool names them; in a hurry, SDL takes them for one that repeats."""
-        self._xdotool("key", "--delay", 20, *names)
+        self._do("key", "--delay", 20, *names)
 
     def focus(self) -> None:
         """Give the window the keyboard."""
-        self._xdotool("windowfocus", self.window)
+        self._do("windowfocus", self.window)
 
     def type(self, text: str) -> None:
-        self._xdotool("type", "--delay", 20, text)
+        """Press the keys that write lower-case letters and blanks."""
+        self.key(*("space" if letter == " " else letter for letter in text))
 
     def mouse(self, at: tuple[float, float]) -> None:
         """Move the mouse to a place in the window, px."""
-        self._xdotool("mousemove", round(at[0]), round(at[1]))
+        self._do("mousemove", round(at[0]), round(at[1]))
 
     def press(self, at: tuple[float, float], button: int = 1) -> None:
-        self._xdotool("mousemove", round(at[0]), round(at[1]), "mousedown", button)
+        self._do("mousemove", round(at[0]), round(at[1]), "mousedown", button)
 
     def release(self, button: int = 1) -> None:
-        self._xdotool("mouseup", button)
+        self._do("mouseup", button)
 
     def click(self, at: tuple[float, float], button: int = 1) -> None:
         """Press and release at a place, both within one picture or nearly so."""
-        self._xdotool("mousemove", round(at[0]), round(at[1]), "mousedown", button, "mouseup", button)
+        self._do("mousemove", round(at[0]), round(at[1]), "mousedown", button, "mouseup", button)
 
     def pull(self, start: tuple[float, float], end: tuple[float, float], button: int = 1) -> None:
         """Press at one place and go to another, in a few moves, without letting go."""
@@ -121,7 +126,7 @@ class Driven:
         words: list[object] = []
         for share in (0.25, 0.5, 0.75, 1.0):
             words += ["mousemove", *(round(a + (b - a) * share) for a, b in zip(start, end, strict=True))]
-        self._xdotool(*words)
+        self._do(*words)
 
     def drag(self, start: tuple[float, float], end: tuple[float, float], button: int = 1) -> None:
         """Press at one place, and let go at another."""
@@ -131,11 +136,11 @@ class Driven:
     def wheel(self, at: tuple[float, float], notches: int) -> None:
         """Turn the wheel over a place; upwards where `notches` is positive."""
         button = 4 if notches > 0 else 5
-        self._xdotool("mousemove", *map(round, at), *("click", button) * abs(notches))
+        self._do("mousemove", *map(round, at), *("click", button) * abs(notches))
 
     def resize(self, width: int, height: int) -> None:
         self.size = width, height
-        self._xdotool("windowsize", self.window, width, height)
+        self._do("windowsize", self.window, width, height)
 
     # What is seen, said and written
 
@@ -161,6 +166,12 @@ class Driven:
         self.key("ctrl+s")
         line = self.wait_for(lambda: next((x for x in self.said()[before:] if x.startswith("session: ")), ""), "a file")
         return Recording.load(self.folder / line.removeprefix("session: "))
+
+    def settled(self) -> Shot:
+        """Return a picture of all that was done before: the second file is written a turn after the first."""
+        self.session()
+        self.session()
+        return self.shot()
 
     def step_number(self) -> int:
         """Return how many steps were made, as the session has it."""

@@ -91,10 +91,14 @@ def test_slider_sets_gravity(drive: Play, tmp_path: Path) -> None:
 
 def test_keys_add_nudge_and_delete_a_ball(drive: Play, tmp_path: Path) -> None:
     window, camera = opened(drive, tmp_path, "--paused")
+    window.key("b")  # the mouse has not been in the window yet
+    (spawn,) = window.session().actions
+    assert isinstance(spawn, Spawn)
+    assert spawn.ball.position == pytest.approx(camera.centre)
+    window.key("r")
     window.mouse(on_screen(camera, (0.5, 0.3)))
     window.key("b")
-    session = window.session()
-    spawn = session.actions[-1]
+    (spawn,) = window.session().actions
     assert isinstance(spawn, Spawn)
     assert spawn.ball.position == pytest.approx((0.5, 0.3), abs=1 / camera.scale)
     window.click(on_screen(camera, BALL))
@@ -119,6 +123,6 @@ def test_space_launches_fireworks_again_and_does_not_pause(drive: Play) -> None:
     assert [action.kind for action in session.actions] == ["launch", "launch"]
     assert all(isinstance(action, Launch) and action.generator == "spark" for action in session.actions)
     assert rerun(session).info["state_hash"] == session.state_hash
-    assert not paused(window.shot())
+    assert not paused(window.settled())
     window.key("p")
     window.wait_until(paused, "PAUSED")

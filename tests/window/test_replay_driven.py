@@ -60,14 +60,15 @@ def test_stored_run_is_played_to_its_end_and_scrubbed_by_clicks(drive: Play, tmp
 
 def test_stored_run_cannot_be_changed_and_says_so(drive: Play, tmp_path: Path) -> None:
     stored(tmp_path, MOVING)
-    window = drive("replay", "run", "--paused")
+    window = drive("replay", "run", "--paused", "--record", "all.json")
     for key in ("e", "g", "ctrl+l"):
         window.key(key)
     window.key("ctrl+s")
     window.wait_for(lambda: "a stored run is stored already" in window.said(), "that it is stored")
     assert paused(window.shot())
     window.key("Escape")
-    assert window.status() == 0
+    assert window.status() == 1
+    assert window.complained() == "--record: all.json: there is no session to save\n"
 
 
 def test_stored_run_is_the_ghost_of_another_engine(drive: Play, tmp_path: Path) -> None:
@@ -97,6 +98,7 @@ def test_session_is_replayed_pauses_at_its_end_and_goes_on(drive: Play, tmp_path
     window = drive("replay", "sandbox-room-1.json")
     window.wait_until(paused, "the end of what was recorded")
     again = window.session()
+    assert "session: sandbox-Moving-1.json" in window.said()  # a replay has no scene file: its title it is
     assert again.duration == session.duration
     assert again.state_hash == session.state_hash
     window.key("p")

@@ -44,7 +44,7 @@ def test_wheel_drag_and_home_move_the_camera(drive: Play, tmp_path: Path) -> Non
     camera = camera.panned((40, 30))
     seen_at(window, camera, "the ball panned")
     window.key("r", "e")
-    window.session()
+    window.settled()
     seen_at(window, camera, "the camera kept")
 
 

@@ -88,7 +88,7 @@ class Taking:
     def session(self, show: Live | Stored | None, name: str) -> None:
         """Keep the session, to be replayed."""
         if not isinstance(show, Live):
-            self._tell("a stored run is stored already", "warning")
+            self._tell("a stored run is stored already" if show is not None else "there is no session yet", "warning")
             return
         outfile = Outfile.numbered(self._folder, name, ".json")
         try:

@@ -1,0 +1,281 @@
+"""Companions: the ghost, the twin, and the audit beside a session."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from sandbox.action import ActionError, Force, Impulse, Pull, Remove, Spawn, Switch
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.compare.comparing import usual_tolerance
+from sandbox.measure.compare.truth import truth_of
+from sandbox.play import companions
+from sandbox.play.companions import Companion, Trust, apart, common, follows, ghost_of
+from sandbox.play.company import Company
+from sandbox.play.session import Session
+from sandbox.scene.file import from_document, load
+from sandbox.scene.model import Ball, Scene
+from sandbox.scene.settings import Settings
+from sandbox.scene.shipped import find
+
+BOUNCE = load(find("bounce"))
+
+
+def gas(duration: float = 12.0) -> Scene:
+    return load(find("gas"), [("world.duration", duration)])
+
+
+def pile() -> Scene:
+    return load(find("pile"), [("grid.ball.rows", 3), ("grid.ball.columns", 10)])
+
+
+def together(session: Session, company: Company, steps: int) -> None:
+    for _ in range(steps):
+        company.advance(session.advance())
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_ghost_is_exact_where_it_can_be_else_another_engine(engine: str) -> None:
+    ghost, note = ghost_of(Session(BOUNCE, engine).relay.checkpoint())
+    assert ghost.engine == ("reference" if engine == "exact" else "exact")
+    assert note == ""
+    ghost.close()
+
+
+def test_ghost_says_why_it_is_not_exact() -> None:
+    session = Session(from_document({"ball": [{"position": [k * 0.5, 0], "radius": 1} for k in range(2)]}))
+    ghost, note = ghost_of(session.relay.checkpoint())
+    assert ghost.engine == "reference"
+    assert "exact refuses" in note
+    company = Company(session)
+    company.show_ghost(True)
+    assert company.ghost_engine == "reference"
+    assert [level for level, _ in company.notes] == ["info"]
+
+
+def test_distance_to_the_ghost_in_free_fall_is_the_error_of_explicit_euler() -> None:
+    """x(k·h) is g·h·t/2 too high; `exact` has the parabola."""
+    session, h = Session(BOUNCE, "pymunk"), BOUNCE.solver.dt
+    company = Company(session)
+    company.show_ghost(True)
+    assert company.distance == 0.0
+    for k in range(1, 1000):
+        together(session, company, 1)
+        assert company.distance == pytest.approx(0.5 * 9.81 * h * k * h, rel=1e-9)  # rounding of sums of ~5 m
+    ghost = company.ghost_frame
+    assert ghost is not None
+    assert ghost.position[0, 1] == pytest.approx(5.5 - 0.5 * 9.81 * 0.999**2, rel=1e-14)  # rounding
+    together(session, company, 3000)
+    assert company.distance is not None
+    assert company.distance < 0.2  # it lands within some steps of 1 ms at up to 10 m/s, and again at each bounce
+    assert company.notes == []
+
+
+def test_ghost_does_what_the_session_does_and_keeps_its_engine() -> None:
+    session = Session(BOUNCE, "pymunk")
+    company = Company(session)
+    company.show_ghost(True)
+    for action in (
+        Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)),
+        Spawn(time=0.0, ball=Ball(name="new", position=(5.0, 5.0), radius=0.1)),
+        Pull(time=0.0, body="new", target=(5.0, 6.0)),
+        Switch(time=0.0, engine="reference", settings={"dt": 0.002, "integrator": "rk4"}),
+        Remove(time=0.0, body="ball"),
+    ):
+        company.act(session.act(action))
+        together(session, company, 20)
+        ghost = company.ghost_frame
+        assert ghost is not None
+        assert ghost.time == pytest.approx(session.time, rel=1e-14)  # counted in steps by each
+        assert ghost.present.tolist() == session.frame.present.tolist()
+        assert company.distance is not None
+        assert company.distance < 1e-2  # of so short a time: g·h·t/2, and a pull of first order
+    assert company.ghost_engine == "exact"
+    assert session.engine == "reference"
+
+
+def test_ghost_that_cannot_follow_goes_and_says_why() -> None:
+    session = Session(BOUNCE, "pymunk")
+    company = Company(session)
+    company.show_ghost(True)
+    company.act(session.act(Spawn(time=0.0, ball=Ball(position=(0.3, 5.5), radius=0.5))))
+    together(session, company, 1)
+    assert company.ghost_frame is None
+    assert not company.ghosted
+    assert [level for level, text in company.notes if "the ghost is gone" in text] == ["warning"]
+    together(session, company, 5)
+
+
+def test_exact_ghost_of_a_heap_gives_up_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rigid balls in a heap touch ever more often: it is given up by its own bounds, or its patience."""
+    monkeypatch.setattr(companions, "PATIENCE", 0.02)
+    session = Session(pile(), "pymunk")
+    company = Company(session)
+    company.show_ghost(True)
+    assert company.ghost_engine == "exact"
+    for _ in range(400):
+        together(session, company, 1)
+        if not company.ghosted:
+            break
+    assert not company.ghosted
+    assert any("the ghost is gone" in text for _, text in company.notes)
+    company.show_ghost(True)  # from here it cannot begin, as balls overlap
+    assert company.ghost_engine == "reference"
+    together(session, company, 3)
+
+
+def test_twin_loses_trust_when_compare_says_so() -> None:
+    scene = gas()
+    truth = truth_of(scene, scene.solver, usual_tolerance(scene))
+    assert truth is not None
+    assert truth.trusted_until < scene.world.duration
+    for engine in ("pymunk", "exact"):
+        session = Session(scene, engine)
+        trust = Trust(session.relay.checkpoint())
+        assert trust.tolerance == usual_tolerance(scene)
+        spreads = []
+        while trust.state == "trusted" and session.time < 3.0 * truth.trusted_until:
+            session.advance(5)
+            trust.advance(5, session.frame)
+            spreads.append(trust.spread)
+        assert trust.state == "lost"
+        assert trust.horizon == session.time
+        # Another engine's impacts come a step later or so, and let errors grow as fast: by a factor a collision.
+        assert 0.5 * truth.trusted_until <= trust.horizon <= 2.0 * truth.trusted_until
+        assert spreads[0] is not None
+        assert spreads[0] < 1e-10
+        trust.advance(5, session.frame)
+        assert trust.state == "lost"
+        trust.close()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_bounce_is_trusted_to_its_end(engine: str) -> None:
+    session = Session(BOUNCE, engine)
+    trust = Trust(session.relay.checkpoint())
+    for _ in range(60):
+        session.advance(100)
+        trust.advance(100, session.frame)
+    assert trust.state == "trusted"
+    assert trust.horizon is None
+    assert trust.spread is not None
+    assert trust.spread < 1e-9
+
+
+def test_what_meets_nothing_is_trusted_without_a_twin() -> None:
+    session = Session(load(find("fireworks")))
+    trust = Trust(session.relay.checkpoint())
+    assert not trust.able
+    trust.advance(5, session.frame)
+    assert trust.state == "trusted"
+    assert trust.spread is None
+    trust.close()
+
+
+def test_twin_that_ends_leaves_trust_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(companions, "PATIENCE", 0.0)
+    scene = load(find("gas"), [("grid.atom.velocity_jitter", 100.0), ("solver.dt", 10.0)])
+    session = Session(scene, "exact")
+    trust = Trust(session.relay.checkpoint())
+    trust.advance(1, session.frame)
+    assert trust.state == "unknown"
+    trust.advance(1, session.frame)
+    trust.act(Impulse(time=0.0, body="atom-1", impulse=(1.0, 0.0)))
+    trust.close()
+
+
+def test_company_begins_anew_when_the_session_has_gone_back() -> None:
+    session = Session(BOUNCE, "pymunk")
+    company = Company(session)
+    company.show_ghost(True)
+    company.show_trust(True)
+    together(session, company, 300)
+    assert company.distance is not None
+    assert company.distance > 0.0
+    for _ in session.seek(100):
+        pass
+    company.begin()
+    assert company.distance == 0.0
+    assert company.trust is not None
+    assert company.trust.spread is None
+    together(session, company, 10)
+    assert company.trust.state == "trusted"
+    company.close()
+
+
+def test_misses_are_counted_and_flash_and_those_of_the_future_are_forgotten() -> None:
+    """A fast ball passes through a thin wall within a step."""
+    scene = from_document(
+        {
+            "ball": [{"name": "a", "position": [0, 0], "radius": 0.1, "velocity": [100, 0]}],
+            "wall": [{"points": [[5.5, -5], [5.5, 5]]}, {"points": [[10.5, -5], [10.5, 5]]}],
+            "solver": {"dt": 0.01},
+        }
+    )
+    session = Session(scene, "pymunk")
+    company = Company(session)
+    assert company.missed == 0
+    seen = []
+    for _ in range(14):
+        together(session, company, 1)
+        seen.append(company.missed)
+    assert seen[-1] == 2
+    assert all(a is not None and b is not None and a <= b for a, b in pairwise(seen))
+    assert len(company.flashes) == 2
+    for _ in session.seek(7):
+        pass
+    company.begin()
+    assert company.missed == 1
+    together(session, company, 7)
+    assert company.missed == 2
+    sparks = Company(Session(load(find("fireworks"))))
+    assert sparks.missed is None
+    assert sparks.flashes == ()
+
+
+def test_follower_is_told_only_what_every_engine_knows() -> None:
+    assert follows(Switch(time=1.0, engine="exact", settings={"integrator": "rk4"})) is None
+    assert follows(Switch(time=1.0, settings={"dt": 0.1, "slop": 0.2})) == Switch(time=1.0, settings={"dt": 0.1})
+    kick = Impulse(time=0.0, body="a", impulse=(1.0, 0.0))
+    assert follows(kick) is kick
+    wanted = Settings(dt=0.1, substeps=3, slop=0.1, integrator="rk4", half_kick=True)
+    assert common(wanted) == Settings(dt=0.1, substeps=3)
+
+
+def test_apart_is_the_largest_distance_of_those_in_both() -> None:
+    one = Session(from_document({"ball": [{"position": [5.0 * k, 0], "radius": 1} for k in range(2)]}))
+    two = Session(from_document({"ball": [{"position": [5.0 * k, 4.0 * k], "radius": 1} for k in range(3)]}))
+    assert apart(one.frame, two.frame) == 4.0
+    assert apart(two.frame, one.frame) == 4.0
+    two.act(Remove(time=0.0, body="ball-2"))
+    assert apart(one.frame, two.frame) == 0.0
+    empty = Session(from_document({"title": "t"}))
+    assert apart(one.frame, empty.frame) is None
+    assert Company(empty).distance is None
+
+
+def test_ghost_takes_over_a_steady_force_or_leaves_it_to_who_can() -> None:
+    session = Session(from_document({"ball": [{"name": "a", "position": [0, 0], "radius": 1}]}), "pymunk")
+    session.act(Force(time=0.0, body="a", force=(1.0, 0.0)))
+    company = Company(session)
+    company.show_ghost(True)
+    together(session, company, 100)
+    ghost = company.ghost_frame
+    assert ghost is not None
+    assert company.ghost_engine == "reference"
+    assert "exact cannot go on with the steady force on 'a'" in company.notes[0][1]
+    assert ghost.velocity[0] == pytest.approx([1.0, 0.0], rel=1e-12)  # a hundred sums
+
+
+def test_companion_that_ended_is_quiet(monkeypatch: pytest.MonkeyPatch) -> None:
+    companion = Companion(Session(BOUNCE).relay.checkpoint())
+    companion.act(Remove(time=0.0, body="zzz"))
+    assert companion.ended is not None
+    assert companion.frame is None
+    companion.advance(3)
+    companion.act(Remove(time=0.0, body="ball"))
+    companion.close()
+    monkeypatch.setattr(companions, "ENGINES", {})
+    with pytest.raises(ActionError, match="no other engine"):
+        ghost_of(Session(BOUNCE).relay.checkpoint())
+    assert np.isfinite(Session(BOUNCE).frame.position).all()
