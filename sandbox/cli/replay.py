@@ -15,8 +15,8 @@ from sandbox.scene.faults import Fault, SceneError
 from sandbox.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from sandbox.play.live import Live
-    from sandbox.play.stored import Stored
+    from sandbox.play.running.live import Live
+    from sandbox.play.running.stored import Stored
 
 
 @click.command(name="replay")
@@ -81,7 +81,7 @@ def _stored(run: Trajectory) -> "Stored":
     from pydantic import ValidationError
 
     from sandbox.play.footage.film import Film
-    from sandbox.play.stored import Stored
+    from sandbox.play.running.stored import Stored
 
     try:
         return Stored(Film(run))
@@ -101,8 +101,8 @@ def _computed(source: Trajectory | Recording, engine: str | None) -> "Live":
 
     from sandbox.action import ActionError, actions_from_json
     from sandbox.play.footage.film import Film
-    from sandbox.play.live import Live
-    from sandbox.play.session import Session
+    from sandbox.play.running.live import Live
+    from sandbox.play.running.session import Session
 
     if isinstance(source, Recording):
         session = source if engine is None else source.on(engine)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import pygame
 
 from sandbox.play.hands import Hands
-from sandbox.play.live import Live
+from sandbox.play.running.live import Live
 from sandbox.scene.model import Scene
 
 ARROWS = {

@@ -18,7 +18,7 @@ from sandbox.play.instruments.picker import Picker
 from sandbox.play.instruments.plates import plate
 from sandbox.play.instruments.timeline import HEIGHT, Timeline
 from sandbox.play.knobs import Knobs
-from sandbox.play.live import Live
+from sandbox.play.running.live import Live
 from sandbox.play.shelf import to_pick
 from sandbox.play.sight import OVERLAYS, Status
 from sandbox.play.sound import Sounds

@@ -3,9 +3,9 @@
 import math
 
 from sandbox.action import Impulse, Move, Pull, Remove, Spawn
-from sandbox.play.live import Live
 from sandbox.play.picking import picked
-from sandbox.play.stored import Stored
+from sandbox.play.running.live import Live
+from sandbox.play.running.stored import Stored
 from sandbox.scene.model import Ball
 
 Place = tuple[float, float]

@@ -6,7 +6,7 @@ from typing import get_args
 from sandbox.action import Action, SetParameter, Switch
 from sandbox.engines.registry import ENGINES
 from sandbox.play.instruments.knob import Knob, Value
-from sandbox.play.live import Live
+from sandbox.play.running.live import Live
 from sandbox.scene.model import Disc, Scene
 from sandbox.scene.settings import Detection, Integrator, Settings
 

@@ -13,11 +13,11 @@ from sandbox.engines.registry import ENGINES, able, engine_named
 from sandbox.play.hands import Hands, Place
 from sandbox.play.instruments.knob import Value
 from sandbox.play.knobs import turned
-from sandbox.play.live import Live
 from sandbox.play.messages import Messages
-from sandbox.play.session import Session
+from sandbox.play.running.live import Live
+from sandbox.play.running.session import Session
+from sandbox.play.running.stored import Stored
 from sandbox.play.shelf import neighbour
-from sandbox.play.stored import Stored
 from sandbox.scene.document import to_document
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import Override, from_document, load

@@ -21,7 +21,7 @@ from sandbox.action import (
 )
 from sandbox.engines.registry import ENGINES, UnknownEngineError
 from sandbox.measure.replay import rerun
-from sandbox.play.session import Session
+from sandbox.play.running.session import Session
 from sandbox.recording import Recording
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Ball, Scene

@@ -11,7 +11,7 @@ from strategies import scenes
 from sandbox.measure.run import run
 from sandbox.play.framing import framing
 from sandbox.play.picking import overlapping, picked
-from sandbox.play.trails import LENGTH, MOST, Trails
+from sandbox.play.running.trails import LENGTH, MOST, Trails
 from sandbox.scene.file import from_document, load
 from sandbox.scene.model import Scene
 from sandbox.scene.shipped import find, shipped

@@ -7,8 +7,8 @@ import pytest
 
 from sandbox.action import ActionError, Impulse, Move, Pull, Remove, Spawn
 from sandbox.play.hands import Hands
-from sandbox.play.live import Live
-from sandbox.play.session import Session
+from sandbox.play.running.live import Live
+from sandbox.play.running.session import Session
 from sandbox.scene.file import from_document
 
 DOCUMENT: dict[str, Any] = {

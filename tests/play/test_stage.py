@@ -8,13 +8,13 @@ import pytest
 from sandbox.action import SetParameter, Switch
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.run import run
-from sandbox.play import live as live_module
 from sandbox.play.footage.film import Film
 from sandbox.play.knobs import Knobs, turned
-from sandbox.play.live import Live
-from sandbox.play.session import Session
+from sandbox.play.running import live as live_module
+from sandbox.play.running.live import Live
+from sandbox.play.running.session import Session
+from sandbox.play.running.stored import Stored
 from sandbox.play.stage import Stage
-from sandbox.play.stored import Stored
 from sandbox.scene.file import from_document, load
 from sandbox.scene.shipped import find
 

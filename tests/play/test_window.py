@@ -11,11 +11,12 @@ import pygame
 import pytest
 from pressing import FOCUS_LOST, key, key_up, move, press, release
 
+from sandbox.action import Spawn
 from sandbox.play.drawing.palette import SKY, WARNING, Colour
-from sandbox.play.live import Live
+from sandbox.play.running.live import Live
+from sandbox.play.running.stored import Stored
 from sandbox.play.screen import NoDisplayError, open_screen
 from sandbox.play.stage import Stage
-from sandbox.play.stored import Stored
 from sandbox.play.window import Window
 
 SIZE = (900, 600)
@@ -51,7 +52,7 @@ def said() -> list[str]:
 @pytest.fixture
 def opened(tmp_path: Path, said: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
     """Open a window on a scene. However slow the machine is, no picture gives up steps for it."""
-    monkeypatch.setattr("sandbox.play.live.BUDGET", math.inf)
+    monkeypatch.setattr("sandbox.play.running.live.BUDGET", math.inf)
     windows: list[Window] = []
 
     def open_on(text: str) -> Window:
@@ -185,6 +186,8 @@ def test_picture_of_a_step_is_that_step(opened: Open) -> None:
         place = on_screen(window, (-1.0 + 20.0 * DT * number, 0.0))
         assert ball_seen(window) == pytest.approx(place, abs=1.0)  # a pixel; a step is 28
     turn(window, key(pygame.K_COMMA, unicode=","), key_up(pygame.K_COMMA))
+    while live(window).busy is not None:
+        turn(window)
     assert ball_seen(window) == pytest.approx(on_screen(window, (-1.0 + 20.0 * DT * 2, 0.0)), abs=1.0)  # a pixel
 
 
@@ -219,6 +222,14 @@ def test_camera_stays_where_it_was_put_and_home_brings_it_back(window: Window) -
     assert window.camera == moved
     turn(window, key(pygame.K_HOME), key_up(pygame.K_HOME))
     assert window.camera == home
+
+
+def test_ball_is_added_under_the_mouse_or_before_it_came_in_the_middle(window: Window) -> None:
+    for place, told in ((window.camera.centre, ()), (THERE, (move(*on_screen(window, THERE)),))):
+        turn(window, *told, key(pygame.K_b, unicode="b"), key_up(pygame.K_b))
+        spawn = live(window).session.actions[-1]
+        assert isinstance(spawn, Spawn)
+        assert spawn.ball.position == pytest.approx(place, abs=1.0 / window.camera.scale)  # a pixel
 
 
 def test_resized_window_is_drawn_whole(window: Window) -> None:

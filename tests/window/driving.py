@@ -23,8 +23,9 @@ LIMIT = 100.0
 SCREEN = (1024, 768)
 SIZE = (900, 600)
 """px, of the window, in the upper left corner of the screen"""
-ASIDE = (1000, 750)
-"""where the mouse is in nobody's way"""
+ASIDE = (2, 2)
+"""Where the mouse is in nobody's way. It is in the window from the start: when it enters, SDL looks which of Ctrl, Alt
+and Shift are down at that moment, which on a busy machine is ahead of the keys that it has yet to read."""
 
 Shot = npt.NDArray[np.uint8]
 """What is seen, (height, width, 3), sRGB."""

@@ -91,11 +91,6 @@ def test_slider_sets_gravity(drive: Play, tmp_path: Path) -> None:
 
 def test_keys_add_nudge_and_delete_a_ball(drive: Play, tmp_path: Path) -> None:
     window, camera = opened(drive, tmp_path, "--paused")
-    window.key("b")  # the mouse has not been in the window yet
-    (spawn,) = window.session().actions
-    assert isinstance(spawn, Spawn)
-    assert spawn.ball.position == pytest.approx(camera.centre)
-    window.key("r")
     window.mouse(on_screen(camera, (0.5, 0.3)))
     window.key("b")
     (spawn,) = window.session().actions

@@ -7,8 +7,8 @@ import pygame
 
 from sandbox.play.footage.capture import Recorder, recorder_in, screenshot, size_within
 from sandbox.play.footage.outfile import CaptureError, Outfile
-from sandbox.play.live import Live
-from sandbox.play.stored import Stored
+from sandbox.play.running.live import Live
+from sandbox.play.running.stored import Stored
 
 FILM_RATE = 25.0
 """pictures a second"""

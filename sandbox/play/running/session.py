@@ -12,10 +12,11 @@ up part of the session, as a switch that changes nothing: who replays the sessio
 from collections.abc import Iterator
 from time import perf_counter
 
-from sandbox.action import Action, ActionError, Pull, Switch, Value
+from sandbox.action import Action, ActionError
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.relay import Relay, joined
-from sandbox.play.history import History, Mark
+from sandbox.play.running.history import History, Mark
+from sandbox.play.running.script import Script
 from sandbox.recording import Recording
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
@@ -60,58 +61,53 @@ class Session:
             Refusal: the engine cannot run the scene.
         """
         self._scene, self._engine = scene, engine
-        self._relay = Relay(scene, engine, settings)
-        self._settings = self._relay.wanted
-        self._actions = list(actions)
-        self._done = 0
+        self.relay = Relay(scene, engine, settings)
+        """what runs"""
+        self._settings = self.relay.wanted
+        self._script = Script(actions)
         self._step = 0
         self._calm = 0
         self._mark: Mark | None = None  # that the relay was taken up from, as long as all that followed was known
         self._astray = False
         self._exhausted = False
         self._contacts: list[Contacts] = []
-        self._everyone = self._relay.bodies
+        self._everyone = self.relay.bodies
         self.history = History()
         self.ended: str | None = None
         """why it cannot go on: it diverged, or asks for more than can be had"""
-        self._relay.contacts()
+        self.relay.contacts()
         self._redo()
-        self._previous = self._frame = self._relay.frame()
+        self._previous = self._frame = self.relay.frame()
         self.history.keep(0, self._frame)
 
     @property
     def scene(self) -> Scene:
         """What runs, with all that was set since."""
-        return self._relay.scene
+        return self.relay.scene
 
     @property
     def engine(self) -> str:
         """The present engine's name."""
-        return self._relay.engine
+        return self.relay.engine
 
     @property
     def settings(self) -> Settings:
         """The present settings, with every choice filled in."""
-        return self._relay.settings
+        return self.relay.settings
 
     @property
     def wanted(self) -> Settings:
         """The present settings as they were asked for."""
-        return self._relay.wanted
+        return self.relay.wanted
 
     @property
     def bodies(self) -> Bodies:
         """The bodies by number; spawned ones at the end."""
-        return self._relay.bodies
+        return self.relay.bodies
 
     def bodies_in(self, frame: Frame) -> Bodies:
         """Return the bodies by number, with those of a state that was seen; it may lie ahead and have more."""
         return self._everyone if len(frame.position) > len(self.bodies) else self.bodies
-
-    @property
-    def relay(self) -> Relay:
-        """What runs."""
-        return self._relay
 
     @property
     def step_number(self) -> int:
@@ -136,7 +132,7 @@ class Session:
     @property
     def actions(self) -> tuple[Action, ...]:
         """All that was done, up to now."""
-        return tuple(self._actions[: self._done])
+        return self._script.so_far
 
     def advance(self, steps: int = 1, until: float | None = None) -> int:
         """Make steps; return how many were made.
@@ -152,7 +148,7 @@ class Session:
         while made < steps and self.ended is None and not last:
             last = made + 1 == steps or (made > 0 and until is not None and perf_counter() > until)
             if last:
-                self._previous = self._relay.frame()
+                self._previous = self.relay.frame()
             if not self._one():
                 break
             made += 1
@@ -167,11 +163,11 @@ class Session:
         if self._step >= self.history.furthest:
             self._own_up()
         try:
-            self._relay.step()
+            self.relay.step()
         except Divergence as divergence:
             self.ended = str(divergence)
         except Exhaustion as exhaustion:
-            self.ended, self._exhausted = f"at {self._relay.time:g} s: {exhaustion}", True
+            self.ended, self._exhausted = f"at {self.relay.time:g} s: {exhaustion}", True
             return False
         self._step += 1
         if self.ended is None:
@@ -180,51 +176,42 @@ class Session:
 
     def _redo(self) -> None:
         """Do again what was done at this time."""
-        due = self._relay.time + 1e-9 * self._relay.settings.dt
         try:
-            while self._done < len(self._actions) and self._actions[self._done].time <= due:
-                self._relay.apply(self._actions[self._done])
-                self._done += 1
-        except ActionError as error:  # of a recording that this engine cannot follow
-            self.ended = f"at {self._relay.time:g} s: {error}"
+            self._script.redo(self.relay)
+        except ActionError as error:
+            self.ended = f"at {self.relay.time:g} s: {error}"
 
     def _see(self) -> None:
         """Look at the present state: keep it, hold it against what was seen before, and make a checkpoint if due."""
-        self._frame = self._relay.frame()
+        self._frame = self.relay.frame()
         if len(self.bodies) >= len(self._everyone):
             self._everyone = self.bodies
-        self._contacts.append(self._relay.contacts())
+        self._contacts.append(self.relay.contacts())
         del self._contacts[:-64]  # nobody asks
         if len(self._contacts[-1]):
             self._calm = 0
         else:
-            self._calm += self._relay.settings.substeps
+            self._calm += self.relay.settings.substeps
         if self._exhausted:  # within the step after this one: that state is none of the session's
             return
         self._check(self._frame)
         self.history.keep(self._step, self._frame)
-        calm = self._calm >= max(CALM, 2 * (self._relay.settings.persistence or 1))
+        calm = self._calm >= max(CALM, 2 * (self.relay.settings.persistence or 1))
         if calm and self.ended is None and self.history.wants_mark(self._step):
-            self.history.mark(Mark(self._step, self._done, self._relay.checkpoint()))
+            self.history.mark(Mark(self._step, self._script.done, self.relay.checkpoint()))
 
     def _check(self, frame: Frame | None) -> None:
         """Hold the present state against what was seen before."""
         known = self.history.known(self._step)
-        if known is not None and known.state_hash() != (frame or self._relay.frame()).state_hash():
+        if known is not None and known.state_hash() != (frame or self.relay.frame()).state_hash():
             self._astray = True
             raise WrongWayError(f"step {self._step} led elsewhere than before")
 
     def _own_up(self) -> None:
         """Make the taking up of the checkpoint part of the session: from here on, what comes is new."""
-        if self._mark is None:
-            return
         mark, self._mark = self._mark, None
-        handed_over = Switch(time=mark.point.frame.time)
-        if self._actions[: mark.actions][-1:] == [handed_over]:  # it is already
-            return
-        self._actions.insert(mark.actions, handed_over)
-        self._done += 1
-        self.history.inserted(mark.step)
+        if mark is not None and self._script.hand_over(mark.actions, mark.point.frame.time):
+            self.history.inserted(mark.step)
 
     def contacts(self) -> Contacts:
         """Return the contacts that were open since the last call."""
@@ -242,51 +229,16 @@ class Session:
         """
         if self.ended is not None:
             raise ActionError("the scene has ended here; go back, or restart")
-        timed = action.model_copy(update={"time": self._relay.time})
-        self._relay.apply(timed)
+        timed = action.model_copy(update={"time": self.relay.time})
+        self.relay.apply(timed)
         self._own_up()
-        later, self._actions[self._done :] = self._actions[self._done :], []
-        self._let_go(later, timed)
-        self._actions.append(timed)
-        self._done += 1
+        self._script.add(timed, self.relay)
         self.history.cut(self._step - 1)
         self._everyone = self.bodies
-        self._frame = self._previous = self._relay.frame()
+        self._frame = self._previous = self.relay.frame()
         self.history.keep(self._step, self._frame)
         self._calm = 0
         return timed
-
-    def _let_go(self, forgotten: list[Action], now: Action) -> None:
-        """Let go of who is pulled by a hand that was to let go later, which is forgotten now."""
-        for each in forgotten:
-            if isinstance(each, Pull) and each.target is None and not (isinstance(now, Pull) and now.body == each.body):
-                release = each.model_copy(update={"time": now.time})
-                self._relay.apply(release)
-                self._actions.append(release)
-                self._done += 1
-
-    def switch(self, engine: str) -> str | None:
-        """Go on with another engine from the state as it is.
-
-        Choices that only the present engine knows are left to the other; it is told which.
-
-        Raises:
-            ActionError: the other engine cannot go on from here.
-        """
-        try:
-            self.act(Switch(time=0.0, engine=engine))
-        except ActionError as error:
-            stated = self._relay.wanted.model_dump(exclude_defaults=True)
-            own = [key for key in stated if key not in ("dt", "substeps", "iterations", "record_every")]
-            if not own:
-                raise
-            free: dict[str, Value] = {key: False if key == "half_kick" else None for key in own}
-            try:
-                self.act(Switch(time=0.0, engine=engine, settings=free))
-            except ActionError:
-                raise error from None
-            return f"left to {engine}: {', '.join(own)}"
-        return None
 
     def seek(self, step: int) -> Iterator[float]:
         """Go to a step, back or forth. Yields the share that is done, after each part of the way.
@@ -318,21 +270,21 @@ class Session:
                 relay = Relay.resumed(mark.point)
             except (Refusal, ActionError):
                 self.history.distrust()
-        self._relay.close()
+        self.relay.close()
         if relay is None or mark is None:
-            self._relay = Relay(self._scene, self._engine, self._settings)
-            self._step = self._done = 0
+            self.relay = Relay(self._scene, self._engine, self._settings)
+            self._step = self._script.done = 0
             self._mark = None
         else:
-            self._relay, self._step, self._done = relay, mark.step, mark.actions
+            self.relay, self._step, self._script.done = relay, mark.step, mark.actions
             self._mark = mark
         self.ended = None
         self._astray = self._exhausted = False
         self._calm = 0
         self._contacts.clear()
-        self._relay.contacts()
+        self.relay.contacts()
         self._redo()
-        self._previous = self._frame = self._relay.frame()
+        self._previous = self._frame = self.relay.frame()
 
     def recording(self) -> Recording:
         """Return the session up to now."""
@@ -341,10 +293,10 @@ class Session:
             engine=self._engine,
             settings=self._settings,
             actions=self.actions,
-            duration=self._relay.time,
-            state_hash=None if self._exhausted else self._relay.state_hash(),
+            duration=self.relay.time,
+            state_hash=None if self._exhausted else self.relay.state_hash(),
         )
 
     def close(self) -> None:
         """Release what the engine holds."""
-        self._relay.close()
+        self.relay.close()

@@ -14,9 +14,10 @@ from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Set
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, UnknownEngineError
 from sandbox.measure.replay import rerun
-from sandbox.play import history as history_module
-from sandbox.play.history import Mark
-from sandbox.play.session import Session, WrongWayError
+from sandbox.play.running import history as history_module
+from sandbox.play.running.history import Mark
+from sandbox.play.running.session import Session, WrongWayError
+from sandbox.play.running.switching import switch
 from sandbox.scene.file import from_document, load
 from sandbox.scene.model import Ball, Scene
 from sandbox.scene.shipped import find
@@ -398,17 +399,17 @@ def test_seek_can_be_given_up_for_another() -> None:
 def test_switch_leaves_to_the_other_engine_what_it_does_not_know() -> None:
     scene = SCENES["bounce"]
     session = played(Session(scene, "reference", scene.solver.replace(integrator="rk4", detection="swept")), 9)
-    note = session.switch("pymunk")
+    note = switch(session, "pymunk")
     assert note is not None
     assert note.startswith("left to pymunk: ")
     assert "integrator" in note
     assert session.engine == "pymunk"
     assert session.settings.dt == scene.solver.dt
-    assert session.switch("exact") is None
+    assert switch(session, "exact") is None
     assert_replays(played(session, 9))
     before = session.frame.state_hash()
     with pytest.raises(ActionError, match="zzz"):
-        session.switch("zzz")
+        switch(session, "zzz")
     assert session.frame.state_hash() == before
 
 

@@ -6,12 +6,13 @@ from time import perf_counter
 from sandbox.action import Action, ActionError, Launch
 from sandbox.engines.compiling import COMPILING
 from sandbox.measure.energy import energy_of
-from sandbox.play.between import between
-from sandbox.play.company import Company
 from sandbox.play.footage.film import Film
-from sandbox.play.pace import Pace
 from sandbox.play.picking import overlapping
-from sandbox.play.session import Session, WrongWayError
+from sandbox.play.running.between import between
+from sandbox.play.running.company import Company
+from sandbox.play.running.pace import Pace
+from sandbox.play.running.session import Session, WrongWayError
+from sandbox.play.running.switching import switch
 from sandbox.play.sight import Sight
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
@@ -162,7 +163,7 @@ class Live:
         """
         if self._seeking is not None:
             raise ActionError("wait until the way back is done")
-        told = self.session.switch(engine)
+        told = switch(self.session, engine)
         self._begin()
         return told
 

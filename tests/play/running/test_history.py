@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from sandbox.engines.checkpoint import Checkpoint
 from sandbox.engines.relay import Relay
-from sandbox.play import history as module
-from sandbox.play.history import APART, BYTES_PER_BODY, MOST, History, Mark
+from sandbox.play.running import history as module
+from sandbox.play.running.history import APART, BYTES_PER_BODY, MOST, History, Mark
 from sandbox.scene.file import from_document
 from sandbox.trajectory import Frame
 

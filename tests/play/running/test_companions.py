@@ -9,10 +9,10 @@ from sandbox.action import ActionError, Force, Impulse, Pull, Remove, Spawn, Swi
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.comparing import usual_tolerance
 from sandbox.measure.compare.truth import truth_of
-from sandbox.play import companions
-from sandbox.play.companions import Companion, Trust, apart, common, follows, ghost_of
-from sandbox.play.company import Company
-from sandbox.play.session import Session
+from sandbox.play.running import companions
+from sandbox.play.running.companions import Companion, Trust, apart, common, follows, ghost_of
+from sandbox.play.running.company import Company
+from sandbox.play.running.session import Session
 from sandbox.scene.file import from_document, load
 from sandbox.scene.model import Ball, Scene
 from sandbox.scene.settings import Settings

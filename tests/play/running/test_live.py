@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Spawn
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
-from sandbox.play import live as module
 from sandbox.play.footage.film import Film
-from sandbox.play.live import Live
-from sandbox.play.session import Session
-from sandbox.play.stored import Stored
+from sandbox.play.running import live as module
+from sandbox.play.running.live import Live
+from sandbox.play.running.session import Session
+from sandbox.play.running.stored import Stored
 from sandbox.scene.file import from_document, load
 from sandbox.scene.model import Ball, Scene
 from sandbox.scene.shipped import find

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.play.between import between
-from sandbox.play.pace import LONGEST, Pace
+from sandbox.play.running.between import between
+from sandbox.play.running.pace import LONGEST, Pace
 from sandbox.trajectory import FloatArray, Frame
 
 

@@ -2,12 +2,12 @@
 
 from sandbox.action import Action, ActionError
 from sandbox.engines.contract import Refusal
-from sandbox.play.companions import Companion, Trust, apart, follows, ghost_of
 from sandbox.play.footage.film import Film
-from sandbox.play.session import Session
+from sandbox.play.running.companions import Companion, Trust, apart, follows, ghost_of
+from sandbox.play.running.session import Session
+from sandbox.play.running.trails import Trails
+from sandbox.play.running.watch import Watch
 from sandbox.play.sight import Flash
-from sandbox.play.trails import Trails
-from sandbox.play.watch import Watch
 from sandbox.scene.meetings import meetings
 from sandbox.trajectory import Frame
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from sandbox.measure.energy import energy_of
 from sandbox.play.footage.film import Film
-from sandbox.play.pace import Pace
 from sandbox.play.picking import overlapping
+from sandbox.play.running.pace import Pace
 from sandbox.play.sight import Sight
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene

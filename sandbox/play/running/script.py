@@ -1,0 +1,61 @@
+"""Script: all that is done in a session, in order, and how far it has been done."""
+
+from sandbox.action import Action, Pull, Switch
+from sandbox.engines.relay import Relay
+
+ROUNDING = 1e-9
+"""Shares of a step by which an action may be late."""
+
+
+class Script:
+    """The actions of a session. What lies ahead was done before the session went back, and is done again."""
+
+    def __init__(self, actions: tuple[Action, ...] = ()) -> None:
+        self._actions = list(actions)
+        self.done = 0
+        """how many have been done"""
+
+    @property
+    def so_far(self) -> tuple[Action, ...]:
+        """What was done up to now."""
+        return tuple(self._actions[: self.done])
+
+    def redo(self, relay: Relay) -> None:
+        """Do what was done at this time.
+
+        Raises:
+            ActionError: the engine cannot do it, as may be with a recording of another.
+        """
+        due = relay.time + ROUNDING * relay.settings.dt
+        while self.done < len(self._actions) and self._actions[self.done].time <= due:
+            relay.apply(self._actions[self.done])
+            self.done += 1
+
+    def add(self, action: Action, relay: Relay) -> None:
+        """Take note of what has just been done; what lay ahead is forgotten.
+
+        Who was to be let go of later is let go of now, unless the action says more of it.
+        """
+        ahead, self._actions[self.done :] = self._actions[self.done :], []
+        for each in ahead:
+            goes_on = isinstance(action, Pull) and isinstance(each, Pull) and action.body == each.body
+            if isinstance(each, Pull) and each.target is None and not goes_on:
+                release = each.model_copy(update={"time": action.time})
+                relay.apply(release)
+                self._actions.append(release)
+        self._actions.append(action)
+        self.done = len(self._actions)
+
+    def hand_over(self, place: int, time: float) -> bool:
+        """Make it part of the session that it was taken up at a checkpoint; return whether it was not yet.
+
+        Args:
+            place: how many actions had been done there.
+            time: when that was, s.
+        """
+        handed_over = Switch(time=time)
+        if self._actions[:place][-1:] == [handed_over]:
+            return False
+        self._actions.insert(place, handed_over)
+        self.done += 1
+        return True
