@@ -114,6 +114,7 @@ def _saved(stage: "Stage", record: Path) -> bool:
         click.echo(f"--record: {record}: there is no session to save", err=True)
         return False
     try:
+        stage.live.arrive()
         stage.live.session.recording().save(record)
     except OSError as error:
         click.echo(f"--record: {record}: {error.strerror or error}", err=True)

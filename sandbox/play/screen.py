@@ -6,6 +6,8 @@ from contextlib import contextmanager
 
 import pygame
 
+from sandbox.play.drawing.palette import BACKGROUND, INK, SKY
+
 SIZE = (1280, 800)
 SMALLEST = (160, 120)
 SHARE = 0.9
@@ -41,6 +43,7 @@ def open_screen(size: tuple[int, int] | None, title: str) -> pygame.Surface:
         close_screen()
         raise NoDisplayError(f"no window can be opened: {str(error) or 'there is no display'}") from None
     pygame.display.set_caption(title, "sandbox")
+    pygame.display.set_icon(_icon())
     pygame.key.set_repeat(350, 40)
     return surface
 
@@ -82,3 +85,13 @@ def _fitting() -> tuple[int, int]:
     scale = unit()
     width, height = (max(round(side * SHARE), 1) for side in desktops[0])
     return max(min(round(SIZE[0] * scale), width), SMALLEST[0]), max(min(round(SIZE[1] * scale), height), SMALLEST[1])
+
+
+def _icon() -> pygame.Surface:
+    """Return a ball on a plane, and the ring of its ghost."""
+    icon = pygame.Surface((64, 64), pygame.SRCALPHA)
+    pygame.draw.rect(icon, BACKGROUND, icon.get_rect(), border_radius=12)
+    pygame.draw.line(icon, INK, (8, 52), (56, 52), 4)
+    pygame.draw.circle(icon, SKY, (28, 34), 16)
+    pygame.draw.circle(icon, INK, (38, 26), 16, 3)
+    return icon

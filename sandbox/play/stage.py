@@ -19,7 +19,7 @@ from sandbox.play.running.session import Session
 from sandbox.play.running.stored import Stored
 from sandbox.play.shelf import neighbour
 from sandbox.scene.document import to_document
-from sandbox.scene.faults import SceneError
+from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import Override, from_document, load
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -83,7 +83,8 @@ class Stage:
         try:
             scene = load(path, self._overrides)
         except SceneError as error:
-            self.faults = tuple(map(str, error.faults))
+            # By the file's own name: its folders would take the place of what is wrong.
+            self.faults = tuple(str(Fault(path.name, f.line, f.path, f.message)) for f in error.faults)
             return False
         return self._start(scene, path, scene, engine or self._engine, None, same)
 
@@ -139,7 +140,7 @@ class Stage:
     def toggle_ghost(self) -> None:
         """Begin a ghost from here, or end it."""
         if self.live is None:
-            self.messages.tell("a stored run has no ghost; replay it with --engine", "warning")
+            self._tell_why_not("has no ghost; replay it with --engine")
             return
         self._ghosted = not self.live.company.ghosted
         self.live.company.show_ghost(self._ghosted)
@@ -147,7 +148,7 @@ class Stage:
     def toggle_trust(self) -> None:
         """Begin to watch a twin from here, or end it."""
         if self.live is None:
-            self.messages.tell("a stored run has no twin; `sandbox play` plays its scene", "warning")
+            self._tell_why_not("has no twin; `sandbox play` plays its scene")
             return
         self._trusting = self.live.company.trust is None
         self.live.company.show_trust(self._trusting)
@@ -155,7 +156,7 @@ class Stage:
     def next_engine(self) -> None:
         """Go on with the next engine that can, from the same state; who cannot says why."""
         if not isinstance(self.show, Live):
-            self.messages.tell("a stored run cannot change its engine; replay it with --engine", "warning")
+            self._tell_why_not("cannot change its engine; replay it with --engine")
             return
         names = list(ENGINES)
         here = names.index(self.show.engine)
@@ -194,11 +195,15 @@ class Stage:
 
         self.act(turn)
 
+    def _tell_why_not(self, what: str) -> None:
+        """Say that what is on is no session."""
+        self.messages.tell(f"a stored run {what}" if self.show is not None else "no scene is open", "warning")
+
     def act(self, deed: Callable[[Live], object]) -> bool:
         """Do something to what is on, and say so where it cannot be done; return whether it could."""
         live = self.live
         if live is None:
-            self.messages.tell("a stored run cannot be changed; `sandbox play` plays its scene", "warning")
+            self._tell_why_not("cannot be changed; `sandbox play` plays its scene")
             return False
         try:
             deed(live)

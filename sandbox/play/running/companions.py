@@ -101,7 +101,8 @@ def common(settings: Settings) -> Settings:
 class Trust:
     """Whether what is seen can still be trusted: a twin, moved by 1e-12 m at first, is still at the same places.
 
-    Past that horizon the scene is chaotic: what is seen is one of many things that might as well have happened.
+    Past that horizon what is seen is one of many things that might as well have happened: the scene is chaotic, or
+    the nudge decides in which step an engine that looks at steps alone sees a contact.
     """
 
     def __init__(self, point: Checkpoint) -> None:

@@ -96,6 +96,7 @@ class Live:
             return
         if paused or self.session.ended is not None:
             self.pace.rest()
+            self.session.rest()
             return
         dt = self.session.settings.dt
         asked = self.pace.due(elapsed, dt)
@@ -116,6 +117,7 @@ class Live:
         """Make one step."""
         self.pace.rest()
         self._advance(1, None)
+        self.session.rest()
 
     def _advance(self, steps: int, until: float | None) -> int:
         before = self.session.time
@@ -180,6 +182,11 @@ class Live:
         self._contacts, self._since = self.session.contacts(), self.session.settings.dt
         self.company.begin()
 
+    def arrive(self) -> None:
+        """Go the rest of the way to where we are going, however long it takes."""
+        while self._seeking is not None:
+            self._go_there()
+
     def back(self) -> None:
         """Set out for the step before."""
         if self.session.step_number > 0 and self._seeking is None:
@@ -219,6 +226,7 @@ class Live:
             except StopIteration:
                 self._seeking = None
         if self._seeking is None:
+            self.session.rest()
             self._begin()
 
     @property

@@ -129,6 +129,10 @@ class Session:
         """The state one step before, or the present one where there is none to go by."""
         return self._previous
 
+    def rest(self) -> None:
+        """Forget the state before: until the next step, pictures show the present one."""
+        self._previous = self._frame
+
     @property
     def actions(self) -> tuple[Action, ...]:
         """All that was done, up to now."""
