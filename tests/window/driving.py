@@ -219,17 +219,23 @@ class Driven:
 
 
 def start_server() -> tuple[subprocess.Popen[bytes], str]:
-    """Start an X server on a display that is free; return it, and the display's name."""
+    """Start an X server on a display of its own; return it, and the display's name.
+
+    A server that is left to choose takes no lock: two that start together may take the same display. So this process's
+    number, which no other has, says which.
+    """
+    number = 100 + os.getpid() % 50_000
     read, write = os.pipe()
     screen = f"{SCREEN[0]}x{SCREEN[1]}x24"
     # -r: no key repeats by itself, however late its release comes on a busy machine. -noreset: it stays as it is
     # between one window and the next, who might come while it starts anew.
-    words = ["Xvfb", "-displayfd", str(write), "-screen", "0", screen, "-nolisten", "tcp", "-r", "-noreset"]
+    quiet = ("-nolisten", "tcp", "-r", "-noreset")
+    words = ["Xvfb", f":{number}", "-displayfd", str(write), "-screen", "0", screen, *quiet]
     server = subprocess.Popen(words, pass_fds=[write], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(write)
     with os.fdopen(read) as answer:
-        number = answer.readline().strip()
-    assert number, "Xvfb did not start"
+        said = answer.readline().strip()
+    assert said == str(number), "Xvfb did not start"
     return server, f":{number}"
 
 
