@@ -71,14 +71,19 @@ class Driven:
             self.process = subprocess.Popen(
                 command(*arguments, "--size", size), cwd=folder, env=self._env, stdout=out, stderr=err
             )
-        found = self.wait_for(lambda: self._find(), "a window")
-        self.window = int(found)
-        self.focus()
-        self.wait_until(lambda shot: len(np.unique(shot.reshape(-1, 3)[::97], axis=0)) > 2, "anything in the window")
+        try:
+            self.window = self.wait_for(self._find, "a window")
+            self.wait_until(lambda shot: len(np.unique(shot.reshape(-1, 3)[::97], axis=0)) > 2, "anything to see")
+            self.window = self._find()  # SDL may have made it anew for its first picture
+            self.focus()
+        except BaseException:
+            self.end()  # nobody else knows of it yet
+            raise
 
-    def _find(self) -> str:
-        found = self._run("search", "--onlyvisible", "--class", "sandbox")
-        return found.stdout.split()[0] if found.stdout.split() else ""
+    def _find(self) -> int:
+        # By its process too: the window of one that has just ended may be there a moment longer.
+        found = self._run("search", "--all", "--onlyvisible", "--pid", self.process.pid, "--class", "sandbox")
+        return int(found.stdout.split()[0]) if found.stdout.split() else 0
 
     def _run(self, *arguments: object) -> subprocess.CompletedProcess[str]:
         words = ["xdotool", *map(str, arguments)]

@@ -90,9 +90,7 @@ class Taking:
         if not isinstance(show, Live):
             self._tell("a stored run is stored already" if show is not None else "there is no session yet", "warning")
             return
-        if show.busy is not None:
-            self._tell(f"{show.busy}: wait until that is done", "warning")
-            return
+        show.arrive()  # where we are going is what is to be kept, not somewhere on the way
         outfile = Outfile.numbered(self._folder, name, ".json")
         try:
             show.session.recording().save(outfile.temporary)
