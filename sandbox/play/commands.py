@@ -1,12 +1,10 @@
-"""Commands: what each key and button does to the window."""
+"""Commands: what each key and button does."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from sandbox.play.keys import Command
-
-if TYPE_CHECKING:
-    from sandbox.play.window import Window
+from sandbox.play.mouse import Mouse
+from sandbox.play.seat import Seat
 
 BUTTONS = {
     "play": Command.PAUSE,
@@ -27,9 +25,9 @@ BUTTONS = {
 class Commands:
     """One function for each command."""
 
-    def __init__(self, window: "Window") -> None:
-        self._window = window
-        stage, desk = window.stage, window.desk
+    def __init__(self, seat: Seat, mouse: Mouse) -> None:
+        self._seat, self._mouse = seat, mouse
+        stage, desk = seat.stage, seat.desk
         self._deeds: dict[Command, Callable[[], object]] = {
             Command.PAUSE: self._pause,
             Command.STEP: stage.step,
@@ -43,12 +41,12 @@ class Commands:
             Command.ENGINE: stage.next_engine,
             Command.GHOST: stage.toggle_ghost,
             Command.TRUST: stage.toggle_trust,
-            Command.HOME: window.home,
+            Command.HOME: seat.home,
             Command.PANEL: self._panel,
             Command.HELP: desk.toggle_help,
             Command.SCREENSHOT: self._screenshot,
             Command.RECORD: self._record,
-            Command.SAVE: lambda: window.taking.session(stage.show, window.name),
+            Command.SAVE: lambda: seat.taking.session(stage.show, seat.name),
             Command.RELOAD: stage.reload,
             Command.SOUND: lambda: stage.messages.tell(*desk.toggle_sound()),
             Command.DELETE: lambda: stage.act(stage.hands.remove),
@@ -63,41 +61,41 @@ class Commands:
     def do(self, command: Command) -> None:
         """Do what a command says."""
         if command.overlay is not None:
-            self._window.desk.overlays ^= {command.overlay}
+            self._seat.desk.overlays ^= {command.overlay}
         else:
             self._deeds[command]()
 
     def toggle(self, name: str) -> None:
         """Turn one of the panel's switches."""
         if name == "antialias":
-            self._window.desk.antialias = not self._window.desk.antialias
+            self._seat.desk.antialias = not self._seat.desk.antialias
         else:
             self.do(Command(name))
 
     def _pause(self) -> None:
-        self._window.stage.paused = not self._window.stage.paused
+        self._seat.stage.paused = not self._seat.stage.paused
 
     def _panel(self) -> None:
-        desk = self._window.desk
+        desk = self._seat.desk
         desk.panel.visible = not desk.panel.visible
-        if self._window.at_home:
-            self._window.home()
+        if self._seat.at_home:
+            self._seat.home()
 
     def _screenshot(self) -> None:
-        self._window.taking.picture(self._window.surface, self._window.name)
+        self._seat.taking.picture(self._seat.surface, self._seat.name)
 
     def _record(self) -> None:
-        taking = self._window.taking
+        taking = self._seat.taking
         if taking.filming:
             taking.end_film()
         else:
-            taking.begin_film(self._window.surface.get_size(), self._window.name)
+            taking.begin_film(self._seat.surface.get_size(), self._seat.name)
 
     def _add(self) -> None:
-        window = self._window
-        place = window.mouse.world()
-        size = min(window.camera.size) / window.camera.scale
-        window.stage.act(lambda live: window.stage.hands.add(live, place, size))
+        seat = self._seat
+        place = self._mouse.world()
+        size = min(seat.camera.size) / seat.camera.scale
+        seat.stage.act(lambda live: seat.stage.hands.add(live, place, size))
 
     def _quit(self) -> None:
-        self._window.leaving = 0
+        self._seat.leaving = 0

@@ -1,11 +1,8 @@
 """Mouse: what it does to the picture and the bodies in it."""
 
-from typing import TYPE_CHECKING
-
 import pygame
 
-if TYPE_CHECKING:
-    from sandbox.play.window import Window
+from sandbox.play.seat import Seat
 
 NOTCH = 1.15
 """by which the wheel brings things closer"""
@@ -16,26 +13,26 @@ REACH = 6.0
 class Mouse:
     """Zooms, pans, picks, pulls and moves."""
 
-    def __init__(self, window: "Window") -> None:
-        self._window = window
+    def __init__(self, seat: Seat) -> None:
+        self._seat = seat
         self._panning = False
         self.place: tuple[int, int] | None = None
         """where it is, px; None before it was over the picture"""
 
     def take(self, event: pygame.event.Event) -> None:
         """Take an event in that nobody else wanted."""
-        window = self._window
+        seat = self._seat
         if event.type == pygame.MOUSEWHEEL:
             notches = getattr(event, "precise_y", 0.0) or float(event.y)
-            window.camera = window.camera.zoomed(NOTCH**notches, pygame.mouse.get_pos())
-            window.at_home = False
+            seat.camera = seat.camera.zoomed(NOTCH**notches, pygame.mouse.get_pos())
+            seat.at_home = False
         elif event.type == pygame.MOUSEBUTTONDOWN:
             self.place = event.pos
             if event.button in (2, 3):
                 self._panning = True
             elif event.button == 1:
-                reach = REACH * window.desk.unit / window.camera.scale
-                window.stage.grasp(window.camera.to_world(event.pos), reach)
+                reach = REACH * seat.desk.unit / seat.camera.scale
+                seat.stage.grasp(seat.camera.to_world(event.pos), reach)
         elif event.type == pygame.MOUSEMOTION:
             self._move(event)
         elif event.type == pygame.MOUSEBUTTONUP:
@@ -48,22 +45,22 @@ class Mouse:
             self._let_go()
 
     def _move(self, event: pygame.event.Event) -> None:
-        window = self._window
+        seat = self._seat
         self.place = event.pos
         if self._panning:
-            window.camera = window.camera.panned(event.rel)
-            window.at_home = False
-        elif window.stage.hands.holding:
-            place = window.camera.to_world(event.pos)
-            if not window.stage.act(lambda live: window.stage.hands.drag(live, place)):
-                window.stage.hands.drop()
+            seat.camera = seat.camera.panned(event.rel)
+            seat.at_home = False
+        elif seat.stage.hands.holding:
+            place = seat.camera.to_world(event.pos)
+            if not seat.stage.act(lambda live: seat.stage.hands.drag(live, place)):
+                seat.stage.hands.drop()
 
     def _let_go(self) -> None:
-        stage = self._window.stage
+        stage = self._seat.stage
         if stage.hands.holding and not stage.act(stage.hands.let_go):
             stage.hands.drop()
 
     def world(self) -> tuple[float, float]:
         """Return the place that it points at, m; before it points at any, the middle of the picture."""
-        camera = self._window.camera
+        camera = self._seat.camera
         return camera.centre if self.place is None else camera.to_world(self.place)

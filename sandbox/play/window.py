@@ -13,22 +13,18 @@ from types import FrameType
 import pygame
 
 from sandbox.engines.compiling import COMPILING
-from sandbox.play.camera import Camera
 from sandbox.play.commands import Commands
-from sandbox.play.desk import Desk
-from sandbox.play.footage.taking import Taking
-from sandbox.play.framing import framing
 from sandbox.play.keys import Keyboard
 from sandbox.play.mouse import Mouse
 from sandbox.play.screen import close_screen, open_screen, unit
+from sandbox.play.seat import TITLE, Seat
 from sandbox.play.stage import Stage
 
 RATE = 60
 """pictures a second, at most"""
-TITLE = "sandbox"
 
 
-class Window:
+class Window(Seat):
     """The window. It owns the display from `open` to `close`."""
 
     def __init__(
@@ -52,52 +48,15 @@ class Window:
         Raises:
             NoDisplayError: there is no display.
         """
-        self.surface = open_screen(size, TITLE)
-        self.stage, self._say = stage, say
-        self.taking = Taking(folder or Path(), film, self.tell)
-        self.desk = Desk(self.surface.get_size(), unit())
-        self.camera = Camera((0.0, 0.0), 100.0, self.surface.get_size())
-        self.at_home = True
-        """whether the camera is where Home puts it; a new scene is then seen whole"""
-        self.leaving: int | None = None
-        """the exit status, once the window is to close"""
+        super().__init__(open_screen(size, TITLE), unit(), stage, folder or Path(), film, say)
         self._keyboard = Keyboard()
-        self.commands = Commands(self)
         self.mouse = Mouse(self)
+        self.commands = Commands(self, self.mouse)
         self._clock = pygame.time.Clock()
         stage.on_new = self.renew
         COMPILING.on_begin = self._show_wait
         if stage.show is not None:
             self.renew(False)
-
-    def tell(self, text: str, level: str = "info") -> None:
-        """Say something in the window and on the terminal."""
-        self.stage.messages.tell(text, level)
-        self._say(text)
-
-    def renew(self, same: bool) -> None:
-        """Look at what is on now; the same scene as before is seen from where it was seen."""
-        if self.at_home:
-            self.home()
-        self.desk.renew(same)
-        show = self.stage.show
-        pygame.display.set_caption(f"{show.scene.title or self.name} - {TITLE}" if show is not None else TITLE)
-
-    @property
-    def name(self) -> str:
-        """What files of this scene are called by: its file, or where it has none, its title."""
-        if self.stage.path is not None:
-            return self.stage.path.stem
-        show = self.stage.show
-        return (show.scene.title if show is not None else "") or "scene"
-
-    def home(self) -> None:
-        """Show the scene whole."""
-        self.at_home = True
-        show = self.stage.show
-        if show is not None:
-            size = self.surface.get_size()
-            self.camera = Camera.fitting(framing(show.scene), size, inset=self.desk.panel.width, foot=self.desk.foot)
 
     def run(self) -> int:
         """Play until the window is closed; return the exit status."""
@@ -153,11 +112,7 @@ class Window:
         surface = pygame.display.get_surface()
         if surface is None or surface.get_size() == self.camera.size:
             return
-        self.surface = surface
-        self.desk.resize(surface.get_size())
-        self.camera = self.camera.resized(surface.get_size())
-        if self.at_home:
-            self.home()
+        self.resize(surface)
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
