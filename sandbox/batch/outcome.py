@@ -27,6 +27,12 @@ class Outcome:
     repeated: bool
     """It was in the store already, and was not run again."""
 
+    @property
+    def replayed(self) -> bool | None:
+        """Whether a recorded session ended in its own state, bit for bit; None where there is none to compare with."""
+        wanted, found = self.job.state_hash, self.trajectory.info.get("state_hash")
+        return None if wanted is None or found is None else bool(wanted == found)
+
     def row(self, final: bool = True) -> dict[str, Any]:
         """Return the run as one JSON object, with or without the final state; figures that are not finite are null."""
         run, info = self.trajectory, self.trajectory.info
@@ -54,6 +60,8 @@ class Outcome:
             "retired": {
                 str(name): time for name, time in zip(run.names, run.retired_time.tolist(), strict=True) if time == time
             },
+            "state_hash": info.get("state_hash"),
+            **({"replayed": self.replayed} if self.job.recorded else {}),
             **({"final": self._final()} if final else {}),
             "path": None if self.path is None else str(self.path),
             "repeated": self.repeated,

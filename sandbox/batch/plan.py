@@ -31,6 +31,10 @@ class Job:
     actions: tuple[Any, ...] = ()
     point: tuple[tuple[str, Any], ...] = ()
     """the swept keys and this run's values"""
+    recorded: bool = False
+    """It is a session that was played before."""
+    state_hash: str | None = None
+    """of the end of that session, where this run is to end alike: on its engine, with nothing set"""
 
 
 def plan(
@@ -69,7 +73,8 @@ def plan(
                 continue
             for engine in engines or (session.engine,):
                 played = session if engine == session.engine else session.on(engine)
-                jobs.append(Job(label, played.scene, engine, played.actions, point))
+                known = None if overrides or point else played.state_hash
+                jobs.append(Job(label, played.scene, engine, played.actions, point, _is_recording(path), known))
     if faults:
         raise SceneError(tuple(faults))
     return jobs
@@ -81,13 +86,17 @@ def _read(path: str, overrides: Sequence[Override]) -> Recording:
     Raises:
         SceneError: it has faults.
     """
-    if not path.lower().endswith(".json"):
+    if not _is_recording(path):
         scene = load(path, overrides)
         return Recording(scene, USUAL, scene.solver, (), scene.world.duration)
     session = Recording.load(path)
     document = to_document(session.whole_scene)
     document["solver"] = session.settings.model_dump(mode="json", exclude_defaults=True)
     return replace(session, scene=from_document(document, path, overrides))
+
+
+def _is_recording(path: str) -> bool:
+    return path.lower().endswith(".json")
 
 
 def parse_sweep(text: str) -> tuple[str, list[Any]]:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from sandbox.cli.reading import gathering, paths_of
+from sandbox.cli.reading import gathering, paths_of, require_scene
 from sandbox.cli.showing import show_stage, window_options
 from sandbox.engines.registry import UnknownEngineError, able, engine_named
 from sandbox.scene.faults import Fault, SceneError
@@ -35,6 +35,7 @@ def command(
     with gathering(faults):
         if scene is not None:
             path = Path(paths_of([scene])[0][1])
+            require_scene(scene, str(path))
             found = load(path, overrides)
             missing = engine_named(engine).missing(found, found.solver) if not faults else ()
             if missing:

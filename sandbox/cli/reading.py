@@ -28,6 +28,17 @@ def paths_of(names: Sequence[str]) -> list[tuple[str, str]]:
     return found
 
 
+def require_scene(name: str, path: str) -> None:
+    """Make sure by a file's ending that it is to be a scene, not what `sandbox replay` shows.
+
+    Raises:
+        SceneError: it is a recorded session or a stored run; the fault names the command for it.
+    """
+    for ending, what in ((".json", "a recorded session"), (".npz", "a stored run")):
+        if path.lower().endswith(ending):
+            raise SceneError([Fault(name, None, "", f"is {what}, no scene; `sandbox replay {name}` shows it")])
+
+
 @contextmanager
 def gathering(faults: list[Fault], place: str = "", also: tuple[type[Exception], ...] = ()) -> Iterator[None]:
     """Add what is wrong to a list of faults and go on, so that all are told at once.

@@ -1,5 +1,6 @@
 """`sandbox replay`: a stored run, or a recorded session, in the window."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,8 @@ from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.recording import Recording
 from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -48,21 +51,21 @@ def command(
             return 1
         try:
             with gathering(faults, run, (UnknownEngineError,)):
-                show = _computed(source, engine) if engine or isinstance(source, Recording) else _stored(source)
+                show = _shown(source, engine)
         except Refusal as refusal:
             click.echo(f"{run}: {refusal}", err=True)
             return 1
-    if show is None:
+    if source is None or show is None:
         for fault in faults:
             click.echo(str(fault), err=True)
         return 2
 
     from sandbox.play.stage import Stage
 
-    stage, put_on = Stage(show.engine), show
+    stage, first, known = Stage(show.engine), show, source
     return show_stage(
         stage,
-        lambda: stage.put_on(put_on, None, put_on.scene),
+        lambda: stage.put_on(first, None, first.scene, again=lambda: _shown(known, engine)),
         size=size,
         paused=paused,
         film=film,
@@ -70,6 +73,10 @@ def command(
         ghost=ghost,
         record=record,
     )
+
+
+def _shown(source: Trajectory | Recording, engine: str | None) -> "Live | Stored":
+    return _computed(source, engine) if engine or isinstance(source, Recording) else _stored(source)
 
 
 def _stored(run: Trajectory) -> "Stored":
@@ -97,21 +104,56 @@ def _computed(source: Trajectory | Recording, engine: str | None) -> "Live":
         UnknownEngineError: the session is of an engine that is not here.
         Refusal: the engine cannot run it.
     """
-    import json
-
-    from sandbox.action import ActionError, actions_from_json
     from sandbox.play.footage.film import Film
     from sandbox.play.running.live import Live
     from sandbox.play.running.session import Session
 
+    film = None
     if isinstance(source, Recording):
         session = source if engine is None else source.on(engine)
-        played = Session(session.scene, session.engine, session.settings, session.actions)
-        return Live(played, until=source.duration)
-    film = Film(source)
+    else:
+        film = Film(source)
+        session = _session_of(source, film.scene, film.duration)
+        if engine is not None and engine != session.engine:
+            session = session.on(engine)
+        session = replace(session, settings=_fitting(session.settings, session.scene, session.engine))
+    played = Session(session.scene, session.engine, session.settings, session.actions)
+    return Live(played, film, until=session.duration)
+
+
+def _session_of(run: Trajectory, scene: Scene, duration: float) -> Recording:
+    """Return what was done in a stored run.
+
+    Raises:
+        SceneError: its settings or actions are none.
+    """
+    import json
+
+    from pydantic import ValidationError
+
+    from sandbox.action import ActionError, actions_from_json
+
     try:
-        actions = actions_from_json(json.dumps(source.info.get("actions", [])))
+        settings = Settings.model_validate(run.info["settings"])
+        actions = actions_from_json(json.dumps(run.info.get("actions", [])))
+    except (KeyError, ValidationError):
+        raise SceneError([Fault("<run>", None, "settings", "they are none")]) from None
     except ActionError as error:
         raise SceneError([Fault("<run>", None, "actions", line) for line in str(error).splitlines()]) from None
-    name = engine or str(source.info["engine"])
-    return Live(Session(film.scene, name, actions=actions), film, until=film.duration)
+    return Recording(scene, str(run.info["engine"]), settings, actions, duration)
+
+
+def _fitting(settings: Settings, scene: Scene, engine: str) -> Settings:
+    """Return the settings of a run as an engine takes them; what it does not know is left to it.
+
+    The engine of the run, too, may refuse some of what it has filled in itself, such as a slop beside springs.
+    """
+    from sandbox.play.running.switching import COMMON
+
+    chosen, stated = engine_named(engine), settings.model_dump()
+    fitting = Settings(**{key: stated.pop(key) for key in COMMON})
+    for key in sorted(stated, key=lambda key: key != "response"):  # which some others go with
+        tried = fitting.replace(**{key: stated[key]})
+        if not chosen.missing(scene, tried):
+            fitting = tried
+    return fitting

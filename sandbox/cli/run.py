@@ -109,6 +109,10 @@ def command(
         if row["status"] != "ok":
             status = status or 1
             click.echo(f"{row['scene']}: {row['status']}: {row['reason']}", err=True)
+        if row.get("replayed") is False:
+            status = status or 1
+            message = "ended in another state than the session did; other versions of the engines lead elsewhere"
+            click.echo(f"{row['scene']}: {message}", err=True)
     if as_json:
         print_json({"runs": rows})
     elif not quiet and rows:

@@ -52,6 +52,8 @@ def read_run(path: Path, name: str) -> Trajectory | Recording:
             begins = stream.read(4096).lstrip()
         if begins.startswith(b"{"):
             return Recording.load(path)
+        if path.suffix.lower() == ".toml":
+            raise ValueError(f"is a scene; `sandbox play {name}` plays it, `sandbox run {name} --out DIR` stores a run")
         if not begins.startswith(b"PK"):
             raise ValueError("neither a stored run (.npz) nor a recording (.json)")
         run = Trajectory.load(path)

@@ -123,6 +123,11 @@ class Relay:
         return MappingProxyType({**self._retired, **self._leg.retired})
 
     @property
+    def pulls(self) -> Mapping[str, Pull]:
+        """The hands that hold bodies, by the bodies' names."""
+        return self._hands.pulls
+
+    @property
     def work(self) -> Mapping[str, int]:
         """What was done so far, by all engines that took part."""
         return dict(self._work + Counter(self._leg.simulation.work)) if self._work else self._leg.simulation.work

@@ -28,6 +28,10 @@ class Claims(NamedTuple):
     told: tuple[tuple[str, str], ...]
     """keys and what they do, as help names them"""
 
+    def deed(self, key: int, again: bool) -> Deed | None:
+        """Return what a key does; held, and so pressed again and again, only the arrows go on."""
+        return None if again and key not in ARROWS else self.deeds.get(key)
+
 
 def claims(scene: Scene, hands: Hands) -> Claims:
     """Return the keys that a scene claims."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from sandbox.play.instruments.knob import Value
 from sandbox.play.keys import Command
 from sandbox.play.mouse import Mouse
 from sandbox.play.seat import Seat
@@ -27,6 +28,7 @@ class Commands:
 
     def __init__(self, seat: Seat, mouse: Mouse) -> None:
         self._seat, self._mouse = seat, mouse
+        self._turned: dict[str, Value] = {}  # knobs since the last `settle`, the last turned last
         stage, desk = seat.stage, seat.desk
         self._deeds: dict[Command, Callable[[], object]] = {
             Command.PAUSE: self._pause,
@@ -35,7 +37,7 @@ class Commands:
             Command.RESTART: stage.restart,
             Command.PREVIOUS: lambda: stage.walk(-1),
             Command.NEXT: lambda: stage.walk(1),
-            Command.PICKER: lambda: desk.open_picker(stage.path),
+            Command.PICKER: self._picker,
             Command.SLOWER: stage.slower,
             Command.FASTER: stage.faster,
             Command.ENGINE: stage.next_engine,
@@ -43,7 +45,7 @@ class Commands:
             Command.TRUST: stage.toggle_trust,
             Command.HOME: seat.home,
             Command.PANEL: self._panel,
-            Command.HELP: desk.toggle_help,
+            Command.HELP: self._help,
             Command.SCREENSHOT: self._screenshot,
             Command.RECORD: self._record,
             Command.SAVE: lambda: seat.taking.session(stage.show, seat.name),
@@ -56,10 +58,11 @@ class Commands:
         }
         desk.panel.on_button = lambda name: self.do(BUTTONS[name])
         desk.panel.on_toggle = lambda name, _: self.toggle(name)
-        desk.panel.on_change = lambda key, value, _: stage.turn(key, value)
+        desk.panel.on_change = self._turn
 
     def do(self, command: Command) -> None:
-        """Do what a command says."""
+        """Do what a command says, after what came before it."""
+        self.settle()
         if command.overlay is not None:
             self._seat.desk.overlays ^= {command.overlay}
         else:
@@ -72,10 +75,36 @@ class Commands:
         else:
             self.do(Command(name))
 
+    def settle(self) -> None:
+        """Act on where knobs and the mouse are by now: once a turn, however many motions led there."""
+        turned, self._turned = self._turned, {}
+        for key, value in turned.items():
+            self._seat.stage.turn(key, value)
+        self._mouse.settle()
+
+    def _turn(self, key: str, value: Value, _: bool) -> None:
+        self._turned.pop(key, None)
+        self._turned[key] = value
+
+    def _let_go(self) -> None:
+        """Let go of everything, as something comes that hides the releases."""
+        self._mouse.let_go()
+        self._seat.desk.panel.release()
+        self.settle()
+
+    def _picker(self) -> None:
+        self._let_go()
+        self._seat.desk.open_picker(self._seat.stage.path)
+
+    def _help(self) -> None:
+        self._let_go()
+        self._seat.desk.toggle_help()
+
     def _pause(self) -> None:
         self._seat.stage.paused = not self._seat.stage.paused
 
     def _panel(self) -> None:
+        self._let_go()
         desk = self._seat.desk
         desk.panel.visible = not desk.panel.visible
         if self._seat.at_home:

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pygame
 
+from sandbox.play.account import account
 from sandbox.play.camera import Camera
 from sandbox.play.claims import Claims, claims
 from sandbox.play.drawing.palette import BACKGROUND, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
-from sandbox.play.facts import facts, told
 from sandbox.play.instruments.graph import EnergyGraph
 from sandbox.play.instruments.hud import draw_hud
 from sandbox.play.instruments.manual import Manual
@@ -47,12 +47,14 @@ class Desk:
         self._size = size
         self._claims: tuple[object, Claims] | None = None
         self._heard: object = None
+        self._untold = False  # the keys that the scene claims
+        self._faults = pygame.Rect(0, 0, 0, 0)  # where they are shown
 
     def renew(self, same: bool) -> None:
         """Forget what was of the scene before."""
         self._graph.clear()
         if not same:
-            self._claims = None
+            self._claims, self._untold = None, True
 
     def resize(self, size: tuple[int, int]) -> None:
         """Fit all to a window of another size, px."""
@@ -99,7 +101,14 @@ class Desk:
         return ("sound on", "info") if self._sounds.enable() else (self._sounds.why, "warning")
 
     def handle(self, event: pygame.event.Event, stage: Stage) -> bool:
-        """Let what lies on top take an event in; return whether it was used up."""
+        """Let what lies on top take an event in; return whether it was used up.
+
+        What ends a drag never is: whoever else holds something has to learn of it.
+        """
+        ends = event.type in (pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST)
+        return self._use(event, stage) and not ends
+
+    def _use(self, event: pygame.event.Event, stage: Stage) -> bool:
         if self.picker is not None and event.type != pygame.QUIT:
             path = self.picker.handle(event)
             if path is not None:
@@ -107,7 +116,7 @@ class Desk:
             if path is not None or self.picker.closed:
                 self.picker = None
             return True
-        if self.manual.handle(event) or self.panel.handle(event):
+        if self.manual.handle(event) or self._close_faults(event, stage) or self.panel.handle(event):
             return True
         show = stage.show
         if show is not None and self._area.height:
@@ -120,6 +129,14 @@ class Desk:
                 show.settle()
             return held or self._timeline.held
         return False
+
+    def _close_faults(self, event: pygame.event.Event, stage: Stage) -> bool:
+        escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
+        click = event.type == pygame.MOUSEBUTTONDOWN and event.button <= 3 and self._faults.collidepoint(event.pos)
+        if not stage.faults or not (escape or click):
+            return False
+        stage.faults = ()
+        return True
 
     def draw(self, surface: pygame.Surface, camera: Camera, stage: Stage, rate: float, recording: str | None) -> None:
         """Draw all."""
@@ -138,7 +155,7 @@ class Desk:
                 self._heard = show.contacts
                 self._sounds.hits(show.contacts, show.bodies)
         status = self.status(stage, rate, recording)
-        draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot)
+        self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot)
         if show is not None:
             self._draw_graph(surface, stage)
             if self.foot:
@@ -194,38 +211,11 @@ class Desk:
 
     def status(self, stage: Stage, rate: float, recording: str | None) -> Status:
         """Return what is told in words."""
-        show, messages = stage.show, stage.messages.shown()
-        if show is None:
-            return Status("No scene", "Ctrl+O", "pick one", 0, 0.0, messages=messages, faults=stage.faults)
-        picked = stage.hands.picked
-        live = stage.live
-        company = live.company if live is not None else None
-        trust = company.trust if company is not None else None
-        return Status(
-            title=show.scene.title or (stage.path.stem if stage.path is not None else "scene"),
-            engine=show.engine,
-            settings=told(show.settings),
-            step=show.step_number,
-            time=show.frame.time,
-            paused=stage.paused,
-            replay=live is None,
-            speed=show.pace.speed,
-            real_speed=show.pace.real_speed,
-            frames_per_second=rate,
-            trust=trust.state if trust is not None else "unknown",
-            horizon=trust.horizon if trust is not None else None,
-            spread=trust.spread if trust is not None else None,
-            ghost=company.ghost_engine if company is not None else None,
-            distance=company.distance if company is not None else None,
-            missed=show.missed,
-            energy=None,
-            recording=recording,
-            busy=show.busy,
-            picked=facts(show.bodies, show.frame, show.contacts, picked) if picked is not None else (),
-            messages=messages,
-            faults=stage.faults,
-            claimed=self.claims(stage).told,
-        )
+        if self._untold:
+            self._untold = False
+            for keys, what in self.claims(stage).told:
+                stage.messages.tell(f"{keys}: {what}")
+        return account(stage, self.claims(stage).told, rate, recording)
 
     def close(self) -> None:
         """Fall silent."""

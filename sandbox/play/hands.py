@@ -2,7 +2,7 @@
 
 import math
 
-from sandbox.action import Impulse, Move, Pull, Remove, Spawn
+from sandbox.action import ActionError, Impulse, Move, Pull, Remove, Spawn
 from sandbox.play.picking import picked
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
@@ -21,6 +21,9 @@ class Hands:
         self.picked: int | None = None
         """number of the body whose figures are shown"""
         self._held: str | None = None
+        self._spot: Place = (0.0, 0.0)
+        self._offset: Place = (0.0, 0.0)
+        self._angle = 0.0
         self._grip: Place = (0.0, 0.0)
         self._moving = False
         self._hand: Place = (0.0, 0.0)
@@ -34,36 +37,48 @@ class Hands:
         """Return the picked body's number, unless that body has not come yet: the session may have gone back."""
         return self.picked if self.picked is not None and self.picked < len(live.bodies) else None
 
-    def look(self, show: Stored, place: Place, reach: float) -> bool:
-        """Pick the body at a place of a stored run; return whether there is one."""
-        self.picked = picked(show.bodies, show.frame, place, reach)
-        return self.picked is not None
+    def look(self, show: Live | Stored, place: Place, reach: float) -> bool:
+        """Pick the body at a place, and do nothing to it; return whether there is one."""
+        frame = show.frame
+        self.picked = number = picked(show.bodies, frame, place, reach)
+        if number is None:
+            return False
+        x, y = frame.position[number].tolist()
+        self._spot, self._offset, self._angle = place, (place[0] - x, place[1] - y), float(frame.angle[number])
+        return True
 
     def grasp(self, live: Live, place: Place, reach: float, paused: bool) -> bool:
         """Pick the body at a place, and take hold of it; return whether there is one.
 
-        While paused a held body is moved, else it is pulled by a spring.
-
         Raises:
             ActionError: it cannot be held; it is picked all the same.
         """
-        self.picked = number = picked(live.bodies, live.frame, place, reach)
-        if number is None:
+        if not self.look(live, place, reach):
             return False
-        frame, name = live.frame, live.bodies.names[number]
-        x, y = frame.position[number].tolist()
-        offset = place[0] - x, place[1] - y
-        self._moving, self._hand = paused, place
-        if paused:
-            self._held, self._grip = name, offset
-            return True
-        if live.bodies.fixed[number]:
-            return True
-        cos, sin = math.cos(float(frame.angle[number])), math.sin(float(frame.angle[number]))
-        self._grip = cos * offset[0] + sin * offset[1], cos * offset[1] - sin * offset[0]
-        live.act(Pull(time=0.0, body=name, grip=self._grip, target=place))
-        self._held = name
+        self.hold(live, paused)
         return True
+
+    def hold(self, live: Live, paused: bool) -> None:
+        """Take hold of the picked body, at the point of it that was looked at, however far it has gone since.
+
+        While paused a held body is moved, else it is pulled by a spring; a fixed one cannot be pulled, and stays.
+
+        Raises:
+            ActionError: it cannot be held.
+        """
+        number = self.picked_of(live)
+        if number is None:
+            return
+        name = live.bodies.names[number]
+        self._moving, self._hand = paused, self._spot
+        if paused:
+            self._grip = _turned(self._offset, float(live.frame.angle[number]) - self._angle)
+        elif live.bodies.fixed[number]:
+            return
+        else:
+            self._grip = _turned(self._offset, -self._angle)
+            live.act(Pull(time=0.0, body=name, grip=self._grip, target=self._spot))
+        self._held = name
 
     def drag(self, live: Live, place: Place) -> None:
         """Move the hand.
@@ -106,31 +121,32 @@ class Hands:
         frame = live.frame
         if number >= len(frame.position) or not frame.present[number]:
             return None
-        cos, sin = math.cos(float(frame.angle[number])), math.sin(float(frame.angle[number]))
+        right, up = _turned(self._grip, float(frame.angle[number]))
         x, y = frame.position[number].tolist()
-        held = x + cos * self._grip[0] - sin * self._grip[1], y + sin * self._grip[0] + cos * self._grip[1]
-        return held, self._hand
+        return (x + right, y + up), self._hand
 
     def remove(self, live: Live) -> None:
         """Take the picked body out.
 
         Raises:
-            ActionError: it cannot be.
+            ActionError: it cannot be, or none is picked.
         """
+        live.act(Remove(time=0.0, body=live.bodies.names[self._chosen(live)]))
+        self.forget()
+
+    def _chosen(self, live: Live) -> int:
         number = self.picked_of(live)
-        if number is not None:
-            live.act(Remove(time=0.0, body=live.bodies.names[number]))
-            self.forget()
+        if number is None:
+            raise ActionError("click a body first")
+        return number
 
     def nudge(self, live: Live) -> None:
         """Kick the picked body upwards and to the right.
 
         Raises:
-            ActionError: it cannot be.
+            ActionError: it cannot be, or none is picked.
         """
-        number = self.picked_of(live)
-        if number is None:
-            return
+        number = self._chosen(live)
         mass, radius = float(live.bodies.mass[number]), float(live.bodies.radius[number])
         kick = mass * min(NUDGE, 10.0 * radius)
         live.act(Impulse(time=0.0, body=live.bodies.names[number], impulse=(0.6 * kick, 0.8 * kick)))
@@ -174,3 +190,9 @@ class Hands:
         if body in live.bodies.names:
             x, y = live.frame.position[live.bodies.names.index(body)].tolist()
             live.act(Move(time=0.0, body=body, position=(x + by[0], y + by[1]), velocity=(0.0, 0.0)))
+
+
+def _turned(way: Place, angle: float) -> Place:
+    """Return a vector turned by an angle, rad."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    return cos * way[0] - sin * way[1], sin * way[0] + cos * way[1]

@@ -178,6 +178,8 @@ class Keyboard:
 
     def __init__(self) -> None:
         self._held: set[int] = set()
+        self.again = False
+        """the last key that came down was down already"""
 
     def command(self, event: pygame.event.Event, claimed: frozenset[int] = frozenset()) -> Command | None:
         """Return what an event asks for, or None; pass every event, so that releases are seen."""
@@ -187,7 +189,7 @@ class Keyboard:
             self._held.clear()
         if event.type != pygame.KEYDOWN:
             return None
-        again = event.key in self._held
+        self.again = event.key in self._held
         self._held.add(event.key)
         command = command_for(event, claimed)
-        return None if again and command not in REPEATING else command
+        return None if self.again and command not in REPEATING else command

@@ -1,4 +1,9 @@
-"""Mouse: what it does to the picture and the bodies in it."""
+"""Mouse: what it does to the picture and the bodies in it.
+
+A press only picks a body, so that its figures can be read without a touch; who goes on to move the mouse takes hold.
+"""
+
+import math
 
 import pygame
 
@@ -8,6 +13,8 @@ NOTCH = 1.15
 """by which the wheel brings things closer"""
 REACH = 6.0
 """px at unit 1 beside a body that still point at it"""
+SLACK = 4.0
+"""px at unit 1 that the mouse may move between press and release of a click"""
 
 
 class Mouse:
@@ -16,6 +23,8 @@ class Mouse:
     def __init__(self, seat: Seat) -> None:
         self._seat = seat
         self._panning = False
+        self._pressed: tuple[int, int] | None = None  # on a body that nobody has taken hold of yet
+        self._drag: tuple[int, int] | None = None  # where what is held is to go
         self.place: tuple[int, int] | None = None
         """where it is, px; None before it was over the picture"""
 
@@ -31,18 +40,22 @@ class Mouse:
             if event.button in (2, 3):
                 self._panning = True
             elif event.button == 1:
-                reach = REACH * seat.desk.unit / seat.camera.scale
-                seat.stage.grasp(seat.camera.to_world(event.pos), reach)
+                self._look(event.pos)
         elif event.type == pygame.MOUSEMOTION:
             self._move(event)
         elif event.type == pygame.MOUSEBUTTONUP:
             if event.button in (2, 3):
                 self._panning = False
             elif event.button == 1:
-                self._let_go()
+                self._open_hand()
         elif event.type == pygame.WINDOWFOCUSLOST:  # the release goes elsewhere
-            self._panning = False
-            self._let_go()
+            self.let_go()
+
+    def _look(self, place: tuple[int, int]) -> None:
+        seat, show = self._seat, self._seat.stage.show
+        reach = REACH * seat.desk.unit / seat.camera.scale
+        there = show is not None and seat.stage.hands.look(show, seat.camera.to_world(place), reach)
+        self._pressed = place if there else None
 
     def _move(self, event: pygame.event.Event) -> None:
         seat = self._seat
@@ -50,12 +63,32 @@ class Mouse:
         if self._panning:
             seat.camera = seat.camera.panned(event.rel)
             seat.at_home = False
-        elif seat.stage.hands.holding:
-            place = seat.camera.to_world(event.pos)
-            if not seat.stage.act(lambda live: seat.stage.hands.drag(live, place)):
-                seat.stage.hands.drop()
+            return
+        stage = seat.stage
+        if self._pressed is not None and math.dist(self._pressed, event.pos) > SLACK * seat.desk.unit:
+            self._pressed = None
+            stage.act(lambda live: stage.hands.hold(live, stage.paused))
+        if stage.hands.holding:
+            self._drag = event.pos
 
-    def _let_go(self) -> None:
+    def settle(self) -> None:
+        """Bring what is held to where the mouse is by now: one action, however many motions led there."""
+        pixel, self._drag = self._drag, None
+        stage = self._seat.stage
+        if pixel is None or not stage.hands.holding:
+            return
+        place = self._seat.camera.to_world(pixel)
+        if not stage.act(lambda live: stage.hands.drag(live, place)):
+            stage.hands.drop()
+
+    def let_go(self) -> None:
+        """Let go of the body that is held, and of the picture."""
+        self._panning = False
+        self._open_hand()
+
+    def _open_hand(self) -> None:
+        self.settle()
+        self._pressed = None
         stage = self._seat.stage
         if stage.hands.holding and not stage.act(stage.hands.let_go):
             stage.hands.drop()

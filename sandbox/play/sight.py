@@ -70,6 +70,8 @@ class Status:
     time: float
     """s, simulated"""
     paused: bool = False
+    ended: str | None = None
+    """why nothing comes after this moment"""
     replay: bool = False
     """a stored run: nothing can be changed"""
     speed: float = 1.0
@@ -81,16 +83,12 @@ class Status:
     """`unknown`, `trusted`, or `lost`: past the horizon of predictability"""
     horizon: float | None = None
     """s, when trust was lost"""
-    spread: float | None = None
-    """m, how far the scene nudged by 1e-12 m has come apart from itself"""
     ghost: str | None = None
     """the ghost's engine"""
     distance: float | None = None
     """m, the largest between a body and its ghost"""
     missed: int | None = None
     """contacts that the engine missed so far; None where none are looked for"""
-    energy: tuple[float, float, float] | None = None
-    """kinetic, potential, total, J"""
     recording: str | None = None
     """what is being recorded, such as "gif 3.2 s" """
     busy: str | None = None

@@ -35,20 +35,22 @@ class Stage:
         """Start with nothing on.
 
         Args:
-            engine: whose name is tried first for every scene.
+            engine: whose name is tried first for every scene, until another is chosen.
             overrides: values set in every scene that is opened.
         """
         self.show: Live | Stored | None = None
         self.path: Path | None = None
         self.file: Scene | None = None
         """the scene as its file has it"""
-        self.paused = False
+        self._paused = False
         self.hands = Hands()
         self.messages = Messages()
         self.faults: tuple[str, ...] = ()
         self.on_new: Callable[[bool], object] = bool
         """Called when something else is on; with whether it is the same scene, for the camera to stay."""
-        self._engine, self._overrides = engine, tuple(overrides)
+        self._engine, self._overrides = engine, tuple(overrides)  # the wish; what plays may be another
+        self._again: Callable[[], Live | Stored] | None = None
+        self._tried: Path | None = None  # the file that was not opened after the present one, for its faults
         self._turned: dict[str, Any] = {}  # values of the scene by path, for a restart to keep
         self._ghosted = False
         self._trusting: bool | None = None  # nobody has said
@@ -63,15 +65,41 @@ class Stage:
         """The present engine's name."""
         return self.show.engine if self.show is not None else self._engine
 
-    def put_on(self, show: Live | Stored, path: Path | None, file: Scene, same: bool = False) -> None:
-        """Show something, and let go of what was on."""
+    @property
+    def paused(self) -> bool:
+        """Whether time stands still; a stored run that goes on at its end starts over."""
+        return self._paused
+
+    @paused.setter
+    def paused(self, paused: bool) -> None:
+        if self._paused and not paused and isinstance(self.show, Stored) and self.show.at_end:
+            self.show.scrub(self.show.begin)
+        self._paused = paused
+
+    def put_on(
+        self,
+        show: Live | Stored,
+        path: Path | None,
+        file: Scene,
+        same: bool = False,
+        again: Callable[[], Live | Stored] | None = None,
+    ) -> None:
+        """Show something, and let go of what was on.
+
+        Args:
+            show: what is on from now.
+            path: its scene file.
+            file: the scene as its file has it.
+            same: it is the scene that was on.
+            again: makes it anew for a restart, where scene and settings are not all of it, as of a recording.
+        """
         if self.show is not None:
             self.show.close()
         self.show, self.path, self.file = show, path, file
+        self._again, self._tried = again, None
         self.hands.forget()
         self.faults = ()
         if isinstance(show, Live):
-            self._engine = show.engine
             few = len(show.bodies) <= FEW
             show.company.show_trust(few if self._trusting is None else self._trusting)
             if self._ghosted and not show.company.ghosted:
@@ -107,6 +135,8 @@ class Stage:
         """Start the same scene at 0, with what was turned, and with the same engine."""
         if isinstance(self.show, Stored):
             self.show.scrub(self.show.begin)
+        elif self._again is not None and self.file is not None:
+            self.put_on(self._again(), self.path, self.file, same=True, again=self._again)
         elif self.show is not None and self.file is not None:
             try:
                 scene = from_document(to_document(self.file), "<scene>", self._turned.items())
@@ -125,17 +155,21 @@ class Stage:
             self.messages.tell(f"{self.path.name} reloaded")
 
     def walk(self, by: int) -> None:
-        """Open the scene file before or after the one that is on."""
-        path = neighbour(self.path, by)
+        """Open the scene file before or after the one that is on, or after the faulty one that was tried last."""
+        path = neighbour(self._tried or self.path, by)
         if path is None:
             self.messages.tell("there is no other scene", "warning")
-            return
-        self.take(path)
+        elif self._tried is not None and self.path is not None and path.resolve() == self.path.resolve():
+            self.faults, self._tried = (), None  # back to what is on: it goes on
+        else:
+            self.take(path)
 
     def take(self, path: Path) -> None:
         """Open another scene file."""
         if self.open(path):
             self._turned.clear()
+        else:
+            self._tried = path
 
     def toggle_ghost(self) -> None:
         """Begin a ghost from here, or end it."""
@@ -227,6 +261,8 @@ class Stage:
         self.show.go_on(elapsed, self.paused)
         if isinstance(self.show, Live) and self.show.wants_pause:
             self.paused, self.show.wants_pause = True, False
+        elif isinstance(self.show, Stored) and self.show.at_end:
+            self.paused = True
         for level, text in self.show.notes:
             self.messages.tell(text, level)
         self.show.notes.clear()

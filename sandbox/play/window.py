@@ -70,6 +70,7 @@ class Window(Seat):
         """Take events in, let so much real time pass, s, draw, and show."""
         for event in pygame.event.get():
             self.take(event)
+        self.commands.settle()
         if self.leaving is not None:
             return
         compiled = COMPILING.seconds
@@ -102,7 +103,7 @@ class Window(Seat):
         if command is not None:
             self.commands.do(command)
         elif event.type == pygame.KEYDOWN:
-            deed = self.desk.claims(self.stage).deeds.get(event.key)
+            deed = self.desk.claims(self.stage).deed(event.key, self._keyboard.again)
             if deed is not None and not event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
                 self.stage.act(deed)
         else:

@@ -1,11 +1,16 @@
 """`sandbox run`: what it prints, its JSON, its exit status."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from calling import DIVERGING, DROP, FAULTY, json_of, lines_of, process, written
 
+from sandbox.action import Impulse
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.replay import rerun
+from sandbox.recording import Recording
+from sandbox.scene.file import loads
 from sandbox.trajectory import Trajectory
 
 KEYS = {
@@ -277,3 +282,51 @@ def test_names_in_any_script_come_out_as_they_are(tmp_path: Path, capfd: pytest.
     scene = written(tmp_path, DROP.replace('"a"', '"[b] ✂ a/b"').replace("Drop", "Ünïted [bold]x"))
     _, document, _ = json_of(capfd, "run", scene)
     assert (document["runs"][0]["title"], list(document["runs"][0]["final"])) == ("Ünïted [bold]x", ["[b] ✂ a/b"])
+
+
+def recorded() -> Recording:
+    """Return a session of the drop with the hash of its end."""
+    scene = loads(DROP)
+    kick = Impulse(time=0.1, body="a", impulse=(1.0, 0.0))
+    session = Recording(scene, "pymunk", scene.solver, (kick,), 0.4)
+    return replace(session, state_hash=rerun(session).info["state_hash"])
+
+
+def test_session_that_ends_in_its_own_state_says_so(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    session = str(recorded().save(tmp_path / "session.json"))
+    wanted = recorded().state_hash
+    for more in ([], ["--engine", "pymunk"], ["--out", str(tmp_path / "runs")], ["--out", str(tmp_path / "runs")]):
+        status, document, err = json_of(capfd, "run", session, *more)
+        assert (status, err) == (0, [])
+        assert [(row["state_hash"], row["replayed"]) for row in document["runs"]] == [(wanted, True)]
+
+
+def test_session_that_ends_elsewhere_is_one_line_and_status_1(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    session = str(replace(recorded(), state_hash="00ff").save(tmp_path / "session.json"))
+    status, _, err = lines_of(capfd, "run", session)
+    assert (status, len(err)) == (1, 1)
+    assert err[0].startswith(f"{session}: ended in another state")
+    assert "other versions" in err[0]
+    status, document, _ = json_of(capfd, "run", session)
+    assert (status, document["runs"][0]["replayed"]) == (1, False)
+
+
+def test_session_with_something_changed_has_nothing_to_compare_with(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    session = str(replace(recorded(), state_hash="00ff").save(tmp_path / "session.json"))
+    for more in (
+        ["--engine", "reference"],
+        ["--set", "solver.dt=0.005"],
+        ["--sweep", "solver.dt=0.01"],
+        ["--seeds", "1"],
+    ):
+        status, document, err = json_of(capfd, "run", session, *more)
+        assert (status, err, document["runs"][0]["replayed"]) == (0, [], None)
+    _, document, _ = json_of(capfd, "run", str(replace(recorded(), state_hash=None).save(tmp_path / "none.json")))
+    assert document["runs"][0]["replayed"] is None
+    _, document, _ = json_of(capfd, "run", written(tmp_path))
+    assert "replayed" not in document["runs"][0]
+    assert len(document["runs"][0]["state_hash"]) > 0

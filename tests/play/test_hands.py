@@ -60,6 +60,32 @@ def test_fixed_body_can_be_moved_while_paused_and_not_pulled() -> None:
     assert passed(show, 5).frame.position[1].tolist() == [5.0, 3.0]
 
 
+@pytest.mark.parametrize("paused", [True, False])
+def test_body_that_went_on_is_held_where_it_was_looked_at(paused: bool) -> None:
+    """It flies and turns between the press and the first motion of the mouse."""
+    show, hands = live(), Hands()
+    show.act(Impulse(time=0.0, body="a", impulse=(8.0, 0.0)))
+    hands.grasp(show, (0.0, 0.25), 0.0, paused=False)
+    hands.drag(show, (9.0, 3.0))
+    passed(show, 40)
+    hands.let_go(show)
+    (x, y), angle = show.frame.position[0].tolist(), float(show.frame.angle[0])
+    before = len(show.session.actions)
+    assert hands.look(show, (x + 0.25, y), 0.0)
+    assert (len(show.session.actions), hands.holding) == (before, False)
+    passed(show, 20)
+    hands.hold(show, paused)
+    hands.drag(show, (5.0, 5.0))
+    turned = float(show.frame.angle[0]) - angle
+    assert abs(turned) > 1e-3  # else this says nothing
+    spot = 0.25 * np.cos(turned), 0.25 * np.sin(turned)
+    if paused:
+        assert show.frame.position[0] == pytest.approx((5.0 - spot[0], 5.0 - spot[1]), rel=1e-12)  # some roundings
+    else:
+        there = show.frame.position[0] + spot
+        assert (hands.line(show) or ((0.0, 0.0), None))[0] == pytest.approx(there, rel=1e-12)  # some roundings
+
+
 def test_pulled_body_comes_under_the_hand_and_flies_on_when_let_go() -> None:
     show, hands = live(), Hands()
     hands.grasp(show, (0.0, 0.25), 0.0, paused=False)
@@ -88,8 +114,11 @@ def test_nothing_is_grasped_where_there_is_nothing() -> None:
     assert hands.picked is None
     hands.drag(show, (1.0, 1.0))
     hands.let_go(show)
-    hands.remove(show)
-    hands.nudge(show)
+    hands.hold(show, paused=True)
+    assert not hands.holding
+    for deed in (hands.remove, hands.nudge):
+        with pytest.raises(ActionError, match="click a body first"):
+            deed(show)
     assert show.session.actions == ()
 
 
@@ -174,8 +203,9 @@ def test_picked_body_that_has_not_come_yet_is_none() -> None:
         show.go_on(0.0, paused=True)
     assert len(show.bodies) == 3
     assert hands.picked_of(show) is None
-    hands.nudge(show)
-    hands.remove(show)
+    for deed in (hands.remove, hands.nudge):
+        with pytest.raises(ActionError, match="click a body first"):
+            deed(show)
     assert show.session.actions == ()
     hands.add(show, (0.0, 9.0), 10.0)
     assert show.bodies.radius[3] == 0.5

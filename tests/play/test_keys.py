@@ -160,6 +160,15 @@ def test_held_key_repeats_only_where_it_should() -> None:
         assert keyboard.command(event) == binding.command
 
 
+def test_held_key_is_known_whoever_claims_it() -> None:
+    keyboard, claimed = Keyboard(), frozenset({pygame.K_SPACE})
+    known = []
+    for event in (key(pygame.K_SPACE), key(pygame.K_SPACE), key_up(pygame.K_SPACE), key(pygame.K_SPACE)):
+        keyboard.command(event, claimed)
+        known.append(keyboard.again)
+    assert known == [False, True, True, False]
+
+
 def test_key_counts_as_new_after_the_focus_was_lost() -> None:
     keyboard = Keyboard()
     keyboard.command(key(pygame.K_p))

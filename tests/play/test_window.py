@@ -11,8 +11,10 @@ import pygame
 import pytest
 from pressing import FOCUS_LOST, key, key_up, move, press, release
 
-from sandbox.action import Spawn
+from sandbox.action import SetParameter, Spawn
 from sandbox.play.drawing.palette import SKY, WARNING, Colour
+from sandbox.play.keys import Command
+from sandbox.play.messages import Messages
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 from sandbox.play.screen import NoDisplayError, open_screen
@@ -38,6 +40,19 @@ name = "a"
 position = [-1.0, 0.0]
 radius = 0.4
 """
+CLAIMS = """
+[[emitter]]
+name = "spark"
+position = [1.0, 0.0]
+count = 3
+velocity_min = [-1.0, -1.0]
+velocity_max = [1.0, 1.0]
+radius = 0.05
+[play]
+arrows = "a"
+arrow_step = 0.25
+relaunch = "spark"
+"""
 BALL, THERE = (-1.0, 0.0), (1.2, 0.2)
 
 Open = Callable[[str], Window]
@@ -52,7 +67,8 @@ def said() -> list[str]:
 @pytest.fixture
 def opened(tmp_path: Path, said: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
     """Open a window on a scene. However slow the machine is, no picture gives up steps for it."""
-    monkeypatch.setattr("sandbox.play.running.live.BUDGET", math.inf)
+    monkeypatch.setattr("sandbox.play.running.live.LEAST", math.inf)
+    monkeypatch.setattr("sandbox.play.running.live.MOST", math.inf)
     windows: list[Window] = []
 
     def open_on(text: str) -> Window:
@@ -149,11 +165,138 @@ def test_pull_ends_when_the_window_loses_the_keyboard(window: Window) -> None:
     assert getattr(live(window).session.actions[-1], "target", 0) is None
 
 
-def test_press_and_release_within_one_turn_pull_nothing_further(window: Window) -> None:
+@pytest.mark.parametrize("stopped", [True, False])
+def test_click_with_a_trembling_hand_only_picks(window: Window, stopped: bool) -> None:
+    turn(window, elapsed=3 * DT)
+    window.stage.paused = stopped
+    end, (x, y) = live(window).end, on_screen(window, BALL)
+    turn(window, press(x, y), move(x + 1, y + 1, held=True), elapsed=DT)
+    turn(window, move(x + 3, y, held=True), release(x + 3, y), elapsed=DT)
+    turn(window, move(x + 90, y), elapsed=DT)
+    assert window.stage.hands.picked == 0
+    assert not window.stage.hands.holding
+    assert live(window).session.actions == ()
+    assert live(window).end >= end
+
+
+def test_drag_takes_the_body_where_it_was_pressed(window: Window) -> None:
+    window.stage.paused = True
+    (x, y), (right, down) = on_screen(window, BALL), on_screen(window, THERE)
+    turn(window, press(x + 10, y), move(x + 13, y, held=True))
+    turn(window, move(right + 10, down, held=True))
+    assert live(window).frame.position[0] == pytest.approx(THERE, abs=1.5 / window.camera.scale)  # rounding to pixels
+
+
+def test_many_motions_of_a_turn_are_one_action(window: Window) -> None:
+    window.stage.paused = True
+    (x, y), (right, down) = on_screen(window, BALL), on_screen(window, THERE)
+    turn(window, press(x, y), *(move(x + k, y, held=True) for k in range(1, 60)), move(right, down, held=True))
+    assert [action.kind for action in live(window).session.actions] == ["move"]
+    turn(window, move(x, y, held=True), move(x + 50, y, held=True), release(x + 50, y), move(x, y))
+    assert [action.kind for action in live(window).session.actions] == ["move", "move"]
+    assert live(window).frame.position[0, 0] == pytest.approx(BALL[0] + 50 / window.camera.scale, abs=0.02)  # 2 pixels
+
+
+def test_many_motions_of_a_knob_are_one_action_before_the_next_command(window: Window) -> None:
+    turn(window)
+    change = window.desk.panel.on_change
+    for value in (1.0, 2.0, -4.0):
+        change("gravity", value, False)
+    window.commands.do(Command.PAUSE)
+    turn(window)
+    (action,) = live(window).session.actions
+    assert isinstance(action, SetParameter)
+    assert action.value == [0.0, -4.0]
+
+
+@pytest.mark.parametrize("code", [pygame.K_o, pygame.K_F1])
+def test_all_that_is_held_is_let_go_before_something_hides_it(window: Window, code: int) -> None:
+    turn(window, press(*on_screen(window, BALL)), move(*on_screen(window, THERE), held=True), press(5, 300, 3))
+    assert window.stage.hands.holding
+    turn(window, key(code, pygame.KMOD_CTRL if code == pygame.K_o else 0))
+    assert not window.stage.hands.holding
+    assert getattr(live(window).session.actions[-1], "target", 0) is None
+    home = window.camera
+    turn(window, key(pygame.K_ESCAPE), key_up(pygame.K_ESCAPE))
+    turn(window, move(400, 400))
+    turn(window, pygame.event.Event(pygame.MOUSEMOTION, pos=(450, 400), rel=(50, 0), buttons=(0, 0, 0)))
+    assert window.camera == home
+
+
+def test_nothing_hides_the_timeline_while_it_is_held(window: Window) -> None:
+    turn(window, elapsed=0.08)
+    turn(window)
+    bar = window.surface.get_height() - window.desk.foot // 2
+    turn(window, press(200, bar))
+    step = live(window).step_number
+    assert step < 8
+    turn(window, key(pygame.K_o, pygame.KMOD_CTRL), key(pygame.K_F1), key(pygame.K_TAB))
+    assert (window.desk.picker, window.desk.manual.open, window.desk.panel.visible) == (None, False, True)
+    turn(window, release(200, bar))
+    while live(window).busy is not None:
+        turn(window)
+    assert live(window).session.step_number == step  # it has gone where it was looked at
+    turn(window, move(500, bar), move(250, 300))
+    assert live(window).step_number == step
+
+
+def test_release_reaches_the_mouse_while_the_timeline_is_held(window: Window) -> None:
+    turn(window, elapsed=0.05)
+    bar = window.surface.get_height() - window.desk.foot // 2
+    turn(window, press(300, 300, 2), press(200, bar), release(200, bar, 2), release(200, bar))
+    home = window.camera
+    turn(window, pygame.event.Event(pygame.MOUSEMOTION, pos=(320, 300), rel=(20, 0), buttons=(0, 0, 0)))
+    assert window.camera == home
+
+
+def test_claimed_keys_are_told_once_and_only_arrows_repeat(opened: Open) -> None:
+    window = opened(ROOM + CLAIMS)
+    turn(window)
+    told = [text for _, text in window.stage.messages.shown()]
+    assert told == ["Arrows: move a by 0.25 m", "Space: launch spark again"]
+    window.stage.messages = Messages()
+    turn(window, key(pygame.K_SPACE), key(pygame.K_SPACE), key(pygame.K_SPACE))
+    assert [action.kind for action in live(window).session.actions] == ["launch"]
+    turn(window, key_up(pygame.K_SPACE), key(pygame.K_SPACE), *(key(pygame.K_UP) for _ in range(3)))
+    assert [action.kind for action in live(window).session.actions] == ["launch"] * 2 + ["move"] * 3
+    turn(window, key(pygame.K_r))
+    assert not window.stage.messages.shown()
+
+
+@pytest.mark.parametrize("code", [pygame.K_n, pygame.K_DELETE])
+def test_key_for_a_picked_body_says_that_none_is(window: Window, code: int) -> None:
+    turn(window, key(code))
+    assert window.stage.messages.shown() == (("warning", "click a body first"),)
+
+
+def test_faults_are_closed_by_a_click_on_them_or_by_escape(window: Window) -> None:
+    for event in (press(*window.surface.get_rect().move(-130, 0).center), key(pygame.K_ESCAPE)):
+        window.stage.faults = ("room.toml:3: ball: wrong",)
+        turn(window)
+        turn(window, press(5, 300), release(5, 300))
+        assert window.stage.faults
+        turn(window, event, release(5, 300))
+        assert not window.stage.faults
+        assert window.leaving is None
+    turn(window, key_up(pygame.K_ESCAPE), key(pygame.K_ESCAPE))
+    assert window.leaving == 0
+
+
+def test_end_is_told_until_one_goes_back(window: Window) -> None:
+    turn(window, elapsed=0.05)
+    session = live(window).session
+    session.ended = "at 0.05 s: it broke"
+    assert window.desk.status(window.stage, 60.0, None).ended == session.ended
+    live(window).scrub(0.0)
+    assert window.desk.status(window.stage, 60.0, None).ended is None
+
+
+def test_press_and_release_within_one_turn_pull_nothing(window: Window) -> None:
     here = on_screen(window, BALL)
     turn(window, press(*here), release(*here), elapsed=DT)
     assert not window.stage.hands.holding
     assert window.stage.hands.picked == 0
+    assert live(window).session.actions == ()
 
 
 @pytest.mark.parametrize("pictures", [1, 3, 7])
@@ -256,6 +399,10 @@ def test_window_of_a_stored_run_tells_what_cannot_be_done(opened: Open, tmp_path
     window = opened(ROOM)
     show = Stored(Film(sandbox.run(sandbox.load(tmp_path / "room.toml"))))
     window.stage.put_on(show, None, show.scene)
+    show.scrub(show.end)
+    assert window.desk.status(window.stage, 60.0, None).ended == "the end of the run"
+    show.scrub(show.begin)
+    assert window.desk.status(window.stage, 60.0, None).ended is None
     for code in (pygame.K_e, pygame.K_g, pygame.K_t, pygame.K_b, pygame.K_n, pygame.K_DELETE):
         turn(window, key(code), key_up(code))
         assert window.stage.messages.shown()[-1][0] == "warning"

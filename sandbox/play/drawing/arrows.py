@@ -45,7 +45,7 @@ def draw_velocities(view: View) -> None:
     for k in np.flatnonzero((length > 2.0 * view.unit) & np.isfinite(length)).tolist():
         (x, y), (dx, dy) = some.centre[k].tolist(), way[k].tolist()
         edge = BACKGROUND if len(some.shown) <= CROWD and length[k] > 16.0 * view.unit else None
-        arrow(view.surface, (x, y), (x + dx, y + dy), YELLOW, 2.0 * view.unit, view.antialias, edge)
+        arrow(view.surface, (x, y), (x + dx, y + dy), ORANGE, 2.0 * view.unit, view.antialias, edge)
 
 
 def _in_sight(view: View, most: int) -> tuple[IntArray, FloatArray, FloatArray]:

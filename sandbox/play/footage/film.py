@@ -49,6 +49,7 @@ class Film:
         self.scene = scene_of(trajectory, name)
         self.bodies = bodies_of(trajectory, self.scene, name)
         self._picture = Picture()
+        self._last: Frame | None = None  # one picture asks for the same time again and again
         self._graph = RunGraph(trajectory, self.scene, self.bodies)
 
     @property
@@ -61,6 +62,11 @@ class Film:
 
         A body that appears, is retired, or is put elsewhere between two frames stays where the earlier one has it.
         """
+        if self._last is None or self._last.time != time:
+            self._last = self._frame_at(time)
+        return self._last
+
+    def _frame_at(self, time: float) -> Frame:
         run = self.trajectory
         k = int(np.clip(np.searchsorted(run.time, time, side="right") - 1, 0, len(run.time) - 1))
         after = min(k + 1, len(run.time) - 1)
@@ -101,25 +107,24 @@ class Film:
             ghost: a state to draw beside it, hollow.
         """
         frame = self.frame(time)
-        linger = LINGER * speed
         by_contact = self.scene.play.show == "overlap"
         return Sight(
             scene=self.scene,
             bodies=self.bodies,
             frame=frame,
             overlays=overlays,
-            contacts=self._contacts(time - linger, time),
-            seconds=linger,
+            contacts=self.contacts(time, speed),
+            seconds=LINGER * speed,
             ghost=ghost,
             trails=self._trails(frame, TRAIL * speed) if "trails" in overlays else (),
             overlapping=overlapping(self.scene, self.bodies, frame) if by_contact else None,
             flashes=tuple(self._flashes(time, FLASH * speed, speed)),
         )
 
-    def _contacts(self, since: float, until: float) -> Contacts:
-        """Return the contacts that began in a time."""
+    def contacts(self, time: float, speed: float = 1.0) -> Contacts:
+        """Return the contacts that are in sight at a time, s: those that began a moment of the film ago."""
         run = self.trajectory
-        rows = np.flatnonzero((run.contact_time > since) & (run.contact_time <= until))
+        rows = np.flatnonzero((run.contact_time > time - LINGER * speed) & (run.contact_time <= time))
         columns = (run.contact_point, run.contact_normal, run.contact_impulse)
         return Contacts(run.contact_time[rows], run.contact_pair[rows], *(column[rows] for column in columns))
 
@@ -139,7 +144,7 @@ class Film:
         run = self.trajectory
         for row in np.flatnonzero((run.missed_time > time - length) & (run.missed_time <= time)).tolist():
             missed = float(run.missed_time[row])
-            x, y = self.frame(missed).position[int(run.missed_pair[row, 0])].tolist()
+            x, y = self._frame_at(missed).position[int(run.missed_pair[row, 0])].tolist()
             yield Flash((x, y), (time - missed) / speed)
 
     @cached_property

@@ -33,6 +33,7 @@ class Taking:
         self._folder, self._film, self._tell = folder, film, tell
         self._recorder: Recorder | None = None
         self._seconds, self._due = 0.0, 0.0
+        self._waiting: tuple[Live, str] | None = None  # a session that is on its way, and the name to keep it by
 
     @property
     def told(self) -> str | None:
@@ -61,7 +62,10 @@ class Taking:
         self._seconds = self._due = 0.0
 
     def roll(self, surface: pygame.Surface, elapsed: float) -> None:
-        """Record what is seen, where a picture is due."""
+        """Record what is seen, where a picture is due, and keep a session that has come to where it was going."""
+        if self._waiting is not None and self._waiting[0].busy is None:
+            (show, name), self._waiting = self._waiting, None
+            self.session(show, name)
         if self._recorder is None:
             return
         self._seconds += elapsed
@@ -90,7 +94,10 @@ class Taking:
         if not isinstance(show, Live):
             self._tell("a stored run is stored already" if show is not None else "there is no session yet", "warning")
             return
-        show.arrive()  # where we are going is what is to be kept, not somewhere on the way
+        if show.busy is not None:  # where it is going is what is to be kept, not somewhere on the way
+            self._waiting = show, name
+            self._tell("saved as soon as it is there", "info")
+            return
         outfile = Outfile.numbered(self._folder, name, ".json")
         try:
             show.session.recording().save(outfile.temporary)

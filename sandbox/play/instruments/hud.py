@@ -49,7 +49,9 @@ def rows(status: Status) -> tuple[Row, ...]:
         Row(f"{status.engine}  ·  {status.settings}", FAINT, rank=1),
         Row(f"step {status.step:,}   {clock(status.time, step)}".replace(",", " "), mono=True, rank=0),
     ]
-    if status.paused:
+    if status.ended is not None:
+        found.append(Row(f"ENDED: {status.ended} (R restarts)", WARNING, "triangle", bold=True, rank=2))
+    elif status.paused:
         space_claimed = any("space" in key.lower() for key, _ in status.claimed)
         keys = "P" if space_claimed else "P or Space"
         found.append(Row(f"PAUSED  ({keys})", WARNING, "bars", bold=True, rank=2))
@@ -63,7 +65,8 @@ def rows(status: Status) -> tuple[Row, ...]:
 
 def _speed(status: Status) -> list[Row]:
     asked, real = status.speed, status.real_speed
-    apart = not status.paused and math.isfinite(real) and abs(real - asked) > APART * abs(asked)
+    still = status.paused or status.ended is not None
+    apart = not still and math.isfinite(real) and abs(real - asked) > APART * abs(asked)
     if apart:
         return [Row(f"speed {percent(asked)}, really {percent(real)}", ORANGE, rank=4)]
     return [] if asked == 1 else [Row(f"speed {percent(asked)}", rank=5)]
@@ -73,7 +76,7 @@ def _doubts(status: Status) -> list[Row]:
     """Return what is known of how far the picture can be believed."""
     found = []
     if status.trust == "trusted":
-        found.append(Row("trusted", GREEN, "disc", rank=6))
+        found.append(Row("predictable", GREEN, "disc", rank=6))
     elif status.trust == "lost":
         since = "" if status.horizon is None else f" since {clock(status.horizon)}"
         found.append(Row(f"past the horizon{since}", WARNING, "triangle", rank=3))
@@ -90,8 +93,10 @@ def _doubts(status: Status) -> list[Row]:
     return found
 
 
-def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int = 0, bottom: int = 0) -> None:
+def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int = 0, bottom: int = 0) -> pygame.Rect:
     """Draw the state of things over a picture; what finds no room is left out, the least important first.
+
+    Return what the faults of the scene file cover, if there are any.
 
     Args:
         surface: the picture.
@@ -104,9 +109,9 @@ def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int
     scale = unit * min(max(min(width / (FULL[0] * unit), height / (FULL[1] * unit)), 0.4), 1.0)
     size = max(13.5 * scale, SMALLEST)
     margin = round(max(10 * scale, 3))
-    free = pygame.Rect(margin, margin, width - 2 * margin, height - 2 * margin)
+    free, nothing = pygame.Rect(margin, margin, width - 2 * margin, height - 2 * margin), pygame.Rect(0, 0, 0, 0)
     if free.width < 2 * size or free.height < size:
-        return
+        return nothing
     shown, room = rows(status), free.copy()
     if status.faults:
         shown = tuple(row for row in shown if row.rank <= ESSENTIAL)
@@ -117,10 +122,10 @@ def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int
     if status.faults:
         top = block.bottom + _pad(size)
         below = pygame.Rect(free.left, top, free.width, free.bottom - top)
-        _draw_faults(surface, status.faults, below if below.height > 6 * size else free, size)
-        return
+        return _draw_faults(surface, status.faults, below if below.height > 6 * size else free, size)
     box = _draw_picked(surface, status.picked, free, block, size)
     _draw_messages(surface, status.messages, free, (block, box), size)
+    return nothing
 
 
 def _pad(size: float) -> int:
@@ -236,12 +241,12 @@ def _draw_messages(
         bottom = rect.top - round(0.4 * size)
 
 
-def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], free: pygame.Rect, size: float) -> None:
-    """Draw the faults of the scene file in a box in the middle; those that find no room are counted."""
+def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], free: pygame.Rect, size: float) -> pygame.Rect:
+    """Draw the faults of the scene file in a box in the middle, and return it; what finds no room is counted."""
     pad, line = round(min(1.1 * size, 0.04 * free.width)), round(1.45 * size)
     room = min(free.width, round(62 * size)) - 2 * pad
     head = "The scene file has a fault" if len(faults) == 1 else f"The scene file has {len(faults)} faults"
-    heads = wrapped(f"{head}; the scene before it goes on", size, room - 1.6 * size, 2, bold=True)
+    heads = wrapped(f"{head}; the scene before it goes on (Esc closes this)", size, room - 1.6 * size, 2, bold=True)
     most = (free.height - 2 * pad) // line - len(heads)
     if most < 5:
         most += len(heads) - 1
@@ -250,7 +255,7 @@ def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], free: pygame.
     rect = pygame.Rect(0, 0, room + 2 * pad, (len(heads) + len(lines)) * line + 2 * pad)
     rect.center = free.center
     if not free.contains(rect):
-        return
+        return pygame.Rect(0, 0, 0, 0)
     plate(surface, rect, 0.6 * size, opacity=244, edge=WARNING)
     draw_mark(surface, "triangle", (rect.left + pad + 0.4 * size, rect.top + pad + line / 2), 0.5 * size, WARNING)
     left, y = rect.left + pad, rect.top + pad + line / 2
@@ -261,6 +266,7 @@ def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], free: pygame.
         colour = FAINT if indent else INK
         write(surface, text, (left + indent, y), size, colour, "midleft", mono=True)
         y += line
+    return rect
 
 
 def _fault_lines(faults: tuple[str, ...], size: float, room: int, most: int) -> list[tuple[int, str]]:

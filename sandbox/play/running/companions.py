@@ -4,12 +4,15 @@ The ghost is the scene as another engine has it, the twin the scene with one bal
 it is asked for, and again whenever the session goes back.
 """
 
+from collections.abc import Collection
 from dataclasses import replace
+from time import perf_counter
 
 import numpy as np
 
 from sandbox.action import Action, ActionError, Switch
 from sandbox.engines.checkpoint import Checkpoint
+from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.relay import Relay
@@ -20,22 +23,30 @@ from sandbox.scene.settings import Settings
 from sandbox.trajectory import FloatArray, Frame
 
 PATIENCE = 0.3
-"""s that one step of a companion may take to compute."""
+"""s that the steps of a companion may take to compute for one picture."""
 
 
 class Companion:
     """A run beside a session. Where it fails it ends, and says why; the session goes on."""
 
-    def __init__(self, point: Checkpoint) -> None:
+    def __init__(self, point: Checkpoint, step: int = 0) -> None:
         """Start.
+
+        Args:
+            point: where the session is.
+            step: how many steps that has made.
 
         Raises:
             Refusal: its engine cannot begin from there.
             ActionError: it cannot take over a steady force.
         """
+        self.step = step
+        """of the session, up to which it has come"""
         self.relay = Relay.resumed(point)
         self.relay.patience = PATIENCE
         self.frame: Frame | None = self.relay.frame()
+        self.begun = point.frame.time
+        """s"""
         self.ended: str | None = None
 
     @property
@@ -52,13 +63,17 @@ class Companion:
             except ActionError as error:
                 self._end(str(error))
 
-    def advance(self, steps: int) -> None:
-        """Make steps."""
-        if self.ended is not None:
+    def follow(self, step: int) -> None:
+        """Make steps up to one of the session; where it has been there, it waits."""
+        steps, self.step = step - self.step, max(step, self.step)
+        until, compiled = perf_counter() + PATIENCE, COMPILING.seconds
+        if self.ended is not None or steps <= 0:
             return
         try:
             for _ in range(steps):
                 self.relay.step()
+                if perf_counter() > until + COMPILING.seconds - compiled:
+                    raise Exhaustion(f"{self.engine} takes longer to compute than there is time")
             self.frame = self.relay.frame()
         except (Divergence, Exhaustion) as error:
             self._end(str(error))
@@ -71,18 +86,23 @@ class Companion:
         self.relay.close()
 
 
-def ghost_of(point: Checkpoint) -> tuple[Companion, str]:
+def ghost_of(point: Checkpoint, step: int = 0, without: Collection[str] = ()) -> tuple[Companion, str]:
     """Return the ghost of a session, and what is to be said of it: `exact` where it can, else another engine.
+
+    Args:
+        point: where the session is.
+        step: how many steps that has made.
+        without: engines that have been tried already.
 
     Raises:
         ActionError: no other engine can go on from here.
     """
     why: list[str] = []
     for name in ("exact", "reference", "pymunk", *ENGINES):
-        if name == point.engine or name not in ENGINES:
+        if name == point.engine or name in without or name not in ENGINES:
             continue
         try:
-            return Companion(replace(point, engine=name, wanted=common(point.wanted))), "; ".join(why)
+            return Companion(replace(point, engine=name, wanted=common(point.wanted)), step), "; ".join(why)
         except (Refusal, ActionError) as refusal:
             why.append(str(refusal))
     raise ActionError("; ".join(why) or "there is no other engine")
@@ -105,31 +125,48 @@ class Trust:
     the nudge decides in which step an engine that looks at steps alone sees a contact.
     """
 
-    def __init__(self, point: Checkpoint) -> None:
+    def __init__(self, point: Checkpoint, step: int = 0) -> None:
         """Start the twin.
+
+        Args:
+            point: where the session is.
+            step: how many steps that has made.
 
         Raises:
             Refusal: the engine cannot begin from there.
             ActionError: it cannot take over a steady force.
         """
         self.tolerance = usual_tolerance(point.scene)
+        self.time = point.frame.time
+        """s, what the session shows"""
         self.horizon: float | None = None
+        """s, when the two had come apart; known as long as the session goes the same way"""
         self.spread: float | None = None
         nudged = _nudged(point)
         self.able = nudged is not None
         """whether anything can grow at all"""
-        self._twin = Companion(nudged) if nudged is not None else None
+        self._twin = Companion(nudged, step) if nudged is not None else None
+
+    @property
+    def step(self) -> int:
+        """Step of the session up to which the twin has come; 0 where there is none."""
+        return self._twin.step if self._twin is not None else 0
 
     def act(self, action: Action) -> None:
         """Do what the session does."""
         if self._twin is not None:
             self._twin.act(action)
 
-    def advance(self, steps: int, frame: Frame) -> None:
-        """Make as many steps as the session, and look how far the two have come apart."""
-        if self._twin is None or self.horizon is not None:
+    def follow(self, step: int) -> None:
+        """Let the twin make steps up to one of the session."""
+        if self._twin is not None:
+            self._twin.follow(step)
+
+    def look(self, frame: Frame, step: int) -> None:
+        """Look how far the session, which shows this after so many steps, and the twin have come apart."""
+        self.time = frame.time
+        if self._twin is None or self.horizon is not None or step != self._twin.step:
             return
-        self._twin.advance(steps)
         if self._twin.frame is None:
             self._twin.close()
             self._twin = None
@@ -142,7 +179,7 @@ class Trust:
     def state(self) -> str:
         """`trusted`, `lost`, or `unknown`."""
         if self.horizon is not None:
-            return "lost"
+            return "lost" if self.time >= self.horizon else "trusted"
         return "trusted" if self._twin is not None or not self.able else "unknown"
 
     def close(self) -> None:

@@ -4,6 +4,7 @@ from sandbox.action import Action, ActionError
 from sandbox.engines.contract import Refusal
 from sandbox.play.footage.film import Film
 from sandbox.play.running.companions import Companion, Trust, apart, follows, ghost_of
+from sandbox.play.running.history import History
 from sandbox.play.running.session import Session
 from sandbox.play.running.trails import Trails
 from sandbox.play.running.watch import Watch
@@ -32,44 +33,80 @@ class Company:
         self.trust: Trust | None = None
         """the twin that is being watched"""
         self._ghost: Companion | None = None
+        self._seen = History()  # of the ghost
+        self._given_up: tuple[str, ...] = ()
         self._watch: Watch | None = None
         self._missed: list[float] = []
         self.begin()
 
-    def begin(self) -> None:
-        """Begin anew from where the session is."""
+    def begin(self, anew: bool = False) -> None:
+        """Watch the session's relay, which is another one now.
+
+        Args:
+            anew: begin the ghost and the twin anew, too, from where the session is. Else they wait where they are:
+                the session has gone back, and may come there again.
+        """
         session = self._session
         self._missed = [time for time in self._missed if time <= session.time]
         # What can meet nothing misses nothing.
         meets = not bool(meetings(session.scene, session.bodies).free.all())
         self._watch = Watch(session.relay) if meets else None
         self.trails.keep(session.frame)
+        if self.trust is not None:
+            self.trust.look(session.frame, session.step_number)
+        session.redone()
+        if anew:
+            self._begin_companions()
+
+    def _begin_companions(self) -> None:
         if self._ghost is not None:
             self.show_ghost(True)
         if self.trust is not None:
             self.show_trust(True)
 
-    def advance(self, steps: int) -> None:
-        """Make as many steps as the session has made."""
-        frame = self._session.frame
+    def advance(self, redone: list[tuple[int, Action]]) -> None:
+        """Go where the session has gone.
+
+        Args:
+            redone: what it has done again on the way, each with the step after which it was.
+        """
+        frame, step = self._session.frame, self._session.step_number
         self.trails.keep(frame)
         if self._watch is not None:
             self._missed += [frame.time] * self._watch.look(frame)
+        for each in (self._ghost, self.trust):
+            for at, action in redone:
+                if each is not None and at > each.step:
+                    each.follow(at)
+                    self._let(each, action)
+            if each is not None:
+                each.follow(step)
         if self.trust is not None:
-            self.trust.advance(steps, frame)
+            self.trust.look(frame, step)
         if self._ghost is not None:
-            self._ghost.advance(steps)
-            if self._ghost.ended is not None:
-                self.notes.append(("warning", f"the ghost is gone: {self._ghost.ended}"))
-                self._drop_ghost()
+            if self._ghost.frame is not None:
+                self._seen.keep(self._ghost.step, self._ghost.frame)
+            else:
+                self._replace_ghost(self._ghost)
 
-    def act(self, action: Action) -> None:
-        """Do what the session has done."""
-        followed = follows(action)
-        if self._ghost is not None and followed is not None:
-            self._ghost.act(followed)
-        if self.trust is not None:
-            self.trust.act(action)
+    def did(self, action: Action) -> None:
+        """Take note of something new that the session has done; where that is in the past, what came is no more."""
+        step = self._session.step_number
+        if self._ghost is not None and self._ghost.step > step:
+            self.show_ghost(True)
+        elif self._ghost is not None:
+            self._let(self._ghost, action)
+        if self.trust is not None and (self.trust.step > step or self.trust.horizon is not None):
+            self.show_trust(True)
+        elif self.trust is not None:
+            self._let(self.trust, action)
+        self._session.redone()
+
+    def _let(self, each: Companion | Trust, action: Action) -> None:
+        """Let one do what the session has done; the ghost keeps its own engine."""
+        followed = follows(action) if each is self._ghost else action
+        if followed is not None:
+            each.act(followed)
 
     @property
     def missed(self) -> int | None:
@@ -86,18 +123,33 @@ class Company:
         """Whether there is a ghost."""
         return self._ghost is not None or self._film is not None
 
-    def show_ghost(self, on: bool) -> None:
-        """Begin a ghost from here, or end it."""
+    def show_ghost(self, on: bool, without: tuple[str, ...] = ()) -> None:
+        """Begin a ghost from here, or end it.
+
+        Args:
+            on: which of both.
+            without: engines that have been tried already.
+        """
         self._film = None
         self._drop_ghost()
-        if on:
-            try:
-                self._ghost, note = ghost_of(self._session.relay.checkpoint())
-            except ActionError as error:
-                self.notes.append(("warning", f"no ghost: {error}"))
-                return
-            if note:
-                self.notes.append(("info", f"the ghost is {self._ghost.engine}: {note}"))
+        if not on:
+            return
+        try:
+            self._ghost, note = ghost_of(self._session.relay.checkpoint(), self._session.step_number, without)
+        except ActionError as error:
+            self.notes.append(("warning", f"no ghost: {error}"))
+            return
+        self._seen = History()
+        if self._ghost.frame is not None:
+            self._seen.keep(self._ghost.step, self._ghost.frame)
+        if note:
+            self.notes.append(("info", f"the ghost is {self._ghost.engine}: {note}"))
+
+    def _replace_ghost(self, ended: Companion) -> None:
+        """Let another engine go on as the ghost, from here."""
+        self._given_up += (ended.engine,)
+        self.notes.append(("warning", f"the ghost of {ended.engine} is gone: {ended.ended}"))
+        self.show_ghost(True, self._given_up)
 
     def _drop_ghost(self) -> None:
         if self._ghost is not None:
@@ -111,7 +163,7 @@ class Company:
             self.trust = None
         if on:
             try:
-                self.trust = Trust(self._session.relay.checkpoint())
+                self.trust = Trust(self._session.relay.checkpoint(), self._session.step_number)
             except (Refusal, ActionError) as error:
                 self.notes.append(("warning", f"no trust light: {error}"))
 
@@ -120,7 +172,10 @@ class Company:
         """The ghost's state."""
         if self._film is not None:
             return self._film.frame(self._session.time)
-        return self._ghost.frame if self._ghost is not None else None
+        time = self._session.time
+        if self._ghost is None or time < self._ghost.begun - 1e-12:
+            return None
+        return self._ghost.frame if self._session.step_number == self._ghost.step else self._seen.nearest(time)[1]
 
     @property
     def ghost_engine(self) -> str | None:

@@ -8,7 +8,8 @@ from sandbox.trajectory import Frame
 
 BUDGET = 256 * 2**20
 """Bytes that the kept states may take."""
-BYTES_PER_BODY = 6 * 8 + 1
+BYTES_PER_BODY, BYTES_PER_FRAME = 6 * 8 + 1, 1100
+"""The second is what Python's own objects take, measured."""
 APART = 30
 """States seen between two checkpoints, at least."""
 MOST = 64
@@ -65,7 +66,7 @@ class History:
             return
         self._steps.insert(at, step)
         self._frames.insert(at, frame)
-        self._bytes += len(frame.position) * BYTES_PER_BODY
+        self._bytes += _bytes(frame)
         if self._bytes > BUDGET and len(self._steps) > 2:
             self._thin()
 
@@ -75,7 +76,7 @@ class History:
         if len(kept) == len(self._steps):  # two are left, and one of them is the first
             kept = [0, len(self._steps) - 1]
         self._steps, self._frames = [self._steps[k] for k in kept], [self._frames[k] for k in kept]
-        self._bytes = sum(len(frame.position) for frame in self._frames) * BYTES_PER_BODY
+        self._bytes = sum(map(_bytes, self._frames))
 
     def known(self, step: int) -> Frame | None:
         """Return the state after so many steps, where it was kept."""
@@ -99,6 +100,11 @@ class History:
         if at > 0 and time - self._frames[at - 1].time < self._frames[at].time - time:
             at -= 1
         return self._steps[at], self._frames[at]
+
+    def closest(self, step: int) -> tuple[int, Frame] | None:
+        """Return the last kept state at or before a step, and its step."""
+        at = bisect_right(self._steps, step) - 1
+        return (self._steps[at], self._frames[at]) if at >= 0 else None
 
     def wants_mark(self, step: int) -> bool:
         """Tell whether enough was seen since the last checkpoint before a step."""
@@ -132,6 +138,10 @@ class History:
     def cut(self, step: int) -> None:
         """Forget what came after a step: from there it will go another way."""
         at = bisect_right(self._steps, step)
+        self._bytes -= sum(map(_bytes, self._frames[at:]))
         del self._steps[at:], self._frames[at:]
-        self._bytes = sum(len(frame.position) for frame in self._frames) * BYTES_PER_BODY
         self._marks = [mark for mark in self._marks if mark.step <= step]
+
+
+def _bytes(frame: Frame) -> int:
+    return len(frame.position) * BYTES_PER_BODY + BYTES_PER_FRAME

@@ -19,9 +19,10 @@ from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, Frame
 
-BUDGET = 0.012
-"""s of each picture that steps may take; where they need more, the scene is slower than asked"""
-SLICE = 0.012
+LEAST, MOST = 0.012, 0.03
+"""s of each picture that steps may take: as much as all else takes, within these bounds. Where they need more, the
+scene is slower than asked."""
+SLICE = 0.04
 """s of each picture that the way to another step may take"""
 
 
@@ -40,7 +41,8 @@ class Live:
         self.pace = Pace()
         self.company = Company(session, ghost)
         self._seeking: Iterator[float] | None = None
-        self._share_done = 0.0
+        self._share_done, self._target = 0.0, 0
+        self._worked = 0.0
         self._contacts, self._since = session.contacts(), session.settings.dt
         self._seed = session.scene.world.seed
         self._told_end = False
@@ -106,8 +108,10 @@ class Live:
                 asked = max(left, 0)
                 self._until, self.wants_pause = None, True
                 self.company.notes.append(("info", "what was recorded ends here; go on, and it is played further"))
-        compiled = COMPILING.seconds
-        made = self._advance(asked, perf_counter() + BUDGET) if asked else 0
+        compiled, began = COMPILING.seconds, perf_counter()
+        budget = min(max(elapsed - self._worked, LEAST), MOST)
+        made = self._advance(asked, began + budget) if asked else 0
+        self._worked = perf_counter() - began
         if COMPILING.seconds > compiled:  # that time was not the scene's
             self.pace.rest()
         else:
@@ -116,6 +120,9 @@ class Live:
     def step(self) -> None:
         """Make one step."""
         self.pace.rest()
+        if self._seeking is not None:
+            self.seek(self._target + 1)
+            return
         self._advance(1, None)
         self.session.rest()
 
@@ -129,7 +136,7 @@ class Live:
             return 0
         if made:
             self._contacts, self._since = self.session.contacts(), self.session.time - before
-            self.company.advance(made)
+            self.company.advance(self.session.redone())
         if self.session.ended is not None and not self._told_end:
             self._told_end = True
             self.company.notes.append(("error", self.session.ended))
@@ -144,7 +151,7 @@ class Live:
         if self._seeking is not None:
             raise ActionError("wait until the way back is done")
         done = self.session.act(action)
-        self.company.act(done)
+        self.company.did(done)
         self._contacts = self.session.contacts()
 
     def relaunch(self, generator: str) -> None:
@@ -166,21 +173,23 @@ class Live:
         if self._seeking is not None:
             raise ActionError("wait until the way back is done")
         told = switch(self.session, engine)
-        self._begin()
+        self._begin(anew=True)
         return told
 
     def seek(self, step: int) -> None:
-        """Set out for another step; it is reached in parts, one a picture."""
+        """Set out for another step. It is reached in parts, one a picture; meanwhile what is known nearest is seen."""
         self.pace.rest()
         self._share_done = 0.0
         self._told_end = False
-        self._seeking = self.session.seek(step)
+        self._target = max(step, 0)
+        self._peek = self.session.history.closest(self._target)
+        self._seeking = self.session.seek(self._target)
         self._go_there()
 
-    def _begin(self) -> None:
+    def _begin(self, anew: bool = False) -> None:
         """Begin what runs beside the session anew, from where it is."""
         self._contacts, self._since = self.session.contacts(), self.session.settings.dt
-        self.company.begin()
+        self.company.begin(anew)
 
     def arrive(self) -> None:
         """Go the rest of the way to where we are going, however long it takes."""
@@ -189,8 +198,9 @@ class Live:
 
     def back(self) -> None:
         """Set out for the step before."""
-        if self.session.step_number > 0 and self._seeking is None:
-            self.seek(self.session.step_number - 1)
+        present = self.session.step_number if self._seeking is None else self._target
+        if present > 0:
+            self.seek(present - 1)
 
     def scrub(self, time: float) -> None:
         """Look at the state seen nearest to a time, s; the session stays where it is until `settle`."""
@@ -226,6 +236,7 @@ class Live:
             except StopIteration:
                 self._seeking = None
         if self._seeking is None:
+            self._peek = None
             self.session.rest()
             self._begin()
 

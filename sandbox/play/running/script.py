@@ -20,16 +20,17 @@ class Script:
         """What was done up to now."""
         return tuple(self._actions[: self.done])
 
-    def redo(self, relay: Relay) -> None:
-        """Do what was done at this time.
+    def redo(self, relay: Relay) -> list[Action]:
+        """Do what was done at this time, and return it.
 
         Raises:
             ActionError: the engine cannot do it, as may be with a recording of another.
         """
-        due = relay.time + ROUNDING * relay.settings.dt
+        due, begin = relay.time + ROUNDING * relay.settings.dt, self.done
         while self.done < len(self._actions) and self._actions[self.done].time <= due:
             relay.apply(self._actions[self.done])
             self.done += 1
+        return self._actions[begin : self.done]
 
     def add(self, action: Action, relay: Relay) -> None:
         """Take note of what has just been done; what lay ahead is forgotten.

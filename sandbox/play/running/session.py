@@ -12,7 +12,7 @@ up part of the session, as a switch that changes nothing: who replays the sessio
 from collections.abc import Iterator
 from time import perf_counter
 
-from sandbox.action import Action, ActionError
+from sandbox.action import Action, ActionError, Pull
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.relay import Relay, joined
 from sandbox.play.running.history import History, Mark
@@ -28,6 +28,10 @@ CALM = 8
 
 PACE = 16
 """Steps made at a time on the way to another one."""
+FINE = 64
+"""Steps before the other one that are made one by one: each is seen, and so at hand for who steps further back."""
+PATIENCE = 2.0
+"""s that one step may take to compute, where an engine can tell."""
 
 
 class WrongWayError(Exception):
@@ -64,7 +68,9 @@ class Session:
         self.relay = Relay(scene, engine, settings)
         """what runs"""
         self._settings = self.relay.wanted
+        self.relay.patience = PATIENCE
         self._script = Script(actions)
+        self._redone: list[tuple[int, Action]] = []
         self._step = 0
         self._calm = 0
         self._mark: Mark | None = None  # that the relay was taken up from, as long as all that followed was known
@@ -181,7 +187,7 @@ class Session:
     def _redo(self) -> None:
         """Do again what was done at this time."""
         try:
-            self._script.redo(self.relay)
+            self._redone += [(self._step, action) for action in self._script.redo(self.relay)]
         except ActionError as error:
             self.ended = f"at {self.relay.time:g} s: {error}"
 
@@ -216,6 +222,11 @@ class Session:
         mark, self._mark = self._mark, None
         if mark is not None and self._script.hand_over(mark.actions, mark.point.frame.time):
             self.history.inserted(mark.step)
+
+    def redone(self) -> list[tuple[int, Action]]:
+        """Return what was done again since the last call, each with the step after which it was."""
+        parts, self._redone = self._redone, []
+        return parts
 
     def contacts(self) -> Contacts:
         """Return the contacts that were open since the last call."""
@@ -263,7 +274,8 @@ class Session:
         begin = self._step
         while self._step < step and self.ended is None:
             known = self.history.next_known(self._step)  # to be held against
-            self.advance(min(PACE, step - self._step, known - self._step if known is not None else PACE))
+            pace = PACE if step - self._step > FINE else 1
+            self.advance(min(pace, known - self._step if known is not None else pace))
             yield (self._step - begin) / (step - begin)
 
     def _restore(self, mark: Mark | None) -> None:
@@ -286,6 +298,7 @@ class Session:
         self._astray = self._exhausted = False
         self._calm = 0
         self._contacts.clear()
+        self.relay.patience = PATIENCE
         self.relay.contacts()
         self._redo()
         self._previous = self._frame = self.relay.frame()
@@ -296,7 +309,8 @@ class Session:
             scene=self._scene,
             engine=self._engine,
             settings=self._settings,
-            actions=self.actions,
+            # A hand that is still holding lets go at the end: no replay is to hang from one that nobody sees.
+            actions=self.actions + tuple(Pull(time=self.relay.time, body=name) for name in self.relay.pulls),
             duration=self.relay.time,
             state_hash=None if self._exhausted else self.relay.state_hash(),
         )

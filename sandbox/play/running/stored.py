@@ -68,6 +68,11 @@ class Stored:
         return float(self._times[-1])
 
     @property
+    def at_end(self) -> bool:
+        """Whether its last time is shown."""
+        return self._time >= self.end
+
+    @property
     def marks(self) -> tuple[float, ...]:
         """None: every moment is as near as any other."""
         return ()
@@ -80,7 +85,7 @@ class Stored:
 
     def go_on(self, elapsed: float, paused: bool) -> None:
         """Let real time pass, s."""
-        if paused or self._time >= self.end:
+        if paused or self.at_end:
             self.pace.rest()
             return
         step = self.pace.flow(elapsed)
@@ -110,7 +115,7 @@ class Stored:
     @property
     def contacts(self) -> Contacts:
         """Those that began a moment ago."""
-        return self.film.sight(self._time, frozenset(), self.pace.speed).contacts
+        return self.film.contacts(self._time, self.pace.speed)
 
     def sight(
         self,

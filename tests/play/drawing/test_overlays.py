@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from drawn import CAMERA, at, ball, changed, contact, drawn, frame, scene, sight
 
-from sandbox.play.drawing.palette import YELLOW
+from sandbox.play.drawing.arrows import HEAT
+from sandbox.play.drawing.palette import ORANGE, YELLOW
 from sandbox.play.sight import Flash
 from sandbox.trajectory import Contacts
 
@@ -32,6 +33,12 @@ def test_velocity_is_shown_as_the_way_of_a_tenth_of_a_second():
         assert reached == pytest.approx(tip[1] if tip[0] == 100 else tip[0], abs=2)  # the edge of the arrow's head
         assert left >= min(tip[0], 100) - 8
         assert bottom <= 68
+
+
+def test_velocities_have_a_colour_that_no_force_has():
+    which = scene(balls=[ball(0, 0, 0.2, velocity=[20.0, 0.0])])
+    assert at(drawn(sight(which, "velocities")), 1.0, 0.0) == ORANGE
+    assert min(sum(abs(a - b) for a, b in zip(heat, ORANGE, strict=True)) for heat in HEAT) > 100
 
 
 def test_a_body_at_rest_has_no_arrow():

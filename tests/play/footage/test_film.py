@@ -265,3 +265,23 @@ def test_scene_and_bodies_are_those_of_the_run() -> None:
     stored = run(scene)
     assert scene_of(stored) == scene
     assert bodies_of(stored, scene) is scene.bodies
+
+
+def test_same_time_is_computed_once() -> None:
+    film = film_of()
+    frame = film.frame(0.123)
+    assert film.sight(0.123, frozenset(OVERLAYS)).frame is frame
+    assert film.frame(0.123) is frame
+    other = film.frame(0.2)
+    assert other.time == 0.2
+    assert film.frame(0.123).state_hash() == frame.state_hash()
+
+
+def test_contacts_in_sight_are_those_that_are_drawn() -> None:
+    film = film_of(BOUNCE)
+    (first, *_) = film.trajectory.contact_time.tolist()
+    for speed in (0.5, 1.0):
+        time = first + 0.75 * LINGER
+        found = film.contacts(time, speed)
+        assert found.time.tolist() == film.sight(time, frozenset(), speed).contacts.time.tolist()
+        assert (first in found.time.tolist()) == (speed == 1.0)

@@ -49,6 +49,15 @@ def test_pause_is_told_in_red_with_its_keys() -> None:
     assert row.colour == WARNING
 
 
+@pytest.mark.parametrize("stopped", [True, False])
+def test_end_is_told_with_its_reason_in_place_of_the_pause(stopped: bool) -> None:
+    status = replace(QUIET, paused=stopped, ended="at 3 s: it broke", real_speed=0.0)
+    (row,) = rows(status)[3:]
+    assert (row.text, row.colour) == ("ENDED: at 3 s: it broke (R restarts)", WARNING)
+    (pause,) = [row for row in rows(replace(QUIET, paused=True)) if "PAUSED" in row.text]
+    assert row.mark != pause.mark
+
+
 def test_pause_names_only_p_where_the_scene_claims_space() -> None:
     assert "PAUSED  (P)" in texts(replace(QUIET, paused=True, claimed=(("Space", "shoot"),)))
 
@@ -74,10 +83,10 @@ def test_real_speed_is_not_told_while_paused() -> None:
 
 
 def test_trust_differs_in_word_and_shape() -> None:
-    (trusted,) = [row for row in rows(replace(QUIET, trust="trusted")) if row.mark]
+    (held,) = [row for row in rows(replace(QUIET, trust="trusted")) if row.mark]
     (lost,) = [row for row in rows(replace(QUIET, trust="lost", horizon=3.2)) if row.mark]
-    assert (trusted.text, lost.text) == ("trusted", "past the horizon since 3.20 s")
-    assert trusted.mark != lost.mark
+    assert (held.text, lost.text) == ("predictable", "past the horizon since 3.20 s")
+    assert held.mark != lost.mark
     assert not [row for row in rows(replace(QUIET, trust="unknown")) if row.mark]
 
 
@@ -145,6 +154,12 @@ def test_newest_message_is_kept_in_a_tiny_window() -> None:
     assert any(rect.bottom > max(each.bottom for each in without) - 5 and rect.top > 90 for rect in laid)
 
 
+def test_place_of_the_faults_is_told_where_there_are_any() -> None:
+    surface = pygame.Surface((640, 480))
+    assert draw_hud(surface, QUIET, 1.0).size == (0, 0)
+    assert draw_hud(surface, replace(QUIET, faults=("a.toml:3: ball: wrong",)), 1.0).collidepoint(320, 260)
+
+
 def test_faults_change_the_middle_of_the_picture() -> None:
     _, plain = drawn(QUIET, (640, 480), 1.0)
     _, faulty = drawn(replace(QUIET, faults=("a.toml:3: ball: wrong",)), (640, 480), 1.0)
@@ -163,13 +178,13 @@ statuses = st.builds(
     step=st.integers(0, 10**12),
     time=numbers,
     paused=st.booleans(),
+    ended=st.none() | words,
     replay=st.booleans(),
     speed=numbers,
     real_speed=numbers,
     frames_per_second=numbers,
     trust=st.sampled_from(["unknown", "trusted", "lost"]),
     horizon=st.none() | numbers,
-    spread=st.none() | numbers,
     ghost=st.none() | words,
     distance=st.none() | numbers,
     missed=st.none() | st.integers(0, 10**9),

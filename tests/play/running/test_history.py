@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sandbox.engines.checkpoint import Checkpoint
 from sandbox.engines.relay import Relay
 from sandbox.play.running import history as module
-from sandbox.play.running.history import APART, BYTES_PER_BODY, MOST, History, Mark
+from sandbox.play.running.history import APART, BYTES_PER_BODY, BYTES_PER_FRAME, MOST, History, Mark
 from sandbox.scene.file import from_document
 from sandbox.trajectory import Frame
 
@@ -65,7 +65,7 @@ def test_nearest_state_is_found(time: float, step: int) -> None:
 @given(st.integers(1, 40), st.integers(2, 400))
 def test_memory_stays_within_its_budget_and_first_and_last_stay(most: int, steps: int) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "BUDGET", most * 100 * BYTES_PER_BODY)
+        patch.setattr(module, "BUDGET", most * (100 * BYTES_PER_BODY + BYTES_PER_FRAME))
         history = History()
         for k in range(steps):
             history.keep(k, frame(float(k), 100))
@@ -76,7 +76,7 @@ def test_memory_stays_within_its_budget_and_first_and_last_stay(most: int, steps
 
 
 def test_what_was_long_ago_is_thinned_out_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "BUDGET", 64 * BYTES_PER_BODY)
+    monkeypatch.setattr(module, "BUDGET", 64 * (BYTES_PER_BODY + BYTES_PER_FRAME))
     history = filled(300)
     known = [k for k in range(300) if history.known(k) is not None]
     gaps = [b - a for a, b in pairwise(known)]

@@ -26,7 +26,8 @@ ALL = frozenset({"shapes", "trails", "contacts"})
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """No test depends on how fast the machine is."""
-    monkeypatch.setattr(module, "BUDGET", 1e9)
+    monkeypatch.setattr(module, "LEAST", 1e9)
+    monkeypatch.setattr(module, "MOST", 1e9)
 
 
 def bounce() -> Scene:
@@ -79,7 +80,8 @@ def test_slow_motion_makes_fewer_steps() -> None:
 
 
 def test_machine_that_is_too_slow_drops_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "BUDGET", -1.0)  # one step is made, then it is late already
+    monkeypatch.setattr(module, "LEAST", -1.0)  # one step is made, then it is late already
+    monkeypatch.setattr(module, "MOST", -1.0)
     show = live()
     for _ in range(20):
         before = show.step_number

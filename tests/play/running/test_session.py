@@ -288,7 +288,9 @@ def test_hand_that_was_to_let_go_later_lets_go_when_that_is_forgotten() -> None:
 def test_memory_is_bounded_with_many_bodies_and_the_way_back_is_found_all_the_same(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(history_module, "BUDGET", 20 * 225 * history_module.BYTES_PER_BODY)
+    monkeypatch.setattr(
+        history_module, "BUDGET", 20 * (225 * history_module.BYTES_PER_BODY + history_module.BYTES_PER_FRAME)
+    )
     session = Session(SCENES["gas"])
     seen = {0: session.frame.state_hash()}
     for _ in range(100):
