@@ -67,7 +67,7 @@ def pulled(
     return (jx, jy), x * jy - y * jx
 
 
-class Hands:
+class Pulls:
     """Who is being pulled, and where to."""
 
     def __init__(self, pulls: Mapping[str, Pull] | None = None) -> None:

@@ -18,7 +18,7 @@ from sandbox.engines.checkpoint import Checkpoint
 from sandbox.engines.contract import Divergence, Exhaustion, Observer, Refusal
 from sandbox.engines.launch import launched
 from sandbox.engines.leg import Leg, begun
-from sandbox.engines.pull import Hands
+from sandbox.engines.pull import Pulls
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import start as start_engine
 from sandbox.scene.bodies import Bodies
@@ -48,7 +48,7 @@ class Relay:
         self._leg = Leg(start_engine(scene, engine, self.wanted), scene.bodies)
         self._retired: dict[int, float] = {}
         self._work: Counter[str] = Counter()
-        self._hands = Hands()
+        self._pulls = Pulls()
         self._forces: dict[str, Force] = {}
         self._kept: list[Contacts] | None = None  # of earlier legs, since the last call; none before the first
         self._observer: Observer | None = None
@@ -65,7 +65,7 @@ class Relay:
             steps=self._leg.steps,
             retired=dict(self.retired),
             forces=self._acting(),
-            pulls=self._hands.pulls,
+            pulls=self._pulls.pulls,
         )
 
     @classmethod
@@ -84,7 +84,7 @@ class Relay:
         relay._leg = begun(point.scene, point.engine, point.wanted, point.bodies, point.frame, point.forces)
         relay._leg.origin, relay._leg.steps = point.origin, point.steps
         relay._retired, relay._work = dict(point.retired), Counter()
-        relay._forces, relay._hands = dict(point.forces), Hands(point.pulls)
+        relay._forces, relay._pulls = dict(point.forces), Pulls(point.pulls)
         relay._kept, relay._observer = None, None
         return relay
 
@@ -125,7 +125,7 @@ class Relay:
     @property
     def pulls(self) -> Mapping[str, Pull]:
         """The hands that hold bodies, by the bodies' names."""
-        return self._hands.pulls
+        return self._pulls.pulls
 
     @property
     def work(self) -> Mapping[str, int]:
@@ -139,7 +139,7 @@ class Relay:
             Divergence: the state is not finite, or beyond all bounds.
             Exhaustion: the step asks for more than can be had.
         """
-        self._hands.act(self._leg.simulation, self.settings.dt)
+        self._pulls.act(self._leg.simulation, self.settings.dt)
         self._leg.steps += 1
         try:
             self._leg.simulation.step()
@@ -156,7 +156,7 @@ class Relay:
             Divergence: as `step`.
             ValueError: there is no such part.
         """
-        self._hands.act(self._leg.simulation, self.settings.dt * part)
+        self._pulls.act(self._leg.simulation, self.settings.dt * part)
         self._leg.steps += part
         try:
             self._leg.simulation.finish(part)
@@ -177,7 +177,7 @@ class Relay:
         """
         match action:
             case Pull():
-                self._hands.hold(action, self._leg.simulation)
+                self._pulls.hold(action, self._leg.simulation)
             case Switch():
                 self._switch(action)
             case Launch():

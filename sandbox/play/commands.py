@@ -43,7 +43,7 @@ class Commands:
             Command.ENGINE: stage.next_engine,
             Command.GHOST: stage.toggle_ghost,
             Command.TRUST: stage.toggle_trust,
-            Command.HOME: seat.home,
+            Command.HOME: self._home,
             Command.PANEL: self._panel,
             Command.HELP: self._help,
             Command.SCREENSHOT: self._screenshot,
@@ -102,6 +102,13 @@ class Commands:
 
     def _pause(self) -> None:
         self._seat.stage.paused = not self._seat.stage.paused
+
+    def _home(self) -> None:
+        """Show the scene as it began; where that is seen already, the bodies where they are now."""
+        if self._seat.at_home:
+            self._seat.find()
+        else:
+            self._seat.home()
 
     def _panel(self) -> None:
         self._let_go()

@@ -22,7 +22,7 @@ def framing(scene: Scene) -> Box:
     """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there."""
     bodies = scene.bodies
     things = [corners for corners in _things(scene) if (np.abs(corners) < LARGEST).all()]
-    start = _around(bodies.position, bodies.radius)
+    start = around(bodies.position, bodies.radius)
     if start is None:
         start = _union([(corners.min(axis=0), corners.max(axis=0)) for corners in things] or [(-ONE, ONE)])
     flown = _union([start, *_flight(scene, bodies)])
@@ -51,7 +51,7 @@ def _union(boxes: list[Corners]) -> Corners:
     return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
 
 
-def _around(position: FloatArray, radius: FloatArray) -> Corners | None:
+def around(position: FloatArray, radius: FloatArray) -> Corners | None:
     """Return the box around circles at (M, 2) m; of many, without the outermost."""
     counts = (np.abs(position) < LARGEST).all(axis=1)
     position, radius = position[counts], radius[counts]
@@ -83,7 +83,7 @@ def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
             counts &= ((place >= world.bounds[0]) & (place <= world.bounds[1])).all(axis=2)
     # Once stopped, it does not come out on the far side.
     counts = np.logical_and.accumulate(counts, axis=0)
-    found = _around(place[counts], radius[counts])
+    found = around(place[counts], radius[counts])
     return [] if found is None else [found]
 
 

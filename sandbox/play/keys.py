@@ -103,7 +103,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding((pygame.K_e,), 0, Command.ENGINE, "next engine", "E", _SCENE),
     Binding((pygame.K_g,), 0, Command.GHOST, "ghost of the reference", "G", _SCENE),
     Binding((pygame.K_t,), 0, Command.TRUST, "trust light", "T", _SCENE),
-    Binding((pygame.K_HOME,), 0, Command.HOME, "fit the scene", "Home", _VIEW),
+    Binding((pygame.K_HOME,), 0, Command.HOME, "fit the scene; again: the bodies", "Home", _VIEW),
     Binding((pygame.K_TAB,), 0, Command.PANEL, "hide the panel, show it", "Tab", _VIEW),
     Binding((pygame.K_b,), 0, Command.ADD_BALL, "add a ball at the cursor", "B", _BODIES),
     Binding((pygame.K_n,), 0, Command.NUDGE, "nudge the picked body", "N", _BODIES),

@@ -3,12 +3,13 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pygame
 
 from sandbox.play.camera import Camera
 from sandbox.play.desk import Desk
 from sandbox.play.footage.taking import Taking
-from sandbox.play.framing import framing
+from sandbox.play.framing import around, framing
 from sandbox.play.stage import Stage
 
 TITLE = "sandbox"
@@ -67,6 +68,20 @@ class Seat:
         if show is not None:
             size = self.surface.get_size()
             self.camera = Camera.fitting(framing(show.scene), size, inset=self.desk.panel.width, foot=self.desk.foot)
+
+    def find(self) -> None:
+        """Show the bodies where they are now."""
+        show = self.stage.show
+        if show is None:
+            return
+        frame = show.frame
+        there = frame.present & np.isfinite(frame.position).all(axis=1)
+        box = around(frame.position[there], show.bodies.radius[: len(there)][there])
+        if box is not None:
+            low, high = ((float(corner[0]), float(corner[1])) for corner in box)
+            size = self.surface.get_size()
+            self.camera = Camera.fitting((low, high), size, inset=self.desk.panel.width, foot=self.desk.foot)
+            self.at_home = False
 
     def resize(self, surface: pygame.Surface) -> None:
         """Go on with a surface of another size."""

@@ -367,6 +367,19 @@ def test_camera_stays_where_it_was_put_and_home_brings_it_back(window: Window) -
     assert window.camera == home
 
 
+def test_home_once_more_finds_the_bodies_where_they_are_now(opened: Open) -> None:
+    away = opened(ROOM.replace("radius = 0.4", "radius = 0.4\nvelocity = [0.0, 50.0]\ncollides = 'none'"))
+    home = away.camera
+    turn(away, elapsed=0.1)
+    for _ in range(30):
+        turn(away, elapsed=0.1)
+    assert not len(places(away.surface, SKY, PICTURE))
+    turn(away, key(pygame.K_HOME), key_up(pygame.K_HOME))
+    assert len(places(away.surface, SKY, PICTURE))
+    turn(away, key(pygame.K_HOME), key_up(pygame.K_HOME))
+    assert away.camera == home
+
+
 def test_ball_is_added_under_the_mouse_or_before_it_came_in_the_middle(window: Window) -> None:
     for place, told in ((window.camera.centre, ()), (THERE, (move(*on_screen(window, THERE)),))):
         turn(window, *told, key(pygame.K_b, unicode="b"), key_up(pygame.K_b))
