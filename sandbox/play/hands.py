@@ -47,17 +47,6 @@ class Hands:
         self._spot, self._offset, self._angle = place, (place[0] - x, place[1] - y), float(frame.angle[number])
         return True
 
-    def grasp(self, live: Live, place: Place, reach: float, paused: bool) -> bool:
-        """Pick the body at a place, and take hold of it; return whether there is one.
-
-        Raises:
-            ActionError: it cannot be held; it is picked all the same.
-        """
-        if not self.look(live, place, reach):
-            return False
-        self.hold(live, paused)
-        return True
-
     def hold(self, live: Live, paused: bool) -> None:
         """Take hold of the picked body, at the point of it that was looked at, however far it has gone since.
 

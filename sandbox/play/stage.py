@@ -10,7 +10,7 @@ from typing import Any
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, able, engine_named
-from sandbox.play.hands import Hands, Place
+from sandbox.play.hands import Hands
 from sandbox.play.instruments.knob import Value
 from sandbox.play.knobs import turned
 from sandbox.play.messages import Messages
@@ -245,14 +245,6 @@ class Stage:
             self.messages.tell(str(error), "warning")
             return False
         return True
-
-    def grasp(self, place: Place, reach: float) -> bool:
-        """Pick the body at a place, m, and take hold of it; return whether there is one."""
-        if isinstance(self.show, Stored):
-            return self.hands.look(self.show, place, reach)
-        return (
-            self.act(lambda live: self.hands.grasp(live, place, reach, self.paused)) and self.hands.picked is not None
-        )
 
     def go_on(self, elapsed: float) -> None:
         """Let real time pass, s."""

@@ -25,6 +25,13 @@ def live(engine: str = "pymunk", **more: Any) -> Live:
     return Live(Session(from_document({**DOCUMENT, **more}), engine))
 
 
+def grasp(hands: Hands, live: Live, place: tuple[float, float], reach: float, paused: bool) -> bool:
+    """Pick the body at a place and take hold of it, as a drag does."""
+    found = hands.look(live, place, reach)
+    hands.hold(live, paused)
+    return found
+
+
 def passed(live: Live, steps: int) -> Live:
     for _ in range(steps):
         live.step()
@@ -34,7 +41,7 @@ def passed(live: Live, steps: int) -> Live:
 @pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
 def test_body_dragged_while_paused_is_exactly_under_the_hand(engine: str) -> None:
     show, hands = passed(live(engine), 3), Hands()
-    assert hands.grasp(show, (0.25, -0.125), 0.0, paused=True)
+    assert grasp(hands, show, (0.25, -0.125), 0.0, paused=True)
     assert (hands.picked, hands.holding) == (0, True)
     for place in ((1.25, 0.875), (-3.0, 2.0), (0.5, 0.5)):
         hands.drag(show, place)
@@ -48,11 +55,11 @@ def test_body_dragged_while_paused_is_exactly_under_the_hand(engine: str) -> Non
 
 def test_fixed_body_can_be_moved_while_paused_and_not_pulled() -> None:
     show, hands = live(), Hands()
-    assert hands.grasp(show, (5.0, 0.0), 0.0, paused=True)
+    assert grasp(hands, show, (5.0, 0.0), 0.0, paused=True)
     hands.drag(show, (5.0, 3.0))
     hands.let_go(show)
     assert show.frame.position[1].tolist() == [5.0, 3.0]
-    assert hands.grasp(show, (5.0, 3.0), 0.0, paused=False)
+    assert grasp(hands, show, (5.0, 3.0), 0.0, paused=False)
     assert hands.picked == 1
     assert not hands.holding
     hands.drag(show, (0.0, 9.0))
@@ -65,7 +72,7 @@ def test_body_that_went_on_is_held_where_it_was_looked_at(paused: bool) -> None:
     """It flies and turns between the press and the first motion of the mouse."""
     show, hands = live(), Hands()
     show.act(Impulse(time=0.0, body="a", impulse=(8.0, 0.0)))
-    hands.grasp(show, (0.0, 0.25), 0.0, paused=False)
+    grasp(hands, show, (0.0, 0.25), 0.0, paused=False)
     hands.drag(show, (9.0, 3.0))
     passed(show, 40)
     hands.let_go(show)
@@ -88,7 +95,7 @@ def test_body_that_went_on_is_held_where_it_was_looked_at(paused: bool) -> None:
 
 def test_pulled_body_comes_under_the_hand_and_flies_on_when_let_go() -> None:
     show, hands = live(), Hands()
-    hands.grasp(show, (0.0, 0.25), 0.0, paused=False)
+    grasp(hands, show, (0.0, 0.25), 0.0, paused=False)
     assert hands.holding
     hands.drag(show, (2.0, 0.25))
     passed(show, 4)
@@ -110,7 +117,7 @@ def test_pulled_body_comes_under_the_hand_and_flies_on_when_let_go() -> None:
 def test_nothing_is_grasped_where_there_is_nothing() -> None:
     show, hands = live(), Hands()
     hands.picked = 2
-    assert not hands.grasp(show, (0.0, 9.0), 0.1, paused=False)
+    assert not grasp(hands, show, (0.0, 9.0), 0.1, paused=False)
     assert hands.picked is None
     hands.drag(show, (1.0, 1.0))
     hands.let_go(show)
@@ -126,7 +133,7 @@ def test_nothing_is_grasped_where_there_is_nothing() -> None:
 def test_nudge_adds_exactly_its_impulse(number: int, place: tuple[float, float], speed: float) -> None:
     """1 m/s, or ten radii a second of a small body."""
     show, hands = live(), Hands()
-    hands.grasp(show, place, 0.0, paused=True)
+    grasp(hands, show, place, 0.0, paused=True)
     for k in (1, 2):
         hands.nudge(show)
         velocity = show.frame.velocity[number]
@@ -170,7 +177,7 @@ def test_new_ball_that_overlaps_is_refused_by_exact() -> None:
 
 def test_removed_body_is_gone_and_no_longer_picked_or_held() -> None:
     show, hands = live(), Hands()
-    hands.grasp(show, (0.0, 0.0), 0.0, paused=False)
+    grasp(hands, show, (0.0, 0.0), 0.0, paused=False)
     passed(show, 2)
     hands.remove(show)
     assert not show.frame.present[0]
@@ -183,7 +190,7 @@ def test_removed_body_is_gone_and_no_longer_picked_or_held() -> None:
 
 def test_body_that_was_removed_elsewhere_can_be_let_go() -> None:
     show, hands = live(), Hands()
-    hands.grasp(show, (0.0, 0.0), 0.0, paused=False)
+    grasp(hands, show, (0.0, 0.0), 0.0, paused=False)
     show.act(Remove(time=0.0, body="a"))
     assert hands.line(show) is None
     with pytest.raises(ActionError, match="no longer there"):
@@ -228,7 +235,7 @@ def test_names_of_any_kind_can_be_held() -> None:
     show = Live(Session(from_document({"ball": balls})))
     for k in range(len(names)):
         hands = Hands()
-        hands.grasp(show, (3.0 * k, 0.0), 0.0, paused=True)
+        grasp(hands, show, (3.0 * k, 0.0), 0.0, paused=True)
         hands.drag(show, (3.0 * k, 5.0))
         hands.nudge(show)
     assert show.frame.position[:, 1].tolist() == [5.0] * 5

@@ -285,10 +285,10 @@ def test_many_bodies_have_no_twin_unless_asked_for() -> None:
 
 def test_what_cannot_be_done_is_a_message(folder: Path) -> None:
     stage = opened(folder / "a.toml")
-    assert stage.grasp((0.0, 5.0), 0.0)
+    assert stage.hands.look(live(stage), (0.0, 5.0), 0.0)
     stage.act(stage.hands.remove)
     assert not live(stage).frame.present[0]
-    assert not stage.grasp((0.0, 5.0), 0.0)
+    assert not stage.hands.look(live(stage), (0.0, 5.0), 0.0)
     assert not stage.act(lambda live: live.relaunch("zzz"))
     assert "zzz" in told(stage, "warning")
 
@@ -299,7 +299,7 @@ def test_stored_run_refuses_every_change_with_a_message() -> None:
     show = Stored(Film(run(scene, "pymunk", dt=0.01)))
     stage.put_on(show, None, scene)
     before = show.frame
-    assert stage.grasp((0.0, 5.5), 0.0)  # one may look
+    assert stage.hands.look(show, (0.0, 5.5), 0.0)  # one may look
     assert stage.hands.picked == 0
     for deed in (
         lambda: stage.act(stage.hands.nudge),
@@ -337,7 +337,6 @@ def test_empty_stage_does_nothing_and_says_so() -> None:
         deed()
     stage.turn("gravity", 1.0)
     stage.reload()
-    assert not stage.grasp((0.0, 0.0), 0.0)
     assert stage.engine == "exact"
 
 
