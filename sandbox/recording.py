@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
-from uuid import uuid4
 
 from pydantic import ValidationError
 
@@ -15,6 +14,7 @@ from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
+from sandbox.whole import whole
 
 FORMAT = 1
 MAX_DURATION = 1e9  # s, as of a scene
@@ -50,13 +50,8 @@ class Recording:
     def save(self, path: str | Path) -> Path:
         """Write it to a file, to a temporary name first: never half a file."""
         path = Path(path)
-        temporary = path.with_name(f".{path.name}-{uuid4().hex}.tmp")
-        try:
+        with whole(path) as temporary:
             temporary.write_text(self.to_json(), encoding="utf-8")
-            temporary.replace(path)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
         return path
 
     def to_json(self) -> str:

@@ -8,10 +8,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Self
-from uuid import uuid4
 
 import numpy as np
 import numpy.typing as npt
+
+from sandbox.whole import whole
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -165,14 +166,8 @@ class Trajectory:
         path = Path(path)
         arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "info"}
         arrays["info"] = np.asarray(json.dumps(dict(self.info), ensure_ascii=False))
-        temporary = path.with_name(f".{path.name}-{uuid4().hex}.tmp")
-        try:
-            with temporary.open("xb") as stream:
-                np.savez_compressed(stream, **arrays)
-            temporary.replace(path)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+        with whole(path) as temporary, temporary.open("xb") as stream:
+            np.savez_compressed(stream, **arrays)
         return path
 
     @classmethod

@@ -5,7 +5,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from uuid import uuid4
 
 import click
 
@@ -18,6 +17,7 @@ from sandbox.measure.recorder import TooLargeError
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
+from sandbox.whole import whole
 
 
 @click.command(name="compare")
@@ -108,12 +108,8 @@ def _write(comparison: Comparison, document: dict[str, object], out: Path) -> No
     from sandbox.report.comparison import plot_comparison
 
     plot_comparison(comparison, out)
-    temporary = out / f".{uuid4().hex}.tmp"
-    try:
+    with whole(out / "comparison.json") as temporary:
         temporary.write_text(json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1), encoding="utf-8")
-        temporary.replace(out / "comparison.json")
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -1,11 +1,13 @@
 """`sandbox play`: the window."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from sandbox.cli.reading import gathering, paths_of, require_scene
 from sandbox.cli.showing import show_stage, window_options
+from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import UnknownEngineError, able, engine_named
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import load
@@ -16,17 +18,7 @@ from sandbox.scene.file import load
 @click.option("--engine", default="pymunk", metavar="NAME", help="which engine to begin with; E goes to the next")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of every scene")
 @window_options
-def command(
-    scene: str | None,
-    engine: str,
-    overrides: tuple[str, ...],
-    size: tuple[int, int] | None,
-    paused: bool,
-    film: str,
-    overlays: tuple[str, ...],
-    ghost: bool,
-    record: Path | None,
-) -> int:
+def command(scene: str | None, engine: str, overrides: tuple[str, ...], **window: Any) -> int:
     """Play a scene in a window. SCENE is a file, or the name of a shipped one; without, pick one there."""
     faults: list[Fault] = []
     with gathering(faults, "--engine", (UnknownEngineError,)):
@@ -39,8 +31,7 @@ def command(
             found = load(path, overrides)
             missing = engine_named(engine).missing(found, found.solver) if not faults else ()
             if missing:
-                others = ", ".join(able(found)) or "none"
-                click.echo(f"{scene}: {engine} refuses: {'; '.join(missing)}; these could: {others}", err=True)
+                click.echo(f"{scene}: {Refusal(engine, missing, able(found))}", err=True)
                 return 1
         elif overrides:
             raise SceneError([Fault("--set", None, "", "sets values of a scene; name the scene too")])
@@ -52,14 +43,4 @@ def command(
     from sandbox.play.stage import Stage
 
     stage = Stage(engine, overrides)
-    return show_stage(
-        stage,
-        lambda: stage.open(path) if path is not None else True,
-        size=size,
-        paused=paused,
-        film=film,
-        overlays=overlays,
-        ghost=ghost,
-        record=record,
-        pick=path is None,
-    )
+    return show_stage(stage, lambda: path is None or stage.open(path), **window, pick=path is None)

@@ -1,8 +1,7 @@
 """`sandbox replay`: a stored run, or a recorded session, in the window."""
 
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -26,16 +25,7 @@ if TYPE_CHECKING:
 @click.argument("run")
 @click.option("--engine", metavar="NAME", help="compute it again on this engine; a stored run is then its ghost")
 @window_options
-def command(
-    run: str,
-    engine: str | None,
-    size: tuple[int, int] | None,
-    paused: bool,
-    film: str,
-    overlays: tuple[str, ...],
-    ghost: bool,
-    record: Path | None,
-) -> int:
+def command(run: str, engine: str | None, **window: Any) -> int:
     """Look at a stored run or a recorded session. RUN is DIR/<id>, a folder of one run, or a recording."""
     faults: list[Fault] = []
     if engine is not None:
@@ -66,12 +56,7 @@ def command(
     return show_stage(
         stage,
         lambda: stage.put_on(first, None, first.scene, again=lambda: _shown(known, engine)),
-        size=size,
-        paused=paused,
-        film=film,
-        overlays=overlays,
-        ghost=ghost,
-        record=record,
+        **window,
     )
 
 
@@ -148,12 +133,9 @@ def _fitting(settings: Settings, scene: Scene, engine: str) -> Settings:
 
     The engine of the run, too, may refuse some of what it has filled in itself, such as a slop beside springs.
     """
-    from sandbox.play.running.switching import COMMON
-
-    chosen, stated = engine_named(engine), settings.model_dump()
-    fitting = Settings(**{key: stated.pop(key) for key in COMMON})
-    for key in sorted(stated, key=lambda key: key != "response"):  # which some others go with
-        tried = fitting.replace(**{key: stated[key]})
+    chosen, fitting = engine_named(engine), settings.common()
+    for key in sorted(Settings.model_fields, key=lambda key: key != "response"):  # which some others go with
+        tried = fitting.replace(**{key: getattr(settings, key)})
         if not chosen.missing(scene, tried):
             fitting = tried
     return fitting

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 
-from sandbox.play.camera import Camera
+from sandbox.play.camera import Box, Camera
 from sandbox.play.desk import Desk
 from sandbox.play.footage.taking import Taking
 from sandbox.play.framing import around, framing
@@ -66,8 +66,7 @@ class Seat:
         self.at_home = True
         show = self.stage.show
         if show is not None:
-            size = self.surface.get_size()
-            self.camera = Camera.fitting(framing(show.scene), size, inset=self.desk.panel.width, foot=self.desk.foot)
+            self._fit(framing(show.scene))
 
     def find(self) -> None:
         """Show the bodies where they are now."""
@@ -79,9 +78,13 @@ class Seat:
         box = around(frame.position[there], show.bodies.radius[: len(there)][there])
         if box is not None:
             low, high = ((float(corner[0]), float(corner[1])) for corner in box)
-            size = self.surface.get_size()
-            self.camera = Camera.fitting((low, high), size, inset=self.desk.panel.width, foot=self.desk.foot)
+            self._fit((low, high))
             self.at_home = False
+
+    def _fit(self, box: Box) -> None:
+        """Show a box whole, beside what the panel and the timeline cover."""
+        size = self.surface.get_size()
+        self.camera = Camera.fitting(box, size, inset=self.desk.panel.width, foot=self.desk.foot)
 
     def resize(self, surface: pygame.Surface) -> None:
         """Go on with a surface of another size."""

@@ -6,8 +6,6 @@ from itertools import chain, cycle, repeat
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
-from uuid import uuid4
-from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +16,7 @@ from sandbox.measure.compare import Comparison
 from sandbox.measure.compare.errors import Errors, errors
 from sandbox.measure.compare.runs import common_frames
 from sandbox.measure.energy import energies
+from sandbox.report.figure_file import write_figure
 from sandbox.report.panels import (
     BEYOND,
     CLOSED,
@@ -31,7 +30,7 @@ from sandbox.report.panels import (
     shortened,
 )
 from sandbox.report.paths import draw_fixed, draw_path, draw_truth, moving_axes
-from sandbox.report.plots import COLOURS, FORMATS, MOST_BODIES
+from sandbox.report.plots import COLOURS, MOST_BODIES
 from sandbox.trajectory import FloatArray
 
 FLOOR = 1e-16
@@ -59,7 +58,7 @@ def plot_comparison(comparison: Comparison, folder: str | Path) -> tuple[Path, .
         "error": draw_error(comparison),
         "energy": draw_energy(comparison),
     }
-    return tuple(_written(figure, Path(folder) / f"{name}.png") for name, figure in figures.items())
+    return tuple(write_figure(figure, Path(folder) / f"{name}.png") for name, figure in figures.items())
 
 
 def draw_trajectories(comparison: Comparison) -> Figure:
@@ -241,17 +240,3 @@ def _finish(
     literal(figure.text(y=1 - 0.10 / tall, s=title, fontsize=16, weight="bold", **place))
     literal(figure.text(y=1 - 0.44 / tall, s="\n".join(lines), fontsize=9.5, linespacing=1.4, **place))
     figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1 - (0.5 + 0.19 * len(lines)) / tall))
-
-
-def _written(figure: Figure, path: Path) -> Path:
-    temporary = path.with_name(f".{uuid4().hex}.tmp")
-    try:
-        with temporary.open("xb") as stream, catch_warnings():
-            # No font has every character; a missing one shows as a box.
-            filterwarnings("ignore", message="Glyph .* missing from")
-            filterwarnings("ignore", message="Matplotlib currently does not support .* natively")
-            figure.savefig(stream, format="png", dpi=150, metadata=FORMATS[".png"])
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path

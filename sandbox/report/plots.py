@@ -6,8 +6,6 @@ from difflib import get_close_matches
 from itertools import cycle
 from pathlib import Path
 from typing import Any, NamedTuple
-from uuid import uuid4
-from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,6 +14,7 @@ from matplotlib.lines import Line2D
 
 from sandbox.measure.closed_form import ClosedForm, closed_form
 from sandbox.measure.energy import energies
+from sandbox.report.figure_file import FORMATS, write_figure
 from sandbox.report.panels import (
     CLOSED,
     FAINT,
@@ -32,9 +31,6 @@ from sandbox.report.panels import (
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.trajectory import FloatArray, Trajectory
-
-FORMATS: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-"""Suffixes that can be written, each with the metadata to leave out: the same run makes the same picture."""
 
 MOST_BODIES = 5
 """Drawn where none is named."""
@@ -77,19 +73,8 @@ def plot_run(
         OSError: the file cannot be written.
     """
     path = Path(path)
-    kind = format_of(path)
-    figure = draw_run(trajectory, scene, bodies, run_bodies)
-    temporary = path.with_name(f".{uuid4().hex}.tmp")
-    try:
-        with temporary.open("xb") as stream, catch_warnings():
-            # No font has every character; a missing one shows as a box.
-            filterwarnings("ignore", message="Glyph .* missing from")
-            filterwarnings("ignore", message="Matplotlib currently does not support .* natively")
-            figure.savefig(stream, format=kind, dpi=150, metadata=FORMATS[f".{kind}"])
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path
+    format_of(path)  # before the work
+    return write_figure(draw_run(trajectory, scene, bodies, run_bodies), path)
 
 
 def format_of(path: str | Path) -> str:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sandbox.report.whole import whole
 from sandbox.trajectory import Trajectory
+from sandbox.whole import whole
 
 STATES = ("time", "body", "x", "y", "vx", "vy", "angle", "angular_velocity", "present")
 """Columns of states, SI units. A body that is not there yet is nan."""

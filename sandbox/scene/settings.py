@@ -12,6 +12,10 @@ Response = Literal["impulse", "penalty"]
 BroadPhase = Literal["all_pairs", "circles", "sweep", "grid", "oriented"]
 
 
+COMMON = ("dt", "substeps", "iterations", "record_every")
+"""What every engine takes; all else is a choice that only some have."""
+
+
 class Settings(Part):
     """Every choice a solver is given. `None` leaves a choice to the engine, which then states its own.
 
@@ -55,3 +59,7 @@ class Settings(Part):
             pydantic.ValidationError: a name or a value is wrong.
         """
         return type(self).model_validate({**self.model_dump(), **changes})
+
+    def common(self) -> Self:
+        """Return settings with only what every engine takes."""
+        return type(self)(**{key: getattr(self, key) for key in COMMON})

@@ -1,7 +1,7 @@
 """Companions: runs beside the session, from the same state by the same actions: the ghost and the twin.
 
-The ghost is the scene as another engine has it, the twin the scene with one ball moved by 1e-12 m. Each begins when
-it is asked for, and again whenever the session goes back.
+The ghost is the scene as another engine has it, the twin the scene with one ball moved by 1e-12 m. Each begins where
+the session is when it is asked for; while the session goes back, it waits.
 """
 
 from collections.abc import Collection
@@ -19,7 +19,7 @@ from sandbox.engines.relay import Relay
 from sandbox.measure.compare.comparing import usual_tolerance
 from sandbox.measure.compare.horizon import NUDGE, ULPS
 from sandbox.scene.meetings import meetings
-from sandbox.scene.settings import Settings
+from sandbox.scene.settings import COMMON
 from sandbox.trajectory import FloatArray, Frame
 
 PATIENCE = 0.3
@@ -102,20 +102,10 @@ def ghost_of(point: Checkpoint, step: int = 0, without: Collection[str] = ()) ->
         if name == point.engine or name in without or name not in ENGINES:
             continue
         try:
-            return Companion(replace(point, engine=name, wanted=common(point.wanted)), step), "; ".join(why)
+            return Companion(replace(point, engine=name, wanted=point.wanted.common()), step), "; ".join(why)
         except (Refusal, ActionError) as refusal:
             why.append(str(refusal))
     raise ActionError("; ".join(why) or "there is no other engine")
-
-
-def common(settings: Settings) -> Settings:
-    """Return settings with only what every engine knows."""
-    return Settings(
-        dt=settings.dt,
-        substeps=settings.substeps,
-        iterations=settings.iterations,
-        record_every=settings.record_every,
-    )
 
 
 class Trust:
@@ -215,5 +205,5 @@ def follows(action: Action) -> Action | None:
     """Return a session's action as the ghost does it: the session's engine is not its own."""
     if not isinstance(action, Switch):
         return action
-    shared = {key: value for key, value in action.settings.items() if key in ("dt", "substeps", "iterations")}
+    shared = {key: value for key, value in action.settings.items() if key in COMMON}
     return Switch(time=action.time, settings=shared) if shared else None

@@ -60,7 +60,7 @@ class Company:
 
     def _begin_companions(self) -> None:
         if self._ghost is not None:
-            self.show_ghost(True)
+            self._begin_ghost()
         if self.trust is not None:
             self.show_trust(True)
 
@@ -93,7 +93,7 @@ class Company:
         """Take note of something new that the session has done; where that is in the past, what came is no more."""
         step = self._session.step_number
         if self._ghost is not None and self._ghost.step > step:
-            self.show_ghost(True)
+            self._begin_ghost()
         elif self._ghost is not None:
             self._let(self._ghost, action)
         if self.trust is not None and (self.trust.step > step or self.trust.horizon is not None):
@@ -123,19 +123,18 @@ class Company:
         """Whether there is a ghost."""
         return self._ghost is not None or self._film is not None
 
-    def show_ghost(self, on: bool, without: tuple[str, ...] = ()) -> None:
-        """Begin a ghost from here, or end it.
-
-        Args:
-            on: which of both.
-            without: engines that have been tried already.
-        """
-        self._film = None
+    def show_ghost(self, on: bool) -> None:
+        """Begin a ghost from here, or end it."""
+        self._film, self._given_up = None, ()
         self._drop_ghost()
-        if not on:
-            return
+        if on:
+            self._begin_ghost()
+
+    def _begin_ghost(self) -> None:
+        """Begin a ghost from here, on the first engine that can and has not been given up."""
+        self._drop_ghost()
         try:
-            self._ghost, note = ghost_of(self._session.relay.checkpoint(), self._session.step_number, without)
+            self._ghost, note = ghost_of(self._session.relay.checkpoint(), self._session.step_number, self._given_up)
         except ActionError as error:
             self.notes.append(("warning", f"no ghost: {error}"))
             return
@@ -149,7 +148,7 @@ class Company:
         """Let another engine go on as the ghost, from here."""
         self._given_up += (ended.engine,)
         self.notes.append(("warning", f"the ghost of {ended.engine} is gone: {ended.ended}"))
-        self.show_ghost(True, self._given_up)
+        self._begin_ghost()
 
     def _drop_ghost(self) -> None:
         if self._ghost is not None:

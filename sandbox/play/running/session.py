@@ -12,12 +12,10 @@ up part of the session, as a switch that changes nothing: who replays the sessio
 from collections.abc import Iterator
 from time import perf_counter
 
-from sandbox.action import Action, ActionError, Pull
-from sandbox.engines.contract import Divergence, Exhaustion, Refusal
-from sandbox.engines.relay import Relay, joined
+from sandbox.action import Action, ActionError
+from sandbox.engines.relay import joined
+from sandbox.play.running.course import Course
 from sandbox.play.running.history import History, Mark
-from sandbox.play.running.script import Script
-from sandbox.recording import Recording
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -30,15 +28,13 @@ PACE = 16
 """Steps made at a time on the way to another one."""
 FINE = 64
 """Steps before the other one that are made one by one: each is seen, and so at hand for who steps further back."""
-PATIENCE = 2.0
-"""s that one step may take to compute, where an engine can tell."""
 
 
 class WrongWayError(Exception):
     """The way from a checkpoint leads to another state than was seen before."""
 
 
-class Session:
+class Session(Course):
     """A scene that is being played on an engine.
 
     Steps that were made before are made again with the actions of then, until something else is done: from there on
@@ -52,73 +48,20 @@ class Session:
         settings: Settings | None = None,
         actions: tuple[Action, ...] = (),
     ) -> None:
-        """Start.
-
-        Args:
-            scene: what is played.
-            engine: its name.
-            settings: by default the scene's own.
-            actions: to be done again on the way, in order of time.
-
-        Raises:
-            UnknownEngineError: no engine has that name.
-            Refusal: the engine cannot run the scene.
-        """
-        self._scene, self._engine = scene, engine
-        self.relay = Relay(scene, engine, settings)
-        """what runs"""
-        self._settings = self.relay.wanted
-        self.relay.patience = PATIENCE
-        self._script = Script(actions)
-        self._redone: list[tuple[int, Action]] = []
-        self._step = 0
+        """Start; as `Course`."""
+        super().__init__(scene, engine, settings, actions)
         self._calm = 0
         self._mark: Mark | None = None  # that the relay was taken up from, as long as all that followed was known
         self._astray = False
-        self._exhausted = False
         self._contacts: list[Contacts] = []
-        self._everyone = self.relay.bodies
+        self._everyone = self.bodies
         self.history = History()
-        self.ended: str | None = None
-        """why it cannot go on: it diverged, or asks for more than can be had"""
-        self.relay.contacts()
-        self._redo()
         self._previous = self._frame = self.relay.frame()
         self.history.keep(0, self._frame)
-
-    @property
-    def scene(self) -> Scene:
-        """What runs, with all that was set since."""
-        return self.relay.scene
-
-    @property
-    def engine(self) -> str:
-        """The present engine's name."""
-        return self.relay.engine
-
-    @property
-    def settings(self) -> Settings:
-        """The present settings, with every choice filled in."""
-        return self.relay.settings
-
-    @property
-    def wanted(self) -> Settings:
-        """The present settings as they were asked for."""
-        return self.relay.wanted
-
-    @property
-    def bodies(self) -> Bodies:
-        """The bodies by number; spawned ones at the end."""
-        return self.relay.bodies
 
     def bodies_in(self, frame: Frame) -> Bodies:
         """Return the bodies by number, with those of a state that was seen; it may lie ahead and have more."""
         return self._everyone if len(frame.position) > len(self.bodies) else self.bodies
-
-    @property
-    def step_number(self) -> int:
-        """Steps made since the start."""
-        return self._step
 
     @property
     def time(self) -> float:
@@ -139,11 +82,6 @@ class Session:
         """Forget the state before: until the next step, pictures show the present one."""
         self._previous = self._frame
 
-    @property
-    def actions(self) -> tuple[Action, ...]:
-        """All that was done, up to now."""
-        return self._script.so_far
-
     def advance(self, steps: int = 1, until: float | None = None) -> int:
         """Make steps; return how many were made.
 
@@ -159,7 +97,9 @@ class Session:
             last = made + 1 == steps or (made > 0 and until is not None and perf_counter() > until)
             if last:
                 self._previous = self.relay.frame()
-            if not self._one():
+            if self._step >= self.history.furthest:
+                self._own_up()
+            if not self._make_step():
                 break
             made += 1
             if self._mark is not None and not last:
@@ -167,29 +107,6 @@ class Session:
         if made:
             self._see()
         return made
-
-    def _one(self) -> bool:
-        """Make a step, and do what is to be done then; tell whether the step was made."""
-        if self._step >= self.history.furthest:
-            self._own_up()
-        try:
-            self.relay.step()
-        except Divergence as divergence:
-            self.ended = str(divergence)
-        except Exhaustion as exhaustion:
-            self.ended, self._exhausted = f"at {self.relay.time:g} s: {exhaustion}", True
-            return False
-        self._step += 1
-        if self.ended is None:
-            self._redo()
-        return True
-
-    def _redo(self) -> None:
-        """Do again what was done at this time."""
-        try:
-            self._redone += [(self._step, action) for action in self._script.redo(self.relay)]
-        except ActionError as error:
-            self.ended = f"at {self.relay.time:g} s: {error}"
 
     def _see(self) -> None:
         """Look at the present state: keep it, hold it against what was seen before, and make a checkpoint if due."""
@@ -222,11 +139,6 @@ class Session:
         mark, self._mark = self._mark, None
         if mark is not None and self._script.hand_over(mark.actions, mark.point.frame.time):
             self.history.inserted(mark.step)
-
-    def redone(self) -> list[tuple[int, Action]]:
-        """Return what was done again since the last call, each with the step after which it was."""
-        parts, self._redone = self._redone, []
-        return parts
 
     def contacts(self) -> Contacts:
         """Return the contacts that were open since the last call."""
@@ -280,41 +192,11 @@ class Session:
 
     def _restore(self, mark: Mark | None) -> None:
         """Take up the checkpoint, or start anew."""
-        relay = None
-        if mark is not None:
-            try:
-                relay = Relay.resumed(mark.point)
-            except (Refusal, ActionError):
-                self.history.distrust()
-        self.relay.close()
-        if relay is None or mark is None:
-            self.relay = Relay(self._scene, self._engine, self._settings)
-            self._step = self._script.done = 0
-            self._mark = None
-        else:
-            self.relay, self._step, self._script.done = relay, mark.step, mark.actions
-            self._mark = mark
-        self.ended = None
-        self._astray = self._exhausted = False
+        taken = self._take_up(mark)
+        if mark is not None and not taken:
+            self.history.distrust()
+        self._mark = mark if taken else None
+        self._astray = False
         self._calm = 0
         self._contacts.clear()
-        self.relay.patience = PATIENCE
-        self.relay.contacts()
-        self._redo()
         self._previous = self._frame = self.relay.frame()
-
-    def recording(self) -> Recording:
-        """Return the session up to now."""
-        return Recording(
-            scene=self._scene,
-            engine=self._engine,
-            settings=self._settings,
-            # A hand that is still holding lets go at the end: no replay is to hang from one that nobody sees.
-            actions=self.actions + tuple(Pull(time=self.relay.time, body=name) for name in self.relay.pulls),
-            duration=self.relay.time,
-            state_hash=None if self._exhausted else self.relay.state_hash(),
-        )
-
-    def close(self) -> None:
-        """Release what the engine holds."""
-        self.relay.close()

@@ -2,9 +2,7 @@
 
 from sandbox.action import ActionError, Switch, Value
 from sandbox.play.running.session import Session
-
-COMMON = ("dt", "substeps", "iterations", "record_every")
-"""Settings that every engine takes."""
+from sandbox.scene.settings import COMMON
 
 
 def switch(session: Session, engine: str) -> str | None:

@@ -10,7 +10,7 @@ from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.comparing import usual_tolerance
 from sandbox.measure.compare.truth import truth_of
 from sandbox.play.running import companions
-from sandbox.play.running.companions import Companion, Trust, apart, common, follows, ghost_of
+from sandbox.play.running.companions import Companion, Trust, apart, follows, ghost_of
 from sandbox.play.running.company import Company
 from sandbox.play.running.session import Session
 from sandbox.scene.file import from_document, load
@@ -310,7 +310,7 @@ def test_follower_is_told_only_what_every_engine_knows() -> None:
     kick = Impulse(time=0.0, body="a", impulse=(1.0, 0.0))
     assert follows(kick) is kick
     wanted = Settings(dt=0.1, substeps=3, slop=0.1, integrator="rk4", half_kick=True)
-    assert common(wanted) == Settings(dt=0.1, substeps=3)
+    assert wanted.common() == Settings(dt=0.1, substeps=3)
 
 
 def test_apart_is_the_largest_distance_of_those_in_both() -> None:

@@ -1,0 +1,148 @@
+"""Course: a relay driven by a script, step by step, from the start or from a checkpoint.
+
+It knows nothing of what was seen before: that is the session's.
+"""
+
+from sandbox.action import Action, ActionError, Pull
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal
+from sandbox.engines.relay import Relay
+from sandbox.play.running.history import Mark
+from sandbox.play.running.script import Script
+from sandbox.recording import Recording
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+PATIENCE = 2.0
+"""s that one step may take to compute, where an engine can tell."""
+
+
+class Course:
+    """A scene on an engine, and what is done in it. Steps are made with the actions of their times."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        engine: str = "pymunk",
+        settings: Settings | None = None,
+        actions: tuple[Action, ...] = (),
+    ) -> None:
+        """Start.
+
+        Args:
+            scene: what is played.
+            engine: its name.
+            settings: by default the scene's own.
+            actions: to be done on the way, in order of time.
+
+        Raises:
+            UnknownEngineError: no engine has that name.
+            Refusal: the engine cannot run the scene.
+        """
+        self._start = scene, engine, settings
+        self.ended: str | None = None
+        """why it cannot go on: it diverged, or asks for more than can be had"""
+        self._exhausted = False
+        self._script = Script(actions)
+        self._redone: list[tuple[int, Action]] = []
+        self._step = 0
+        self._take_over(Relay(*self._start))
+
+    @property
+    def scene(self) -> Scene:
+        """What runs, with all that was set since."""
+        return self.relay.scene
+
+    @property
+    def engine(self) -> str:
+        """The present engine's name."""
+        return self.relay.engine
+
+    @property
+    def settings(self) -> Settings:
+        """The present settings, with every choice filled in."""
+        return self.relay.settings
+
+    @property
+    def wanted(self) -> Settings:
+        """The present settings as they were asked for."""
+        return self.relay.wanted
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies by number; spawned ones at the end."""
+        return self.relay.bodies
+
+    @property
+    def step_number(self) -> int:
+        """Steps made since the start."""
+        return self._step
+
+    @property
+    def actions(self) -> tuple[Action, ...]:
+        """All that was done, up to now."""
+        return self._script.so_far
+
+    def _make_step(self) -> bool:
+        """Make a step, and do what is to be done then; tell whether the step was made."""
+        try:
+            self.relay.step()
+        except Divergence as divergence:
+            self.ended = str(divergence)
+        except Exhaustion as exhaustion:
+            self.ended, self._exhausted = f"at {self.relay.time:g} s: {exhaustion}", True
+            return False
+        self._step += 1
+        if self.ended is None:
+            self._redo()
+        return True
+
+    def _redo(self) -> None:
+        """Do again what was done at this time."""
+        try:
+            self._redone += [(self._step, action) for action in self._script.redo(self.relay)]
+        except ActionError as error:
+            self.ended = f"at {self.relay.time:g} s: {error}"
+
+    def redone(self) -> list[tuple[int, Action]]:
+        """Return what was done again since the last call, each with the step after which it was."""
+        parts, self._redone = self._redone, []
+        return parts
+
+    def _take_up(self, mark: Mark | None) -> bool:
+        """Go back to a checkpoint, or to the start; tell whether the checkpoint could be taken up."""
+        relay = None
+        if mark is not None:
+            try:
+                relay = Relay.resumed(mark.point)
+            except (Refusal, ActionError):
+                mark = None
+        self.relay.close()
+        self.ended, self._exhausted = None, False
+        self._step, self._script.done = (mark.step, mark.actions) if mark is not None else (0, 0)
+        self._take_over(relay or Relay(*self._start))
+        return mark is not None
+
+    def _take_over(self, relay: Relay) -> None:
+        self.relay = relay
+        """what runs"""
+        relay.patience = PATIENCE
+        relay.contacts()
+        self._redo()
+
+    def recording(self) -> Recording:
+        """Return all up to now, to be replayed."""
+        scene, engine, settings = self._start
+        return Recording(
+            scene=scene,
+            engine=engine,
+            settings=scene.solver if settings is None else settings,
+            # A hand that is still holding lets go at the end: no replay is to hang from one that nobody sees.
+            actions=self.actions + tuple(Pull(time=self.relay.time, body=name) for name in self.relay.pulls),
+            duration=self.relay.time,
+            state_hash=None if self._exhausted else self.relay.state_hash(),
+        )
+
+    def close(self) -> None:
+        """Release what the engine holds."""
+        self.relay.close()
