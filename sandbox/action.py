@@ -3,11 +3,11 @@
 A session is a scene and its actions; so it can be stored, replayed, and replayed on another engine.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
-from sandbox.scene.model import Ball
+from sandbox.scene.model import Ball, Box, Capsule, Compound, Polygon, Single
 from sandbox.scene.part import MAX_SPEED, Name, Part, Point, Velocity
 
 Amount = Annotated[float, Field(ge=-1e42, le=1e42)]
@@ -16,6 +16,10 @@ Amount = Annotated[float, Field(ge=-1e42, le=1e42)]
 
 Value = float | int | bool | str | None
 """Of a setting."""
+
+
+SPAWNED = ("ball", "box", "capsule", "polygon", "body")
+"""What can be added to a running scene, by the headings of its tables."""
 
 
 class ActionError(ValueError):
@@ -61,10 +65,34 @@ class Move(Timed):
 
 
 class Spawn(Timed):
-    """Add a ball; it gets the next number."""
+    """Add a body; it gets the next number. Exactly one of the shapes is stated, as in a scene file."""
 
     kind: Literal["spawn"] = "spawn"
-    ball: Ball
+    ball: Ball | None = None
+    box: Box | None = None
+    capsule: Capsule | None = None
+    polygon: Polygon | None = None
+    body: Compound | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if sum(each is not None for each in self._shapes) != 1:
+            raise ValueError(f"state exactly one of {', '.join(SPAWNED)}")
+        return self
+
+    @property
+    def _shapes(self) -> tuple[Single | None, ...]:
+        return tuple(getattr(self, key) for key in SPAWNED)
+
+    @property
+    def single(self) -> Single:
+        """What is added."""
+        return next(each for each in self._shapes if each is not None)
+
+    def named(self, name: str) -> Self:
+        """Return the same with a name for the body."""
+        key = next(key for key in SPAWNED if getattr(self, key) is not None)
+        return self.model_copy(update={key: self.single.model_copy(update={"name": name})})
 
 
 class Remove(Timed):
@@ -105,6 +133,15 @@ class Launch(Timed):
     seed: Annotated[int, Field(ge=0, lt=2**63)]
 
 
+class Throttle(Timed):
+    """Open a thrust of the scene, or close it."""
+
+    kind: Literal["throttle"] = "throttle"
+    thrust: Name
+    level: Annotated[float, Field(ge=0, le=1)]
+    """share of its force, from now on"""
+
+
 class Switch(Timed):
     """Go on with another engine, or with other settings, from the state as it is."""
 
@@ -116,7 +153,8 @@ class Switch(Timed):
 
 
 Action = Annotated[
-    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Switch, Field(discriminator="kind")
+    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Throttle | Switch,
+    Field(discriminator="kind"),
 ]
 
 _ACTIONS: TypeAdapter[tuple[Action, ...]] = TypeAdapter(tuple[Action, ...])

@@ -18,6 +18,7 @@ from sandbox.action import (
     SetParameter,
     Spawn,
     Switch,
+    Throttle,
     is_settable,
     speed_limit,
 )
@@ -28,7 +29,7 @@ from sandbox.scene.document import to_document
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import from_document
 from sandbox.scene.meetings import Meetings, meetings
-from sandbox.scene.model import Ball, Collides, Scene, default_name
+from sandbox.scene.model import Ball, Box, Capsule, Collides, Compound, Polygon, Scene, Single, default_name
 from sandbox.scene.part import BACKING, MAX_BODIES
 from sandbox.trajectory import BoolArray, FloatArray
 
@@ -85,8 +86,15 @@ class Cast(Protocol):
             ActionError: it asks for what the settings or the engine cannot go on with.
         """
 
-    def add(self, ball: Ball, name: str) -> int:
-        """Add a ball that was checked, and return its number.
+    def throttle(self, number: int, level: float) -> None:
+        """Open the scene's thrust of that number to a share of its force.
+
+        Raises:
+            ActionError: the engine models no thrust.
+        """
+
+    def add(self, single: Single, name: str) -> int:
+        """Add a body that was checked, and return its number.
 
         Raises:
             ActionError: the engine cannot.
@@ -112,6 +120,8 @@ def perform(action: Action, cast: Cast) -> int | None:
             return _number(action.body, cast)
         case SetParameter():
             _set(action, cast)
+        case Throttle():
+            cast.throttle(_thrust_number(action.thrust, cast.scene), action.level)
         case Pull() | Launch() | Switch():
             raise ActionError(f"{action!r} is nothing that an engine does by itself; sandbox.start gives one that can")
         case _:
@@ -187,26 +197,40 @@ def _move(action: Move, cast: Cast) -> None:
     fixed = bool(cast.bodies.fixed[number])
     if fixed and action.velocity not in (None, (0.0, 0.0)):
         raise ActionError(f"{action.body!r} is fixed; it can be put elsewhere, but has no velocity")
-    element = cast.bodies.elements[cast.bodies.element[number]]
-    _check_place(action.position, element.radius, element.collides, cast)
+    collides = cast.bodies.elements[cast.bodies.element[number]].collides
+    _check_place(action.position, float(cast.bodies.radius[number]), collides, cast)
     cast.put(number, np.asarray(action.position))
     if action.velocity is not None and not fixed:
         cast.set_velocity(number, np.asarray(action.velocity))
 
 
+def _thrust_number(name: str, scene: Scene) -> int:
+    names = [thrust.name or default_name("thrust", k) for k, thrust in enumerate(scene.thrusts)]
+    if name not in names:
+        raise ActionError(f"no thrust is named {name!r}; there are {', '.join(names) or 'none'}")
+    return names.index(name)
+
+
 def _spawn(action: Spawn, cast: Cast) -> None:
-    scene, ball = cast.scene, action.ball
-    name = ball.name or default_name("spawned", len(cast.bodies))
+    scene, single = cast.scene, action.single
+    name = single.name or default_name("spawned", len(cast.bodies))
     if name in cast.bodies.names or name in scene.fixed_names:
         raise ActionError(f"a body or fixed thing is called {name!r} already")
     if len(cast.bodies) >= MAX_BODIES:
         raise ActionError(f"the scene holds {MAX_BODIES:,} bodies already")
-    alone = Scene(world=scene.world, materials=scene.materials, pairs=scene.pairs, balls=(ball,))
+    alone = alone_in(scene, single)
     faults = crosscheck(alone)
     if faults:
         raise ActionError("; ".join(message for _, message in faults))
-    _check_place(ball.position, ball.radius, ball.collides, cast)
-    cast.add(ball, name)
+    _check_place(single.position, float(alone.bodies.radius[0]), single.collides, cast)
+    cast.add(single, name)
+
+
+def alone_in(scene: Scene, single: Single) -> Scene:
+    """Return a scene of one body in the surroundings of another."""
+    kinds = {Ball: "balls", Box: "boxes", Capsule: "capsules", Polygon: "polygons", Compound: "compounds"}
+    surroundings = {"world": scene.world, "materials": scene.materials, "pairs": scene.pairs}
+    return Scene.model_validate(surroundings).model_copy(update={kinds[type(single)]: (single,)})
 
 
 def _set(action: SetParameter, cast: Cast) -> None:

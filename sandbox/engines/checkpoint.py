@@ -1,7 +1,7 @@
 """Checkpoint: all that can be known of a running scene from outside, as values; what a relay is taken up from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,15 +33,10 @@ class Checkpoint:
 def cast(bodies: Bodies, frame: Frame) -> Bodies:
     """Return the bodies that are there, in the state of a frame."""
     there = np.flatnonzero(frame.present)
-    return Bodies(
-        names=bodies.names if len(there) == len(bodies) else tuple(bodies.names[n] for n in there.tolist()),
+    return replace(
+        bodies.some(there),
         position=frame.position[there],
         velocity=frame.velocity[there],
         angle=frame.angle[there],
         angular_velocity=frame.angular_velocity[there],
-        radius=bodies.radius[there],
-        mass=bodies.mass[there],
-        fixed=bodies.fixed[there],
-        element=bodies.element[there],
-        elements=bodies.elements,
     )

@@ -196,15 +196,15 @@ class Relay:
                     self._leg.bodies = replace(self._leg.bodies, elements=self._leg.simulation.bodies.elements)
 
     def _spawn(self, action: Spawn) -> None:
-        name = action.ball.name or self._new_name()
+        name = action.single.name or self._new_name()
         if name in self.bodies.names:
             raise ActionError(f"a body or fixed thing is called {name!r} already")
-        ball = action.ball.model_copy(update={"name": name})
-        self._leg.simulation.apply(Spawn(time=action.time, ball=ball))
-        self._leg.joined_by(self.bodies.joined_by(ball, name))
+        named = action.named(name)
+        self._leg.simulation.apply(named)
+        self._leg.joined_by(self.bodies.joined_by(named.single, name))
 
     def _new_name(self) -> str:
-        """Return a name for a ball without one, that nobody has."""
+        """Return a name for a body without one, that nobody has."""
         taken, number = {*self.bodies.names, *self.scene.fixed_names}, len(self.bodies)
         while (name := default_name("spawned", number)) in taken:
             number += 1

@@ -12,8 +12,9 @@ from sandbox.engines.fixtures import Fixtures, fixtures_of
 from sandbox.engines.kernel import kernel
 from sandbox.engines.limits import FARTHEST, FASTEST
 from sandbox.scene.bodies import Bodies
+from sandbox.scene.links import Links
 from sandbox.scene.meetings import Meetings, meetings
-from sandbox.scene.model import Ball, Collides, Scene
+from sandbox.scene.model import Collides, Scene, Single
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 NOTHING, FIXED, ALL = 0, 1, 2
@@ -38,6 +39,8 @@ class Roster:
         """(N, 2) N, steady, by actions"""
         self.torque: FloatArray = np.zeros(len(bodies))
         """(N,) N·m, steady, by actions"""
+        self.throttles: FloatArray = np.asarray([0.0 if t.key else 1.0 for t in scene.thrusts], dtype=np.float64)
+        """how far each thrust of the scene is open, 0 to 1"""
         self._retired: dict[int, float] = {}
         self._twisted: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
         self._assume(scene, bodies, meetings(scene, bodies))
@@ -56,9 +59,23 @@ class Roster:
         """(N,) `NOTHING`, `FIXED` (planes, walls, posts, fixed balls) or `ALL`"""
         moves = self.moving
         self.inverse_mass: FloatArray = np.where(moves, 1.0 / bodies.mass, 0.0)
-        # What nothing can rub gets no moment: its spin stays as it is, bit for bit.
+        # What nothing can turn gets no moment: its spin stays as it is, bit for bit.
         turns = moves & (meet.turnable | self._twisted)
         self.inverse_moment: FloatArray = np.where(turns, 1.0 / bodies.moment, 0.0)
+
+    @property
+    def links(self) -> Links:
+        """The joints whose bodies are all there."""
+        return self.scene.links.some(self.linked())
+
+    def linked(self) -> IntArray:
+        """Return the numbers of the scene's joints whose bodies are all there."""
+        links, there = self.scene.links, np.append(self.present, True)  # the world, −1, finds the last
+        return np.flatnonzero(there[links.a] & there[links.b])
+
+    def throttle(self, number: int, level: float) -> None:
+        """Open the scene's thrust of that number to a share of its force."""
+        self.throttles[number] = level
 
     @property
     def moving(self) -> BoolArray:
@@ -102,17 +119,17 @@ class Roster:
         Raises:
             ActionError: it has more surfaces than a scene may have.
         """
-        spawned = self.bodies.elements[len(self.scene.discs) :]
-        bodies = replace(self.bodies, elements=(*scene.discs, *spawned))
+        spawned = self.bodies.elements[len(self.scene.movers) :]
+        bodies = replace(self.bodies, elements=(*scene.movers, *spawned))
         self._assume(scene, bodies, derived(scene, bodies))
 
-    def add(self, ball: Ball, name: str) -> int:
-        """Add a ball that was checked, and return its number.
+    def add(self, single: Single, name: str) -> int:
+        """Add a body that was checked, and return its number.
 
         Raises:
             ActionError: it makes more surfaces than a scene may have.
         """
-        bodies = self.bodies.joined_by(ball, name)
+        bodies = self.bodies.joined_by(single, name)
         meet = derived(self.scene, bodies)
         self.position = np.vstack((self.position, bodies.position[-1:]))
         self.velocity = np.vstack((self.velocity, bodies.velocity[-1:]))

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sandbox.scene.bodies import Bodies, BoolArray
+from sandbox.scene.bodies import Bodies
 from sandbox.scene.crosscheck import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps, height_above
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Plane, Post, Scene, Wall
-from sandbox.scene.near import FloatArray
+from sandbox.scene.near import BoolArray, FloatArray
 from sandbox.scene.part import BACKING
 from sandbox.scene.settings import Settings
 

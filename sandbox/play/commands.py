@@ -53,7 +53,8 @@ class Commands:
             Command.SOUND: lambda: stage.messages.tell(*desk.toggle_sound()),
             Command.DELETE: lambda: stage.act(stage.hands.remove),
             Command.NUDGE: lambda: stage.act(stage.hands.nudge),
-            Command.ADD_BALL: self._add,
+            Command.ADD_BALL: lambda: self._add(box=False),
+            Command.ADD_BOX: lambda: self._add(box=True),
             Command.QUIT: self._quit,
         }
         desk.panel.on_button = lambda name: self.do(BUTTONS[name])
@@ -127,11 +128,11 @@ class Commands:
         else:
             taking.begin_film(self._seat.surface.get_size(), self._seat.name)
 
-    def _add(self) -> None:
+    def _add(self, *, box: bool) -> None:
         seat = self._seat
         place = self._mouse.world()
         size = min(seat.camera.size) / seat.camera.scale
-        seat.stage.act(lambda live: seat.stage.hands.add(live, place, size))
+        seat.stage.act(lambda live: seat.stage.hands.add(live, place, size, box=box))
 
     def _quit(self) -> None:
         self._seat.leaving = 0

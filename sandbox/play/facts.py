@@ -5,6 +5,7 @@ import math
 from sandbox.play.instruments.figures import figure
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.settings import Settings
+from sandbox.scene.solids import Box, Capsule
 from sandbox.trajectory import Contacts, Frame
 
 
@@ -30,13 +31,26 @@ def facts(bodies: Bodies, frame: Frame, contacts: Contacts, number: int) -> tupl
             f"E kin {figure(kinetic, 'J')}",
         ]
     lines.insert(1, f"x {figure(x, 'm')}, {figure(y, 'm')}")
-    lines.append(f"m {figure(mass, 'kg')}, r {figure(float(bodies.radius[number]), 'm')}")
+    lines.append(f"m {figure(mass, 'kg')}, {_size(bodies, number)}")
+    if not bodies.fixed[number]:
+        lines.append(f"I {figure(moment, 'kg·m²')}")
     if angle:
         lines.append(f"angle {figure(angle, 'rad')}")
     touching = int((contacts.pair == number).any(axis=1).sum()) if len(contacts) else 0
     if touching:
         lines.append(f"{touching} contact{'s' if touching > 1 else ''}")
     return tuple(lines)
+
+
+def _size(bodies: Bodies, number: int) -> str:
+    """Return in words how large a body is, by what its kind is known by."""
+    element = bodies.elements[int(bodies.element[number])]
+    if isinstance(element, Box):
+        return f"{figure(element.size[0], 'm')} × {figure(element.size[1], 'm')}"
+    if isinstance(element, Capsule):
+        return f"l {figure(element.length, 'm')}, r {figure(element.radius, 'm')}"
+    word = "r" if bodies.round[number] else "reach"
+    return f"{word} {figure(float(bodies.radius[number]), 'm')}"
 
 
 def told(settings: Settings) -> str:

@@ -1,12 +1,19 @@
 """Hands: what pointing, dragging and keys do to the bodies of a session. Places are in the world, m."""
 
 import math
+from typing import Any
+
+import numpy as np
 
 from sandbox.action import ActionError, Impulse, Move, Pull, Remove, Spawn
+from sandbox.play.hulls import Hull, area_of
 from sandbox.play.picking import picked
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
-from sandbox.scene.model import Ball
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.discs import Ball, Disc
+from sandbox.scene.shapes import form_of
+from sandbox.scene.solids import Box
 
 Place = tuple[float, float]
 
@@ -140,13 +147,16 @@ class Hands:
         kick = mass * min(NUDGE, 10.0 * radius)
         live.act(Impulse(time=0.0, body=live.bodies.names[number], impulse=(0.6 * kick, 0.8 * kick)))
 
-    def add(self, live: Live, place: Place, size: float) -> None:
-        """Put a new ball at a place: like the picked one, or like the first, else of a size that suits the view.
+    def add(self, live: Live, place: Place, size: float, *, box: bool = False) -> None:
+        """Put a new ball or box at a place: like the picked body, or like the first, else of a size that suits the view.
+
+        What is like a body of another shape is about as large as it, and of its density.
 
         Args:
             live: where.
             place: m.
             size: of what is in sight, m.
+            box: instead of a ball.
 
         Raises:
             ActionError: there is no room, or the engine cannot.
@@ -155,20 +165,10 @@ class Hands:
         picked = self.picked_of(live)
         like = picked if picked is not None else (0 if len(bodies) else None)
         if like is None:
-            ball = Ball(position=place, radius=min(max(size / 40.0, 1e-9), 1e9), restitution=0.5, friction=0.5)
+            made = _made(place, min(max(size / 40.0, 1e-9), 1e9), box, restitution=0.5, friction=0.5)
         else:
-            element = bodies.elements[int(bodies.element[like])]
-            ball = Ball(
-                position=place,
-                radius=element.radius,
-                mass=element.mass,
-                density=element.density,
-                material=element.material,
-                restitution=element.restitution,
-                friction=element.friction,
-                collides=element.collides,
-            )
-        live.act(Spawn(time=0.0, ball=ball))
+            made = _like(bodies, like, place, box)
+        live.act(Spawn(time=0.0, box=made) if isinstance(made, Box) else Spawn(time=0.0, ball=made))
 
     def shift(self, live: Live, body: str, by: Place) -> None:
         """Put a body a little elsewhere, at rest, as the arrow keys do.
@@ -179,6 +179,28 @@ class Hands:
         if body in live.bodies.names:
             x, y = live.frame.position[live.bodies.names.index(body)].tolist()
             live.act(Move(time=0.0, body=body, position=(x + by[0], y + by[1]), velocity=(0.0, 0.0)))
+
+
+def _like(bodies: Bodies, number: int, place: Place, box: bool) -> Ball | Box:
+    """Return a ball or box at a place that is like a body."""
+    element = bodies.elements[int(bodies.element[number])]
+    surface = {key: getattr(element, key) for key in ("material", "restitution", "friction", "collides")}
+    if not box and isinstance(element, Disc):
+        return Ball(position=place, radius=element.radius, mass=element.mass, density=element.density, **surface)
+    if box and isinstance(element, Box):
+        return Box(position=place, size=element.size, mass=element.mass, density=element.density, **surface)
+    area = sum(area_of(Hull(np.asarray(piece.corners), piece.radius)) for piece in form_of(element).pieces)
+    radius = math.sqrt(area / math.pi)
+    density = float(bodies.mass[number]) / area
+    return _made(place, radius, box, density=density, **surface)
+
+
+def _made(place: Place, radius: float, box: bool, **more: Any) -> Ball | Box:
+    """Return a ball, or a square box of about its area."""
+    if not box:
+        return Ball(position=place, radius=radius, **more)
+    side = math.sqrt(math.pi) * radius
+    return Box(position=place, size=(side, side), **more)
 
 
 def _turned(way: Place, angle: float) -> Place:

@@ -38,6 +38,7 @@ class Command(StrEnum):
     SOUND = "sound"
     DELETE = "delete"
     ADD_BALL = "add ball"
+    ADD_BOX = "add box"
     NUDGE = "nudge"
     SHAPES = "shapes"
     VELOCITIES = "velocities"
@@ -62,7 +63,7 @@ class Binding(NamedTuple):
     keys: tuple[int, ...]
     """codes, `pygame.K_…`"""
     modifiers: int
-    """`pygame.KMOD_CTRL`, or 0: neither Ctrl nor Alt; Shift never matters"""
+    """`pygame.KMOD_CTRL`, `KMOD_SHIFT`, or 0: neither Ctrl nor Alt; Shift matters only where a binding has it"""
     command: Command
     about: str
     label: str
@@ -75,7 +76,7 @@ class Binding(NamedTuple):
 
 
 _TIME, _VIEW, _SCENE, _BODIES, _SHOW, _WINDOW = "Time", "View", "Scene", "Bodies", "Show", "Keep and share"
-_CTRL = pygame.KMOD_CTRL
+_CTRL, _SHIFT = pygame.KMOD_CTRL, pygame.KMOD_SHIFT
 _ABOUT_OVERLAYS = (
     "shapes",
     "velocities",
@@ -106,6 +107,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding((pygame.K_HOME,), 0, Command.HOME, "fit the scene; again: the bodies", "Home", _VIEW),
     Binding((pygame.K_TAB,), 0, Command.PANEL, "hide the panel, show it", "Tab", _VIEW),
     Binding((pygame.K_b,), 0, Command.ADD_BALL, "add a ball at the cursor", "B", _BODIES),
+    Binding((pygame.K_b,), _SHIFT, Command.ADD_BOX, "add a box at the cursor", "Shift+B", _BODIES),
     Binding((pygame.K_n,), 0, Command.NUDGE, "nudge the picked body", "N", _BODIES),
     Binding((pygame.K_DELETE,), 0, Command.DELETE, "remove the picked body", "Delete", _BODIES),
     *(
@@ -163,7 +165,8 @@ def command_for(event: pygame.event.Event, claimed: frozenset[int] = frozenset()
     plain = not (control or alt)
     if character in _BY_CHARACTER and (plain or ord(character) != key):
         return _BY_CHARACTER[character]  # first, as `[` may be AltGr and 8, and AltGr may look like Ctrl and Alt
-    return _BY_KEY.get((key, 0)) if plain else None
+    shifted = _BY_KEY.get((key, _SHIFT)) if modifiers & _SHIFT else None
+    return (shifted or _BY_KEY.get((key, 0))) if plain else None
 
 
 def _latin(event: pygame.event.Event) -> int:

@@ -7,7 +7,7 @@ from sandbox.action import Action, SetParameter, Switch
 from sandbox.engines.registry import ENGINES
 from sandbox.play.instruments.knob import Knob, Value
 from sandbox.play.running.live import Live
-from sandbox.scene.model import Disc, Scene
+from sandbox.scene.model import Mover, Scene
 from sandbox.scene.settings import Detection, Integrator, Settings
 
 KINDS = ("ball", "grid", "scatter", "emitter")
@@ -95,12 +95,12 @@ def _surface(live: Live, file: Scene, picked: int | None, key: str, high: float)
     """
     scene = live.scene
     element = int(live.bodies.element[picked]) if picked is not None else 0
-    if element >= len(scene.discs):
+    if element >= len(scene.movers):
         if picked is None:
             return Knob(key, key, 0.0, high, 0.0, enabled=False, why="there is no ball")
         value = getattr(live.bodies.elements[element], key) or 0.0
         return Knob(key, key, 0.0, high, value, enabled=False, why="a ball added by hand keeps its own")
-    disc = scene.discs[element]
+    disc = scene.movers[element]
     label = key if picked is None else f"{key} of {disc.name or 'this'}"
     default = None
     pairs = _pairs(scene, disc if picked is not None else None)
@@ -111,17 +111,17 @@ def _surface(live: Live, file: Scene, picked: int | None, key: str, high: float)
         if picked is not None:
             label = f"{key} of {disc.material}"
         return Knob(key, label, 0.0, high, value, default=default)
-    if element < len(file.discs):
-        default = stated(file, file.discs[element], key)
+    if element < len(file.movers):
+        default = stated(file, file.movers[element], key)
     return Knob(key, label, 0.0, high, stated(scene, disc, key), default=default)
 
 
-def _pairs(scene: Scene, disc: Disc | None) -> list[int]:
+def _pairs(scene: Scene, disc: Mover | None) -> list[int]:
     """Return the numbers of the pairs that a ball's material is in; without a ball, of all."""
     return [n for n, pair in enumerate(scene.pairs) if disc is None or disc.material in pair.between]
 
 
-def stated(scene: Scene, disc: Disc, key: str) -> float:
+def stated(scene: Scene, disc: Mover, key: str) -> float:
     """Return the restitution or friction that a ball states itself, or its material; 0 for none."""
     own: float | None = getattr(disc, key)
     if own is None and disc.material is not None:
@@ -144,13 +144,11 @@ def _paths(live: Live, key: str, picked: int | None) -> list[str]:
     """Return where a figure stands: of the picked body or its material, or of all pairs, balls and generators."""
     scene = live.scene
     element = int(live.bodies.element[picked]) if picked is not None else 0
-    if element < len(scene.discs):
-        pairs = _pairs(scene, scene.discs[element] if picked is not None else None)
+    if element < len(scene.movers):
+        pairs = _pairs(scene, scene.movers[element] if picked is not None else None)
         if pairs:
             return [f"pair.{n}.{key}" for n in pairs] if picked is not None else [f"pair.*.{key}"]
-    lists: list[tuple[str, Sequence[Disc]]] = list(
-        zip(KINDS, (scene.balls, scene.grids, scene.scatters, scene.emitters), strict=True)
-    )
+    lists: list[tuple[str, Sequence[Mover]]] = list(scene.kinds.items())
     if picked is None:
         return [f"{kind}.{each}.{key}" for kind, discs in lists if discs for each in _every(discs)]
     for kind, discs in lists:
@@ -160,12 +158,12 @@ def _paths(live: Live, key: str, picked: int | None) -> list[str]:
     return []
 
 
-def _every(discs: Sequence[Disc]) -> list[str]:
+def _every(discs: Sequence[Mover]) -> list[str]:
     """Return what addresses all elements of a list: `*`, unless one is called so."""
     return [_part(discs, k) for k in range(len(discs))] if any(disc.name == "*" for disc in discs) else ["*"]
 
 
-def _part(discs: Sequence[Disc], index: int) -> str:
+def _part(discs: Sequence[Mover], index: int) -> str:
     """Return what addresses an element of a list: its number, unless another is called so, as names go first."""
     name = discs[index].name
     if name is None or all(disc.name != str(index) for disc in discs):

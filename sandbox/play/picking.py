@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from sandbox.play.hulls import Hull, hulls_of, meeting, nearest
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.near import near_pairs
@@ -24,33 +25,57 @@ def picked(bodies: Bodies, frame: Frame, place: tuple[float, float], reach: floa
         distance = np.hypot(*(frame.position[:count] - np.asarray(place)).T)
         radius = bodies.radius[:count]
         able = frame.present[:count] & (distance <= radius + reach)
+        beside = distance - radius
+        for number in np.flatnonzero(able & ~bodies.round[:count]).tolist():
+            beside[number] = nearest(hulls_of(bodies, frame, number), *place)
+        able &= beside <= reach
         if not able.any():
             return None
-        score = np.where(able, np.where(distance <= radius, distance / radius, 1.0 + distance - radius), np.inf)
+        score = np.where(able, np.where(beside <= 0.0, distance / radius, 1.0 + beside), np.inf)
     return int(np.argmin(score))
 
 
 def overlapping(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
     """Tell which bodies overlap a plane, wall, post or one another, (N,); what just touches does not."""
-    position, radius, there = frame.position, bodies.radius[: len(frame.position)], frame.present
+    position, there = frame.position, frame.present
+    count = min(len(position), len(bodies))
+    radius, lone = bodies.radius[: len(position)], bodies.round[:count]
     found = np.zeros(len(position), np.bool_)
+    sound = there & np.isfinite(position).all(axis=1) & np.isfinite(frame.angle)
+    solids = {number: hulls_of(bodies, frame, number) for number in np.flatnonzero(sound & ~lone).tolist()}
     with np.errstate(all="ignore"):
         for plane in scene.planes:
             normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
-            found |= (position - np.asarray(plane.point)) @ normal < radius
+            found |= lone & ((position - np.asarray(plane.point)) @ normal < radius)
+            for number, hulls in solids.items():
+                found[number] |= any(((h.corners - plane.point) @ normal < h.radius).any() for h in hulls)
         for wall in scene.walls:
             points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
             for a, b in pairwise(points):
-                found |= _to_segment(position, a, b) < radius + wall.thickness / 2.0
+                near = _to_segment(position, a, b) < radius + wall.thickness / 2.0
+                found |= near & lone
+                _meet_fixed(found, near, solids, Hull(np.asarray((a, b)), wall.thickness / 2.0))
         for post in scene.posts:
-            found |= np.hypot(*(position - np.asarray(post.position)).T) < radius + post.radius
-    able = np.flatnonzero(there & np.isfinite(position).all(axis=1))
+            near = np.hypot(*(position - np.asarray(post.position)).T) < radius + post.radius
+            found |= near & lone
+            _meet_fixed(found, near, solids, Hull(np.asarray((post.position,)), post.radius))
+    able = np.flatnonzero(sound)
     reach = 2.0 * float(radius[able].max()) if len(able) else 0.0
     for i, j in near_pairs(position[able], reach):
         a, b = able[i], able[j]
         over = np.hypot(*(position[a] - position[b]).T) < radius[a] + radius[b]
+        for k in np.flatnonzero(over & ~(lone[a] & lone[b])).tolist():
+            one, other = (solids.get(n) or hulls_of(bodies, frame, n) for n in (int(a[k]), int(b[k])))
+            over[k] = any(meeting(p, q)[0] < 0.0 for p in one for q in other)
         found[a[over]] = found[b[over]] = True
     return found & there
+
+
+def _meet_fixed(found: BoolArray, near: BoolArray, solids: dict[int, list[Hull]], fixed: Hull) -> None:
+    """Note which bodies near a fixed thing overlap it."""
+    for number, hulls in solids.items():
+        if near[number] and not found[number]:
+            found[number] = any(meeting(hull, fixed)[0] < 0.0 for hull in hulls)
 
 
 def _to_segment(position: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:

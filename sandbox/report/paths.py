@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import AxLine, Line2D
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Polygon
 
 from sandbox.report.panels import BEYOND, CLOSED, MOST_POINTS, STILL, draw, draw_closed
+from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Plane, Post, Scene
 from sandbox.trajectory import FloatArray, Trajectory
 
@@ -65,18 +66,48 @@ def _path(position: FloatArray) -> FloatArray:
 
 
 def draw_fixed(panel: Axes, scene: Scene) -> None:
-    """Draw planes, walls, posts and fixed balls; as artists they have no say in the limits."""
-    bodies = scene.bodies
-    still = np.flatnonzero(bodies.fixed)
-    circles = list(zip(bodies.position[still].tolist(), bodies.radius[still].tolist(), strict=True))
+    """Draw planes, walls, posts and fixed bodies; as artists they have no say in the limits."""
     for thing in scene.fixed:
         if isinstance(thing, Plane):
             x, y = thing.point
             panel.add_artist(AxLine((x, y), (x - thing.normal[1], y + thing.normal[0]), None, **SOLID))
         elif isinstance(thing, Post):
-            circles.append((list(thing.position), thing.radius))
+            panel.add_artist(Circle(thing.position, thing.radius, fill=False, **SOLID))
         else:
             points = [*thing.points, thing.points[0]] if thing.closed else thing.points
             panel.add_artist(Line2D(*np.asarray(points).T, **SOLID))
-    for (x, y), radius in circles:
-        panel.add_artist(Circle((x, y), radius, fill=False, **SOLID))
+    bodies = scene.bodies
+    for number in np.flatnonzero(bodies.fixed).tolist():
+        pieces = _pieces(bodies, number)
+        for piece in pieces:
+            panel.add_artist(Polygon(piece, fill=False, **SOLID))
+        for piece in pieces if len(pieces) > 1 else ():  # of what several make up, the outer edge alone is seen
+            inside = {"color": panel.get_facecolor(), "lw": 0.0, "zorder": SOLID["zorder"] + 0.01}
+            panel.add_artist(Polygon(piece, **inside))
+
+
+def _pieces(bodies: Bodies, number: int) -> list[FloatArray]:
+    """Return the outlines (K, 2) of a body's pieces as it starts, m."""
+    shapes, angle = bodies.shapes, float(bodies.angle[number])
+    cos, sin = math.cos(angle), math.sin(angle)
+    turn = np.asarray(((cos, sin), (-sin, cos)))
+    found = []
+    for piece in np.flatnonzero(shapes.body == number).tolist():
+        corners = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]]
+        found.append(bodies.position[number] + _widened(corners, float(shapes.radius[piece])) @ turn)
+    return found
+
+
+def _widened(corners: FloatArray, radius: float) -> FloatArray:
+    """Return the outline of a hull that is widened by a radius, m."""
+    if radius == 0.0:
+        return corners
+    if len(corners) == 1:
+        spots = np.linspace(-math.pi, math.pi, 65)[None, :-1]
+    else:
+        way = np.roll(corners, -1, axis=0) - corners
+        normal = np.arctan2(-way[:, 0], way[:, 1])
+        before = np.roll(normal, 1)
+        spots = before[:, None] + np.mod(normal - before, 2.0 * math.pi)[:, None] * np.linspace(0.0, 1.0, 25)
+    around = corners[:, None] + radius * np.stack((np.cos(spots), np.sin(spots)), axis=-1)
+    return np.asarray(around.reshape(-1, 2))

@@ -5,15 +5,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sandbox.scene.bodies import Bodies, mass_of
+from sandbox.scene.attachments import attachments
+from sandbox.scene.bodies import Bodies
 from sandbox.scene.claimed import claimed
 from sandbox.scene.faults import Location
 from sandbox.scene.generators import GeneratorError, size
-from sandbox.scene.model import Disc, Emitter, Generator, Grid, Plane, Scatter, Scene, Surfaced
+from sandbox.scene.model import Emitter, Generator, Grid, Mover, Plane, Scatter, Scene, Single, Surfaced
 from sandbox.scene.near import FloatArray, IntArray, near_pairs
+from sandbox.scene.outlines import outlines
 from sandbox.scene.part import BACKING, MAX_BODIES, MAX_POSITION, MAX_SPEED, MAX_STEPS
 from sandbox.scene.repeats import repeats
-from sandbox.scene.surfaces import numbered
+from sandbox.scene.shapes import form_of
+from sandbox.scene.surfaces import bearers_of, numbered
 
 Found = tuple[Location, str]
 
@@ -30,33 +33,38 @@ SHORTEST = 1e-9
 
 def crosscheck(scene: Scene) -> list[Found]:
     """Return every fault that lies between the parts of a scene; none means that it can be run."""
-    materials, generators = list(_materials(scene)), list(_generators(scene))
-    found = [*materials, *_masses(scene), *_fixed(scene), *repeats(scene), *generators, *_world(scene)]
-    if generators:
+    materials, shapeless = list(_materials(scene)), [*_generators(scene), *outlines(scene)]
+    found = [*materials, *_fixed(scene), *repeats(scene), *shapeless, *_world(scene)]
+    if shapeless:
         return found  # what follows counts on being able to lay the bodies out
+    found += _masses(scene)
     try:
         bodies = scene.bodies
     except GeneratorError as error:
         return [*found, (error.location, str(error))]
     found += [*_names(scene, bodies), *_states(scene, bodies), *_starts(scene, bodies), *claimed(scene, bodies)]
+    found += attachments(scene, bodies)
     return found if materials else [*found, *_surfaces(scene, bodies)]
 
 
-def _elements(scene: Scene) -> list[tuple[Location, Disc]]:
-    """Return the balls and generators with their locations, in scene order."""
-    kinds: dict[str, tuple[Disc, ...]] = {
-        "ball": scene.balls,
-        "grid": scene.grids,
-        "scatter": scene.scatters,
-        "emitter": scene.emitters,
-    }
-    return [((kind, k), element) for kind, elements in kinds.items() for k, element in enumerate(elements)]
+def _elements(scene: Scene) -> list[tuple[Location, Mover]]:
+    """Return the elements that have bodies with their locations, in scene order."""
+    return [((kind, k), element) for kind, elements in scene.kinds.items() for k, element in enumerate(elements)]
 
 
 def _things(scene: Scene) -> list[tuple[Location, Surfaced]]:
     """Return the fixed things with their locations, in the order of their numbers."""
     kinds: dict[str, tuple[Surfaced, ...]] = {"plane": scene.planes, "wall": scene.walls, "post": scene.posts}
     return [((kind, k), thing) for kind, things in kinds.items() for k, thing in enumerate(things)]
+
+
+def _parts(scene: Scene) -> Iterator[tuple[Location, Surfaced]]:
+    """Yield the parts of bodies with their locations."""
+    for k, compound in enumerate(scene.compounds):
+        kinds = {"ball": compound.balls, "box": compound.boxes, "capsule": compound.capsules}
+        for kind, parts in (*kinds.items(), ("polygon", compound.polygons)):
+            for n, part in enumerate(parts):
+                yield ("body", k, kind, n), part
 
 
 def _materials(scene: Scene) -> Iterator[Found]:
@@ -76,22 +84,26 @@ def _materials(scene: Scene) -> Iterator[Found]:
             yield ("pair", k, "between"), "this pair is stated a second time; state it once"
         stated.add(frozenset(pair.between))
 
-    for location, thing in (*_things(scene), *_elements(scene)):
+    for location, thing in (*_things(scene), *_elements(scene), *_parts(scene)):
         if thing.material is not None and thing.material not in declared:
             yield (*location, "material"), f"no material is named {thing.material!r}; {known}"
 
 
 def _masses(scene: Scene) -> Iterator[Found]:
-    for location, disc in _elements(scene):
-        if disc.mass is not None and disc.density is not None:
+    for location, element in _elements(scene):
+        if element.mass is not None and element.density is not None:
             yield (*location, "density"), "mass and density are both stated; state one of them"
-        elif not 1e-15 <= mass_of(disc) <= 1e30:
-            message = f"gives a mass of {mass_of(disc):g} kg; masses are 1e-15 to 1e30 kg"
-            yield (*location, "density"), message
-    for k, ball in enumerate(scene.balls):
-        if ball.fixed and (ball.velocity != (0.0, 0.0) or ball.angular_velocity):
-            key = "velocity" if ball.velocity != (0.0, 0.0) else "angular_velocity"
-            yield ("ball", k, key), "a fixed ball never moves; leave this out, or fixed"
+            continue
+        mass, moment = form_of(element)[1:3]
+        if not 1e-15 <= mass <= 1e30:
+            key = "density" if element.density is not None else "mass"
+            yield (*location, key), f"gives a mass of {mass:g} kg; masses are 1e-15 to 1e30 kg"
+        elif not (1e-200 <= moment <= 1e200):
+            yield location, f"gives a moment of inertia of {moment:g} kg·m²; 1e-200 to 1e200 kg·m² are possible"
+    for location, element in _elements(scene):
+        if isinstance(element, Single) and element.fixed and (any(element.velocity) or element.angular_velocity):
+            key = "velocity" if any(element.velocity) else "angular_velocity"
+            yield (*location, key), "a fixed body never moves; leave this out, or fixed"
 
 
 def _fixed(scene: Scene) -> Iterator[Found]:
@@ -116,7 +128,7 @@ def _generators(scene: Scene) -> Iterator[Found]:
         if any(low > high for low, high in zip(emitter.velocity_min, emitter.velocity_max, strict=True)):
             yield ("emitter", k, "velocity_max"), "is smaller than `velocity_min` in a component"
     generators: tuple[Generator, ...] = (*scene.grids, *scene.scatters, *scene.emitters)
-    total = len(scene.balls) + sum(map(size, generators))
+    total = sum(len(those) for those in scene.kinds.values()) - len(generators) + sum(map(size, generators))
     if total > MAX_BODIES:
         location = next((where for where, _ in reversed(_elements(scene))), ())
         yield location, f"the scene would hold {total:,} bodies; at most {MAX_BODIES:,}"
@@ -153,16 +165,16 @@ def _taken(name: str) -> str:
 
 
 def _surfaces(scene: Scene, bodies: Bodies) -> Iterator[Found]:
-    if len(numbered(scene, (*bodies.elements, *scene.fixed))[0]) > MAX_SURFACES:
-        yield (), f"more than {MAX_SURFACES} different surfaces; share materials between balls"
+    if len(numbered(scene, (*bearers_of(bodies.elements), *scene.fixed))[0]) > MAX_SURFACES:
+        yield (), f"more than {MAX_SURFACES} different surfaces; share materials between bodies"
 
 
 def _states(scene: Scene, bodies: Bodies) -> Iterator[Found]:
     """Check places and speeds that a generator may have carried out of range."""
     elements = _elements(scene)
     for wrong, message in (
-        (np.abs(bodies.position).max(axis=1, initial=0) > MAX_POSITION, f"a ball lies beyond ±{MAX_POSITION:g} m"),
-        (np.hypot(*bodies.velocity.T) > MAX_SPEED, f"a ball is faster than {MAX_SPEED:g} m/s"),
+        (np.abs(bodies.position).max(axis=1, initial=0) > MAX_POSITION, f"a body lies beyond ±{MAX_POSITION:g} m"),
+        (np.hypot(*bodies.velocity.T) > MAX_SPEED, f"a body is faster than {MAX_SPEED:g} m/s"),
     ):
         for element in _each(bodies.element[wrong]):
             yield elements[element][0], message
@@ -193,20 +205,20 @@ def _starts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
 
     movers = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
     most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(movers.sum())
-    overlaps = count_overlaps(bodies.position[movers], bodies.radius[movers], most)
+    overlaps = count_overlaps(bodies.position[movers], bodies.core[movers], most)
     location = max(elements, key=lambda e: _population(e[1]))[0] if elements else ()
     if overlaps > most:
         message = (
-            f"the scene starts with {overlaps:,} or more overlapping pairs of balls; at most {most:,} can be solved. "
+            f"the scene starts with {overlaps:,} or more overlapping pairs of bodies; at most {most:,} can be solved. "
             'Spread them, or let them pass through each other with collides = "none" or "fixed"'
         )
         yield location, message
         return
     passing = touches & ~bodies.fixed
     most = max(most, MAX_PASSING)
-    if passing.sum() > movers.sum() and count_overlaps(bodies.position[passing], bodies.radius[passing], most) > most:
+    if passing.sum() > movers.sum() and count_overlaps(bodies.position[passing], bodies.core[passing], most) > most:
         message = (
-            f"the scene starts with more than {most:,} overlapping pairs of balls; that they pass through each other "
+            f"the scene starts with more than {most:,} overlapping pairs of bodies; that they pass through each other "
             "has to be found out again at every step. Spread them, use fewer, or let them meet nothing with "
             'collides = "none"'
         )
@@ -217,7 +229,7 @@ def _each(elements: IntArray) -> list[int]:
     return sorted(set(elements.tolist()))
 
 
-def _population(element: Disc) -> int:
+def _population(element: Mover) -> int:
     return size(element) if isinstance(element, Grid | Scatter | Emitter) else 1
 
 
@@ -239,6 +251,7 @@ def count_overlaps(position: FloatArray, radius: FloatArray, enough: float = mat
     a crowd among them is come upon. So each octave of radii is counted by itself first: however the rest goes, of K
     octaves on one spot the pairs are K times those within the octaves at most.
     """
+    position, radius = position[radius > 0.0], radius[radius > 0.0]
     octave = np.floor(np.log2(radius))
     present = np.unique(octave).tolist()
     alike = 0

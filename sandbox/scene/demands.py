@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.scene.links import LinkKind
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Plane, Post, Scene, Wall
 
@@ -24,8 +25,20 @@ class Demand(StrEnum):
     BALL_PLANE = "ball-plane"
     BALL_SEGMENT = "ball-segment"
     BALL_POST = "ball-post"
+    POLYGONS = "polygons"
     RESTITUTION = "restitution"
     FRICTION = "friction"
+    RODS = "rods"
+    PIVOTS = "pivots"
+    SLIDES = "slides"
+    GROOVES = "grooves"
+    ROTARY_LIMITS = "rotary limits"
+    MOTORS = "motors"
+    GEARS = "gears"
+    SPRINGS = "springs"
+    ROTARY_SPRINGS = "rotary springs"
+    ATTRACTION = "attraction"
+    THRUST = "thrust"
     BOUNDS = "bounds"
 
 
@@ -45,6 +58,21 @@ BALLS = frozenset(
     }
 )
 """All that a scene of balls and fixed things can demand. Engines list what they have: a new demand is nobody's yet."""
+
+OF_LINKS = {
+    LinkKind.ROD: Demand.RODS,
+    LinkKind.PIVOT: Demand.PIVOTS,
+    LinkKind.SLIDE: Demand.SLIDES,
+    LinkKind.GROOVE: Demand.GROOVES,
+    LinkKind.ROTARY_LIMIT: Demand.ROTARY_LIMITS,
+    LinkKind.MOTOR: Demand.MOTORS,
+    LinkKind.GEAR: Demand.GEARS,
+    LinkKind.SPRING: Demand.SPRINGS,
+    LinkKind.ROTARY_SPRING: Demand.ROTARY_SPRINGS,
+}
+"""What each kind of link demands."""
+
+JOINTS = frozenset(OF_LINKS.values())
 
 
 class Item(NamedTuple):
@@ -75,9 +103,7 @@ def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
     if spinning:
         why = _count(spinning, "body starts with a spin", "bodies start with a spin", "")
     else:
-        why = _count(
-            turned, "body can be rubbed into a spin", "bodies can be rubbed into a spin", "nothing can turn a body"
-        )
+        why = _count(turned, "body can be turned", "bodies can be turned", "nothing can turn a body")
     yield Demand.ROTATION, bool(spinning or turned), why
 
     gravity = world.gravity != (0.0, 0.0)
@@ -102,12 +128,25 @@ def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
         count = _count(len(things), word, f"{word}s", "")
         yield demand, meet.ball_fixed[kind], count if meet.ball_fixed[kind] else why
 
+    others = int((~bodies.round & meet.touches & ~bodies.fixed).sum())
+    why = _count(int((~bodies.round).sum()), "body is no ball", "bodies are no balls", "all bodies are balls")
+    yield Demand.POLYGONS, meet.solids, f"{why}, {others:,} of them can meet something" if meet.solids else why
+
     touch = bool(meet.touching.any())
     for demand, most in ((Demand.RESTITUTION, meet.restitution), (Demand.FRICTION, meet.friction)):
         why = f"up to {most:g}" if most else "0 for every pair that can meet"
         yield demand, most > 0, why if touch else "nothing can meet"
 
+    yield from _joints(scene)
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
+
+
+def _joints(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
+    for kind, demand in OF_LINKS.items():
+        count = int(np.count_nonzero(scene.links.kind == kind))
+        yield demand, count > 0, f"{count:,}" if count else "none"
+    for demand, things in ((Demand.ATTRACTION, scene.attractions), (Demand.THRUST, scene.thrusts)):
+        yield demand, bool(things), f"{len(things):,}" if things else "none"
 
 
 def _count(n: int, one: str, many: str, none: str) -> str:

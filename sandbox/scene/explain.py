@@ -7,6 +7,18 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from sandbox.scene.faults import Location
+from sandbox.scene.joints import (
+    Gear,
+    Groove,
+    Joined,
+    Motor,
+    Pivot,
+    Rod,
+    RotaryLimit,
+    RotarySpring,
+    Slide,
+    Spring,
+)
 from sandbox.scene.model import Scene
 
 _EXPECTED = {
@@ -33,14 +45,21 @@ _EXPECTED = {
 
 def explain(details: Any) -> tuple[Location, str]:
     """Return the location of one of pydantic's errors, and what is wrong there and would be right."""
-    location: Location = tuple(details["loc"])
+    location = place_of(details)
+    if location[:1] == ("attraction",) and location[2:3] == ("toward",):
+        return location[:3], "is not right here; it should be a place, such as [0.0, 0.0], or the name of a body"
     kind, value, context = details["type"], details["input"], details.get("ctx", {})
     if kind == "missing":
         return location, "is missing; it must be given"
     if kind == "extra_forbidden":
-        return location, f"unknown key; {_known_keys(location)}"
+        return location, f"unknown key; {_known_keys(tuple(details['loc']))}"
     if kind == "json_invalid":
         return location, f"the scene cannot be read: {context['error']}"
+    if kind == "union_tag_not_found":
+        return location, f"is missing; a joint is one of {', '.join(JOINTS)}"
+    if kind == "union_tag_invalid":
+        tag = context["tag"]
+        return location, f"{_shown(tag)} is not right here; a joint is one of {', '.join(JOINTS)}"
     if kind == "value_error":
         return location, str(context["error"])
     if kind == "string_pattern_mismatch":
@@ -56,6 +75,16 @@ def explain(details: Any) -> tuple[Location, str]:
     return location, f"{_shown(value)} is not right here; it should be {expected}"
 
 
+def place_of(details: Any) -> Location:
+    """Return where in a document one of pydantic's errors is: joints are told apart by a tag, which is no key."""
+    location: Location = tuple(details["loc"])
+    if len(location) > 2 and location[0] == "joint":
+        return location[:2] + location[3:]
+    if details["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        return (*location, "kind")
+    return location
+
+
 def _shown(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False, default=str)
     return text if len(text) <= 60 else f"{text[:57]}…"
@@ -69,13 +98,23 @@ def _known_keys(location: Location) -> str:
 
 
 def model_at(location: Location) -> type[BaseModel]:
-    """Return the model of the table at a location of a scene document."""
+    """Return the model of the table at a location of a scene document, a joint's kind standing after its number."""
     model: type[BaseModel] = Scene
     for key in location:
+        if model is Scene and key == "joint":
+            return JOINTS.get(str(location[2]), Joined) if len(location) > 2 else Joined
         if isinstance(key, str):
             fields = {field.alias or name: field.annotation for name, field in model.model_fields.items()}
             model = next(m for m in (fields[key], *get_args(fields[key])) if _is_model(m))
     return model
+
+
+JOINTS: dict[str, type[BaseModel]] = {
+    tag: model
+    for model in (Rod, Pivot, Slide, Groove, RotaryLimit, Motor, Gear, Spring, RotarySpring)
+    for tag in get_args(model.model_fields["kind"].annotation)
+}
+"""The kinds of joints by their words."""
 
 
 def _is_model(annotation: Any) -> bool:

@@ -9,31 +9,24 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
-from sandbox.scene.part import (
-    MAX_BODIES,
-    AngularVelocity,
-    Colour,
-    Coordinate,
-    Density,
-    Friction,
-    Mass,
-    Name,
-    Part,
-    Point,
-    Radius,
-    Restitution,
-    Vector,
-    Velocity,
-)
+from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
+from sandbox.scene.forces import Attraction, Thrust
+from sandbox.scene.joints import Joint
+from sandbox.scene.part import Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
 from sandbox.scene.settings import Settings
+from sandbox.scene.solids import Box, Capsule, Compound, Polygon
+from sandbox.scene.surfaced import Collides, Mover, Single, Surfaced
 
 if TYPE_CHECKING:
     from sandbox.scene.bodies import Bodies
+    from sandbox.scene.links import Links
 
-Collides = Literal["all", "fixed", "none"]
-"""What a body can meet: everything, only planes, walls, posts and fixed balls, or nothing at all."""
+__all__ = [
+    "Attraction", "Ball", "Box", "Capsule", "Collides", "Compound", "Disc", "Emitter", "Generator", "Grid", "Joint",
+    "Material", "Mover", "Pair", "Plane", "Play", "Polygon", "Post", "Scatter", "Scene", "Single", "Surfaced", "Thrust",
+    "Wall", "World", "default_name",
+]  # fmt: skip
 
-Count = Annotated[int, Field(ge=1, le=MAX_BODIES)]
 Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
 Drag = Annotated[float, Field(ge=0, le=1e9)]
 
@@ -73,17 +66,6 @@ class Pair(Part):
     friction: Friction | None = None
 
 
-class Surfaced(Part):
-    """Anything that can be touched. A figure stated here outranks its material's."""
-
-    name: Name | None = None
-    """one without a name is called by its kind and its place in the file"""
-    material: Name | None = None
-    restitution: Restitution | None = None
-    friction: Friction | None = None
-    colour: Colour | None = None
-
-
 class Plane(Surfaced):
     """A half-plane, solid behind its normal."""
 
@@ -108,71 +90,6 @@ class Post(Surfaced):
 
     position: Point
     radius: Radius
-
-
-class Disc(Surfaced):
-    """What the balls of a scene and of its generators have in common: a uniform disc, I = ½ m r²."""
-
-    radius: Radius
-    mass: Mass | None = None
-    """kg; without mass or density, 1"""
-    density: Density | None = None
-    """kg/m²"""
-    angle: Annotated[float, Field(ge=-1e12, le=1e12)] = 0.0
-    angular_velocity: AngularVelocity = 0.0
-    """rad/s"""
-    collides: Collides = "all"
-
-
-class Ball(Disc):
-    """One ball."""
-
-    position: Point
-    velocity: Velocity = (0.0, 0.0)
-    fixed: bool = False
-    """Never moves: infinitely heavy."""
-
-
-class Grid(Disc):
-    """Balls in columns and rows, counted along each row from the lower left."""
-
-    origin: Point
-    """centre of the lower left ball, m"""
-    columns: Count
-    rows: Count = 1
-    spacing: tuple[Coordinate, Coordinate]
-    """from centre to centre, m"""
-    jitter: Annotated[float, Field(ge=0, le=1e9)] = 0.0
-    """Each coordinate is moved by up to ± this, m."""
-    velocity: Velocity = (0.0, 0.0)
-    velocity_jitter: Annotated[float, Field(ge=0, le=1e12)] = 0.0
-    """Each component is changed by up to ± this, m/s."""
-
-
-class Scatter(Disc):
-    """Balls placed at random in a box, none overlapping another of the same scatter if they collide."""
-
-    count: Count
-    lower: Point
-    upper: Point
-    velocity: Velocity = (0.0, 0.0)
-    velocity_jitter: Annotated[float, Field(ge=0, le=1e12)] = 0.0
-    """Each component is changed by up to ± this, m/s."""
-
-
-class Emitter(Disc):
-    """Particles that leave one point with random velocities, such as a firework."""
-
-    position: Point
-    count: Count
-    velocity_min: Velocity
-    velocity_max: Velocity
-    """Each component is uniform between the two, m/s."""
-    radius: Radius = 0.05
-    collides: Collides = "none"
-
-
-Generator = Grid | Scatter | Emitter
 
 
 class Play(Part):
@@ -206,6 +123,13 @@ class Scene(Part):
     grids: tuple[Grid, ...] = Field((), alias="grid")
     scatters: tuple[Scatter, ...] = Field((), alias="scatter")
     emitters: tuple[Emitter, ...] = Field((), alias="emitter")
+    boxes: tuple[Box, ...] = Field((), alias="box")
+    capsules: tuple[Capsule, ...] = Field((), alias="capsule")
+    polygons: tuple[Polygon, ...] = Field((), alias="polygon")
+    compounds: tuple[Compound, ...] = Field((), alias="body")
+    joints: tuple[Joint, ...] = Field((), alias="joint")
+    attractions: tuple[Attraction, ...] = Field((), alias="attraction")
+    thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
 
     @cached_property
     def bodies(self) -> "Bodies":
@@ -214,18 +138,40 @@ class Scene(Part):
 
         return expand(self)
 
+    @cached_property
+    def links(self) -> "Links":
+        """The joints, by the numbers of `bodies`."""
+        from sandbox.scene.linking import links_of
+
+        return links_of(self)
+
     @property
-    def discs(self) -> tuple[Disc, ...]:
-        """The balls and generators of the file, in scene order."""
-        return self.balls + self.grids + self.scatters + self.emitters
+    def kinds(self) -> dict[str, tuple[Mover, ...]]:
+        """The elements with bodies by the headings of their tables, in scene order."""
+        return {
+            "ball": self.balls,
+            "grid": self.grids,
+            "scatter": self.scatters,
+            "emitter": self.emitters,
+            "box": self.boxes,
+            "capsule": self.capsules,
+            "polygon": self.polygons,
+            "body": self.compounds,
+        }
+
+    @property
+    def movers(self) -> tuple[Mover, ...]:
+        """The elements with bodies, in scene order."""
+        return tuple(each for those in self.kinds.values() for each in those)
 
     def placed(self, bodies: "Bodies") -> "Scene":
         """Return this scene with its bodies as they have come to be: elsewhere, fewer, or more.
 
-        Only `bodies` differs: the file that it would be written to is the same.
+        Only `bodies` and `links` differ: the file that it would be written to is the same.
         """
+        links = self.links.among(bodies.names, self.bodies.names)
         scene = self.model_copy()
-        scene.__dict__["bodies"] = bodies  # where cached_property looks first
+        scene.__dict__.update(bodies=bodies, links=links)  # where cached_property looks first
         return scene
 
     @property

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 CHUNK = 1 << 20
 """Candidates handled at once: bounds memory, large enough to hide numpy's overhead."""

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from sandbox.scene.faults import Location
-from sandbox.scene.model import Plane, Scene, Wall
+from sandbox.scene.model import Ball, Plane, Scene, Single, Wall
 
 MAX_REPEATS = 5_000
 """Equal shapes; half a second."""
@@ -36,9 +36,18 @@ def _shapes(scene: Scene) -> Iterator[tuple[Location, Key]]:
             yield ("wall", k, "points", n), segment
     for k, post in enumerate(scene.posts):
         yield ("post", k), ("disc", *post.position, post.radius)
-    for k, ball in enumerate(scene.balls):
-        if ball.fixed and ball.collides != "none":
-            yield ("ball", k), ("disc", *ball.position, ball.radius)
+    for kind, those in scene.kinds.items():
+        for k, single in enumerate(those):
+            if isinstance(single, Single) and single.fixed and single.collides != "none":
+                yield (kind, k), _single(single)
+
+
+def _single(single: Single) -> Key:
+    """Return where a fixed body is and what it looks like."""
+    if isinstance(single, Ball):
+        return "disc", *single.position, single.radius
+    looks = single.model_dump(exclude={"name", "material", "restitution", "friction", "colour", "mass", "density"})
+    return "solid", repr(looks)
 
 
 def _plane(plane: Plane) -> Key:

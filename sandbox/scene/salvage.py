@@ -15,8 +15,10 @@ HARMLESS: dict[str, Any] = {
     "position": [0.0, 0.0],
     "point": [0.0, 0.0],
     "normal": [0.0, 1.0],
-    "points": [[0.0, 0.0], [1.0, 0.0]],
+    "points": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
     "radius": 1.0,
+    "size": [1.0, 1.0],
+    "length": 1.0,
     "origin": [0.0, 0.0],
     "spacing": [10.0, 10.0],
     "columns": 1,
@@ -31,12 +33,15 @@ HARMLESS: dict[str, Any] = {
 ALOOF: dict[str, dict[str, Any]] = {
     "plane": {"point": [0.0, -1e16], "normal": [0.0, 1.0]},
     "world": {"duration": 1e-6},
-    **{kind: {"collides": "none"} for kind in ("ball", "grid", "scatter", "emitter")},
+    **{kind: {"collides": "none"} for kind in Scene().kinds},
 }
 """What else a table with a fault is given, so that it makes nothing around it look wrong."""
 
 _TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - {"title", "about"}
 
+
+REFERRING = {("joint",), ("attraction",), ("thrust",)}
+"""Tables that speak of bodies: one that is faulty is left out, with its like."""
 
 OF_THEIR_OWN = {("material",), ("name",), ("between",)}
 """Keys that no stand-in touches: what the cross-check says of them holds for an element with other faults too."""
@@ -51,6 +56,9 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
     document = copy.deepcopy(document)
     touched: set[Location] = set()
     for location in wrong:
+        if location[:1] in REFERRING:
+            document.pop(str(location[0]), None)  # nothing rests on them
+            continue
         if len(location) == 1 and location[0] in document and location[0] not in _TABLES:
             if difflib.get_close_matches(str(location[0]), _TABLES, n=1) == ["material"]:
                 return []  # many a name would seem to point at nothing

@@ -9,6 +9,7 @@ from sandbox.scene.part import Part
 Integrator = Literal["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]
 Detection = Literal["discrete", "bisect", "swept", "shrink"]
 Response = Literal["impulse", "penalty"]
+Joints = Literal["impulses", "relaxation", "xpbd", "rattle"]
 BroadPhase = Literal["all_pairs", "circles", "sweep", "grid", "oriented"]
 
 
@@ -44,6 +45,11 @@ class Settings(Part):
     detection: Detection | None = None
     response: Response | None = None
     broad_phase: BroadPhase | None = None
+    joints: Joints | None = None
+    """How joints are held: velocities put right by impulses, or positions, by relaxation or with compliance (XPBD),
+    or both (RATTLE)."""
+    stretch: Annotated[float, Field(ge=0, le=1e3)] | None = None
+    """The most that springs stretch, as a part of their rest length, where joints are held by relaxation."""
     record_every: Annotated[int, Field(ge=1, le=1_000_000_000)] = 1
     """Keep every n-th frame, and always the last."""
 

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene, Surfaced
+from sandbox.scene.model import Mover, Scene, Surfaced
 from sandbox.scene.near import FloatArray, IntArray
+from sandbox.scene.solids import Compound
 
 
 class Surface(NamedTuple):
@@ -37,7 +38,9 @@ class Surfaces:
 
     surfaces: tuple[Surface, ...]
     of_body: IntArray
-    """(N,) surface number of each body"""
+    """(N,) surface number of each body; of one in pieces, that of the first"""
+    of_shape: IntArray
+    """(S,) surface number of each convex piece, as `Bodies.shapes` lists them"""
     of_fixed: IntArray
     """(F,) surface number of each fixed thing"""
     restitution: FloatArray
@@ -52,7 +55,7 @@ def surfaces_of(scene: Scene, bodies: Bodies) -> Surfaces:
     Raises:
         KeyError: a thing names a material that the scene does not declare.
     """
-    surfaces, of_element = numbered(scene, bodies.elements)
+    surfaces, of_bearer = numbered(scene, bearers_of(bodies.elements))
     more, of_fixed = numbered(scene, scene.fixed, surfaces)
     surfaces = (*surfaces, *more)
     restitution, friction = _mixed([s.restitution for s in surfaces]), _mixed([s.friction for s in surfaces])
@@ -64,7 +67,36 @@ def surfaces_of(scene: Scene, bodies: Bodies) -> Surfaces:
         for table, stated in ((restitution, pair.restitution), (friction, pair.friction)):
             if stated is not None:
                 table[np.ix_(first, second)] = table[np.ix_(second, first)] = stated
-    return Surfaces(surfaces, of_element[bodies.element], of_fixed, restitution, friction)
+    counts = np.asarray([len(_bearers(element)) for element in bodies.elements], dtype=np.int64)
+    begin = np.cumsum(counts) - counts
+    of_body = of_bearer[begin[bodies.element]] if len(bodies) else np.empty(0, np.int64)
+    of_shape = of_body
+    if not bodies.round.all():
+        shapes = bodies.shapes
+        of_shape = of_bearer[begin[bodies.element[shapes.body]] + shapes.bearer]
+    return Surfaces(surfaces, of_body, of_shape, of_fixed, restitution, friction)
+
+
+def bearers_of(elements: Sequence[Mover]) -> list[Surfaced]:
+    """Return what has the surfaces of elements, one after the other: an element itself, or each of its parts."""
+    return [each for element in elements for each in _bearers(element)]
+
+
+def _bearers(element: Mover) -> Sequence[Surfaced]:
+    if not isinstance(element, Compound):
+        return (element,)
+    return [_dressed(part, element) for part in element.parts]
+
+
+def _dressed(part: Surfaced, body: Surfaced) -> Surfaced:
+    """Return a part with the surface of its body where it states none of its own; a material of its own is all its."""
+    if part.material is not None:
+        return part
+    return Surfaced(
+        material=body.material,
+        restitution=body.restitution if part.restitution is None else part.restitution,
+        friction=body.friction if part.friction is None else part.friction,
+    )
 
 
 def numbered(

@@ -12,7 +12,7 @@ from sandbox.scene.settings import Settings
 if TYPE_CHECKING:
     from sandbox.engines.exact.simulation import ExactSimulation
 
-STEPS = ("integrator", "detection", "response", "broad_phase")
+STEPS = ("integrator", "detection", "response", "broad_phase", "joints", "stretch")
 """Choices of solvers that step."""
 
 OVERLAP = ("slop", "bias", "persistence")

@@ -5,7 +5,7 @@ import numpy as np
 from sandbox.action import ActionError
 from sandbox.engines.exact.overlap import allowed, overlapping_things, told
 from sandbox.engines.roster import ALL, FIXED, MEETS, NOTHING, Roster
-from sandbox.scene.model import Ball, Scene
+from sandbox.scene.model import Ball, Scene, Single
 from sandbox.trajectory import BoolArray, FloatArray
 
 
@@ -72,15 +72,19 @@ class Troupe(Roster):
         super().change(scene)
         self.renewed = True
 
-    def add(self, ball: Ball, name: str) -> int:
-        """Add a ball that was checked, and return its number.
+    def add(self, single: Single, name: str) -> int:
+        """Add a body that was checked, and return its number.
 
         Raises:
-            ActionError: something stands there, or it makes more surfaces than a scene may have.
+            ActionError: something stands there, it is no ball, or it makes more surfaces than a scene may have.
         """
-        others = np.ones(len(self.bodies), dtype=np.bool_)
-        self._check_free(name, np.asarray(ball.position), ball.radius, MEETS[ball.collides], ball.fixed, others)
-        number = super().add(ball, name)
+        if isinstance(single, Ball):
+            others = np.ones(len(self.bodies), dtype=np.bool_)
+            place, kind = np.asarray(single.position), MEETS[single.collides]
+            self._check_free(name, place, single.radius, kind, single.fixed, others)
+        elif single.collides != "none":
+            raise ActionError(f"exact models no polygons, such as {name!r}; pymunk and reference do")
+        number = super().add(single, name)
         self.renewed = True
         return number
 

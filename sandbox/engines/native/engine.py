@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.overlap import BIAS, slop_of
-from sandbox.scene.demands import BALLS, Demand, demands
+from sandbox.scene.demands import BALLS, JOINTS, Demand, demands
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -29,7 +29,7 @@ class PymunkEngine:
 
     name: str = "pymunk"
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
-    capabilities: frozenset[Demand] = BALLS
+    capabilities: frozenset[Demand] = BALLS | JOINTS | {Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST}
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that pymunk lacks."""
@@ -45,13 +45,21 @@ class PymunkEngine:
         ]
         if settings.broad_phase is not None:
             lacks.append(f"broad_phase {settings.broad_phase!r} is not a choice it has (it has its own tree)")
+        if settings.joints not in (None, "impulses"):
+            lacks.append(f"joints {settings.joints!r} is not a choice it has (only 'impulses')")
+        if settings.stretch is not None:
+            lacks.append("stretch is for joints held by relaxation, which it has not")
         if settings.half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has drag")
+        if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts):
+            lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has other forces")
         return tuple(lacks)
 
     def resolve(self, scene: Scene, settings: Settings) -> Settings:
         """Return the settings with slop, bias, persistence and pymunk's own words filled in."""
-        own = {"slop": slop_of(scene), "bias": BIAS, "persistence": PERSISTENCE, **PYMUNK_WORDS}
+        own: dict[str, object] = {"slop": slop_of(scene), "bias": BIAS, "persistence": PERSISTENCE, **PYMUNK_WORDS}
+        if len(scene.links):
+            own["joints"] = "impulses"
         return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
 
     def start(self, scene: Scene, settings: Settings | None = None) -> "NativeSimulation":

@@ -8,6 +8,7 @@ import numpy as np
 
 from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
 from sandbox.engines.native.drag import acceleration
+from sandbox.engines.native.field import Field
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import World
 from sandbox.scene.near import FloatArray, IntArray
@@ -19,7 +20,8 @@ BLOCK = 16_384
 class FreeFlight:
     """M bodies in free flight. Rows are this object's own; `numbers` says which body each row is."""
 
-    def __init__(self, world: World, h: float) -> None:
+    def __init__(self, world: World, h: float, field: Field | None = None) -> None:
+        self._field = field if field is not None and field.attracts else None
         self.numbers: IntArray = np.empty(0, np.int64)
         self.position: FloatArray = np.empty((0, 2))
         self.velocity: FloatArray = np.empty((0, 2))
@@ -167,7 +169,7 @@ class FreeFlight:
         Under gravity alone what a scene can start with stays finite for as many steps as it may have, so
         nothing is looked at then.
         """
-        if not (self._pushed or self._twisted or self._dragged):
+        if not (self._pushed or self._twisted or self._dragged or self._field is not None):
             return None
         place, speed = np.hypot(*self.position.T), np.hypot(*self.velocity.T)
         good = (place <= FARTHEST) & (speed <= FASTEST) & np.isfinite(self.angular_velocity)
@@ -186,6 +188,8 @@ class FreeFlight:
                 velocity += self._kick[: len(velocity)]
         if forced is not None:
             self.velocity += forced
+        if self._field is not None:
+            self.velocity += self._field.at(self.position) * self._h
         if self.turns:
             self.angle += self.angular_velocity * self._h
         if self._twisted:

@@ -1,4 +1,4 @@
-"""MeetingBodies: the bodies that can touch something, in a pymunk space."""
+"""MeetingBodies: the bodies that can touch something, or are joined to something, in a pymunk space."""
 
 import math
 from typing import NamedTuple
@@ -7,10 +7,13 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
+from sandbox.engines.native.constraints import constraint_of
 from sandbox.engines.native.drag import acceleration
+from sandbox.engines.native.field import Field
 from sandbox.engines.native.reader import Reader
 from sandbox.engines.native.space import (
     SurfaceSetter,
+    body_shapes,
     category,
     fixed_shapes,
     gravity_of,
@@ -19,20 +22,22 @@ from sandbox.engines.native.space import (
 )
 from sandbox.engines.touching import NOTHING, Touching
 from sandbox.scene.bodies import Bodies
+from sandbox.scene.links import WORLD, Links
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray, IntArray
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 MANY = 5_000
 """Shapes from which on they are added shuffled: pymunk's tree takes 30 s for 40,000 in a sorted line."""
 
 
 class Member(NamedTuple):
-    """A body in the space, with its shape."""
+    """A body in the space, with its shapes; what can meet nothing has none."""
 
     body: pymunk.Body
-    shape: pymunk.Circle
+    shapes: tuple[tuple[int, pymunk.Shape], ...]
+    """each with its number among the pieces of all bodies"""
 
     @property
     def moves(self) -> bool:
@@ -51,6 +56,12 @@ class MeetingBodies:
         self._members: dict[int, Member] = {}
         self._fixed: list[tuple[pymunk.Body, list[pymunk.Shape]]] = []
         self._surface_of: IntArray = np.empty(0, np.int64)
+        self._moments: FloatArray = np.empty(0)
+        self._touches: BoolArray = np.empty(0, np.bool_)
+        self._links: list[tuple[pymunk.Constraint, int, int]] = []
+        self._attached = self._polygons = False
+        self._named: dict[str, pymunk.Body] = {}
+        self.field = Field(scene)
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self._steady: dict[int, tuple[FloatArray, float]] = {}
         self._moving = 0
@@ -76,6 +87,8 @@ class MeetingBodies:
             return
         if not self._fixed:
             self._add_fixed(bodies)
+        self._moments = bodies.moment
+        self._polygons = self._polygons or not bodies.round.all()
         order = np.asarray(_order(len(numbers)))
         states = np.column_stack((position, angle, velocity, angular_velocity, bodies.mass[numbers], moment))
         for number, state in zip(numbers[order].tolist(), states[order].tolist(), strict=True):
@@ -95,11 +108,16 @@ class MeetingBodies:
             if spin:
                 body.angular_velocity = spin
             self._moving += 1
-        shape = pymunk.Circle(body, float(bodies.radius[number]))
-        shape.filter = category(fixed, bodies.elements[bodies.element[number]].collides)
-        self._setter.dress(shape, int(self._surface_of[number]))
-        self._space.add(body, shape)
-        self._members[number] = Member(body, shape)
+        shapes = tuple(body_shapes(body, bodies, number)) if self._touches[number] or fixed else ()
+        for piece, shape in shapes:
+            shape.filter = category(fixed, bodies.elements[bodies.element[number]].collides)
+            self._setter.dress(shape, int(self._surface_of[piece]))
+        self._space.add(body, *(shape for _, shape in shapes))
+        self._members[number] = Member(body, shapes)
+        name = bodies.names[number]
+        self._named[name] = body
+        if not fixed and (self.field.attracts or self.field.thrusted(name)):
+            self.field.drive(name, body, self._named)
 
     def _add_fixed(self, bodies: Bodies) -> None:
         """Add the fixed things, once there is something to meet them."""
@@ -134,36 +152,62 @@ class MeetingBodies:
         if not len(numbers):
             return
         for number in numbers.tolist():
+            self._unlink(number)
             member = self._members.pop(number)
             self._moving -= member.moves
-            self._space.remove(member.shape, member.body)
+            self._space.remove(*(shape for _, shape in member.shapes), member.body)
+            self._named = {name: body for name, body in self._named.items() if body is not member.body}
             self._steady.pop(number, None)
         self._reader.members_changed()
         self._state = None
 
+    def link(self, links: Links) -> None:
+        """Join the bodies that are here as a scene says, once; what is joined is always here."""
+        if self._attached or not self._members:
+            return
+        self._attached = True
+        bias = self._settings.bias
+        assert bias is not None
+        for k, (a, b) in enumerate(zip(links.a.tolist(), links.b.tolist(), strict=True)):
+            first = self._space.static_body if a == WORLD else self._members[a].body
+            constraint = constraint_of(links, k, first, self._members[b].body, bias)
+            self._space.add(constraint)
+            self._links.append((constraint, a, b))
+
+    def _unlink(self, number: int) -> None:
+        """Let go of what a body that leaves was joined to."""
+        for constraint, a, b in self._links:
+            if number in (a, b):
+                self._space.remove(constraint)
+        self._links = [each for each in self._links if number not in each[1:]]
+
     @property
     def joints(self) -> bool:
-        """Whether a ball can touch one fixed thing twice at once."""
-        return any(len(shapes) > 1 for _, shapes in self._fixed)
+        """Whether two can touch in several places at once."""
+        several = any(len(shapes) > 1 for _, shapes in self._fixed)
+        return several or any(len(member.shapes) > 1 for member in self._members.values())
 
     def renew(self, scene: Scene, meet: Meetings) -> None:
         """Go on with a scene's changed air, gravity or coefficients, or with more surfaces."""
         self._scene = scene
-        self._surface_of, self._surface_of_fixed = meet.surfaces.of_body, meet.surfaces.of_fixed
+        self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
+        self._touches = meet.touches
         self._setter.renew(meet)
         self._space.gravity = gravity_of(scene)
-        for number, (body, circle) in self._members.items():
-            self._setter.dress(circle, int(self._surface_of[number]))
+        for number, (body, own) in self._members.items():
+            for piece, shape in own:
+                self._setter.dress(shape, int(self._surface_of[piece]))
             if meet.turnable[number] and math.isinf(body.moment):
-                body.moment = 0.5 * body.mass * circle.radius**2
+                body.moment = float(self._moments[number])
         for (_, shapes), surface in zip(self._fixed, self._surface_of_fixed.tolist(), strict=False):
             for shape in shapes:
                 self._setter.dress(shape, surface)
 
-    def step(self) -> None:
-        """Advance by one substep."""
+    def step(self, time: float) -> None:
+        """Advance by one substep, from a time, s."""
         if not self._moving:
             return
+        self.field.time = time
         self._apply_forces()
         self._space.step(self._settings.h)
         self._state = None
@@ -203,7 +247,7 @@ class MeetingBodies:
 
     def touching(self) -> Touching:
         """Return who touches whom now, and how (`Reader.touching`)."""
-        return self._reader.touching() if self._moving else NOTHING
+        return self._reader.touching(self._polygons) if self._moving else NOTHING
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a body that is not finite or beyond all bounds, and what is the matter; else None."""

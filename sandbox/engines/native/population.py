@@ -15,7 +15,7 @@ from sandbox.engines.native.free import FreeFlight
 from sandbox.engines.native.meeting import MeetingBodies
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Ball, Collides, Scene
+from sandbox.scene.model import Collides, Scene, Single
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
@@ -40,8 +40,8 @@ class Population:
         self.h = settings.h
         self._half_kick = 0.5 * settings.h if settings.half_kick else 0.0
         self.velocity[~self.bodies.fixed] += self.ahead
-        self.free = FreeFlight(scene.world, settings.h)
         self.meeting = MeetingBodies(scene, settings)
+        self.free = FreeFlight(scene.world, settings.h, self.meeting.field)
         self._meet = meetings(scene, self.bodies)
         self.meeting.renew(scene, self._meet)
         self._place(np.arange(len(self.bodies)))
@@ -87,8 +87,8 @@ class Population:
     def _place(self, numbers: IntArray) -> None:
         """Give each body to the half that it belongs to, and its surface, as things now stand."""
         meet, bodies = self._meet, self.bodies
-        flying = meet.free[numbers]
-        # What contacts cannot turn gets no moment in the space; in flight it keeps it, for the torques of actions.
+        flying = meet.free[numbers] & ~self._driven[numbers]
+        # What nothing can turn gets no moment in the space; in flight it keeps it, for the torques of actions.
         turned = np.where(meet.turnable, bodies.moment, math.inf)
         state = self.position, self.velocity, self.angle, self.angular_velocity
         for half, chosen, moment in (
@@ -98,6 +98,17 @@ class Population:
             position, velocity, angle, spin = (array[chosen] for array in state)
             half.join(chosen, bodies, position, velocity, angle, spin, moment[chosen])
         self.free.live_in(*state)
+        self.meeting.link(self.scene.links)
+
+    @property
+    def _driven(self) -> BoolArray:
+        """(N,) which bodies only the space can kick: those with thrusts, and all where bodies attract each other."""
+        field = self.meeting.field
+        if field.between_bodies:
+            return np.ones(len(self.bodies), dtype=np.bool_)
+        if not field.level:
+            return np.zeros(len(self.bodies), dtype=np.bool_)
+        return np.asarray([field.thrusted(name) for name in self.bodies.names], dtype=np.bool_)
 
     def change(self, scene: Scene) -> None:
         """Go on with a scene that differs in air, gravity or coefficients alone.
@@ -107,8 +118,8 @@ class Population:
         """
         if self._half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             raise ActionError("drag cannot come up in a run that was started with half_kick, which knows none")
-        spawned = self.bodies.elements[len(self.scene.discs) :]
-        bodies = replace(self.bodies, elements=(*scene.discs, *spawned))
+        spawned = self.bodies.elements[len(self.scene.movers) :]
+        bodies = replace(self.bodies, elements=(*scene.movers, *spawned))
         meet = derived(scene, bodies)
         self.refresh()
         self.velocity[self.moving] -= self.ahead
@@ -153,19 +164,23 @@ class Population:
     def _home(self, number: int) -> FreeFlight | MeetingBodies:
         return self.free if number in self.free.numbers else self.meeting
 
-    def add(self, ball: Ball, name: str) -> int:
-        """Add a ball and return its number.
+    def throttle(self, number: int, level: float) -> None:
+        """Open the scene's thrust of that number to a share of its force."""
+        self.meeting.field.level[number] = level
+
+    def add(self, single: Single, name: str) -> int:
+        """Add a body and return its number.
 
         Raises:
             ActionError: it makes more surfaces than a scene may have.
         """
         scene = self.scene
-        bodies = self.bodies.joined_by(ball, name)
+        bodies = self.bodies.joined_by(single, name)
         meet = derived(scene, bodies)
         self.refresh()
         number = len(self.bodies)
         self.bodies, self._meet = bodies, meet
-        ahead = np.zeros(2) if ball.fixed else self.ahead
+        ahead = np.zeros(2) if single.fixed else self.ahead
         self.position = np.vstack((self.position, self.bodies.position[-1:]))
         self.velocity = np.vstack((self.velocity, self.bodies.velocity[-1:] + ahead))
         self.angle = np.append(self.angle, self.bodies.angle[-1])

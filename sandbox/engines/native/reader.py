@@ -22,6 +22,10 @@ TOUCH = (
 )
 
 
+SECOND = ArbiterFields.POINT_A_2 | ArbiterFields.POINT_B_2
+"""What polygons have besides: they touch in two points."""
+
+
 class Reader:
     """Reads bodies and arbiters of one space.
 
@@ -83,15 +87,20 @@ class Reader:
         self._forces.set_float_buf(self._outgoing.reshape(-1))
         set_space_bodies(self._space, BodyFields.FORCE, self._forces)
 
-    def touching(self) -> Touching:
-        """Return what touches now, as arrays of their own."""
+    def touching(self, polygons: bool = False) -> Touching:
+        """Return what touches now, as arrays of their own; with polygons, which may touch in two points."""
         self._arbiters.clear()
-        get_space_arbiters(self._space, TOUCH, self._arbiters)
+        get_space_arbiters(self._space, TOUCH | SECOND if polygons else TOUCH, self._arbiters)
         words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
         if not len(words):
             return NOTHING
         # A parted contact is remembered for a while, with no points.
         live = np.flatnonzero(words[:, 2])
         a, b = (self._number_of.numbers(words[:, k].take(live)) for k in (0, 1))
-        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128).reshape(-1, 4).take(live, axis=0)
-        return Touching(a, b, vectors[:, 0], vectors[:, 1], (vectors[:, 2] + vectors[:, 3]) * 0.5)
+        width = 6 if polygons else 4
+        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128).reshape(-1, width).take(live, axis=0)
+        point = (vectors[:, 2] + vectors[:, 3]) * 0.5
+        if polygons:
+            twice = words[:, 2].take(live) > 1
+            point = np.where(twice, 0.5 * (point + (vectors[:, 4] + vectors[:, 5]) * 0.5), point)
+        return Touching(a, b, vectors[:, 0], vectors[:, 1], point)

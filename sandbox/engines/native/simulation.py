@@ -160,7 +160,7 @@ class NativeSimulation(Running):
         start = self.time + k * h
         before = self._state()[0].copy() if self._observer is not None else None
         population.free.step()
-        population.meeting.step()
+        population.meeting.step(start)
         population.changed()
         if self._ledger is not None and look:
             self._record(start + h)

@@ -13,6 +13,7 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.native.coefficients import factors, wrong_pairs
+from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Collides, Plane, Post, Scene, Wall
 from sandbox.scene.near import FloatArray
@@ -20,7 +21,7 @@ from sandbox.scene.part import BACKING
 from sandbox.scene.settings import Settings
 
 FIXED, LOOSE, SOLITARY = 0b001, 0b010, 0b100
-"""Collision categories: what never moves, balls that meet everything, balls that meet only what is fixed."""
+"""Collision categories: what never moves, bodies that meet everything, bodies that meet only what is fixed."""
 
 SHORTEST_REACH, LONGEST_REACH = 5e3, 5e6
 """m; pymunk's half-planes are segments, whose noise grows with their length: 3e-13 m at a reach of 5e3."""
@@ -49,7 +50,7 @@ def gravity_of(scene: Scene) -> tuple[float, float]:
 
 @cache
 def category(fixed: bool, collides: Collides) -> pymunk.ShapeFilter:
-    """Return the filter of a ball."""
+    """Return the filter of a body."""
     if fixed:
         return pymunk.ShapeFilter(categories=FIXED, mask=LOOSE | SOLITARY if collides == "all" else 0)
     if collides == "all":
@@ -83,6 +84,25 @@ def fixed_shapes(
             yield pymunk.Segment(body, a, b, thing.thickness / 2.0)
     else:
         yield pymunk.Circle(body, thing.radius, thing.position)
+
+
+def body_shapes(body: pymunk.Body, bodies: Bodies, number: int) -> Iterator[tuple[int, pymunk.Shape]]:
+    """Yield the shapes of a body with the number of each among all pieces of all bodies."""
+    if bodies.round.all():
+        yield number, pymunk.Circle(body, float(bodies.radius[number]))
+        return
+    shapes = bodies.shapes
+    first, last = np.searchsorted(shapes.body, (number, number + 1)).tolist()
+    for piece in range(first, last):
+        corners = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]].tolist()
+        radius = float(shapes.radius[piece])
+        match len(corners):
+            case 1:
+                yield piece, pymunk.Circle(body, radius, corners[0])
+            case 2:
+                yield piece, pymunk.Segment(body, corners[0], corners[1], radius)
+            case _:
+                yield piece, pymunk.Poly(body, corners, radius=radius)
 
 
 def _half_plane(plane: Plane, body: pymunk.Body, centre: FloatArray, reach: float) -> pymunk.Segment:

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
 """What is chosen where nothing is stated: what pymunk does, and the tutorial."""
 
+HELD = {Demand.RODS, Demand.PIVOTS, Demand.SLIDES, Demand.ROTARY_LIMITS}
+"""Joints that hold, other than springs, which are forces."""
+
 FEW = 24
 """Bodies up to which testing all pairs is quicker than sorting them."""
 
@@ -32,13 +35,27 @@ class ReferenceEngine:
 
     name: str = "reference"
     about: str = "by hand, fixed step: integrators, broad phases, times of impact, impulses or penalty springs"
-    capabilities: frozenset[Demand] = BALLS
+    capabilities: frozenset[Demand] = BALLS | {
+        Demand.POLYGONS,
+        Demand.RODS,
+        Demand.PIVOTS,
+        Demand.SLIDES,
+        Demand.ROTARY_LIMITS,
+        Demand.SPRINGS,
+        Demand.ROTARY_SPRINGS,
+        Demand.ATTRACTION,
+        Demand.THRUST,
+    }
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that the reference lacks."""
-        lacks = [f"it does not model {demand}" for demand in sorted(demands(scene) - self.capabilities)]
-        if settings.broad_phase == "oriented":
-            lacks.append("broad_phase 'oriented' needs polygons, which it does not model; 'grid' or 'sweep' suit balls")
+        wanted = demands(scene)
+        lacks = [f"it does not model {demand}" for demand in sorted(wanted - self.capabilities)]
+        lacks += self._detection_lacks(wanted, settings)
+        if settings.broad_phase == "oriented" and Demand.POLYGONS not in wanted:
+            lacks.append("broad_phase 'oriented' is for polygons, of which the scene has none; 'grid' or 'sweep' do")
+        if settings.stretch is not None and settings.joints != "relaxation":
+            lacks.append("stretch is for joints held by relaxation; solver.joints is not 'relaxation'")
         if settings.half_kick:
             lacks.append("half_kick is a remedy for pymunk's scheme; integrator 'velocity_verlet' has it built in")
         if settings.persistence not in (None, 1):
@@ -52,6 +69,17 @@ class ReferenceEngine:
                 if getattr(settings, key) is not None
             ]
         return tuple(lacks)
+
+    def _detection_lacks(self, wanted: frozenset[Demand], settings: Settings) -> list[str]:
+        """Say what a detection of impacts in time cannot do."""
+        lacks = []
+        if settings.detection == "swept" and Demand.POLYGONS in wanted:
+            lacks.append("detection 'swept' knows times of impact of balls alone, not of polygons; 'bisect' does")
+        if settings.detection in ("bisect", "swept") and wanted & HELD:
+            lacks.append(
+                f"detection {settings.detection!r} resolves impacts one by one, apart from joints; 'shrink' does not"
+            )
+        return lacks
 
     def _penalty_lacks(self, scene: Scene, settings: Settings) -> list[str]:
         from sandbox.engines.reference.stability import unstable
@@ -69,6 +97,10 @@ class ReferenceEngine:
     def resolve(self, scene: Scene, settings: Settings) -> Settings:
         """Return the settings with every choice filled in."""
         own: dict[str, object] = {**WORDS, "slop": slop_of(scene), "bias": BIAS, "persistence": 1}
+        if len(scene.links):
+            own["joints"] = "impulses"
+        if demands(scene) & {Demand.SPRINGS, Demand.ROTARY_SPRINGS, Demand.ATTRACTION}:
+            own["integrator"] = "semi_implicit_euler"  # explicit Euler makes what swings gain energy
         if settings.response == "penalty":
             from sandbox.engines.reference.stability import suited
 
@@ -96,7 +128,7 @@ class ReferenceEngine:
 def _suitable(scene: Scene) -> str:
     """Return the broad phase that suits a scene's balls."""
     bodies = scene.bodies
-    radius = bodies.radius[~meetings(scene).free | bodies.fixed]
+    radius = bodies.radius[meetings(scene).touches | bodies.fixed]
     if len(radius) <= FEW:
         return "all_pairs"
     return "grid" if radius.max() <= ONE_SIZE * radius.min() else "sweep"

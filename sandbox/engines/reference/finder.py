@@ -154,5 +154,6 @@ def _room_for(size: int) -> Manifolds:
         separation=np.empty(size),
         point=np.empty((size, 2)),
         arm=np.empty((size, 2)),
+        offset=np.zeros((size, 2)),  # where only discs meet it stays so
         coefficient=np.empty((size, 2)),
     )

@@ -10,7 +10,7 @@ from sandbox.trajectory import FloatArray, IntArray
 
 
 @kernel
-def approach(now: Manifolds, velocity: FloatArray, out: FloatArray) -> None:
+def approach(now: Manifolds, velocity: FloatArray, spin: FloatArray, out: FloatArray) -> None:
     """Write the normal velocity (K,) of each contact, m/s: negative where the two approach."""
     for k in range(len(now.key)):
         i, j = now.first[k], now.second[k]
@@ -18,7 +18,9 @@ def approach(now: Manifolds, velocity: FloatArray, out: FloatArray) -> None:
         if j >= 0:
             vx += velocity[j, 0]
             vy += velocity[j, 1]
-        out[k] = vx * now.normal[k, 0] + vy * now.normal[k, 1]
+        out[k] = vx * now.normal[k, 0] + vy * now.normal[k, 1] + spin[i] * now.offset[k, 0]
+        if j >= 0:
+            out[k] -= spin[j] * now.offset[k, 1]
 
 
 @kernel
@@ -55,33 +57,64 @@ def solve_velocities(
         impulse: (K, 2) N·s along the normal and along the normal turned left; those to start with, and then the sums.
         iterations: passes over all contacts.
     """
+    start_with(now, velocity, spin, inverse_mass, inverse_moment, impulse)
+    for _ in range(iterations):
+        solve_once(now, bounce, velocity, spin, inverse_mass, inverse_moment, impulse)
+
+
+@kernel
+def start_with(
+    now: Manifolds,
+    velocity: FloatArray,
+    spin: FloatArray,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    impulse: FloatArray,
+) -> None:
+    """Apply the impulses (K, 2) that contacts start with; the arguments are those of `solve_velocities`."""
     for k in range(len(now.key)):
         _push(now, k, impulse[k, 0], impulse[k, 1], velocity, spin, inverse_mass, inverse_moment)
-    for _ in range(iterations):
-        for k in range(len(now.key)):
-            i, j = now.first[k], now.second[k]
-            nx, ny = now.normal[k, 0], now.normal[k, 1]
-            a, b = now.arm[k, 0], now.arm[k, 1]
-            mass = inverse_mass[i]
-            turning = inverse_moment[i] * a * a
-            vx, vy = -velocity[i, 0], -velocity[i, 1]
-            rub = -spin[i] * a
-            if j >= 0:
-                mass += inverse_mass[j]
-                turning += inverse_moment[j] * b * b
-                vx += velocity[j, 0]
-                vy += velocity[j, 1]
-                rub -= spin[j] * b
-            if mass == 0.0:
-                continue
-            along = (-(bounce[k] + (vx * nx + vy * ny))) / mass
-            old_normal, old_tangent = impulse[k, 0], impulse[k, 1]
-            impulse[k, 0] = max(old_normal + along, 0.0)
-            most = now.coefficient[k, 1] * impulse[k, 0]
-            across = -(vy * nx - vx * ny + rub) / (mass + turning)
-            impulse[k, 1] = min(max(old_tangent + across, -most), most)
-            normal, tangent = impulse[k, 0] - old_normal, impulse[k, 1] - old_tangent
-            _push(now, k, normal, tangent, velocity, spin, inverse_mass, inverse_moment)
+
+
+@kernel
+def solve_once(
+    now: Manifolds,
+    bounce: FloatArray,
+    velocity: FloatArray,
+    spin: FloatArray,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    impulse: FloatArray,
+) -> None:
+    """Pass over all contacts once; the arguments are those of `solve_velocities`."""
+    for k in range(len(now.key)):
+        i, j = now.first[k], now.second[k]
+        nx, ny = now.normal[k, 0], now.normal[k, 1]
+        a, a_off = now.arm[k, 0], now.offset[k, 0]
+        mass = inverse_mass[i]
+        along_mass = mass + inverse_moment[i] * a_off * a_off
+        across_mass = mass + inverse_moment[i] * a * a
+        vx, vy = -velocity[i, 0], -velocity[i, 1]
+        rub, turn = -spin[i] * a, spin[i] * a_off
+        if j >= 0:
+            b, b_off = now.arm[k, 1], now.offset[k, 1]
+            mass += inverse_mass[j]
+            along_mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
+            across_mass += inverse_mass[j] + inverse_moment[j] * b * b
+            vx += velocity[j, 0]
+            vy += velocity[j, 1]
+            rub -= spin[j] * b
+            turn -= spin[j] * b_off
+        if mass == 0.0:
+            continue
+        along = (-(bounce[k] + (vx * nx + vy * ny) + turn)) / along_mass
+        old_normal, old_tangent = impulse[k, 0], impulse[k, 1]
+        impulse[k, 0] = max(old_normal + along, 0.0)
+        most = now.coefficient[k, 1] * impulse[k, 0]
+        across = -(vy * nx - vx * ny + rub) / across_mass
+        impulse[k, 1] = min(max(old_tangent + across, -most), most)
+        normal, tangent = impulse[k, 0] - old_normal, impulse[k, 1] - old_tangent
+        _push(now, k, normal, tangent, velocity, spin, inverse_mass, inverse_moment)
 
 
 @kernel
@@ -101,12 +134,12 @@ def _push(
     x, y = nx * normal - ny * tangent, nx * tangent + ny * normal
     velocity[i, 0] -= inverse_mass[i] * x
     velocity[i, 1] -= inverse_mass[i] * y
-    # The lever is the normal itself times the arm: only the tangential part turns anything.
-    spin[i] -= inverse_moment[i] * now.arm[k, 0] * tangent
+    # The lever has two parts, along the normal and beside it: for discs only the first, which turns by rubbing.
+    spin[i] -= inverse_moment[i] * (now.arm[k, 0] * tangent - now.offset[k, 0] * normal)
     if j >= 0:
         velocity[j, 0] += inverse_mass[j] * x
         velocity[j, 1] += inverse_mass[j] * y
-        spin[j] -= inverse_moment[j] * now.arm[k, 1] * tangent
+        spin[j] -= inverse_moment[j] * (now.arm[k, 1] * tangent + now.offset[k, 1] * normal)
 
 
 @kernel
@@ -115,6 +148,7 @@ def solve_overlaps(
     target: FloatArray,
     push: FloatArray,
     inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
     iterations: int,
 ) -> None:
     """Find the velocities that undo overlap, apart from those of the motion.
@@ -122,8 +156,9 @@ def solve_overlaps(
     Args:
         now: K contacts.
         target: (K,) m/s, how fast each is to part.
-        push: (N, ≥ 2) m/s, changed.
+        push: (N, 3) m/s and rad/s, changed.
         inverse_mass: (N,) 1/kg.
+        inverse_moment: (N,) 1/(kg·m²).
         iterations: passes over all contacts.
     """
     total = target * 0.0
@@ -131,19 +166,23 @@ def solve_overlaps(
         for k in range(len(now.key)):
             i, j = now.first[k], now.second[k]
             nx, ny = now.normal[k, 0], now.normal[k, 1]
-            mass = inverse_mass[i]
-            vx, vy = -push[i, 0], -push[i, 1]
+            a_off, b_off = now.offset[k, 0], now.offset[k, 1]
+            mass = inverse_mass[i] + inverse_moment[i] * a_off * a_off
+            vx, vy, turn = -push[i, 0], -push[i, 1], push[i, 2] * a_off
             if j >= 0:
-                mass += inverse_mass[j]
+                mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
                 vx += push[j, 0]
                 vy += push[j, 1]
+                turn -= push[j, 2] * b_off
             if mass == 0.0:
                 continue
             old = total[k]
-            total[k] = max(old + (target[k] - (vx * nx + vy * ny)) / mass, 0.0)
+            total[k] = max(old + (target[k] - (vx * nx + vy * ny) - turn) / mass, 0.0)
             change = total[k] - old
             push[i, 0] -= inverse_mass[i] * change * nx
             push[i, 1] -= inverse_mass[i] * change * ny
+            push[i, 2] += inverse_moment[i] * change * a_off
             if j >= 0:
                 push[j, 0] += inverse_mass[j] * change * nx
                 push[j, 1] += inverse_mass[j] * change * ny
+                push[j, 2] -= inverse_moment[j] * change * b_off

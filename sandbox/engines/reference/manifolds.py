@@ -34,7 +34,9 @@ class Manifolds(NamedTuple):
     point: FloatArray
     """(K, 2) m, midway in the overlap"""
     arm: FloatArray
-    """(K, 2) m, from each centre to the contact along the normal"""
+    """(K, 2) m, from each centre to the contact along the normal, towards the other"""
+    offset: FloatArray
+    """(K, 2) m, how far to the left of the normal the contact lies from each centre; 0 for discs"""
     coefficient: FloatArray
     """(K, 2) restitution and friction of the pair"""
 

@@ -33,6 +33,10 @@ class Inputs(NamedTuple):
     """(N, 1) or (1, 1): 1 for what air can brake, 0 for what is fixed or gone"""
     contacts: Callable[[State], FloatArray] | None = None
     """Penalty contacts: the acceleration (N, D) that they add in a state."""
+    forces: tuple[Callable[[float, State], FloatArray], ...] = ()
+    """What else acts, by time and state: springs, attraction, thrusts; the acceleration (N, D) that each adds."""
+    rubbing: bool = False
+    """Some of these forces depend on velocity."""
 
     @property
     def dragged(self) -> bool:
@@ -42,15 +46,15 @@ class Inputs(NamedTuple):
     @property
     def damped(self) -> bool:
         """Acceleration depends on velocity, so that a scheme needs to know the velocity where it asks."""
-        return self.dragged or self.contacts is not None
+        return self.dragged or self.rubbing or self.contacts is not None
 
 
 Transition: TypeAlias = Callable[[float, State, Inputs], State]
 """ẋ = f(t, x, u)"""
 
 
-def transition(t: float, x: State, u: Inputs) -> State:  # noqa: ARG001, nothing here depends on time by itself
-    """Return ẋ: the rates, and the accelerations a = g + F/m − k w − c |w| w, where w = v − wind.
+def transition(t: float, x: State, u: Inputs) -> State:
+    """Return ẋ: the rates, and the accelerations a = g + F/m − k w − c |w| w + Σ f(t, x), where w = v − wind.
 
     Args:
         t: s.
@@ -67,6 +71,8 @@ def transition(t: float, x: State, u: Inputs) -> State:  # noqa: ARG001, nothing
         wind = x[1, :, :2] - u.wind
         rate = u.linear_drag + u.quadratic_drag * np.sqrt(wind[:, :1] ** 2 + wind[:, 1:] ** 2)
         derivative[1, :, :2] -= u.mobile * rate * wind
+    for force in u.forces:
+        derivative[1] += force(t, x)
     if u.contacts is not None:
         derivative[1] += u.contacts(x)
     return derivative

@@ -70,18 +70,22 @@ def penalty_forces(
         i, j = now.first[k], now.second[k]
         nx, ny = now.normal[k, 0], now.normal[k, 1]
         a, b = now.arm[k, 0], now.arm[k, 1]
-        mass, turning = inverse_mass[i], inverse_moment[i] * a * a
+        a_off, b_off = now.offset[k, 0], now.offset[k, 1]
+        mass = inverse_mass[i] + inverse_moment[i] * a_off * a_off
+        turning = inverse_moment[i] * (a * a - a_off * a_off)
         vx, vy, rub = -rates[i, 0], -rates[i, 1], -spin[i] * a
+        roll = spin[i] * a_off
         if j >= 0:
-            mass += inverse_mass[j]
-            turning += inverse_moment[j] * b * b
+            mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
+            turning += inverse_moment[j] * (b * b - b_off * b_off)
             vx += rates[j, 0]
             vy += rates[j, 1]
             rub -= spin[j] * b
+            roll -= spin[j] * b_off
         if mass == 0.0:
             continue
         damper = 2.0 * now.coefficient[k, 0] * math.sqrt(stiffness / mass)
-        normal = max(-stiffness * now.separation[k] - damper * (vx * nx + vy * ny), 0.0)
+        normal = max(-stiffness * now.separation[k] - damper * (vx * nx + vy * ny + roll), 0.0)
         slip = vy * nx - vx * ny + rub
         most = now.coefficient[k, 1] * normal
         # A viscous slope that damps slip as fast as the spring swings, so that it asks for no smaller step.
@@ -89,10 +93,10 @@ def penalty_forces(
         x, y = nx * normal - ny * tangent, nx * tangent + ny * normal
         acceleration[i, 0] -= inverse_mass[i] * x
         acceleration[i, 1] -= inverse_mass[i] * y
-        turn[i] -= inverse_moment[i] * a * tangent
+        turn[i] -= inverse_moment[i] * (a * tangent - a_off * normal)
         if j >= 0:
             acceleration[j, 0] += inverse_mass[j] * x
             acceleration[j, 1] += inverse_mass[j] * y
-            turn[j] -= inverse_moment[j] * b * tangent
+            turn[j] -= inverse_moment[j] * (b * tangent + b_off * normal)
         acceleration[row[k], 0] += x
         acceleration[row[k], 1] += y

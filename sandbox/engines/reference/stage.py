@@ -7,6 +7,7 @@
 Only `resolve` and `impact` change the present state.
 """
 
+import math
 from collections.abc import Callable
 from typing import Protocol
 
@@ -15,10 +16,15 @@ import numpy as np
 from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.impulses import approach, remembered, solve_overlaps, solve_velocities
 from sandbox.engines.reference.integrators import INTEGRATORS
+from sandbox.engines.reference.joints.field import Field
+from sandbox.engines.reference.joints.solver import JointSolver, kick_pose
+from sandbox.engines.reference.joints.together import solve_together
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.motion import Inputs, State, transition
 from sandbox.engines.reference.penalty import Penalty
+from sandbox.engines.reference.piece_finder import PieceFinder
 from sandbox.engines.roster import Roster
+from sandbox.scene.links import LinkKind
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import FloatArray, IntArray
 
@@ -40,18 +46,37 @@ class Stage:
         self._roster, self._settings = roster, settings
         self._slop, self._bias = settings.slop, settings.bias
         self._integrator = INTEGRATORS[settings.integrator]
-        self.finder = Finder(roster, settings.broad_phase)
+        self._links = roster.scene.links
+        self._joints = self._joint_solver()
+        self._field = Field(roster)
+        self.finder = self._new_finder()
         self.penalty = Penalty(roster, settings, self.finder) if settings.response == "penalty" else None
         self.time = 0.0
         self.witness: Witness | None = None
         self._memory: tuple[IntArray, FloatArray, float] = np.empty(0, np.int64), np.empty((0, 2)), settings.h
-        self.push: FloatArray = np.zeros((0, 2))
+        self.push: FloatArray = np.zeros((0, 3))
+        """(N, 3) m/s and rad/s, by which overlap is undone in the next substep"""
         self.enter()
+
+    def _new_finder(self) -> Finder:
+        assert self._settings.broad_phase
+        kind = PieceFinder if self._roster.meet.solids else Finder
+        return kind(self._roster, self._settings.broad_phase)
+
+    def _joint_solver(self) -> JointSolver | None:
+        """Return what holds the scene's links, if it has any."""
+        how, roster = self._settings.joints, self._roster
+        if not len(self._links):
+            return None
+        assert how is not None
+        inverse = roster.inverse_mass, roster.inverse_moment
+        cap = math.inf if self._settings.stretch is None else self._settings.stretch
+        return JointSolver(self._links, *inverse, self._bias, self._settings.iterations, how, cap)
 
     def enter(self) -> None:
         """Take the state from the roster, whose bodies may have been changed."""
         roster = self._roster
-        turns = bool(roster.inverse_moment.any() or roster.angular_velocity.any())
+        turns = bool(roster.inverse_moment.any() or roster.angular_velocity.any() or len(self._links))
         parts = [roster.position, roster.velocity]
         if turns:
             parts = [
@@ -60,14 +85,22 @@ class Stage:
             ]
         self.x: State = np.stack(parts)
         # Overlap goes on being corrected, except for who is gone.
-        kept = np.zeros((len(roster.position), 2))
+        kept = np.zeros((len(roster.position), 3))
         kept[: len(self.push)] = self.push
         self.push = np.where(roster.moving[:, None], kept, 0.0)
         self._pushes = bool(self.push.any())
         self._no_spin: FloatArray = np.zeros((len(roster.position), 3))
+        if roster.meet.solids != isinstance(self.finder, PieceFinder):  # keys mean other pairs from now on
+            work, self.finder = self.finder.work, self._new_finder()
+            self.finder.work = work
+            self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
+            if self._settings.response == "penalty":
+                self.penalty = Penalty(roster, self._settings, self.finder)
         self.finder.population_changed()
         if self.penalty is not None:
             self.penalty.population_changed()
+        if self._joints is not None:
+            self._joints.use(roster.inverse_mass, roster.inverse_moment, roster.linked())
         self.apply_forces()
 
     def leave(self) -> None:
@@ -85,7 +118,20 @@ class Stage:
         steady[:, :2] = np.where(moving, world.gravity, 0.0) + roster.force * roster.inverse_mass[:, None]
         if steady.shape[1] == 3:
             steady[:, 2] = roster.torque * roster.inverse_moment
-        self.u = Inputs(steady, world.linear_drag, world.quadratic_drag, world.wind, moving.astype(np.float64))
+        forces: list[Callable[[float, State], FloatArray]] = [] if self._field.empty else [self._field]
+        springs = self._links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
+        if self._joints is not None and self._joints.how != "xpbd" and len(springs):
+            joints = self._joints
+            forces.append(lambda _, x: joints.forces(x))
+        self.u = Inputs(
+            steady,
+            world.linear_drag,
+            world.quadratic_drag,
+            world.wind,
+            moving.astype(np.float64),
+            forces=tuple(forces),
+            rubbing=bool(springs.figures[:, 2].any()),
+        )
 
     def moved(self, h: float) -> State:
         """Return the state a time h, s, ahead, as if nothing were hit on the way. Nothing is changed."""
@@ -94,7 +140,9 @@ class Stage:
         else:
             moved = self._integrator.step(transition, self.time, self.x, self.u, h)
         if self._pushes:
-            moved[0, :, :2] += h * self.push
+            moved[0] += h * self.push[:, : moved.shape[2]]
+        if self._joints is not None and self._joints.how != "impulses":
+            self._joints.project(self.x, moved, h)
         return moved
 
     def overlaps(self, x: State) -> Manifolds:
@@ -108,7 +156,9 @@ class Stage:
         the kick of gravity. Positions follow a change of velocity as far as the scheme moves them within the step.
         """
         if self.penalty is not None:
-            self._done(moved, *self.penalty.given(), h)
+            contacts, given = self.penalty.given()
+            self._held(moved, contacts.of(slice(0)), h)  # joints alone
+            self._done(moved, contacts, given, h)
             return
         impulse = self._held(moved, contacts, h)
         self._pushes = False
@@ -118,7 +168,8 @@ class Stage:
             target = -(1.0 - self._bias**h) / h * np.minimum(contacts.separation + self._slop, 0.0)
             self._pushes = bool(target.any())
             if self._pushes:
-                solve_overlaps(contacts, target, self.push, self._roster.inverse_mass, self._settings.iterations)
+                inverse = self._roster.inverse_mass, self._roster.inverse_moment
+                solve_overlaps(contacts, target, self.push, *inverse, self._settings.iterations)
         self._memory = contacts.key.copy(), impulse, h
         self._done(moved, contacts, impulse, h)
 
@@ -139,16 +190,19 @@ class Stage:
         Both the state and the separations are brought up to date.
         """
         impulse = np.zeros((contacts.size, 2))
-        if not contacts.size:
+        joined = self._joints is not None and self._joints.how == "impulses"
+        if not (contacts.size or joined):
             return impulse
         share = self._integrator.share
+        if self._joints is not None and joined:
+            self._joints.prepare(kick_pose(moved, share, h), h)
         bounce = self._approach(contacts, self.x[1]) * contacts.coefficient[:, 0]
         key, old, old_h = self._memory
         remembered(contacts.key, key, old, impulse)
         # What rests takes impulses in proportion to the time. Never more: a blow does not grow with it.
         impulse *= min(h / old_h, 1.0)
         kicked = moved[1].copy()
-        self._solve(contacts, bounce, moved[1], impulse)
+        self._solve(contacts, bounce, moved[1], impulse, joined)
         if share:
             change = moved[1] - kicked
             moved[0] += (share * h) * change
@@ -157,7 +211,7 @@ class Stage:
 
     def _approach(self, contacts: Manifolds, velocity: FloatArray) -> FloatArray:
         out = np.empty(contacts.size)
-        approach(contacts, velocity, out)
+        approach(contacts, velocity, self._spin(velocity), out)
         return out
 
     def gentle(self, h: float) -> float:
@@ -168,10 +222,20 @@ class Stage:
         """Return how fast each contact closes in a state, (K,) m/s."""
         return -self._approach(contacts, x[1])
 
-    def _solve(self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray) -> None:
+    def _solve(
+        self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray, joined: bool = False
+    ) -> None:
         inverse = self._roster.inverse_mass, self._roster.inverse_moment
-        spin = (velocity if velocity.shape[1] == 3 else self._no_spin)[:, 2]
+        if self._joints is not None and joined:
+            rows, times = self._joints.rows, self._settings.iterations
+            solve_together(contacts, bounce, rows, velocity, *inverse, impulse, times)
+            return
+        spin = self._spin(velocity)
         solve_velocities(contacts, bounce, velocity, spin, *inverse, impulse, self._settings.iterations)
+
+    def _spin(self, velocity: FloatArray) -> FloatArray:
+        """Return the spins (N,) among rates (N, D): zeros where nothing turns."""
+        return (velocity if velocity.shape[1] == 3 else self._no_spin)[:, 2]
 
     def _done(self, after: State, contacts: Manifolds, impulse: FloatArray, h: float) -> None:
         before, self.x = self.x, after

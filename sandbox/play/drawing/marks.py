@@ -7,8 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pygame
 
+from sandbox.play.drawing.anatomy import Place
 from sandbox.play.drawing.discs import Discs, Style
 from sandbox.play.drawing.palette import BACKGROUND, FAINT, INK, WARNING, YELLOW
+from sandbox.play.drawing.polygons import Polygons
 from sandbox.play.drawing.shade import Look, disc_distance, paint
 from sandbox.play.drawing.strokes import stroke
 from sandbox.play.drawing.text import measure, write
@@ -19,10 +21,16 @@ FLASH = 1.5
 """s, how long a missed contact is shown"""
 
 
-def draw_boxes(view: View) -> None:
+def draw_boxes(view: View, polygons: Polygons) -> None:
     """Draw the box around each body."""
     some = view.first(MOST_BOXES)
-    for (x, y), radius in zip(some.centre.tolist(), some.radius.tolist(), strict=True):
+    lone = some.sight.bodies.round[some.shown]
+    if not lone.all():
+        for left, top, right, bottom in polygons.boxes(some)[~lone].tolist():
+            if max(abs(left), abs(top), abs(right), abs(bottom)) < 16_000.0:
+                box = pygame.Rect(math.floor(left), math.floor(top), math.ceil(right - left), math.ceil(bottom - top))
+                pygame.draw.rect(view.surface, FAINT, box, max(1, round(view.unit)))
+    for (x, y), radius in zip(some.centre[lone].tolist(), some.radius[lone].tolist(), strict=True):
         if radius < 8000.0:
             side = math.ceil(2.0 * radius)
             box = pygame.Rect(math.floor(x - radius), math.floor(y - radius), side, side)
@@ -62,18 +70,22 @@ def _quartered(size: float) -> pygame.Surface:
     return mark
 
 
-def draw_names(view: View) -> None:
+def draw_names(view: View, polygons: Polygons) -> None:
     """Write the names of bodies above them, as many as fit without covering one another."""
     taken: list[pygame.Rect] = []
     size = 12 * view.unit
     some = view.first(4 * MOST_NAMES)
     area = view.surface.get_rect()
-    rows = zip(some.shown.tolist(), some.centre.tolist(), some.radius.tolist(), strict=True)
-    for number, (x, y), radius in rows:
+    bodies = some.sight.bodies
+    lone = bodies.round[some.shown]
+    tops = some.centre[:, 1] - some.radius if lone.all() else polygons.boxes(some)[:, 1]
+    room = bodies.core[some.shown] * some.camera.scale
+    rows = zip(some.shown.tolist(), some.centre.tolist(), tops.tolist(), room.tolist(), strict=True)
+    for number, (x, y), top, radius in rows:
         name = view.sight.bodies.names[number]
         name = name if len(name) <= 24 else name[:23] + "…"
         width, height = measure(name, size)
-        above = y - radius - 3.0 * view.unit
+        above = top - 3.0 * view.unit
         if not (abs(x) < 30_000 and abs(above) < 30_000):
             continue
         place = pygame.Rect(round(x - width / 2), round(above - height), width, height)
@@ -90,7 +102,8 @@ def draw_verdicts(view: View) -> None:
     overlapping = view.sight.overlapping
     assert overlapping is not None
     some = view.first(MOST_NAMES)
-    for number, (x, y), radius in zip(some.shown.tolist(), some.centre.tolist(), some.radius.tolist(), strict=True):
+    room = some.sight.bodies.core[some.shown] * some.camera.scale
+    for number, (x, y), radius in zip(some.shown.tolist(), some.centre.tolist(), room.tolist(), strict=True):
         touching = number < len(overlapping) and bool(overlapping[number])
         word, size = "overlap" if touching else "clear", min(max(0.28 * radius, 11.0 * view.unit), 26.0 * view.unit)
         place = y - 0.4 * radius  # above the mark of its centre and its name
@@ -117,8 +130,8 @@ def draw_flashes(view: View) -> None:
         paint(view.surface, disc_distance(x, y, radius), look, within)
 
 
-def draw_picked(view: View, discs: Discs) -> None:
-    """Draw a bright ring around the picked body."""
+def draw_picked(view: View, discs: Discs, polygons: Polygons) -> None:
+    """Draw a bright line around the picked body."""
     number, frame = view.sight.picked, view.sight.frame
     if number is None or not 0 <= number < min(len(frame.position), len(view.sight.bodies)):
         return
@@ -128,6 +141,11 @@ def draw_picked(view: View, discs: Discs) -> None:
         if not frame.present[number] or not view.camera.in_sight(place, radius)[0]:
             return
     (x, y), size = view.camera.to_screen(place)[0].tolist(), max(radius * view.camera.scale, 2.0) + 4.0 * view.unit
+    angle = float(frame.angle[number])
+    if not view.sight.bodies.round[number] and size > 8.0 * view.unit and math.isfinite(angle):
+        spot = Place(x, y, angle, view.camera.scale)
+        polygons.ring(view.surface, view.sight.bodies, number, spot, 4.0 * view.unit, YELLOW, 2.0 * view.unit)
+        return
     discs.ring(view.surface, (x, y), size, YELLOW, Style(2.0 * view.unit, antialias=view.antialias))
 
 

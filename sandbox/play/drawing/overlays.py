@@ -4,6 +4,8 @@ import numpy as np
 
 from sandbox.play.drawing.arrows import draw_contacts, draw_impulses, draw_velocities
 from sandbox.play.drawing.discs import Discs
+from sandbox.play.drawing.fittings import draw_fittings
+from sandbox.play.drawing.joints import draw_joints, held
 from sandbox.play.drawing.marks import (
     draw_boxes,
     draw_centres,
@@ -15,6 +17,7 @@ from sandbox.play.drawing.marks import (
 )
 from sandbox.play.drawing.palette import FAINT, INK, mixed
 from sandbox.play.drawing.points import Points
+from sandbox.play.drawing.polygons import Polygons
 from sandbox.play.drawing.strokes import stroke
 from sandbox.play.drawing.trails import draw_trails
 from sandbox.play.drawing.view import View
@@ -30,9 +33,10 @@ MOST_GHOSTS = 4000
 class Overlays:
     """Draws the overlays of a picture, what lies below the bodies and what lies above them."""
 
-    def __init__(self, discs: Discs, points: Points) -> None:
+    def __init__(self, discs: Discs, points: Points, polygons: Polygons) -> None:
         self._discs = discs
         self._points = points
+        self._polygons = polygons
 
     def need_bodies(self, sight: Sight) -> bool:
         """Tell whether the bodies in sight must be known, even those that are mere points."""
@@ -42,14 +46,18 @@ class Overlays:
         """Draw what bodies cover."""
         if "trails" in view.sight.overlays:
             draw_trails(view, self._points)
+        if "shapes" in view.sight.overlays and len(view.sight.scene.links):
+            draw_joints(view, held(view), self._discs)
 
     def above(self, view: View) -> None:
-        """Draw what covers bodies. There are no joints yet: their overlay draws nothing."""
+        """Draw what covers bodies."""
         overlays = view.sight.overlays
         if view.sight.ghost is not None:
             self._ghost(view)
         if "bounds" in overlays:
-            draw_boxes(view)
+            draw_boxes(view, self._polygons)
+        if "joints" in overlays and len(view.sight.scene.links):
+            draw_fittings(view, held(view), self._discs)
         if "centres" in overlays:
             draw_centres(view)
         if view.sight.overlapping is not None:
@@ -61,10 +69,10 @@ class Overlays:
         if "contacts" in overlays:
             draw_contacts(view, self._discs)
         draw_flashes(view)
-        draw_picked(view, self._discs)
+        draw_picked(view, self._discs, self._polygons)
         draw_pull(view, self._discs)
         if "names" in overlays:
-            draw_names(view)
+            draw_names(view, self._polygons)
 
     def _ghost(self, view: View) -> None:
         """Draw the bodies of the other engine hollow, and join each to its own where they are apart."""
@@ -81,7 +89,11 @@ class Overlays:
         centre, own = camera.to_screen(place[seen]), camera.to_screen(frame.position[seen])
         tint = np.broadcast_to(np.asarray(INK, np.uint8), (len(seen), 3))
         style = view.style(1.5)._replace(hollow=True)
-        self._discs.draw(view.surface, centre, np.maximum(radius[seen] * camera.scale, 2.0 * view.unit), tint, style)
+        size, bodies = radius[seen] * camera.scale, view.sight.bodies
+        lone = bodies.round[seen] | (size < 2.0 * view.unit)
+        self._discs.draw(view.surface, centre[lone], np.maximum(size[lone], 2.0 * view.unit), tint[lone], style)
+        who, angle = seen[~lone], ghost.angle[seen[~lone]]
+        self._polygons.draw(view.surface, bodies, who, centre[~lone], angle, camera.scale, tint[~lone], style)
         with np.errstate(invalid="ignore", over="ignore"):
             gap = np.hypot(*(centre - own).T)
         for k in np.flatnonzero((gap > APART * view.unit) & frame.present[seen]).tolist():

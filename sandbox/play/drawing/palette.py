@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Ball, Emitter, Surfaced
+from sandbox.scene.discs import Emitter
+from sandbox.scene.surfaced import Single, Surfaced
 
 Colour = tuple[int, int, int]
 """sRGB, 0 to 255 each."""
@@ -26,7 +27,7 @@ SURFACE: Colour = (138, 151, 168)
 INK: Colour = (230, 235, 242)
 FAINT: Colour = (146, 158, 174)
 NEUTRAL: Colour = (126, 137, 152)
-"""Fixed balls and posts."""
+"""Fixed bodies and posts."""
 
 ORANGE: Colour = (230, 159, 0)
 SKY: Colour = (86, 180, 233)
@@ -84,7 +85,7 @@ def colour_of_fixed(thing: Surfaced, otherwise: Colour = NEUTRAL) -> Colour:
 def colour_of(bodies: Bodies) -> ColourArray:
     """Return the colours of bodies, (N, 3), which stay what they are when another body joins.
 
-    An element's own colour, else the accents in turn; fixed balls are neutral.
+    An element's own colour, else the accents in turn; fixed ones are neutral.
     """
     colours = np.empty((len(bodies), 3), np.uint8)
     first = np.searchsorted(bodies.element, np.arange(len(bodies.elements) + 1))
@@ -92,7 +93,7 @@ def colour_of(bodies: Bodies) -> ColourArray:
         start, end = int(first[k]), int(first[k + 1])
         if element.colour is not None:
             colours[start:end] = hex_colour(element.colour)
-        elif isinstance(element, Ball):
+        elif isinstance(element, Single):
             colours[start:end] = NEUTRAL if element.fixed else accent(k)
         elif end - start <= FEW:
             colours[start:end] = [accent(k + n) for n in range(end - start)]

@@ -12,6 +12,7 @@ from sandbox.play.drawing.grid import draw_grid, draw_scale
 from sandbox.play.drawing.overlays import Overlays
 from sandbox.play.drawing.palette import BACKGROUND, CLEAR, TOUCHING, ColourArray, colour_of
 from sandbox.play.drawing.points import LARGEST, Packed, Points, packed
+from sandbox.play.drawing.polygons import Polygons
 from sandbox.play.drawing.view import View
 from sandbox.play.sight import Sight
 from sandbox.scene.bodies import Bodies
@@ -22,10 +23,10 @@ from sandbox.trajectory import BoolArray
 
 POINT = 1.2
 """px, the radius below which a ball is a point"""
-
-
 CROWD = 20_000
 """Bodies, of which many are points."""
+ROUNDISH = 0.9
+"""Share of its radius that the disc within a body has at least, if only a spoke shows how it has turned."""
 
 
 class Kept(NamedTuple):
@@ -60,7 +61,8 @@ class Picture:
     def __init__(self) -> None:
         self._discs = Discs()
         self._points = Points()
-        self._overlays = Overlays(self._discs, self._points)
+        self._polygons = Polygons()
+        self._overlays = Overlays(self._discs, self._points, self._polygons)
         self._background: tuple[Kept, pygame.Surface] | None = None
         self._sizes: Sizes | None = None
         self._known: tuple[Bodies, Scene] | None = None
@@ -111,21 +113,31 @@ class Picture:
         )
         self._overlays.below(view)
         if "shapes" in sight.overlays:
-            self._draw_discs(view, np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None)
+            self._draw_bodies(view, np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None)
         self._overlays.above(view)
         draw_scale(surface, camera, unit, foot)
 
-    def _draw_discs(self, view: View, which: IntArray | None) -> None:
+    def _draw_bodies(self, view: View, which: IntArray | None) -> None:
         """Draw the bodies that are no points: all, or those at some places of the view."""
         centre, radius, colours, shown = view.centre, view.radius, view.colours, view.shown
         if which is not None:
             centre, radius, colours, shown = centre[which], radius[which], colours[which], shown[which]
-        self._discs.draw(view.surface, centre, radius, colours, view.style())
-        turning = self._turning[shown]
+        bodies, frame = view.sight.bodies, view.sight.frame
+        turning, lone = self._turning[shown], bodies.round[shown]
+        if lone.all():
+            self._discs.draw(view.surface, centre, radius, colours, view.style())
+        else:
+            those, angle = shown[~lone], frame.angle[shown[~lone]]
+            self._polygons.draw(
+                view.surface, bodies, those, centre[~lone], angle, view.camera.scale, colours[~lone], view.style()
+            )
+            self._discs.draw(view.surface, centre[lone], radius[lone], colours[lone], view.style())
+            turning &= lone | (bodies.core[shown] > ROUNDISH * bodies.radius[shown])
+            radius = bodies.core[shown] * view.camera.scale
         if not turning.all():
             centre, radius, colours, shown = centre[turning], radius[turning], colours[turning], shown[turning]
         if len(shown):
-            spokes(view.surface, centre, radius, view.sight.frame.angle[shown], colours, view.antialias)
+            spokes(view.surface, centre, radius, frame.angle[shown], colours, view.antialias)
 
     def _draw_points(
         self, surface: pygame.Surface, camera: Camera, sight: Sight, sizes: "Sizes", colours: ColourArray

@@ -85,11 +85,11 @@ class Points:
         """Draw all in one compiled pass; return whether that could be done."""
         from sandbox.engines.kernel import COMPILED
 
-        if not COMPILED or not _is_flat(surface):
+        if not COMPILED or not is_flat(surface):
             return False
         from sandbox.play.drawing.scatter import scatter
 
-        flat = _flat(surface)
+        flat = flat_pixels(surface)
         there = np.ones(len(position), np.bool_) if present is None else present
         edges = area.left, area.top, area.right, area.bottom
         middle = camera.size[0] / 2.0, camera.size[1] / 2.0
@@ -169,8 +169,8 @@ def _cut(
 
 def _writer(surface: pygame.Surface) -> tuple[Write, int]:
     """Return what writes into a surface's pixels, and how many of them its rows count, with what pads them."""
-    if _is_flat(surface):
-        return _flat(surface).__setitem__, surface.get_pitch() // 4
+    if is_flat(surface):
+        return flat_pixels(surface).__setitem__, surface.get_pitch() // 4
     width, three = surface.get_width(), surface.get_bytesize() == 3
     table = pygame.surfarray.pixels3d(surface) if three else pygame.surfarray.pixels2d(surface)
 
@@ -180,12 +180,12 @@ def _writer(surface: pygame.Surface) -> tuple[Write, int]:
     return write, width
 
 
-def _is_flat(surface: pygame.Surface) -> bool:
+def is_flat(surface: pygame.Surface) -> bool:
     """Tell whether a surface's pixels are whole numbers of 32 bits, in one row after the other."""
     return surface.get_bytesize() == 4 and surface.get_pitch() % 4 == 0 and surface.get_parent() is None
 
 
-def _flat(surface: pygame.Surface) -> Packed:
+def flat_pixels(surface: pygame.Surface) -> Packed:
     """Return a surface's pixels, to be written to."""
     return np.frombuffer(memoryview(surface.get_buffer()), np.uint32)  # type: ignore[arg-type]  # it is a buffer, which its stub leaves out
 

@@ -1,13 +1,19 @@
 """Touches: where contacts are now. A contact's row tells where it began, and its bodies have moved on since."""
 
+import math
+from itertools import pairwise
+
 import numpy as np
 
 from sandbox.play.drawing.view import View
-from sandbox.scene.model import Post, Wall
+from sandbox.play.hulls import Hull, hulls_of, meeting
+from sandbox.scene.model import Plane, Post, Wall
 from sandbox.trajectory import FloatArray
 
 MOST_CURVED = 400
 """Contacts with walls and posts whose normals are worked out anew."""
+SLACK = 0.02
+"""Radii by which places that touch may be farther apart than the nearest."""
 LONGEST = 256
 """Points of a wall for which that is done."""
 
@@ -32,6 +38,11 @@ def touches(view: View) -> tuple[FloatArray, FloatArray]:
         _round(view, normal, np.flatnonzero(known & (second < 0))[:MOST_CURVED])
         normal = np.where(np.isfinite(normal).all(axis=1, keepdims=True), normal, contacts.normal)
         place = position[a] + normal * bodies.radius[a][:, None]
+        lone = np.append(bodies.round, True)
+        b = np.where((second >= 0) & (second < count), second, len(bodies))
+        rows = np.flatnonzero(known & ~(lone[a] & lone[b]))
+        place[rows], normal[rows] = contacts.point[rows], contacts.normal[rows]
+        _solid(view, place, normal, rows[:MOST_CURVED])
     sound = known[:, None] & np.isfinite(place).all(axis=1, keepdims=True)
     return np.where(sound, place, contacts.point), normal
 
@@ -50,6 +61,42 @@ def _round(view: View, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtyp
         else:
             continue
         normal[row] = way / np.hypot(*way)
+
+
+def _solid(
+    view: View, place: FloatArray, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]"
+) -> None:
+    """Find anew where bodies touch of which one is no lone disc: in the middle of where they are nearest."""
+    bodies, frame, fixed = view.sight.bodies, view.sight.frame, view.sight.scene.fixed
+    for row, (number, other) in zip(rows.tolist(), view.sight.contacts.pair[rows].tolist(), strict=True):
+        if not np.isfinite(frame.position[number]).all() or not math.isfinite(float(frame.angle[number])):
+            continue
+        own = hulls_of(bodies, frame, number)
+        if other >= 0:
+            others = hulls_of(bodies, frame, other) if np.isfinite(frame.position[other]).all() else []
+        else:
+            others = _hulls_of_fixed(fixed[-1 - other], frame.position[number]) if -1 - other < len(fixed) else []
+        tolerance = SLACK * float(bodies.radius[number])
+        found = [meeting(one, two, tolerance) for one in own for two in others]
+        if found:
+            place[row] = min(found, key=lambda each: each[0])[1]
+        for disc, way in ((number, 1.0), (other, -1.0)):
+            if disc >= 0 and bodies.round[disc]:  # the normal goes through its centre
+                out = (place[row] - frame.position[disc]) * way
+                normal[row] = out / np.hypot(*out)
+
+
+def _hulls_of_fixed(thing: Plane | Wall | Post, near: FloatArray) -> list[Hull]:
+    """Return a fixed thing as hulls; of a plane, what lies about a place."""
+    if isinstance(thing, Post):
+        return [Hull(np.asarray([thing.position]), thing.radius)]
+    if isinstance(thing, Wall):
+        ends = (*thing.points, thing.points[0]) if thing.closed else thing.points
+        return [Hull(np.asarray(pair), thing.thickness / 2.0) for pair in pairwise(ends[:LONGEST])]
+    normal = np.asarray(thing.normal) / math.hypot(*thing.normal)
+    foot = near - ((near - thing.point) @ normal) * normal
+    along = np.asarray((-normal[1], normal[0])) * 1e3 * max(1.0, float(np.abs(near - foot).max()))
+    return [Hull(np.asarray((foot - along, foot + along)), 0.0)]
 
 
 def _nearest(wall: Wall, centre: FloatArray) -> FloatArray:

@@ -233,10 +233,10 @@ def bodies_of(trajectory: Trajectory, scene: Scene, name: str = "<run>") -> Bodi
         actions = in_order(actions_from_json(json.dumps(trajectory.info.get("actions", []))))
     except ActionError as error:
         raise SceneError([Fault(name, None, "info.actions", line) for line in str(error).splitlines()]) from None
-    spawned = [action.ball for action in actions if isinstance(action, Spawn)]
+    spawned = [action.single for action in actions if isinstance(action, Spawn)]
     names = [str(name) for name in trajectory.names.tolist()]
-    for ball, called in zip(spawned, names[len(bodies) :], strict=False):  # a run that ended early lacks the last
-        bodies = bodies.joined_by(ball, called)
+    for single, called in zip(spawned, names[len(bodies) :], strict=False):  # a run that ended early lacks the last
+        bodies = bodies.joined_by(single, called)
     if list(bodies.names) != names:
         raise SceneError([Fault(name, None, "names", "the bodies are not those of the run's scene and actions")])
     return bodies

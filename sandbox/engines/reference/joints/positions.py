@@ -1,0 +1,195 @@
+"""Positions: joints held by moving bodies into place; their velocities follow from how far they were moved.
+
+Gauss-Seidel: one link after the other, again and again. Without compliance it is relaxation (Jakobsen 2001, Advanced
+character physics), with it XPBD (Macklin, Müller & Chentanez 2016). Bodies off their centres are moved and turned by
+generalised inverse masses (Müller et al. 2020, Detailed rigid body simulation with extended position based dynamics).
+A pivot is solved in both directions at once here, there along its error alone.
+
+Pushing along the lines of where bodies have got to is robust and takes energy, as an implicit scheme does. Pushing
+along those of where they started is SHAKE (Ryckaert, Ciccotti & Berendsen 1977), which takes none: see `solver`.
+
+The multipliers λ are sums over the iterations, N·s² or N·m·s²: λ/h² is the force on the second body.
+"""
+
+import math
+
+from sandbox.engines.kernel import bare_kernel
+from sandbox.engines.reference.joints.ties import (
+    PIVOT,
+    ROTARY_LIMIT,
+    ROTARY_SPRING,
+    SLIDE,
+    SPRING,
+    Ties,
+    block,
+    line,
+    push,
+    reach,
+    slackness,
+    turning,
+    twist,
+    yielding,
+)
+from sandbox.trajectory import FloatArray
+
+
+@bare_kernel
+def project(
+    ties: Ties,
+    pose: FloatArray,
+    start: FloatArray,
+    h: float,
+    iterations: int,
+    lagged: bool,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    shift: FloatArray,
+    multiplier: FloatArray,
+    way: FloatArray,
+) -> None:
+    """Move bodies to where their ties are fulfilled; springs as compliant ones.
+
+    The caller corrects velocities by the shift over h.
+
+    Args:
+        ties: K of them.
+        pose: (N, 3) m and rad where the bodies would go, changed.
+        start: (N, 3) where they were at the start of the step: dampers resist the way from there.
+        h: step, s.
+        iterations: passes over all ties.
+        lagged: push along the lines as they were at the start; else as they are.
+        inverse_mass: (N,) 1/kg, 0 for what is fixed.
+        inverse_moment: (N,) 1/(kg·m²).
+        shift: (N, 3) how far each was moved and turned; written. Taken from poses, it would have their rounding: that
+            of a place far out, over h, is a velocity.
+        multiplier: (K, 2) λ along the line, or x and y of a pivot, or of the angle; written.
+        way: (K, 2) the direction of the line when it was last solved; 1, 0 of an angle; written.
+    """
+    shift[:] = 0.0
+    multiplier[:] = 0.0
+    for _ in range(iterations):
+        for k in range(len(ties.kind)):
+            kind = ties.kind[k]
+            if kind in (ROTARY_LIMIT, ROTARY_SPRING):
+                _angle(ties, k, pose, start, h, inverse_moment, shift, multiplier)
+                way[k, 0], way[k, 1] = 1.0, 0.0
+            elif kind == PIVOT:
+                _together(ties, k, pose, start, h, lagged, inverse_mass, inverse_moment, shift, multiplier)
+            else:
+                _distance(ties, k, pose, start, h, lagged, inverse_mass, inverse_moment, shift, multiplier, way)
+
+
+@bare_kernel
+def _distance(
+    ties: Ties,
+    k: int,
+    pose: FloatArray,
+    start: FloatArray,
+    h: float,
+    lagged: bool,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    shift: FloatArray,
+    multiplier: FloatArray,
+    way: FloatArray,
+) -> None:
+    """Bring the ends of tie k to their distance, along their line."""
+    i, j = ties.first[k], ties.second[k]
+    arms, dx, dy = reach(ties, k, pose)
+    length, nx, ny = line(dx, dy)
+    if lagged:
+        arms, sx, sy = reach(ties, k, start)
+        _, nx, ny = line(sx, sy)
+    if nx == ny == 0.0:
+        return
+    share = yielding(i, j, arms, nx, ny, inverse_mass, inverse_moment)
+    if share == 0.0:
+        return
+    old = multiplier[k, 0]
+    if ties.kind[k] == SPRING:
+        moved = 0.0
+        if ties.figures[k, 2] > 0.0:
+            _, sx, sy = reach(ties, k, start)
+            moved = (dx - sx) * nx + (dy - sy) * ny
+        new = old + _compliant(ties, k, length - ties.figures[k, 0], moved, old, share, h)
+    else:
+        most = ties.figures[k, 1] if ties.kind[k] == SLIDE else ties.figures[k, 0]
+        new = _bounded(length - share * old, ties.figures[k, 0], most, share)
+    bound = ties.most_force[k] * h * h
+    new = min(max(new, -bound), bound)
+    multiplier[k, 0], way[k, 0], way[k, 1] = new, nx, ny
+    x, y = (new - old) * nx, (new - old) * ny
+    push(i, j, arms, x, y, inverse_mass, inverse_moment, pose)
+    push(i, j, arms, x, y, inverse_mass, inverse_moment, shift)
+
+
+@bare_kernel
+def _angle(
+    ties: Ties,
+    k: int,
+    pose: FloatArray,
+    start: FloatArray,
+    h: float,
+    inverse_moment: FloatArray,
+    shift: FloatArray,
+    multiplier: FloatArray,
+) -> None:
+    """Bring the angle of tie k into its bounds, or towards its rest."""
+    i, j = ties.first[k], ties.second[k]
+    share = slackness(i, j, inverse_moment)
+    if share == 0.0:
+        return
+    old, turned = multiplier[k, 0], turning(i, j, pose)
+    if ties.kind[k] == ROTARY_SPRING:
+        moved = turned - turning(i, j, start)
+        new = old + _compliant(ties, k, turned - ties.figures[k, 0], moved, old, share, h)
+    else:
+        new = _bounded(turned - share * old, ties.figures[k, 0], ties.figures[k, 1], share)
+    bound = ties.most_force[k] * h * h
+    multiplier[k, 0] = min(max(new, -bound), bound)
+    twist(i, j, multiplier[k, 0] - old, inverse_moment, pose)
+    twist(i, j, multiplier[k, 0] - old, inverse_moment, shift)
+
+
+@bare_kernel
+def _together(
+    ties: Ties,
+    k: int,
+    pose: FloatArray,
+    start: FloatArray,
+    h: float,
+    lagged: bool,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    shift: FloatArray,
+    multiplier: FloatArray,
+) -> None:
+    """Bring the ends of pivot k together."""
+    i, j = ties.first[k], ties.second[k]
+    arms, dx, dy = reach(ties, k, pose)
+    if lagged:
+        arms, _, _ = reach(ties, k, start)
+    xx, xy, yy = block(i, j, arms, inverse_mass, inverse_moment)
+    old_x, old_y = multiplier[k, 0], multiplier[k, 1]
+    x, y = old_x - (xx * dx + xy * dy), old_y - (xy * dx + yy * dy)
+    if ties.most_force[k] < math.inf:
+        size, bound = math.sqrt(x * x + y * y), ties.most_force[k] * h * h
+        share = bound / size if size > bound else 1.0
+        x, y = share * x, share * y
+    multiplier[k, 0], multiplier[k, 1] = x, y
+    push(i, j, arms, x - old_x, y - old_y, inverse_mass, inverse_moment, pose)
+    push(i, j, arms, x - old_x, y - old_y, inverse_mass, inverse_moment, shift)
+
+
+@bare_kernel
+def _compliant(ties: Ties, k: int, stretch: float, moved: float, old: float, share: float, h: float) -> float:
+    """Return by how much λ of spring k changes: Macklin et al. 2016, (26), with α̃ = 1/(k h²) and γ = c/(k h)."""
+    compliance = 1.0 / (ties.figures[k, 1] * h * h)
+    resistance = ties.figures[k, 2] / (ties.figures[k, 1] * h)
+    return -(stretch + compliance * old + resistance * moved) / ((1.0 + resistance) * share + compliance)
+
+
+@bare_kernel
+def _bounded(free: float, least: float, most: float, share: float) -> float:
+    """Return the λ that brings what would be at `free` without it into its bounds: none, if it is there."""
+    return (min(max(free, least), most) - free) / share

@@ -1,0 +1,60 @@
+"""Pieces: the convex pieces of bodies, and after them the segments of walls and posts, laid out in the world."""
+
+import numpy as np
+
+from sandbox.engines.kernel import kernel
+from sandbox.engines.reference.meeting import pair_key
+from sandbox.engines.roster import NOTHING, Roster
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+
+class Pieces:
+    """S pieces of bodies and G segments, which a piece of two corners or one is just as well."""
+
+    def __init__(self, roster: Roster) -> None:
+        shapes, segments = roster.bodies.shapes, roster.fixtures.segments
+        self.count = len(shapes)
+        self.body: IntArray = shapes.body
+        self.surface: IntArray = roster.meet.surfaces.of_shape
+        self.local: FloatArray = shapes.corner
+        self.local_middle: FloatArray = shapes.middle
+        self.reach: FloatArray = shapes.reach
+        self.radius: FloatArray = np.concatenate((shapes.radius, segments[:, 4]))
+        ends = segments[:, :4].reshape(-1, 2)
+        self.first: IntArray = np.concatenate((shapes.first, shapes.first[-1] + 2 * np.arange(1, len(segments) + 1)))
+        self.corner: FloatArray = np.concatenate((shapes.corner, ends))
+        """(V + 2G, 2) m, in the world as it was last laid out"""
+        self.middle: FloatArray = np.empty((self.count, 2))
+        """(S, 2) m, likewise"""
+        self.meets: IntArray = roster.meets[self.body]
+        self.moves: BoolArray = roster.moving[self.body]
+        self.able: BoolArray = self.moves & (self.meets > NOTHING)
+        links = roster.links
+        self.apart: IntArray = np.sort([pair_key(a, b) for a, b in links.apart().tolist()]).astype(np.int64)
+        """(K,) keys of the pairs of bodies that joints keep from meeting, ascending"""
+
+    def lay_out(self, position: FloatArray, angle: FloatArray) -> None:
+        """Put corners and middles where bodies now lie, at (N, ≥ 2) m and (N,) rad."""
+        lay_out(self.body, self.first, self.local, self.local_middle, position, angle, self.corner, self.middle)
+
+
+@kernel
+def lay_out(
+    body: IntArray,
+    first: IntArray,
+    local: FloatArray,
+    local_middle: FloatArray,
+    position: FloatArray,
+    angle: FloatArray,
+    corner: FloatArray,
+    middle: FloatArray,
+) -> None:
+    """Turn and move the corners and middles of pieces into the world."""
+    for p in range(len(body)):
+        b = body[p]
+        x, y, cos, sin = position[b, 0], position[b, 1], np.cos(angle[b]), np.sin(angle[b])
+        for k in range(first[p], first[p + 1]):
+            u, v = local[k, 0], local[k, 1]
+            corner[k, 0], corner[k, 1] = x + cos * u - sin * v, y + sin * u + cos * v
+        u, v = local_middle[p, 0], local_middle[p, 1]
+        middle[p, 0], middle[p, 1] = x + cos * u - sin * v, y + sin * u + cos * v

@@ -1,0 +1,169 @@
+"""Polygons: bodies that are no lone discs, drawn whole: no seam shows where their pieces overlap or abut.
+
+A crowd is drawn in one compiled pass where numba is there; a few by their distance, as large discs are; a crowd
+without numba plainly. The first two look the same.
+"""
+
+import sys
+
+import numpy as np
+import pygame
+
+from sandbox.play.drawing.anatomy import Anatomy, Place, clipped_box
+from sandbox.play.drawing.discs import Style, dark
+from sandbox.play.drawing.palette import BACKGROUND, Colour, ColourArray
+from sandbox.play.drawing.points import flat_pixels, is_flat
+from sandbox.play.drawing.shade import Look, paint
+from sandbox.play.drawing.strokes import fill
+from sandbox.play.drawing.view import View
+from sandbox.play.hulls import rounded
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.near import IntArray
+from sandbox.trajectory import FloatArray
+
+FEW = 8
+"""Bodies up to which numba is not imported for them alone"""
+FARTHEST = 1e6
+"""px: bodies farther away, or larger, are drawn by their distance, which knows no whole numbers"""
+
+
+class Polygons:
+    """Draws bodies of any shape, and keeps what is known of their pieces between pictures."""
+
+    def __init__(self) -> None:
+        self._known: tuple[Bodies, Anatomy] | None = None
+
+    def anatomy(self, bodies: Bodies) -> Anatomy:
+        """Return what bodies consist of."""
+        if self._known is None or self._known[0] is not bodies:
+            self._known = bodies, Anatomy(bodies)
+        return self._known[1]
+
+    def draw(
+        self,
+        surface: pygame.Surface,
+        bodies: Bodies,
+        who: IntArray,
+        centre: FloatArray,
+        angle: FloatArray,
+        scale: float,
+        colours: ColourArray,
+        style: Style,
+    ) -> None:
+        """Draw bodies in their order.
+
+        Args:
+            surface: where.
+            bodies: N of them.
+            who: (K,) the numbers of those that are drawn.
+            centre: (K, 2) px, finite.
+            angle: (K,) rad, counted as in the world, where y is up; what is not finite counts as 0.
+            scale: px/m.
+            colours: (K, 3).
+            style: of all of them; hollow is the rim alone, in its own colour.
+        """
+        if not len(who):
+            return
+        anatomy = self.anatomy(bodies)
+        angle = np.where(np.isfinite(angle), angle, 0.0)
+        line = anatomy.rims(who, scale, style.line)
+        if style.hollow:
+            line = np.full(len(who), style.line)
+        near = bool((np.abs(centre).max(axis=1) + bodies.radius[who] * scale < FARTHEST).all())
+        worth = len(who) > FEW or "numba" in sys.modules
+        if worth and near and _in_one_pass(surface, anatomy, who, centre, angle, scale, colours, line, style):
+            return
+        plain = len(who) > FEW and near
+        rows = zip(
+            who.tolist(), centre.tolist(), angle.tolist(), map(tuple, colours.tolist()), line.tolist(), strict=True
+        )
+        for number, (x, y), turned, colour, width in rows:
+            place = Place(x, y, turned, scale)
+            if plain:
+                _plain(surface, anatomy, number, place, colour, style)
+                continue
+            look = Look(colour, dark(colour), width, antialias=style.antialias)
+            if style.hollow:
+                look = look._replace(fill=None, rim=colour)
+            _painted(surface, anatomy, number, place, look, 0.0)
+
+    def ring(
+        self,
+        surface: pygame.Surface,
+        bodies: Bodies,
+        number: int,
+        place: Place,
+        gap: float,
+        colour: Colour,
+        line: float,
+    ) -> None:
+        """Draw a line around a body, so wide; its outer edge is a gap, px, away from it."""
+        _painted(surface, self.anatomy(bodies), number, place, Look(None, colour, line), gap)
+
+    def boxes(self, view: View) -> FloatArray:
+        """Return left, top, right and bottom of the boxes around the bodies of a view, (K, 4) px."""
+        angle = view.sight.frame.angle[view.shown]
+        angle = np.where(np.isfinite(angle), angle, 0.0)
+        return self.anatomy(view.sight.bodies).boxes(view.shown, view.centre, angle, view.camera.scale)
+
+
+def _painted(surface: pygame.Surface, anatomy: Anatomy, number: int, place: Place, look: Look, gap: float) -> None:
+    distance = anatomy.distance(number, place)
+    within = clipped_box(anatomy.within(number, place, gap + 2.0), surface.get_clip())
+    if within.width:
+        paint(surface, lambda x, y: np.asarray(distance(x, y) - gap), look, within)
+
+
+def _in_one_pass(
+    surface: pygame.Surface,
+    anatomy: Anatomy,
+    who: IntArray,
+    centre: FloatArray,
+    angle: FloatArray,
+    scale: float,
+    colours: ColourArray,
+    line: FloatArray,
+    style: Style,
+) -> bool:
+    """Draw all in one compiled pass; return whether that could be done."""
+    from sandbox.engines.kernel import COMPILED
+
+    if not COMPILED or not is_flat(surface):
+        return False
+    from sandbox.play.drawing.stencil import stencil
+
+    area = surface.get_clip()
+    edges = area.left, area.top, area.right, area.bottom
+    red, green, blue, _ = surface.get_shifts()
+    pose = np.column_stack((centre, np.cos(angle), np.sin(angle), np.full(len(who), scale)))
+    inner = colours.astype(np.int64)
+    outer = inner if style.hollow else np.rint((inner + np.asarray(BACKGROUND)) / 2.0).astype(np.int64)
+    stencil(
+        flat_pixels(surface),
+        surface.get_pitch() // 4,
+        edges,
+        anatomy.pieces,
+        np.empty((len(anatomy.pieces.corner), 7)),
+        who,
+        pose,
+        line,
+        inner,
+        outer,
+        (red, green, blue),
+        style.hollow,
+        style.antialias,
+    )
+    return True
+
+
+def _plain(surface: pygame.Surface, anatomy: Anatomy, number: int, place: Place, colour: Colour, style: Style) -> None:
+    """Draw a body with what pygame has: its pieces filled, and of a lone one its edge."""
+    hulls = anatomy.hulls(number, place)
+    line = pygame.draw.aalines if style.antialias else pygame.draw.lines
+    for hull in hulls:
+        corners = [(x, y) for x, y in rounded(hull).tolist()]
+        if not style.hollow:
+            fill(surface, corners, colour, style.antialias)
+        if style.hollow or len(hulls) == 1:
+            edge = colour if style.hollow else dark(colour)
+            line(surface, edge, True, [(x - 0.5, y - 0.5) for x, y in corners])

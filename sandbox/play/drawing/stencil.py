@@ -1,0 +1,271 @@
+"""Stencil: bodies of convex pieces into pixels in one pass, compiled where it can be; antialiased by their distance."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sandbox.engines.kernel import bare_kernel
+from sandbox.play.drawing.anatomy import SEAM, Pieces
+from sandbox.scene.near import IntArray
+from sandbox.trajectory import FloatArray
+
+Tone = tuple[float, float, float]
+"""Red, green and blue, 0 to 255."""
+Shift = tuple[int, int, int]
+"""Bits by which a surface shifts red, green and blue."""
+
+
+class Pose(NamedTuple):
+    """Where a body is in the picture."""
+
+    x: float
+    """px"""
+    y: float
+    cos: float
+    """of its angle, counted as in the world"""
+    sin: float
+    scale: float
+    """px/m"""
+
+
+@bare_kernel
+def _side_distance2(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Return the square of the distance from a segment."""
+    dx, dy, px, py = bx - ax, by - ay, x - ax, y - ay
+    share = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-300), 0.0), 1.0)
+    px, py = px - share * dx, py - share * dy
+    return px * px + py * py
+
+
+@bare_kernel
+def _piece_distance(x: float, y: float, room: FloatArray, first: int, last: int, radius: float) -> float:
+    """Return the signed distance from a piece that `_place` has put into the picture; some lower bound beyond ½ px."""
+    if last - first > 2:
+        most, side = -np.inf, first
+        for k in range(first, last):
+            away = room[k, 2] * x + room[k, 3] * y + room[k, 4]
+            if away > most:
+                most, side = away, k
+        if most <= 0.0 or most - radius >= 0.5:
+            return most - radius
+        after = first if side + 1 == last else side + 1
+        nx, ny = room[side, 2], room[side, 3]
+        behind = (room[side, 1] - y) * nx - (room[side, 0] - x) * ny
+        beyond = (room[after, 1] - y) * nx - (room[after, 0] - x) * ny
+        if behind * beyond <= 0.0:  # its foot lies between the ends of the side
+            return most - radius
+    best = np.inf
+    for k in range(first, last if last - first > 2 else first + 1):
+        after = first if k + 1 == last else k + 1
+        best = min(best, _side_distance2(x, y, room[k, 0], room[k, 1], room[after, 0], room[after, 1]))
+    return math.sqrt(best) - radius
+
+
+@bare_kernel
+def _outline_distance(x: float, y: float, edge: FloatArray, first: int, last: int) -> float:
+    """Return the distance from an outline, in its own units."""
+    best = np.inf
+    for k in range(first, last):
+        if edge[k, 0] == 0.0:
+            away2 = _side_distance2(x, y, edge[k, 1], edge[k, 2], edge[k, 3], edge[k, 4])
+            best = min(best, away2)
+        else:
+            px, py = x - edge[k, 1], y - edge[k, 2]
+            length = math.sqrt(px * px + py * py)
+            if px * edge[k, 4] + py * edge[k, 5] >= length * edge[k, 6]:
+                best = min(best, (length - edge[k, 3]) ** 2)
+    return math.sqrt(best)
+
+
+@bare_kernel
+def _blended(under: int, shade: float, cover: float, fill: Tone, rim: Tone, shift: Shift) -> int:
+    """Return a pixel with a colour between filling and rim laid over it."""
+    pixel = under
+    for channel in range(3):
+        colour = fill[channel] + (rim[channel] - fill[channel]) * shade
+        below = (under >> shift[channel]) & 255
+        value = int(below + (colour - below) * cover + 0.5)
+        pixel = (pixel & ~(255 << shift[channel])) | (value << shift[channel])
+    return pixel
+
+
+@bare_kernel
+def _span(
+    y: float, room: FloatArray, first: int, last: int, offset: float, left: float, right: float
+) -> tuple[float, float]:
+    """Return from where to where a row lies no farther than an offset outside all sides of a polygon."""
+    from_x, to_x = left, right
+    for k in range(first, last):
+        across, bound = room[k, 2], offset - (room[k, 3] * y + room[k, 4])
+        if across > 1e-9:
+            to_x = min(to_x, bound / across)
+        elif across < -1e-9:
+            from_x = max(from_x, bound / across)
+        elif bound < 0.0:
+            to_x = left - 1.0
+    return from_x, to_x
+
+
+@bare_kernel
+def _inner_span(
+    y: float, room: FloatArray, first: int, last: int, radius: float, left: float, right: float
+) -> tuple[float, float]:
+    """Return from where to where a row surely lies within a piece whose radius is this, which may be negative."""
+    if last - first > 2:
+        return _span(y, room, first, last, min(radius, 0.0), left, right)
+    if radius <= 0.0:
+        return left, left - 1.0
+    if last - first == 1:
+        under = radius * radius - (y - room[first, 1]) ** 2
+        half = math.sqrt(max(under, 0.0))
+        return max(left, room[first, 0] - half), min(right, room[first, 0] + half) if under > 0.0 else left - 1.0
+    from_x, to_x = _span(y, room, first, last, radius, left, right)
+    for k in range(first, last):  # no farther than the ends
+        after = 2 * first + 1 - k
+        dx, dy = room[after, 0] - room[k, 0], room[after, 1] - room[k, 1]
+        bound = dy * (room[k, 1] - y)
+        if dx > 1e-9:
+            from_x = max(from_x, room[k, 0] + bound / dx)
+        elif dx < -1e-9:
+            to_x = min(to_x, room[k, 0] + bound / dx)
+        elif bound > 0.0:
+            to_x = left - 1.0
+    return from_x, to_x
+
+
+@bare_kernel
+def _body_distance(
+    x: float, y: float, body: int, pieces: Pieces, room: FloatArray, pose: Pose, edges: tuple[int, int], deep: float
+) -> float:
+    """Return the signed distance from a body, px; only whether it is deeper than its rim, where it is."""
+    begin, end = pieces.piece[body], pieces.piece[body + 1]
+    away = np.inf
+    for piece in range(begin, end):
+        first, last = pieces.first[piece], pieces.first[piece + 1]
+        away = min(away, _piece_distance(x, y, room, first, last, pieces.radius[piece] * pose.scale))
+        if away <= deep:
+            return deep
+    if end - begin > 1 and away < 0.5:
+        if edges[0] == edges[1]:  # of too many pieces there is no outline, and no rim
+            return deep if away <= SEAM else away
+        px, py = (x - pose.x) / pose.scale, (pose.y - y) / pose.scale
+        along, across = pose.cos * px + pose.sin * py, pose.cos * py - pose.sin * px
+        near = pose.scale * _outline_distance(along, across, pieces.edge, edges[0], edges[1])
+        return -near if away <= SEAM else near
+    return away
+
+
+@bare_kernel
+def _place(pieces: Pieces, body: int, pose: Pose, room: FloatArray) -> tuple[float, float, float, float]:
+    """Put a body's corners into the picture, each with the line of the side behind it: normal, outwards, and offset.
+
+    Returns:
+        Left, top, right and bottom of what the body covers, with a margin of 1, px.
+    """
+    left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
+    for piece in range(pieces.piece[body], pieces.piece[body + 1]):
+        wide = pieces.radius[piece] * pose.scale + 1.0
+        first, last = pieces.first[piece], pieces.first[piece + 1]
+        for k in range(first, last):
+            x, y = pieces.corner[k, 0], pieces.corner[k, 1]
+            px = pose.x + (pose.cos * x - pose.sin * y) * pose.scale
+            py = pose.y - (pose.sin * x + pose.cos * y) * pose.scale
+            room[k, 0], room[k, 1] = px, py
+            left, right = min(left, px - wide), max(right, px + wide)
+            top, bottom = min(top, py - wide), max(bottom, py + wide)
+        for k in range(first, last):
+            after = first if k + 1 == last else k + 1
+            nx, ny = room[k, 1] - room[after, 1], room[after, 0] - room[k, 0]
+            length = max(math.sqrt(nx * nx + ny * ny), 1e-300)
+            room[k, 2], room[k, 3] = nx / length, ny / length
+            room[k, 4] = -(nx * room[k, 0] + ny * room[k, 1]) / length
+    return left, top, right, bottom
+
+
+@bare_kernel
+def stencil(
+    pixels: npt.NDArray[np.uint32],
+    stride: int,
+    area: tuple[int, int, int, int],
+    pieces: Pieces,
+    room: FloatArray,
+    who: IntArray,
+    pose: FloatArray,
+    line: FloatArray,
+    fill: IntArray,
+    rim: IntArray,
+    shift: Shift,
+    hollow: bool,
+    antialias: bool,
+) -> None:
+    """Draw bodies in their order.
+
+    Args:
+        pixels: of the surface, flat.
+        stride: of a row, px.
+        area: left, top, right and bottom of what may be drawn on, px.
+        pieces: what they consist of.
+        room: (V, 7) to work in.
+        who: (K,) their numbers.
+        pose: (K, 5) as in `Pose`.
+        line: (K,) widths of their rims, px.
+        fill: (K, 3) their colours.
+        rim: (K, 3) the colours of their rims.
+        shift: of the surface.
+        hollow: the rims alone.
+        antialias: whether edges are smooth.
+    """
+    others = ~(255 << shift[0] | 255 << shift[1] | 255 << shift[2])
+    for k in range(len(who)):
+        body, here = who[k], Pose(pose[k, 0], pose[k, 1], pose[k, 2], pose[k, 3], pose[k, 4])
+        begin, end = pieces.piece[body], pieces.piece[body + 1]
+        low, high = pieces.first[begin], pieces.first[end]
+        left, top, right, bottom = _place(pieces, body, here, room)
+        left, top = max(left, float(area[0])), max(top, float(area[1]))
+        right, bottom = min(right, float(area[2])), min(bottom, float(area[3]))
+        if not (left < right and top < bottom):
+            continue
+        polygon = pieces.radius[begin] == 0.0 and end - begin == 1 and high - low > 2
+        element, radius = pieces.element[body], pieces.radius[begin] * here.scale
+        edges = pieces.edge_first[element], pieces.edge_first[element + 1]
+        deep = -(line[k] + 0.5)
+        inner = float(fill[k, 0]), float(fill[k, 1]), float(fill[k, 2])
+        outer = float(rim[k, 0]), float(rim[k, 1]), float(rim[k, 2])
+        plain, edge = _blended(0, 0.0, 1.0, inner, outer, shift), _blended(0, 1.0, 1.0, inner, outer, shift)
+        for row in range(int(top), math.ceil(bottom)):
+            y, start = row + 0.5, row * stride
+            column, stop = int(left), math.ceil(right)
+            if polygon:
+                from_x, to_x = _span(y, room, low, high, 0.5, left, right)
+                column, stop = int(from_x), math.ceil(to_x)
+            for piece in range(begin, end):
+                first, last, wide = pieces.first[piece], pieces.first[piece + 1], pieces.radius[piece] * here.scale
+                room[first, 5], room[first, 6] = _inner_span(y, room, first, last, wide + deep, left, right)
+            while column < stop:
+                x, beyond = column + 0.5, column
+                for piece in range(begin, end):
+                    first = pieces.first[piece]
+                    if room[first, 5] <= x <= room[first, 6]:
+                        beyond = max(beyond, min(int(room[first, 6] - 0.5) + 1, stop))
+                if beyond > column:
+                    if not hollow:
+                        for there in range(start + column, start + beyond):
+                            pixels[there] = int(pixels[there]) & others | plain
+                    column = beyond
+                    continue
+                if end - begin == 1:  # a call with all arrays takes longer than the rest
+                    away = _piece_distance(x, y, room, low, high, radius)
+                else:
+                    away = _body_distance(x, y, body, pieces, room, here, edges, deep)
+                cover, shade = min(max(0.5 - away, 0.0), 1.0), min(max(away - deep, 0.0), 1.0)
+                if not antialias:
+                    cover, shade = math.floor(cover + 0.5), math.floor(shade + 0.5)
+                if hollow:
+                    cover, shade = cover * shade, 1.0
+                if cover == 1.0 and shade == 1.0:
+                    pixels[start + column] = int(pixels[start + column]) & others | edge
+                elif cover > 0.0:
+                    pixels[start + column] = _blended(int(pixels[start + column]), shade, cover, inner, outer, shift)
+                column += 1

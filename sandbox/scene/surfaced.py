@@ -1,0 +1,55 @@
+"""Surfaced and Mover: what everything that can be touched, and everything that moves, has in common."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from sandbox.scene.part import (
+    AngularVelocity,
+    Colour,
+    Density,
+    Friction,
+    Mass,
+    Name,
+    Part,
+    Point,
+    Restitution,
+    Velocity,
+)
+
+Collides = Literal["all", "fixed", "none"]
+"""What a body can meet: everything, only planes, walls, posts and fixed bodies, or nothing at all."""
+
+
+class Surfaced(Part):
+    """Anything that can be touched. A figure stated here outranks its material's."""
+
+    name: Name | None = None
+    """one without a name is called by its kind and its place in the file"""
+    material: Name | None = None
+    restitution: Restitution | None = None
+    friction: Friction | None = None
+    colour: Colour | None = None
+
+
+class Mover(Surfaced):
+    """Anything that has a number: bodies, and the generators that stand for many."""
+
+    mass: Mass | None = None
+    """kg; without mass or density, 1"""
+    density: Density | None = None
+    """kg/m²"""
+    angle: Annotated[float, Field(ge=-1e12, le=1e12)] = 0.0
+    angular_velocity: AngularVelocity = 0.0
+    """rad/s"""
+    collides: Collides = "all"
+
+
+class Single(Mover):
+    """One body."""
+
+    position: Point
+    velocity: Velocity = (0.0, 0.0)
+    """of the centre of mass, m/s"""
+    fixed: bool = False
+    """Never moves: infinitely heavy."""

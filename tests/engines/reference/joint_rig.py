@@ -1,0 +1,135 @@
+"""A few bodies, their links, and the shortest loop that steps them, for the tests of joints."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from sandbox.engines.reference.integrators import INTEGRATORS
+from sandbox.engines.reference.joints.solver import JointSolver, kick_pose
+from sandbox.engines.reference.motion import Inputs, transition
+from sandbox.scene.links import LinkKind, Links
+
+G = 9.81
+BIAS = 0.9**60
+"""pymunk's own: a tenth of an error is undone in a sixtieth of a second."""
+
+
+def link(kind: LinkKind, a: int, b: int, *figures: float, **more: Any) -> dict[str, Any]:
+    return {"kind": kind, "a": a, "b": b, "figures": [*figures, 0.0, 0.0, 0.0][:3], **more}
+
+
+def links_of(*some: dict[str, Any]) -> Links:
+    def column(name: str, default: Any, kind: type = np.float64) -> Any:
+        return np.array([one.get(name, default) for one in some], dtype=kind)
+
+    return Links(
+        kind=column("kind", 0, np.int64),
+        a=column("a", -1, np.int64),
+        b=column("b", 0, np.int64),
+        anchor_a=column("anchor_a", (0.0, 0.0)).reshape(-1, 2),
+        anchor_b=column("anchor_b", (0.0, 0.0)).reshape(-1, 2),
+        figures=column("figures", (0.0, 0.0, 0.0)).reshape(-1, 3),
+        most_force=column("most_force", np.inf),
+        collide=column("collide", False, np.bool_),
+        names=tuple(f"link {k}" for k in range(len(some))),
+    )
+
+
+class Rig:
+    """Bodies with links, stepped as the engine does, without contacts."""
+
+    def __init__(
+        self,
+        links: Links,
+        pose: Any,
+        rates: Any = 0.0,
+        mass: Any = 1.0,
+        moment: Any = math.inf,
+        *,
+        how: str = "impulses",
+        integrator: str = "semi_implicit_euler",
+        iterations: int = 10,
+        bias: float = BIAS,
+        cap: float = math.inf,
+        gravity: float = G,
+        drag: float = 0.0,
+        forces: Any = None,
+    ) -> None:
+        pose = np.atleast_2d(np.asarray(pose, dtype=float))
+        if pose.shape[1] == 2:
+            pose = np.column_stack((pose, np.zeros(len(pose))))
+        self.x = np.stack((pose, np.broadcast_to(rates, pose.shape)))
+        self.mass = np.broadcast_to(np.asarray(mass, dtype=float), len(pose)).copy()
+        self.moment = np.broadcast_to(np.asarray(moment, dtype=float), len(pose)).copy()
+        self.solver = JointSolver(links, 1 / self.mass, 1 / self.moment, bias, iterations, how, cap)
+        self.integrator = INTEGRATORS[integrator]
+        steady = np.zeros_like(pose)
+        steady[np.isfinite(self.mass), 1] = -gravity
+        acting = forces or (lambda x: 0.0)
+        self.u = Inputs(steady, drag, contacts=lambda x: self.solver.forces(x) + acting(x))
+        self.time, self.gravity = 0.0, gravity
+
+    def step(self, h: float) -> None:
+        moved = self.integrator.step(transition, self.time, self.x, self.u, h)
+        if self.solver.how == "impulses":
+            share = self.integrator.share
+            self.solver.prepare(kick_pose(moved, share, h), h)
+            kicked = moved[1].copy()
+            self.solver.solve(moved[1])
+            moved[0] += share * h * (moved[1] - kicked)
+        else:
+            self.solver.project(self.x, moved, h)
+        self.x, self.time = moved, self.time + h
+
+    def run(self, time: float, h: float) -> "Rig":
+        for _ in range(round(time / h)):
+            self.step(h)
+        return self
+
+    @property
+    def pose(self) -> Any:
+        return self.x[0]
+
+    @property
+    def rates(self) -> Any:
+        return self.x[1]
+
+    @property
+    def energy(self) -> float:
+        moves = np.isfinite(self.mass)
+        kinetic = 0.5 * (self.mass[moves] * (self.rates[moves, :2] ** 2).sum(axis=1)).sum()
+        turns = np.isfinite(self.moment)
+        kinetic += 0.5 * (self.moment[turns] * self.rates[turns, 2] ** 2).sum()
+        return float(kinetic + self.gravity * (self.mass[moves] * self.pose[moves, 1]).sum())
+
+    @property
+    def momentum(self) -> Any:
+        return (self.mass[:, None] * self.rates[:, :2]).sum(axis=0)
+
+    @property
+    def angular_momentum(self) -> float:
+        x, v = self.pose[:, :2], self.rates[:, :2]
+        own = np.where(np.isfinite(self.moment), self.moment, 0.0) * self.rates[:, 2]
+        return float((self.mass * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]) + own).sum())
+
+
+def pendulum(angle: float, **more: Any) -> Rig:
+    """Return a ball on a rod of 1 m that hangs from the origin, `angle` degrees from straight down, at rest."""
+    a = math.radians(angle)
+    return Rig(links_of(link(LinkKind.ROD, -1, 0, 1.0)), [math.sin(a), -math.cos(a)], **more)
+
+
+def period(rig: Rig, h: float, swings: int = 1) -> float:
+    """Return the time from the first to a later turning point on the far side, halved and doubled into a period.
+
+    The angle's zeros are found between steps by a straight line.
+    """
+    crossings: list[float] = []
+    while len(crossings) < 2 * swings + 1:
+        old = rig.pose[0, 0]
+        rig.step(h)
+        new = rig.pose[0, 0]
+        if (old > 0.0) != (new > 0.0):
+            crossings.append(rig.time - h * new / (new - old))
+    return (crossings[-1] - crossings[0]) / swings
