@@ -13,6 +13,7 @@ what it compiled of a function whose callee in another file has changed since.
 import os
 import shutil
 import sys
+import time
 from collections.abc import Callable
 from functools import cache
 from hashlib import blake2b
@@ -32,6 +33,9 @@ try:
 except ImportError:
     COMPILED = False
 """Whether kernels are compiled. NUMBA_DISABLE_JIT=1 in the environment runs them as plain Python."""
+
+UNUSED = 3600.0
+"""s after which compiled code of a former state of the sources is thrown away."""
 
 LARGE = 100
 """Bodies from which on it is worth saying that kernels run uncompiled."""
@@ -68,7 +72,7 @@ def _compiled(function: Callable[P, R], options: dict[str, bool]) -> Callable[P,
 def cache_folder() -> Path | None:
     """Return the folder for compiled code of just these sources, or None where none can be written.
 
-    Folders of former states of the sources are removed.
+    Folders of former states of the sources are removed, an hour on: until then a process may be at work in them.
     """
     here = Path(__file__).resolve().parent
     # Installations may share the user's folder, and Pythons the sources: each has folders of its own.
@@ -87,10 +91,18 @@ def cache_folder() -> Path | None:
         except OSError:
             continue
         for old in home.glob(f"kernels-{place}-*"):
-            if old != folder:
+            if old != folder and _unused(old):
                 shutil.rmtree(old, ignore_errors=True)  # another process may be removing it too
         return folder
     return None
+
+
+def _unused(folder: Path) -> bool:
+    """Tell whether a folder is so old that no process can still be compiling into it."""
+    try:
+        return time.time() - folder.stat().st_mtime > UNUSED
+    except OSError:  # gone already
+        return False
 
 
 def tell_if_slow(bodies: int) -> None:

@@ -1,41 +1,41 @@
-"""Launch: the balls of a generator put back to where they start, laid out with another seed."""
+"""Launch: the bodies of a generator put back to where they start, laid out with another seed."""
 
 import numpy as np
 
 from sandbox.action import ActionError, Launch
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.claimed import generator_names
-from sandbox.scene.generators import GeneratorError, expand
-from sandbox.scene.model import Generator, Scene
+from sandbox.scene.claimed import generators
+from sandbox.scene.generators import GeneratorError
+from sandbox.scene.layouts import count_of, layout_of
+from sandbox.scene.model import Mover, Scene
 from sandbox.trajectory import BoolArray, Frame
 
 
 def launched(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tuple[Frame, BoolArray]:
-    """Return the state with a generator's balls at their start, and which they are, (N,); those gone are back.
+    """Return the state with a generator's bodies at their start, and which they are, (N,); those gone are back.
 
     Raises:
-        ActionError: there is no such generator, or its balls do not fit.
+        ActionError: there is no such generator, or its bodies do not fit.
     """
-    names = generator_names(scene)
-    if action.generator not in names:
+    found = next(((place, mover) for name, place, mover in generators(scene) if name == action.generator), None)
+    if found is None:
         raise ActionError(f"no generator is named {action.generator!r}")
-    kinds: tuple[tuple[Generator, ...], ...] = (scene.grids, scene.scatters, scene.emitters)
-    every = [(generator, place) for kind in kinds for place, generator in enumerate(kind)]
-    which = names.index(action.generator)
-    generator, place = every[which]
+    place, generator = found
     try:
-        position, velocity = expand(generator, action.seed, place)
+        layout = layout_of(generator, action.seed, place, scene.world.gravity)
     except GeneratorError as error:
         raise ActionError(str(error)) from None
-    those = bodies.element == len(scene.balls) + which
-    positions, velocities = frame.position.copy(), frame.velocity.copy()
-    positions[those], velocities[those] = position, velocity
-    state = Frame(
-        frame.time,
-        positions,
-        velocities,
-        np.where(those, generator.angle, frame.angle),
-        np.where(those, generator.angular_velocity, frame.angular_velocity),
-        frame.present | those,
-    )
-    return state, those
+    first = _first(scene, generator)
+    those = np.zeros(len(bodies), np.bool_)
+    those[first : first + len(layout)] = True
+    columns = {}
+    for key in ("position", "velocity", "angle", "angular_velocity"):
+        columns[key] = getattr(frame, key).copy()
+        columns[key][those] = getattr(layout, key)
+    return Frame(time=frame.time, present=frame.present | those, **columns), those
+
+
+def _first(scene: Scene, generator: Mover) -> int:
+    """Return the number of a generator's first body."""
+    movers = scene.movers
+    return sum(count_of(each) for each in movers[: next(k for k, each in enumerate(movers) if each is generator)])

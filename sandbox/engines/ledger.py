@@ -3,8 +3,6 @@
 Vectors are complex numbers, x + iy, until they leave.
 """
 
-from typing import Protocol
-
 import numpy as np
 
 from sandbox.engines.contract import Exhaustion
@@ -16,67 +14,44 @@ MAX_ROWS = 20_000_000
 """Rows kept before a run is stopped: 1.4 GB."""
 
 
-class ImpulseMemory(Protocol):
-    """What an engine remembers of contacts that have parted, and reports again when they touch once more."""
-
-    def forget_and_advance(self) -> None:
-        """Go on to the next substep."""
-
-    def part(self, key: IntArray, impulse: ComplexArray, normal: ComplexArray) -> None:
-        """Remember (K,) pairs that touched in the last substep, and do not now."""
-
-    def excess(self, key: IntArray, normal: ComplexArray) -> ComplexArray:
-        """Return what is reported too much (K,), on the first of pairs that have just met, N·s."""
-
-
 class ContactLedger:
     """Contacts since the last `take`. One that lasts is one row, its impulse summed."""
 
-    def __init__(self, things: int, joints: bool, memory: ImpulseMemory | None = None) -> None:
+    def __init__(self, things: int, joints: bool) -> None:
         """Start empty.
 
         Args:
             things: how many fixed things there are.
             joints: whether a pair can show several times at once, as a ball in the corner of a polyline does.
-            memory: what the engine still remembers of parted contacts, where it does.
         """
-        self._things, self._joints = things, joints
+        self._things = things
+        self.joints = joints
+        """may change, as bodies of several pieces come"""
         self._rows = RowTable()
-        self._memory = memory
         self._count = 0
         self._time: FloatArray = np.empty(256)
         self._pair: IntArray = np.empty((256, 2), np.int64)
         self._place: ComplexArray = np.empty((256, 2), np.complex128)  # point, normal
         self._impulse: ComplexArray = np.empty(256, np.complex128)
         self._row: IntArray = np.empty(0, np.int64)  # of what touches now
-        self._reported: tuple[ComplexArray, ComplexArray] = (self._impulse[:0], self._impulse[:0])
 
     def record(self, time: float, now: Touching) -> None:
         """Enter what touches at a time, s."""
-        if self._joints and len(now.a) > 1:
+        if self.joints and len(now.a) > 1:
             now = _ordered(now)
-        if self._memory is not None:
-            self._memory.forget_and_advance()
         if not len(now.a) and not len(self._row):
             return
         swapped = (now.a < 0) | ((now.b >= 0) & (now.b < now.a))
         first, second = np.where(swapped, now.b, now.a), np.where(swapped, now.a, now.b)
-        before = self._rows.key
         # Fixed things, −1 − k, become 0 … F − 1, and bodies follow them: small whole numbers for the table.
-        row, new, gone = self._rows.find(first + self._things, second + self._things)
-        if self._memory is not None and gone.any():
-            self._memory.part(before[gone], *(each[gone] for each in self._reported))
-        self._reported = now.impulse, now.normal
-
+        row, new = self._rows.find(first + self._things, second + self._things)
         sign = swapped * 2.0 - 1.0
         given = now.impulse * sign  # by the first to the second
         if len(new):
             # An engine may list contacts by addresses: without an order of our own, no two runs would agree.
             new = new[np.argsort(self._rows.key[new], kind="stable")]
-            if self._memory is not None:
-                given[new] -= sign[new] * self._memory.excess(self._rows.key[new], now.normal[new])
             leader, group = new, np.arange(len(new))
-            if self._joints:
+            if self.joints:
                 _, at, group = np.unique(self._rows.key[new], return_index=True, return_inverse=True)
                 leader, group = new[at], group.reshape(-1)
             row[new] = self._count + group
@@ -86,7 +61,7 @@ class ContactLedger:
             self._place[rows, 0], self._place[rows, 1] = now.point[leader], -sign[leader] * now.normal[leader]
         self._rows.keep(row)
         self._row = row
-        if self._joints:
+        if self.joints:
             np.add.at(self._impulse, row, given)
         else:
             self._impulse[row] += given

@@ -119,8 +119,8 @@ class Roster:
         Raises:
             ActionError: it has more surfaces than a scene may have.
         """
-        spawned = self.bodies.elements[len(self.scene.movers) :]
-        bodies = replace(self.bodies, elements=(*scene.movers, *spawned))
+        spawned = self.bodies.elements[len(self.scene.elements) :]
+        bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
         self._assume(scene, bodies, derived(scene, bodies))
 
     def add(self, single: Single, name: str) -> int:

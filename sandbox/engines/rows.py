@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sandbox.trajectory import BoolArray, IntArray
+from sandbox.trajectory import IntArray
 
 LARGEST_SQUARE = 4096
 """Bodies and fixed things up to which a square table serves: 64 MB at most, of which only what is touched is real."""
@@ -20,7 +20,7 @@ class RowTable:
         self.key: IntArray = np.empty(0, np.int64)
         self._table = np.zeros((0, 0), np.int32)  # place in `key`, never cleared
 
-    def find(self, first: IntArray, second: IntArray) -> tuple[IntArray, IntArray, BoolArray]:
+    def find(self, first: IntArray, second: IntArray) -> tuple[IntArray, IntArray]:
         """Look up the pairs of a new moment.
 
         Args:
@@ -28,21 +28,18 @@ class RowTable:
             second: (K,) likewise.
 
         Returns:
-            Each pair's row (K,), unset where it is new; the places (M,) of the new ones; which pairs of the last
-            moment are gone (L,).
+            Each pair's row (K,), unset where it is new; the places (M,) of the new ones.
         """
         key = (first << 32) | second
-        gone = np.ones(len(self.key), np.bool_)
         row, new = np.empty(len(key), np.int64), np.arange(len(key))
         if len(key) and len(self.key):
             place = self._places(first, second, key)
             known = self.key[place] == key
             row, new = self._row[place], np.flatnonzero(~known)
-            gone[place[known]] = False
         if len(key) and self._fits(first, second):
             self._table[first, second] = np.arange(len(key))
         self.key = key
-        return row, new, gone
+        return row, new
 
     def keep(self, row: IntArray) -> None:
         """Say which row each pair of the last `find` has."""

@@ -27,6 +27,8 @@ class Field:
         self._thrusts: dict[str, list[tuple[int, Thrust, Point]]] = {}
         bodies = scene.bodies
         for k, thrust in enumerate(scene.thrusts):
+            if thrust.body not in bodies.names:  # it left before an earlier engine handed over
+                continue
             x, y = form_of(bodies.elements[bodies.element[bodies.names.index(thrust.body)]]).centre
             arm = thrust.point[0] - x, thrust.point[1] - y
             self._thrusts.setdefault(thrust.body, []).append((k, thrust, arm))
@@ -54,7 +56,9 @@ class Field:
             away = position - np.asarray(attraction.toward, dtype=np.float64)
             square = (away * away).sum(axis=1)
             below = (square + attraction.softening**2) * np.sqrt(square)
-            total -= away * np.divide(attraction.strength, below, out=np.zeros_like(below), where=below > 0)[:, None]
+            with np.errstate(over="ignore"):  # next to the very place; whoever is there leaves all bounds
+                rate = np.divide(attraction.strength, below, out=np.zeros_like(below), where=below > 0)
+                total -= away * rate[:, None]
         return total
 
     def drive(self, name: str, body: pymunk.Body, members: dict[str, pymunk.Body]) -> None:
@@ -65,7 +69,7 @@ class Field:
             x, y = body.position
             ax, ay = self._pull(name, x, y, body.mass, members) if self.attracts else (0.0, 0.0)
             if thrusts:
-                cos, sin = math.cos(body.angle), math.sin(body.angle)
+                cos, sin = body.rotation_vector  # math.cos raises where the angle is no longer finite
                 fx, fy, torque = self._thrust(thrusts)
                 ax += (cos * fx - sin * fy) / body.mass
                 ay += (sin * fx + cos * fy) / body.mass
@@ -108,6 +112,10 @@ class Field:
 
 
 def _rate(attraction: Attraction, dx: float, dy: float) -> float:
-    """Return the acceleration for each metre of distance, 1/s²; 0 in the very place that attracts."""
+    """Return the acceleration for each metre of distance, 1/s²; 0 in the very place that attracts, or all but there.
+
+    It never raises: pymunk would only print what a callback raises, and go on.
+    """
     square = dx * dx + dy * dy
-    return attraction.strength / ((square + attraction.softening**2) * math.sqrt(square)) if square > 0.0 else 0.0
+    below = (square + attraction.softening**2) * math.sqrt(square)
+    return attraction.strength / below if below > 0.0 else 0.0

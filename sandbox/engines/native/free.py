@@ -179,27 +179,28 @@ class FreeFlight:
         """Advance by one substep: positions by the old velocity, then velocities by their kick."""
         if not len(self.numbers):
             return
-        forced = self._forced_kick() if self._dragged or self._pushed else None
+        forced = self._dragged or self._pushed or self._field is not None
         for position, velocity in self._blocks:
             moved = self._moved[: len(position)]
             np.multiply(velocity, self._h, out=moved)
             position += moved
-            if self._falls and forced is None:
+            if self._falls and not forced:
                 velocity += self._kick[: len(velocity)]
-        if forced is not None:
-            self.velocity += forced
-        if self._field is not None:
-            self.velocity += self._field.at(self.position) * self._h
+        if forced:
+            self.velocity += self._forced_kick()
         if self.turns:
             self.angle += self.angular_velocity * self._h
         if self._twisted:
             self.angular_velocity += self._torque * (1.0 / self._moment) * self._h
 
     def _forced_kick(self) -> FloatArray:
-        """Return (g + f/m)·h, or with drag, whose force already holds gravity, (f/m)·h."""
+        """Return (g + a + f/m)·h, a the pull of the field; with drag, whose force already holds gravity, g is 0."""
         mass = self._mass[:, None]
         inverse = 1.0 / mass
-        if not self._dragged:
-            return (np.asarray(self.world.gravity) + self._force * inverse) * self._h
-        push = self._force * inverse if self._pushed else None
-        return (mass * acceleration(self.world, self.velocity, push, self._h)) * inverse * self._h
+        if self._dragged:
+            push = self._force * inverse if self._pushed else None
+            kick = (mass * acceleration(self.world, self.velocity, push, self._h)) * inverse
+            return (kick if self._field is None else self._field.at(self.position) + kick) * self._h
+        gravity = np.asarray(self.world.gravity)
+        pull = gravity if self._field is None else gravity + self._field.at(self.position)
+        return (pull + self._force * inverse) * self._h

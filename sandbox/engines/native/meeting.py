@@ -10,6 +10,7 @@ from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
 from sandbox.engines.native.constraints import constraint_of
 from sandbox.engines.native.drag import acceleration
 from sandbox.engines.native.field import Field
+from sandbox.engines.native.memory import RememberedImpulses, without
 from sandbox.engines.native.reader import Reader
 from sandbox.engines.native.space import (
     SurfaceSetter,
@@ -61,6 +62,8 @@ class MeetingBodies:
         self._links: list[tuple[pymunk.Constraint, int, int]] = []
         self._attached = self._polygons = False
         self._named: dict[str, pymunk.Body] = {}
+        self._name_of: dict[int, str] = {}
+        self._remembered: RememberedImpulses | None = None
         self.field = Field(scene)
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self._steady: dict[int, tuple[FloatArray, float]] = {}
@@ -108,16 +111,31 @@ class MeetingBodies:
             if spin:
                 body.angular_velocity = spin
             self._moving += 1
-        shapes = tuple(body_shapes(body, bodies, number)) if self._touches[number] or fixed else ()
-        for piece, shape in shapes:
-            shape.filter = category(fixed, bodies.elements[bodies.element[number]].collides)
-            self._setter.dress(shape, int(self._surface_of[piece]))
-        self._space.add(body, *(shape for _, shape in shapes))
-        self._members[number] = Member(body, shapes)
+        self._space.add(body)
+        self._members[number] = Member(body, ())
+        if self._touches[number] or fixed:
+            self._give_shapes(number, bodies)
         name = bodies.names[number]
-        self._named[name] = body
+        self._named[name], self._name_of[number] = body, name
         if not fixed and (self.field.attracts or self.field.thrusted(name)):
             self.field.drive(name, body, self._named)
+
+    def _give_shapes(self, number: int, bodies: Bodies) -> None:
+        """Let a body in the space be touched from now on."""
+        body, fixed = self._members[number].body, bool(bodies.fixed[number])
+        shapes = tuple(body_shapes(body, bodies, number))
+        for piece, shape in shapes:
+            collides = bodies.elements[bodies.element[number]].collides
+            shape.filter = category(fixed, collides, int(bodies.group[number]))
+            self._setter.dress(shape, int(self._surface_of[piece]))
+        self._space.add(*(shape for _, shape in shapes))
+        self._members[number] = Member(body, shapes)
+
+    def touched(self, bodies: Bodies) -> None:
+        """Give shapes to those that were only joined or driven, and have come to meet something."""
+        for number, member in self._members.items():
+            if not member.shapes and self._touches[number]:
+                self._give_shapes(number, bodies)
 
     def _add_fixed(self, bodies: Bodies) -> None:
         """Add the fixed things, once there is something to meet them."""
@@ -156,7 +174,7 @@ class MeetingBodies:
             member = self._members.pop(number)
             self._moving -= member.moves
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
-            self._named = {name: body for name, body in self._named.items() if body is not member.body}
+            del self._named[self._name_of.pop(number)]  # in place: the field looks into it
             self._steady.pop(number, None)
         self._reader.members_changed()
         self._state = None
@@ -246,8 +264,15 @@ class MeetingBodies:
         angle[at], angular_velocity[at] = state[:, 2], state[:, 5]
 
     def touching(self) -> Touching:
-        """Return who touches whom now, and how (`Reader.touching`)."""
-        return self._reader.touching(self._polygons) if self._moving else NOTHING
+        """Return who touches whom now, and how (`Reader.touching`); from the first call on, all impulses add up."""
+        if not self._moving:
+            return NOTHING
+        found = self._reader.touching(self._polygons)
+        if self._remembered is None:
+            self._remembered = RememberedImpulses(self._space)
+            return found
+        ids, impulses = self._remembered.take()
+        return without(found, self._reader.numbers(ids), impulses) if len(ids) else found
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a body that is not finite or beyond all bounds, and what is the matter; else None."""

@@ -1,49 +1,66 @@
-"""PartedMemory: the impulses that pymunk still remembers of contacts that have parted.
+"""RememberedImpulses: what pymunk reports too much where shapes meet again.
 
-When a pair touches again within `persistence` substeps, Munk2D starts its accumulated impulse at the old value
-(`cpArbiterUpdate`) without having applied it (`cpArbiterApplyCachedImpulse` skips first contacts). What it then
-reports as the total holds the old impulse a second time. Taken off again, the impulses of a run add up to its change
-of momentum, to rounding.
+Two shapes that part are remembered for `persistence` substeps. If they touch again by then, Munk2D starts each point
+that it knows again, by its hash, at the impulse that was accumulated there (`cpArbiterUpdate`) without applying it
+(`cpArbiterApplyCachedImpulse` skips first contacts). What it then reports as the total holds the old impulses a
+second time. Taken off again, the impulses of a run add up to its change of momentum, to rounding.
+
+What a contact starts with can be read when it begins. That serves every shape: polygons, of whose two points one may
+be known and the other new, and bodies of several pieces, of which one parts while another stays.
 """
 
+from typing import Any
+
 import numpy as np
+import pymunk
 
-from sandbox.engines.touching import ComplexArray
-from sandbox.trajectory import IntArray
+from sandbox.engines.touching import Touching
+from sandbox.trajectory import FloatArray, IntArray
 
 
-class PartedMemory:
-    """The last accumulated impulses of pairs that touched no more than `persistence` substeps ago."""
+class RememberedImpulses:
+    """The impulses that contacts of the last substep began with, which had been applied before they parted."""
 
-    def __init__(self, persistence: int) -> None:
-        self._persistence = persistence
-        self._moment = 0
-        self._parted: dict[int, tuple[int, complex]] = {}
+    def __init__(self, space: pymunk.Space) -> None:
+        self._ids: list[tuple[int, int]] = []
+        self._impulses: list[tuple[float, float]] = []
+        space.on_collision(begin=self._begin)
 
-    def forget_and_advance(self) -> None:
-        """Go on to the next substep."""
-        self._moment += 1
-        while self._parted:
-            key = next(iter(self._parted))
-            if self._moment - self._parted[key][0] <= self._persistence:
-                break
-            del self._parted[key]
+    def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
+        x, y = arbiter.total_impulse
+        if x or y:
+            a, b = arbiter.shapes
+            if a.body is not None and b.body is not None:
+                self._ids.append((a.body.id, b.body.id))
+                self._impulses.append((x, y))
 
-    def part(self, key: IntArray, impulse: ComplexArray, normal: ComplexArray) -> None:
-        """Remember pairs that touched in the last substep, and do not now.
+    def take(self) -> tuple[IntArray, FloatArray]:
+        """Return the ids (K, 2) of the bodies, and the impulses (K, 2) on the first of each, N·s; forget them."""
+        ids, impulses = np.asarray(self._ids, np.int64).reshape(-1, 2), np.asarray(self._impulses).reshape(-1, 2)
+        self._ids, self._impulses = [], []
+        return ids, impulses
 
-        Args:
-            key: (K,) of the pairs.
-            impulse: (K,) on the first of each, as pymunk reported it, N·s.
-            normal: (K,) from the first to the second.
-        """
-        # pymunk accumulates along the normal and across it: the impulse turned back by the normal.
-        accumulated = -impulse * normal.conj()
-        for each, value in zip(key.tolist(), accumulated.tolist(), strict=True):
-            self._parted.pop(each, None)  # so that the dict stays in the order of parting
-            self._parted[each] = self._moment - 1, value
 
-    def excess(self, key: IntArray, normal: ComplexArray) -> ComplexArray:
-        """Return what pymunk reports too much (K,), on the first of pairs that have just met, N·s."""
-        known = [self._parted.pop(each, (0, 0j))[1] for each in key.tolist()]
-        return -normal * np.asarray(known, np.complex128)
+def without(touching: Touching, pair: IntArray, impulse: FloatArray) -> Touching:
+    """Return what touches without impulses that are counted twice.
+
+    Args:
+        touching: what pymunk reports.
+        pair: (K, 2) numbers of the bodies; where they touch in several places, it does not matter in which.
+        impulse: (K, 2) on the first of each, N·s.
+    """
+    if not len(pair) or not len(touching.a):
+        return touching
+    low = int(min(touching.a.min(), touching.b.min(), pair.min()))
+    span = int(max(touching.a.max(), touching.b.max(), pair.max())) - low + 1
+    key = (touching.a - low) * span + touching.b - low
+    order = np.argsort(key, kind="stable")
+    corrected = touching.impulse.copy()
+    given = impulse[:, 0] + 1j * impulse[:, 1]
+    for first, second, sign in ((0, 1, 1.0), (1, 0, -1.0)):
+        wanted = (pair[:, first] - low) * span + pair[:, second] - low
+        row = order[np.minimum(np.searchsorted(key, wanted, sorter=order), len(key) - 1)]
+        found = key[row] == wanted
+        np.subtract.at(corrected, row[found], sign * given[found])
+        pair, given = pair[~found], given[~found]  # some may be listed the other way round
+    return touching._replace(impulse=corrected)

@@ -118,8 +118,8 @@ class Population:
         """
         if self._half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             raise ActionError("drag cannot come up in a run that was started with half_kick, which knows none")
-        spawned = self.bodies.elements[len(self.scene.movers) :]
-        bodies = replace(self.bodies, elements=(*scene.movers, *spawned))
+        spawned = self.bodies.elements[len(self.scene.elements) :]
+        bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
         meet = derived(scene, bodies)
         self.refresh()
         self.velocity[self.moving] -= self.ahead
@@ -188,6 +188,7 @@ class Population:
         self.present = np.append(self.present, True)
 
         self.meeting.renew(scene, meet)
+        self.meeting.touched(bodies)
         out = [n for n in np.flatnonzero(self.present & ~meet.free).tolist() if not self.meeting.holds(n)]
         self._promote(np.asarray([n for n in out if n != number], np.int64))
         self._place(np.asarray([number]))

@@ -62,6 +62,10 @@ class Reader:
         table = np.frombuffer(self._bodies.float_buf()).reshape(-1, STATE_WIDTH)
         return self._numbers, table[: len(self._rows)] if self._first else table[self._rows]
 
+    def numbers(self, ids: IntArray) -> IntArray:
+        """Return the numbers that ids of bodies stand for."""
+        return self._number_of.numbers(ids)
+
     def members_changed(self) -> None:
         """Note that bodies came or went, which moves rows."""
         self._moved = True

@@ -9,7 +9,6 @@ from sandbox.action import Action
 from sandbox.engines.acting import perform
 from sandbox.engines.contract import Divergence, Observer
 from sandbox.engines.ledger import ContactLedger
-from sandbox.engines.native.memory import PartedMemory
 from sandbox.engines.native.population import Population
 from sandbox.engines.running import Running
 from sandbox.scene.bodies import Bodies
@@ -115,6 +114,8 @@ class NativeSimulation(Running):
             self._still = None
             leaving = perform(action, self._population)
             self._population.changed()
+            if self._ledger is not None:
+                self._ledger.joints = self._population.meeting.joints  # a spawned body may have several pieces
             if leaving is not None:
                 self._take_out(np.asarray([leaving]))
 
@@ -134,8 +135,7 @@ class NativeSimulation(Running):
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
             meeting = self._population.meeting
-            memory = PartedMemory(self._settings.persistence or 1)
-            self._ledger = ContactLedger(len(self._population.scene.fixed), meeting.joints, memory)
+            self._ledger = ContactLedger(len(self._population.scene.fixed), meeting.joints)
             self._record(self.time)
         return self._ledger.take()
 

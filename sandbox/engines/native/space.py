@@ -49,13 +49,13 @@ def gravity_of(scene: Scene) -> tuple[float, float]:
 
 
 @cache
-def category(fixed: bool, collides: Collides) -> pymunk.ShapeFilter:
-    """Return the filter of a body."""
+def category(fixed: bool, collides: Collides, group: int = 0) -> pymunk.ShapeFilter:
+    """Return the filter of a body; those of one group other than 0 pass through each other."""
     if fixed:
-        return pymunk.ShapeFilter(categories=FIXED, mask=LOOSE | SOLITARY if collides == "all" else 0)
+        return pymunk.ShapeFilter(group, categories=FIXED, mask=LOOSE | SOLITARY if collides == "all" else 0)
     if collides == "all":
-        return pymunk.ShapeFilter(categories=LOOSE, mask=FIXED | LOOSE)
-    return pymunk.ShapeFilter(categories=SOLITARY, mask=FIXED)
+        return pymunk.ShapeFilter(group, categories=LOOSE, mask=FIXED | LOOSE)
+    return pymunk.ShapeFilter(group, categories=SOLITARY, mask=FIXED)
 
 
 def reach_of(scene: Scene, starts: FloatArray, speeds: FloatArray) -> tuple[FloatArray, float]:

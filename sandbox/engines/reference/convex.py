@@ -24,6 +24,9 @@ FAVOUR = 5e-4
 """By which part of a face's length the other piece's face must part them better to be the one that is clipped to: Box2D
 takes 0.5 mm. Without it two boxes at rest would change roles, and so their normal, from step to step."""
 
+LEVEL = 0.01
+"""Angle up to which two faces are level, rad."""
+
 SLACK = 1e-9
 """Part of a face's length by which corners may lie beside each other and still count as face to face."""
 
@@ -68,8 +71,6 @@ def meet_disc(
     px, py = corner[start, 0], corner[start, 1]
     if end - start == 1:
         separation, nx, ny = circle_circle(x, y, disc_radius, px, py, piece_radius)
-        if sign < 0.0 and x == px and y == py:
-            nx = -nx  # so that the first always parts from the second in the same direction
     elif end - start == 2:
         qx, qy = corner[start + 1, 0], corner[start + 1, 1]
         separation, nx, ny = circle_segment(x, y, disc_radius, px, py, qx, qy, piece_radius)
@@ -197,12 +198,13 @@ def facing(
         dx, dy = corner[b_two, 0] - corner[b_one, 0], corner[b_two, 1] - corner[b_one, 1]
         incident, other = face_at(corner, a, a_end, a_corner, -dy, dx)
         ex, ey = corner[a_two, 0] - corner[a_one, 0], corner[a_two, 1] - corner[a_one, 1]
-        shorter = math.sqrt(min(dx * dx + dy * dy, ex * ex + ey * ey))
-        if b_gap > a_gap + FAVOUR * shorter:
+        own, its = math.sqrt(dx * dx + dy * dy), math.sqrt(ex * ex + ey * ey)
+        if b_gap > a_gap + FAVOUR * min(own, its):
             return True, b_one, b_two, incident, other
-        # Apart, only faces across from each other change roles: the nearest points must remain the nearest.
+        # Apart, the normal must remain the way between the nearest points: only faces across from each other, and
+        # level, change roles.
         if b_gap > 0.0:
-            if incident != a_one or other != a_two:
+            if incident != a_one or other != a_two or abs(dx * ey - dy * ex) > LEVEL * own * its:
                 return True, b_one, b_two, incident, other
             return False, a_one, a_two, b_one, b_two
     dx, dy = corner[a_two, 0] - corner[a_one, 0], corner[a_two, 1] - corner[a_one, 1]

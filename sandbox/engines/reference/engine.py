@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
 """What is chosen where nothing is stated: what pymunk does, and the tutorial."""
 
+SUITED = {"relaxation": "semi_implicit_euler", "xpbd": "semi_implicit_euler", "rattle": "velocity_verlet"}
+"""What goes with ways to hold joints by their positions: kicks come before positions are put right."""
+
 HELD = {Demand.RODS, Demand.PIVOTS, Demand.SLIDES, Demand.ROTARY_LIMITS}
 """Joints that hold, other than springs, which are forces."""
 
@@ -101,6 +104,7 @@ class ReferenceEngine:
             own["joints"] = "impulses"
         if demands(scene) & {Demand.SPRINGS, Demand.ROTARY_SPRINGS, Demand.ATTRACTION}:
             own["integrator"] = "semi_implicit_euler"  # explicit Euler makes what swings gain energy
+        own["integrator"] = SUITED.get(settings.joints or "impulses", own["integrator"])
         if settings.response == "penalty":
             from sandbox.engines.reference.stability import suited
 

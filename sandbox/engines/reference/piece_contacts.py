@@ -12,12 +12,15 @@ from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 
 @kernel
-def drop(keys: IntArray, body: IntArray, apart: IntArray) -> int:
-    """Keep, at the front, the pairs of pieces that may meet: of two bodies, not joined; return how many."""
+def drop(keys: IntArray, body: IntArray, apart: IntArray, group: IntArray) -> int:
+    """Keep, at the front, the pairs of pieces that may meet, and return how many.
+
+    They are of two bodies, which are neither joined nor of one group.
+    """
     kept = 0
     for k in range(len(keys)):
         a, b = body[keys[k] >> FIRST], body[keys[k] & SECOND]
-        if a == b:
+        if a == b or (group[a] != 0 and group[a] == group[b]):
             continue
         key = pair_key(min(a, b), max(a, b))
         low, high = 0, len(apart)

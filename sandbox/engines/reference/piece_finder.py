@@ -58,7 +58,7 @@ class PieceFinder(Finder):
                     self._order, pieces.middle, pieces.reach, pieces.meets, pieces.moves, margin, room
                 ),
             )
-            bodies = bodies[: drop(bodies, pieces.body, pieces.apart)]
+            bodies = bodies[: drop(bodies, pieces.body, pieces.apart, pieces.group)]
         if len(boxes):
             self._segment_keys, segments = self._filled(
                 self._segment_keys,

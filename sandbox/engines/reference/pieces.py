@@ -32,6 +32,8 @@ class Pieces:
         links = roster.links
         self.apart: IntArray = np.sort([pair_key(a, b) for a, b in links.apart().tolist()]).astype(np.int64)
         """(K,) keys of the pairs of bodies that joints keep from meeting, ascending"""
+        self.group: IntArray = roster.bodies.group
+        """(N,) of each body"""
 
     def lay_out(self, position: FloatArray, angle: FloatArray) -> None:
         """Put corners and middles where bodies now lie, at (N, ≥ 2) m and (N,) rad."""

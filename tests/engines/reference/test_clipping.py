@@ -94,12 +94,15 @@ def test_a_point_that_is_left_alone_keeps_its_feature():
         assert rows[:, 5].tolist() == [1.0 - feature]
 
 
-def test_the_first_keeps_the_reference_face_where_both_part_nearly_as_well():
-    """Tilted by less than the favour either way, a box rests on the other's normal."""
-    for angle in (-4e-4, -1e-5, 0.0, 1e-5, 4e-4):
-        for height in (0.9995, 1.0005):
-            rows = met(box(), box(0, height, 1, 1, angle), reach=0.01)
+def test_the_first_keeps_the_reference_face_where_the_second_parts_them_little_better():
+    """The second overhangs by 1 m: tilted, its corner sinks below the first's face, and its own face parts them."""
+    for height in (0.999, 1.001):  # in overlap and apart
+        for angle in (-3e-4, -1e-5, 0.0, 1e-5, 3e-4):  # rad; sinks by less than the favour
+            rows = met(box(), box(0, height, 3, 1, angle), reach=0.01)
             assert rows[:, :2].tolist() == [[0.0, 1.0], [0.0, 1.0]]
+        for angle in (-6e-3, 6e-3):
+            rows = met(box(), box(0, height, 3, 1, angle), reach=0.01)
+            assert rows[0, :2] == pytest.approx((-math.sin(angle), math.cos(angle)), abs=ROUNDING)
 
 
 def test_corners_in_the_middle_of_a_face_change_nothing():

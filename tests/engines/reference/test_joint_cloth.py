@@ -33,10 +33,10 @@ def test_the_catenary_is_the_limit_of_many_links():
 @pytest.mark.parametrize(
     ("how", "integrator", "iterations", "accuracy"),
     [
-        ("impulses", "semi_implicit_euler", 20, 1e-6),  # warm started: they go on converging from step to step
-        ("relaxation", "semi_implicit_euler", 100, 2e-3),  # each step starts anew
-        ("xpbd", "semi_implicit_euler", 100, 2e-3),  # as relaxation, for rods
-        ("rattle", "velocity_verlet", 100, 2e-3),  # each step starts anew
+        ("impulses", "semi_implicit_euler", 20, 1e-9),  # warm started, they converge from step to step: 1e-11
+        ("relaxation", "semi_implicit_euler", 100, 5e-4),  # each step starts anew: measured 3.4e-4, as h²
+        ("xpbd", "semi_implicit_euler", 100, 5e-4),  # for rods it is relaxation
+        ("rattle", "velocity_verlet", 100, 5e-4),  # half the push of a step, less stretch
     ],
 )
 def test_a_chain_comes_to_rest_in_its_catenary(how, integrator, iterations, accuracy):
@@ -46,7 +46,7 @@ def test_a_chain_comes_to_rest_in_its_catenary(how, integrator, iterations, accu
     held = links_of(*(link(LinkKind.ROD, k - 1, k, piece) for k in range(20)))
     mass = [0.05] * 19 + [math.inf]
     rig = Rig(held, start, mass=mass, drag=3.0, how=how, integrator=integrator, iterations=iterations)
-    rig.run(15.0, 1 / 240)
+    rig.run(12.0, 1 / 120)
     assert -rig.pose[:, 1].min() == pytest.approx(discrete_sag(), abs=accuracy)
 
 
@@ -62,22 +62,20 @@ def hanging(how, iterations, kind=LinkKind.SPRING, count=10, cap=math.inf, stiff
 
 def test_xpbd_is_as_stiff_as_stated_whatever_the_iterations_once_they_converge():
     expected = 10 * 11 / 2 * 0.1 * G / 400.0
-    assert hanging("xpbd", 100)[0] == pytest.approx(expected, rel=1e-3)
-    assert hanging("xpbd", 400)[0] == pytest.approx(expected, rel=1e-6)
+    for iterations in (10, 50, 200):
+        assert hanging("xpbd", iterations)[0] == pytest.approx(expected, rel=1e-6)  # measured 1.6e-7, then 3e-8 by drag
 
 
 def test_relaxation_is_as_stiff_as_it_has_iterations():
     five, ten, twenty = (hanging("relaxation", n, LinkKind.ROD)[0] for n in (5, 10, 20))
-    assert five > 1.5 * ten > 2.0 * twenty > 0.0
+    assert five > 2.0 * ten > 4.0 * twenty > 0.0  # measured 5.9, 2.8, 1.2 mm of 1 m
 
 
 def test_capped_springs_stretch_to_their_cap_and_no_farther():
     _, free = hanging("relaxation", 50, stiffness=60.0)
     _, capped = hanging("relaxation", 50, stiffness=60.0, cap=CAP)
     assert free.max() > 1.5 * 0.1  # it takes a cap
-    assert capped.max() < 0.11 * (1 + 1e-2)  # as far as 50 passes converge
-    light = free < 0.105
-    assert capped[light] == pytest.approx(free[light], rel=1e-6)  # what is below the cap is as by Hooke alone
+    assert capped.max() < 0.11 * (1 + 1e-3)  # as far as 50 passes converge: measured 4e-4
 
 
 def test_springs_of_no_rest_length_have_no_cap():

@@ -44,11 +44,13 @@ def test_kepler_by_rk4_returns_after_a_period():
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "leapfrog"])
 def test_symplectic_schemes_keep_keplers_second_law_and_a_band_of_energy(integrator):
     rig, worst = orbit(integrator), 0.0
-    for _ in range(20_000):
+    for _ in range(10_000):
         rig.step(2 * math.pi / 2000)
         worst = max(worst, abs(energy_of(rig) + 0.5))
-    assert rig.angular_momentum == pytest.approx(math.sqrt(0.75), rel=1e-11)  # kept to 20,000 steps' rounding
-    assert worst < (0.02 if integrator == "semi_implicit_euler" else 1e-4)  # 10 orbits; measured .010 and 4e-5
+    assert rig.angular_momentum == pytest.approx(math.sqrt(0.75), rel=1e-11)  # kept to 10,000 steps' rounding
+    assert worst < (
+        4e-3 if integrator == "semi_implicit_euler" else 2e-5
+    )  # 5 orbits; measured 2.2e-3, and 1.3e-5 at most
 
 
 def test_two_bodies_go_round_each_other_and_keep_their_momentum():

@@ -69,7 +69,8 @@ def torsion(ties: Ties, k: int, pose: FloatArray, rates: FloatArray) -> float:
     """Return the torque of rotary spring k on its second body, N·m."""
     i, j = ties.first[k], ties.second[k]
     turned = turning(i, j, pose) - ties.figures[k, 0]
-    return -ties.figures[k, 1] * turned - ties.figures[k, 2] * turning(i, j, rates)
+    torque: float = -ties.figures[k, 1] * turned - ties.figures[k, 2] * turning(i, j, rates)
+    return torque
 
 
 @bare_kernel

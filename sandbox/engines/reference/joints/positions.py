@@ -73,54 +73,34 @@ def project(
             if kind in (ROTARY_LIMIT, ROTARY_SPRING):
                 _angle(ties, k, pose, start, h, inverse_moment, shift, multiplier)
                 way[k, 0], way[k, 1] = 1.0, 0.0
-            elif kind == PIVOT:
+                continue
+            if kind == PIVOT:
                 _together(ties, k, pose, start, h, lagged, inverse_mass, inverse_moment, shift, multiplier)
+                continue
+            i, j, old = ties.first[k], ties.second[k], multiplier[k, 0]
+            arms, dx, dy = reach(ties, k, pose)
+            length, nx, ny = line(dx, dy)
+            moved = 0.0
+            if lagged or (kind == SPRING and ties.figures[k, 2] > 0.0):
+                old_arms, sx, sy = reach(ties, k, start)
+                moved = (dx - sx) * nx + (dy - sy) * ny
+                if lagged:
+                    arms = old_arms
+                    _, nx, ny = line(sx, sy)
+            share = yielding(i, j, arms, nx, ny, inverse_mass, inverse_moment)
+            if nx == ny == 0.0 or share == 0.0:
+                continue
+            if kind == SPRING:
+                new = old + _compliant(ties, k, length - ties.figures[k, 0], moved, old, share, h)
             else:
-                _distance(ties, k, pose, start, h, lagged, inverse_mass, inverse_moment, shift, multiplier, way)
-
-
-@bare_kernel
-def _distance(
-    ties: Ties,
-    k: int,
-    pose: FloatArray,
-    start: FloatArray,
-    h: float,
-    lagged: bool,
-    inverse_mass: FloatArray,
-    inverse_moment: FloatArray,
-    shift: FloatArray,
-    multiplier: FloatArray,
-    way: FloatArray,
-) -> None:
-    """Bring the ends of tie k to their distance, along their line."""
-    i, j = ties.first[k], ties.second[k]
-    arms, dx, dy = reach(ties, k, pose)
-    length, nx, ny = line(dx, dy)
-    if lagged:
-        arms, sx, sy = reach(ties, k, start)
-        _, nx, ny = line(sx, sy)
-    if nx == ny == 0.0:
-        return
-    share = yielding(i, j, arms, nx, ny, inverse_mass, inverse_moment)
-    if share == 0.0:
-        return
-    old = multiplier[k, 0]
-    if ties.kind[k] == SPRING:
-        moved = 0.0
-        if ties.figures[k, 2] > 0.0:
-            _, sx, sy = reach(ties, k, start)
-            moved = (dx - sx) * nx + (dy - sy) * ny
-        new = old + _compliant(ties, k, length - ties.figures[k, 0], moved, old, share, h)
-    else:
-        most = ties.figures[k, 1] if ties.kind[k] == SLIDE else ties.figures[k, 0]
-        new = _bounded(length - share * old, ties.figures[k, 0], most, share)
-    bound = ties.most_force[k] * h * h
-    new = min(max(new, -bound), bound)
-    multiplier[k, 0], way[k, 0], way[k, 1] = new, nx, ny
-    x, y = (new - old) * nx, (new - old) * ny
-    push(i, j, arms, x, y, inverse_mass, inverse_moment, pose)
-    push(i, j, arms, x, y, inverse_mass, inverse_moment, shift)
+                most = ties.figures[k, 1] if kind == SLIDE else ties.figures[k, 0]
+                new = _bounded(length - share * old, ties.figures[k, 0], most, share)
+            bound = ties.most_force[k] * h * h
+            new = min(max(new, -bound), bound)
+            multiplier[k, 0], way[k, 0], way[k, 1] = new, nx, ny
+            x, y = (new - old) * nx, (new - old) * ny
+            push(i, j, arms, x, y, inverse_mass, inverse_moment, pose)
+            push(i, j, arms, x, y, inverse_mass, inverse_moment, shift)
 
 
 @bare_kernel
@@ -184,8 +164,8 @@ def _together(
 @bare_kernel
 def _compliant(ties: Ties, k: int, stretch: float, moved: float, old: float, share: float, h: float) -> float:
     """Return by how much λ of spring k changes: Macklin et al. 2016, (26), with α̃ = 1/(k h²) and γ = c/(k h)."""
-    compliance = 1.0 / (ties.figures[k, 1] * h * h)
-    resistance = ties.figures[k, 2] / (ties.figures[k, 1] * h)
+    compliance: float = 1.0 / (ties.figures[k, 1] * h * h)
+    resistance: float = ties.figures[k, 2] / (ties.figures[k, 1] * h)
     return -(stretch + compliance * old + resistance * moved) / ((1.0 + resistance) * share + compliance)
 
 

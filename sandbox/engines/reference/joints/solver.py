@@ -100,15 +100,14 @@ class JointSolver:
         self._springs: Ties = ties_of(self.links, *SPRINGS, among=whole)
         self._held: Ties = ties_of(self.links, *(HOLDS + SPRINGS if self.how == "xpbd" else HOLDS), among=whole)
         if self.how == "relaxation":
-            caps = cap_stretch(self._springs, self._cap)
-            self._held = Ties(*(np.concatenate(pair) for pair in zip(self._held, caps, strict=True)))
+            self._held = self._held.joined(cap_stretch(self._springs, self._cap))
         self.rows: Rows = rows_of(self._held)
         self.rows.impulse[:] = memory[self._held.link]
         self._given = np.zeros((len(self.links), 2))
 
     def forces(self, x: State) -> FloatArray:
         """Return the accelerations (N, 3) by springs in a state, m/s² and rad/s²; in xpbd there are none."""
-        out = np.zeros_like(x[1])
+        out: FloatArray = np.zeros_like(x[1])
         if self.how != "xpbd":
             spring_forces(self._springs, x[0], x[1], self.inverse_mass, self.inverse_moment, out)
         return out
@@ -135,6 +134,9 @@ class JointSolver:
 
     def project(self, start: State, moved: State, h: float) -> None:
         """Move bodies into place, and change their velocities accordingly.
+
+        Under relaxation and in xpbd, what hangs at rest keeps the velocity (1 − share)·h·a of the part of a kick that
+        its integrator's positions have yet to follow: none after a kick-drift step, whose share is 1.
 
         Args:
             start: (2, N, 3) at the start of the step.
@@ -177,7 +179,7 @@ class JointSolver:
         Args:
             x: (2, N, 3) the state that springs are looked at in; of the others, it is the mean over the last step.
         """
-        load = np.zeros((len(self.links), 2))
+        load: FloatArray = np.zeros((len(self.links), 2))
         if self.how != "xpbd":
             spring_loads(self._springs, x[0], x[1], load)
         return load + self.impulse() / self._h

@@ -18,7 +18,7 @@ def cap_stretch(ties: Ties, cap: float) -> Ties:
         cap: the most stretch as a part of the rest length; inf for none.
     """
     some = np.flatnonzero((ties.kind == SPRING) & (ties.figures[:, 0] > 0.0) & np.isfinite(cap))
-    own = Ties(*(column[some] for column in ties))
+    own = ties.some(some)
     figures = np.zeros((len(some), 3))
     figures[:, 1] = (1.0 + cap) * own.figures[:, 0]
     return own._replace(kind=np.full(len(some), SLIDE), figures=figures, most_force=np.full(len(some), np.inf))

@@ -44,16 +44,23 @@ class Ties(NamedTuple):
     most_force: FloatArray
     """(K,) N or N·m"""
 
+    def some(self, which: IntArray) -> "Ties":
+        """Return those at some places."""
+        return Ties._make(column[which] for column in self)
+
+    def joined(self, more: "Ties") -> "Ties":
+        """Return these and more."""
+        return Ties._make(np.concatenate(pair) for pair in zip(self, more, strict=True))
+
 
 def ties_of(links: Links, *kinds: LinkKind, among: IntArray | None = None) -> Ties:
     """Return the links of some kinds, in their order; with `among`, only those of these numbers."""
     which = np.isin(links.kind, kinds)
     if among is not None:
         which &= np.isin(np.arange(len(links)), among)
-    number = np.flatnonzero(which)
     anchor = np.column_stack((links.anchor_a, links.anchor_b))
-    columns = links.kind, links.a, links.b, anchor, links.figures, links.most_force
-    return Ties(number, *(np.ascontiguousarray(column[number]) for column in columns))
+    every = Ties(np.arange(len(links)), links.kind, links.a, links.b, anchor, links.figures, links.most_force)
+    return every.some(np.flatnonzero(which))
 
 
 @bare_kernel
@@ -96,7 +103,8 @@ def parting(i: int, j: int, arms: Arms, velocity: FloatArray) -> tuple[float, fl
 @bare_kernel
 def turning(i: int, j: int, rate: FloatArray) -> float:
     """Return the angle, or spin, of body j as seen from i."""
-    return rate[j, 2] - rate[i, 2] if i >= 0 else rate[j, 2]
+    turned: float = rate[j, 2]
+    return turned - rate[i, 2] if i >= 0 else turned
 
 
 @bare_kernel
@@ -142,7 +150,7 @@ def yielding(
     """Return how much a unit push along (nx, ny) parts the two ends along it: an inverse mass, 1/kg."""
     ax, ay, bx, by = arms
     lever = bx * ny - by * nx
-    share = inverse_mass[j] + inverse_moment[j] * lever * lever
+    share: float = inverse_mass[j] + inverse_moment[j] * lever * lever
     if i >= 0:
         lever = ax * ny - ay * nx
         share += inverse_mass[i] + inverse_moment[i] * lever * lever
@@ -152,14 +160,15 @@ def yielding(
 @bare_kernel
 def slackness(i: int, j: int, inverse_moment: FloatArray) -> float:
     """Return how much a unit torque turns the second as seen from the first, 1/(kg·m²)."""
-    return inverse_moment[j] + inverse_moment[i] if i >= 0 else inverse_moment[j]
+    share: float = inverse_moment[j]
+    return share + inverse_moment[i] if i >= 0 else share
 
 
 @bare_kernel
 def block(
     i: int, j: int, arms: Arms, inverse_mass: FloatArray, inverse_moment: FloatArray
 ) -> tuple[float, float, float]:
-    """Return the push that parts the ends by a unit: the symmetric matrix's xx, xy, yy, kg; 0 where nothing can move."""
+    """Return the push that parts the ends by a unit: a matrix's xx, xy, yy, kg; 0 where nothing can move."""
     ax, ay, bx, by = arms
     xx = yy = inverse_mass[j]
     xx += inverse_moment[j] * by * by
