@@ -4,7 +4,7 @@ As in Munk2D (`cpArbiter.c`): accumulated impulses clamped to what a contact can
 last substep; overlap corrected by velocities of their own, which move bodies but are no part of their motion.
 """
 
-from sandbox.engines.kernel import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.trajectory import FloatArray, IntArray
 
@@ -149,6 +149,7 @@ def solve_overlaps(
     push: FloatArray,
     inverse_mass: FloatArray,
     inverse_moment: FloatArray,
+    total: FloatArray,
     iterations: int,
 ) -> None:
     """Find the velocities that undo overlap, apart from those of the motion.
@@ -159,9 +160,9 @@ def solve_overlaps(
         push: (N, 3) m/s and rad/s, changed.
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
+        total: (K,) what each has given so far, kg·m/s; 0 at first.
         iterations: passes over all contacts.
     """
-    total = target * 0.0
     for _ in range(iterations):
         for k in range(len(now.key)):
             i, j = now.first[k], now.second[k]

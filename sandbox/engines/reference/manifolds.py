@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sandbox.engines.kernel import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key
 from sandbox.engines.reference.narrow_phase import NARROW_PHASE
 from sandbox.trajectory import BoolArray, FloatArray, IntArray

@@ -3,7 +3,7 @@
 Keys hold the pair and, in the lowest bit, which of its two points: the points of a pair stand one after the other.
 """
 
-from sandbox.engines.kernel import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.convex import meet_half_plane, meet_pieces
 from sandbox.engines.reference.manifolds import KIND, Manifolds
 from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key

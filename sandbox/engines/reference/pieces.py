@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sandbox.engines.kernel import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.meeting import pair_key
 from sandbox.engines.roster import NOTHING, Roster
 from sandbox.trajectory import BoolArray, FloatArray, IntArray

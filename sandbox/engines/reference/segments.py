@@ -7,7 +7,7 @@ of them reaches.
 import numpy as np
 
 from sandbox.engines.fixtures import Fixtures
-from sandbox.engines.kernel import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.meeting import ROUNDING, pair_key
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 

@@ -9,7 +9,7 @@ Granular Matter 9, 465): the damping ratio ζ alone, whatever the masses and the
 
 import math
 
-from sandbox.engines.kernel import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.trajectory import FloatArray, IntArray
 

@@ -169,7 +169,7 @@ class Stage:
             self._pushes = bool(target.any())
             if self._pushes:
                 inverse = self._roster.inverse_mass, self._roster.inverse_moment
-                solve_overlaps(contacts, target, self.push, *inverse, self._settings.iterations)
+                solve_overlaps(contacts, target, self.push, *inverse, np.zeros_like(target), self._settings.iterations)
         self._memory = contacts.key.copy(), impulse, h
         self._done(moved, contacts, impulse, h)
 

@@ -6,7 +6,7 @@ along never does.
 
 import math
 
-from sandbox.engines.kernel import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.manifolds import KIND
 from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key
 from sandbox.trajectory import BoolArray, FloatArray, IntArray

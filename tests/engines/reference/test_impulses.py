@@ -24,6 +24,7 @@ def contacts(*rows):
         separation=np.array(separation, float),
         point=np.zeros((count, 2)),
         arm=np.array(arms, float),
+        offset=np.zeros((count, 2)),
         coefficient=np.column_stack((restitution, friction)).astype(float),
     )
 
@@ -34,7 +35,7 @@ def solved(now, velocity, spin, mass, moment, iterations=1, start=None, bounce=N
     inverse = 1.0 / np.array(mass, float), 1.0 / np.array(moment, float)
     if bounce is None:
         bounce = np.empty(now.size)
-        approach(now, velocity, bounce)
+        approach(now, velocity, spin, bounce)
         bounce *= now.coefficient[:, 0]
     impulse = np.zeros((now.size, 2)) if start is None else np.array(start, float)
     solve_velocities(now, bounce, velocity, spin, *inverse, impulse, iterations)
@@ -126,7 +127,7 @@ def residual(iterations, start=None):
     kicked = np.tile([0.0, -0.1], (10, 1))
     velocity, _, impulse = solved(now, kicked, np.zeros(10), np.ones(10), np.ones(10), iterations, start, np.zeros(10))
     left = np.empty(10)
-    approach(now, velocity, left)
+    approach(now, velocity, np.zeros(len(velocity)), left)
     return float(-left.min()), impulse
 
 
@@ -170,20 +171,20 @@ def test_momentum_is_kept_among_many(velocities, iterations):
 @given(st.lists(st.floats(0, 3), min_size=10, max_size=10), st.integers(1, 50))
 def test_pushing_overlaps_apart_keeps_momentum_and_never_pulls(targets, iterations):
     now = stack(10).of(slice(1, 10))
-    push, mass = np.zeros((10, 2)), np.arange(1.0, 11.0)
-    solve_overlaps(now, np.array(targets[1:]), push, 1.0 / mass, iterations)
-    assert mass @ push == pytest.approx([0, 0], abs=1e-12)  # ulps of 100 N·s
+    push, mass = np.zeros((10, 3)), np.arange(1.0, 11.0)
+    solve_overlaps(now, np.array(targets[1:]), push, 1.0 / mass, 1.0 / mass, np.zeros(9), iterations)
+    assert mass @ push == pytest.approx([0, 0, 0], abs=1e-12)  # ulps of 100 N·s
     if iterations == 50 or sum(targets[1:]) == 0:
         left = np.empty(9)
-        approach(now, push, left)
+        approach(now, push, push[:, 2], left)
         assert (left >= np.array(targets[1:]) - 1.0).all()
 
 
 def test_one_overlap_parts_as_fast_as_wanted():
     now = contacts((0, 1, (1, 0), -0.1, (0.5, 0.5), 0.0, 0.0))
-    push = np.zeros((2, 2))
-    solve_overlaps(now, np.array([3.0]), push, np.array([1.0, 0.5]), 1)
-    assert push == pytest.approx(np.array([[-2.0, 0.0], [1.0, 0.0]]), rel=1e-15)  # a quotient
+    push, inverse = np.zeros((2, 3)), np.array([1.0, 0.5])
+    solve_overlaps(now, np.array([3.0]), push, inverse, inverse, np.zeros(1), 1)
+    assert push == pytest.approx(np.array([[-2.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), rel=1e-15)  # a quotient
 
 
 @pytest.mark.parametrize("power", [-12, -6, 0, 6, 12])

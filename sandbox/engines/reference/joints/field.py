@@ -41,7 +41,8 @@ class Field:
 
     def __call__(self, time: float, x: State) -> FloatArray:
         """Return the accelerations (N, D) at a time, s, in a state (2, N, D), m/s² and rad/s²."""
-        roster, out = self._roster, np.zeros_like(x[1])
+        roster = self._roster
+        out: FloatArray = np.zeros_like(x[1])
         if len(self._target):
             there = (self._target == WORLD) | roster.present[self._target]
             some = self._target[there], self._place[there], self._strength[there], self._softening[there]
