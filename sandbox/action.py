@@ -126,7 +126,7 @@ class Pull(Timed):
 
 
 class Launch(Timed):
-    """Start the balls of a grid, scatter or emitter anew, laid out with another seed."""
+    """Start the bodies of a generator anew, laid out with another seed."""
 
     kind: Literal["launch"] = "launch"
     generator: Name

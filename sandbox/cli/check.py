@@ -9,7 +9,7 @@ import click
 
 from sandbox.cli.reading import fault_rows, paths_of, print_json
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.forecast import at_most, largest_safe_dt, warnings
+from sandbox.measure.forecast import at_most, largest_safe_dt, notes, warnings
 from sandbox.scene.demands import Item, bill
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import load
@@ -48,7 +48,8 @@ def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, 
 
 def _faulty(name: str, error: SceneError) -> dict[str, Any]:
     faults = fault_rows(error.faults)
-    return {"scene": name, "title": None, "ok": False, "faults": faults, "demands": [], "engines": {}, "warnings": []}
+    empty: dict[str, Any] = {"demands": [], "engines": {}, "warnings": [], "notes": []}
+    return {"scene": name, "title": None, "ok": False, "faults": faults, **empty}
 
 
 def _checked(name: str, scene: Scene) -> tuple[dict[str, Any], tuple[Item, ...]]:
@@ -68,6 +69,7 @@ def _checked(name: str, scene: Scene) -> tuple[dict[str, Any], tuple[Item, ...]]
         "engines": engines,
         "safe_dt": safe if math.isfinite(safe) else None,
         "warnings": [{"kind": w.kind, "message": w.message, **w.figures} for w in warnings(scene)],
+        "notes": [{"kind": n.kind, "message": n.message, **n.figures} for n in notes(scene)],
     }
     return document, items
 
@@ -83,6 +85,8 @@ def _print(name: str, scene: Scene, document: dict[str, Any], items: tuple[Item,
         safe = document["safe_dt"]
         say = "at any dt nothing can tunnel" if safe is None else f"nothing can tunnel up to dt = {at_most(safe)} s"
         _tell(f"{say}; the scene's is {scene.solver.dt:g} s")
+        for note in document["notes"]:
+            _tell(f"note: {note['message']}")
     for warning in document["warnings"]:
         if quiet:
             click.echo(f"{name}: warning: {warning['message']}")

@@ -222,7 +222,8 @@ def _spawn(action: Spawn, cast: Cast) -> None:
     faults = crosscheck(alone)
     if faults:
         raise ActionError("; ".join(message for _, message in faults))
-    _check_place(single.position, float(alone.bodies.radius[0]), single.collides, cast)
+    x, y = alone.bodies.position[0].tolist()  # of its centre: an outline may be drawn far from its own position
+    _check_place((x, y), float(alone.bodies.radius[0]), single.collides, cast)
     cast.add(single, name)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sandbox.action import Force, Pull
+from sandbox.action import Force, Pull, Throttle
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -27,6 +27,7 @@ class Checkpoint:
     """since then"""
     retired: Mapping[int, float]
     forces: Mapping[str, Force]
+    throttles: Mapping[str, Throttle]
     pulls: Mapping[str, Pull]
 
 

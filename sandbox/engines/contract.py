@@ -74,7 +74,7 @@ class Simulation(Protocol):
 
     @property
     def retired(self) -> Mapping[int, float]:
-        """When each body that was removed, or left world.bounds, was gone: number → s."""
+        """When each body that was removed, left world.bounds or had lived its time was gone: number → s."""
 
     @property
     def work(self) -> Mapping[str, int]:

@@ -1,5 +1,7 @@
 """Launch: the bodies of a generator put back to where they start, laid out with another seed."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from sandbox.action import ActionError, Launch
@@ -11,8 +13,10 @@ from sandbox.scene.model import Mover, Scene
 from sandbox.trajectory import BoolArray, Frame
 
 
-def launched(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tuple[Frame, BoolArray]:
-    """Return the state with a generator's bodies at their start, and which they are, (N,); those gone are back.
+def launched(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tuple[Frame, Bodies, BoolArray]:
+    """Return the state with a generator's bodies at their start, all bodies, and which were launched, (N,).
+
+    Those gone are back; their lives, if not for ever, begin anew.
 
     Raises:
         ActionError: there is no such generator, or its bodies do not fit.
@@ -32,7 +36,11 @@ def launched(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tupl
     for key in ("position", "velocity", "angle", "angular_velocity"):
         columns[key] = getattr(frame, key).copy()
         columns[key][those] = getattr(layout, key)
-    return Frame(time=frame.time, present=frame.present | those, **columns), those
+    if layout.lifetime is not None:
+        born, lifetime = bodies.born.copy(), bodies.lifetime.copy()
+        born[those], lifetime[those] = frame.time, layout.lifetime
+        bodies = replace(bodies, born=born, lifetime=lifetime)
+    return Frame(time=frame.time, present=frame.present | those, **columns), bodies, those
 
 
 def _first(scene: Scene, generator: Mover) -> int:

@@ -1,11 +1,11 @@
 """Leg: one simulation of a relay, and how its numbers and times read in the whole."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sandbox.action import ActionError, Force
+from sandbox.action import ActionError, Force, Throttle
 from sandbox.engines.checkpoint import cast
 from sandbox.engines.contract import Observer, Simulation
 from sandbox.engines.registry import start as start_engine
@@ -115,20 +115,29 @@ class Leg:
 
 
 def begun(
-    scene: Scene, engine: str, wanted: Settings, bodies: Bodies, frame: Frame, forces: Mapping[str, Force]
+    scene: Scene, engine: str, wanted: Settings, bodies: Bodies, frame: Frame, lasting: Iterable[Force | Throttle]
 ) -> Leg:
     """Start a leg from a state.
+
+    Args:
+        scene: what runs.
+        engine: its name.
+        wanted: settings.
+        bodies: all, by the numbers of the whole.
+        frame: the state.
+        lasting: what acts from earlier on: steady forces, thrusts that were opened or closed.
 
     Raises:
         Refusal: the engine lacks something.
         ActionError: it cannot take over a steady force.
     """
-    simulation = start_engine(scene.placed(cast(bodies, frame)), engine, wanted)
-    for force in forces.values():
+    simulation = start_engine(scene.placed(cast(bodies, frame), frame.time), engine, wanted)
+    for each in lasting:
         try:
-            simulation.apply(force)
+            simulation.apply(each)
         except ActionError as error:
             simulation.close()
-            raise ActionError(f"{engine} cannot go on with the steady force on {force.body!r}: {error}") from None
+            what = f"the steady force on {each.body!r}" if isinstance(each, Force) else f"the thrust {each.thrust!r}"
+            raise ActionError(f"{engine} cannot go on with {what}: {error}") from None
     numbers = None if frame.present.all() else np.flatnonzero(frame.present)
     return Leg(simulation, bodies, frame, numbers, frame.time)

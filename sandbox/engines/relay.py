@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from pydantic import ValidationError
 
-from sandbox.action import Action, ActionError, Force, Launch, Pull, Remove, SetParameter, Spawn, Switch
+from sandbox.action import Action, ActionError, Force, Launch, Pull, Remove, SetParameter, Spawn, Switch, Throttle
 from sandbox.engines.checkpoint import Checkpoint
 from sandbox.engines.contract import Divergence, Exhaustion, Observer, Refusal
 from sandbox.engines.launch import launched
@@ -50,6 +50,7 @@ class Relay:
         self._work: Counter[str] = Counter()
         self._pulls = Pulls()
         self._forces: dict[str, Force] = {}
+        self._throttles: dict[str, Throttle] = {}
         self._kept: list[Contacts] | None = None  # of earlier legs, since the last call; none before the first
         self._observer: Observer | None = None
 
@@ -65,6 +66,7 @@ class Relay:
             steps=self._leg.steps,
             retired=dict(self.retired),
             forces=self._acting(),
+            throttles=dict(self._throttles),
             pulls=self._pulls.pulls,
         )
 
@@ -81,10 +83,12 @@ class Relay:
         """
         relay = cls.__new__(cls)
         relay.engine, relay.wanted = point.engine, point.wanted
-        relay._leg = begun(point.scene, point.engine, point.wanted, point.bodies, point.frame, point.forces)
+        lasting: list[Force | Throttle] = [*point.forces.values(), *point.throttles.values()]
+        relay._leg = begun(point.scene, point.engine, point.wanted, point.bodies, point.frame, lasting)
         relay._leg.origin, relay._leg.steps = point.origin, point.steps
         relay._retired, relay._work = dict(point.retired), Counter()
         relay._forces, relay._pulls = dict(point.forces), Pulls(point.pulls)
+        relay._throttles = dict(point.throttles)
         relay._kept, relay._observer = None, None
         return relay
 
@@ -119,7 +123,7 @@ class Relay:
 
     @property
     def retired(self) -> Mapping[int, float]:
-        """When each body that was removed, or left world.bounds, was gone: number → s."""
+        """When each body that was removed, left world.bounds or had lived its time was gone: number → s."""
         return MappingProxyType({**self._retired, **self._leg.retired})
 
     @property
@@ -181,15 +185,17 @@ class Relay:
             case Switch():
                 self._switch(action)
             case Launch():
-                frame, those = launched(action, self.scene, self.bodies, self.frame())
+                frame, bodies, those = launched(action, self.scene, self.bodies, self.frame())
                 retired = {n: time for n, time in self.retired.items() if not those[n]}
-                self._hand_over(self.engine, self.wanted, frame, retired)
+                self._hand_over(self.engine, self.wanted, bodies, frame, retired)
             case Spawn():
                 self._spawn(action)
             case _:
                 self._leg.simulation.apply(action)
                 if isinstance(action, Force):
                     self._forces[action.body] = action
+                elif isinstance(action, Throttle):
+                    self._throttles[action.thrust] = action
                 elif isinstance(action, Remove):
                     self._forces.pop(action.body, None)
                 elif isinstance(action, SetParameter):
@@ -216,16 +222,19 @@ class Relay:
         except ValidationError as error:
             told = (f"solver.{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
             raise ActionError("; ".join(told)) from None
-        self._hand_over(action.engine or self.engine, wanted, self.frame(), dict(self.retired))
+        self._hand_over(action.engine or self.engine, wanted, self.bodies, self.frame(), dict(self.retired))
 
-    def _hand_over(self, engine: str, wanted: Settings, frame: Frame, retired: dict[int, float]) -> None:
+    def _hand_over(
+        self, engine: str, wanted: Settings, bodies: Bodies, frame: Frame, retired: dict[int, float]
+    ) -> None:
         """Start the next leg from a state.
 
         Raises:
             ActionError: the engine cannot go on from it. Nothing has changed then.
         """
         try:
-            leg = begun(self.scene, engine, wanted, self.bodies, frame, self._acting())
+            lasting: list[Force | Throttle] = [*self._acting().values(), *self._throttles.values()]
+            leg = begun(self.scene, engine, wanted, bodies, frame, lasting)
         except (Refusal, UnknownEngineError) as refusal:
             raise ActionError(str(refusal)) from None
         old = self._leg

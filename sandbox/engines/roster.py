@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from sandbox.engines.acting import derived
+from sandbox.engines.expiry import Expiry
 from sandbox.engines.fixtures import Fixtures, fixtures_of
 from sandbox.engines.kernel import kernel
 from sandbox.engines.limits import FARTHEST, FASTEST
@@ -42,6 +43,7 @@ class Roster:
         self.throttles: FloatArray = np.asarray([0.0 if t.key else 1.0 for t in scene.thrusts], dtype=np.float64)
         """how far each thrust of the scene is open, 0 to 1"""
         self._retired: dict[int, float] = {}
+        self._expiry = Expiry(bodies, scene.began, h)
         self._twisted: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
         self._assume(scene, bodies, meetings(scene, bodies))
 
@@ -149,12 +151,13 @@ class Roster:
         self._retired |= dict.fromkeys(numbers.tolist(), time)
         self._assume(self.scene, self.bodies, self.meet)
 
-    def outside(self) -> IntArray:
-        """Return the moving bodies whose centres have left world.bounds, (K,)."""
-        bounds = self.scene.world.bounds
+    def going(self, time: float) -> IntArray:
+        """Return who is to be retired at a time, s: whose life is over or whose centre has left world.bounds, (K,)."""
+        due, bounds = self._expiry.due(time), self.scene.world.bounds
         if bounds is None:
-            return np.empty(0, np.int64)
+            return due[self.present[due]] if len(due) else due
         out = ((self.position < bounds[0]) | (self.position > bounds[1])).any(axis=1)
+        out[due] = True
         return np.flatnonzero(out & self.moving)
 
     def beyond(self) -> int | None:

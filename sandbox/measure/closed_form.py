@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.measure.lying import gap_above
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Plane, Scene, World
 from sandbox.scene.surfaces import surfaces_of
@@ -36,7 +37,17 @@ def why_not(scene: Scene) -> str | None:
     """Return why free flight in this scene has no closed form, or None where it has one."""
     if scene.world.quadratic_drag > 0:
         return "world.quadratic_drag couples x and y: the flight has no closed form"
+    if scene.attractions:
+        return "an attraction draws every body: the flight has no closed form here"
     return None
+
+
+def driven(scene: Scene, bodies: Bodies) -> BoolArray:
+    """Return which bodies are joined to something or carry a thrust, (N,): no formula here is theirs."""
+    found = scene.links.held(len(bodies))
+    if scene.thrusts:
+        found |= np.isin(bodies.names, [thrust.body for thrust in scene.thrusts])
+    return found
 
 
 def free_flight(
@@ -165,7 +176,8 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
     reaches a plane. Contacts that the engine missed count where the run was audited; a missed bounce does not
     end the bouncing, which is right then.
 
-    A run that actions interfered with has none.
+    A run that actions interfered with has none, nor has a body that is joined to something, attracted or thrust. Only
+    a ball bounces by formula; other shapes have theirs up to the first contact.
     """
     bodies = scene.bodies
     if trajectory.info.get("actions") or trajectory.names.tolist() != list(bodies.names) or bodies.fixed[number]:
@@ -175,15 +187,16 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
 
 
 def _flying(trajectory: Trajectory, scene: Scene, bodies: Bodies, number: int) -> ClosedForm | None:
-    if why_not(scene) is not None:
+    if why_not(scene) is not None or driven(scene, bodies)[number]:
         return None
     start = bodies.position[number], bodies.velocity[number]
     position, velocity = free_flight(trajectory.time, *start, scene.world)
     valid = trajectory.time < valid_until(trajectory, number)
     if bodies.elements[bodies.element[number]].collides != "none":
+        angle = bodies.angle[number] + trajectory.time * bodies.angular_velocity[number]
         for plane in scene.planes:
             point, normal = np.asarray(plane.point), _unit(plane)
-            gap = (position - point) @ normal - bodies.radius[number]
+            gap = gap_above(bodies, number, position, angle, point, normal)
             noise = TOUCH + 4.0 * np.finfo(np.float64).eps * float(np.abs((start[0], point)).max())
             valid &= ~np.logical_or.accumulate(gap < -noise)
     return ClosedForm(position, velocity, valid)
@@ -214,12 +227,14 @@ class Bouncing(NamedTuple):
 
 
 def bouncing(scene: Scene, bodies: Bodies, number: int) -> Bouncing | None:
-    """Return the bouncing of a body, as long as it meets nothing but the plane; None where it is no such case.
+    """Return the bouncing of a ball, as long as it meets nothing but the plane; None where it is no such case.
 
-    The scene has one plane, gravity is square to it or 0, there is no drag, and nothing rubs: friction is 0, or
-    the ball neither spins nor moves along the plane.
+    Nothing holds, draws or drives it. The scene has one plane, gravity is square to it or 0, there is no drag, and
+    nothing rubs: friction is 0, or the ball neither spins nor moves along the plane.
     """
     world, collides = scene.world, bodies.elements[bodies.element[number]].collides
+    if not bodies.round[number] or scene.attractions or driven(scene, bodies)[number]:
+        return None
     if len(scene.planes) != 1 or world.linear_drag > 0 or world.quadratic_drag > 0 or collides == "none":
         return None
     normal, pull = _unit(scene.planes[0]), np.asarray(world.gravity)

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.measure.potential import Potential
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.trajectory import BoolArray, FloatArray, Frame, Trajectory
@@ -18,7 +19,7 @@ class Energies(NamedTuple):
     kinetic: FloatArray
     """(T,) ½ m v² + ½ I ω²"""
     potential: FloatArray
-    """(T,) −m g·x: 0 at the origin"""
+    """(T,) −m g·x, 0 at the origin, and what springs and attraction store"""
     total: FloatArray
     """(T,)"""
 
@@ -28,8 +29,9 @@ def energies(
 ) -> Energies:
     """Return the energy of all bodies that move, or of one.
 
-    A body counts from its first frame until it is retired; a fixed one counts nothing. Gravity is the
-    scene's, the moment that of a uniform disc. Where a run diverged, energy may be infinite or nan.
+    A body counts from its first frame until it is retired; a fixed one counts nothing. Gravity, springs and
+    attraction are the scene's; a spring counts as long as both its bodies do, and of one body half of what it shares
+    with another (`potential.Potential`). Where a run diverged, energy may be infinite or nan.
 
     Args:
         trajectory: the run.
@@ -54,24 +56,30 @@ def energies(
     mass = np.where(bodies.fixed, 0.0, bodies.mass)[columns]
     moment = np.where(bodies.fixed, 0.0, bodies.moment)[columns]
     gravity = np.asarray(scene.world.gravity)
-    gone = np.where(np.isnan(trajectory.retired_time), np.inf, trajectory.retired_time)[columns]
-    seen = np.zeros(len(mass), dtype=np.bool_)
+    stored = Potential(scene, bodies, body)
+    looked = slice(None) if stored else columns  # who is there, of whom one may be joined to
+    own = columns if stored else slice(None)
+    gone = np.where(np.isnan(trajectory.retired_time), np.inf, trajectory.retired_time)[looked]
+    seen = np.zeros(len(gone), dtype=np.bool_)
     kinetic, potential = np.empty(frames), np.empty(frames)
 
-    step = max(1, CHUNK // max(1, len(mass)))
+    step = max(1, CHUNK // max(1, len(gone)))
     for begin in range(0, frames, step):
         rows = slice(begin, begin + step)
         position, velocity = trajectory.position[rows, columns], trajectory.velocity[rows, columns]
         spin = trajectory.angular_velocity[rows, columns]
-        there = _there(position, seen)
+        there = _there(trajectory.position[rows, looked], seen)
         seen = there[-1]
-        counts = there & (trajectory.time[rows, None] < gone)
+        present = there & (trajectory.time[rows, None] < gone)
+        counts = present[:, own]
         # A diverged state squares to infinity: that is its energy, not a fault.
         with np.errstate(over="ignore", invalid="ignore"):
             squared = np.einsum("tnk,tnk->tn", velocity, velocity)
             turning = _sum(np.square(spin), counts, moment)
             kinetic[rows] = 0.5 * (_sum(squared, counts, mass) + turning)
             potential[rows] = -_sum(position @ gravity, counts, mass)
+            if stored:
+                potential[rows] += stored.at(trajectory.position[rows], trajectory.angle[rows], present)
     with np.errstate(invalid="ignore"):
         return Energies(kinetic, potential, kinetic + potential)
 
@@ -87,8 +95,17 @@ def _sum(values: FloatArray, counts: BoolArray, weights: FloatArray) -> FloatArr
     return np.asarray(np.where(counts, values, 0.0) @ weights)
 
 
-def energy_of(frame: Frame, bodies: Bodies, gravity: tuple[float, float]) -> tuple[float, float, float]:
-    """Return the kinetic, potential and total energy of one state, J; of those who are there and move."""
+def energy_of(
+    frame: Frame, bodies: Bodies, gravity: tuple[float, float], scene: Scene | None = None
+) -> tuple[float, float, float]:
+    """Return the kinetic, potential and total energy of one state, J; of those who are there and move.
+
+    Args:
+        frame: the state.
+        bodies: at least those of the frame, numbered alike.
+        gravity: m/s².
+        scene: whose springs and attractions count too; without, none do.
+    """
     count = len(frame.position)
     counts = frame.present & ~bodies.fixed[:count]
     mass, moment = bodies.mass[:count][counts], bodies.moment[:count][counts]
@@ -96,4 +113,8 @@ def energy_of(frame: Frame, bodies: Bodies, gravity: tuple[float, float]) -> tup
         squared = np.einsum("nk,nk->n", frame.velocity[counts], frame.velocity[counts])
         kinetic = 0.5 * float(mass @ squared + moment @ np.square(frame.angular_velocity[counts]))
         potential = -float(mass @ (frame.position[counts] @ np.asarray(gravity)))
+        if scene is not None:
+            stored = Potential(scene, bodies if count == len(bodies) else bodies.some(np.arange(count)))
+            if stored:
+                potential += float(stored.at(frame.position[None], frame.angle[None], frame.present[None])[0])
         return kinetic, potential, kinetic + potential

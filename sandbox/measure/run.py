@@ -13,6 +13,7 @@ from sandbox.engines.registry import engine_named
 from sandbox.engines.relay import start
 from sandbox.measure.audit import Audit
 from sandbox.measure.energy import energies
+from sandbox.measure.joint_error import joint_error
 from sandbox.measure.recorder import Recorder, TooLargeError
 from sandbox.measure.schedule import ROUNDING, Stretch, schedule
 from sandbox.measure.versions import versions
@@ -92,6 +93,7 @@ def run(
     trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, missed, info)
     total = energies(trajectory.at([0, -1]), scene, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
+    info["joint_error"] = joint_error(trajectory, scene)
     return trajectory
 
 
@@ -112,7 +114,7 @@ def _refused(scene: Scene, engine: str, settings: Settings, actions: tuple[Actio
     count = len(scene.bodies)
     outcome = {"status": "refused", "reason": reason, "steps": 0, "seconds": 0.0, "work": {}, "audited": False}
     outcome["state_hash"] = None
-    info = _info(scene, engine, settings, actions, **outcome, energy_start=None, energy_end=None)
+    info = _info(scene, engine, settings, actions, **outcome, energy_start=None, energy_end=None, joint_error=None)
     shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
     frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}
     return _trajectory(frames, scene.bodies, Contacts.none(), np.full(count, np.nan), _no_misses(), info)

@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import pygame
 
+from sandbox.action import Throttle
 from sandbox.play.hands import Hands
 from sandbox.play.running.live import Live
-from sandbox.scene.model import Scene
+from sandbox.scene.model import Scene, default_name
 
 ARROWS = {
     pygame.K_LEFT: (-1.0, 0.0),
@@ -16,6 +17,8 @@ ARROWS = {
     pygame.K_UP: (0.0, 1.0),
     pygame.K_DOWN: (0.0, -1.0),
 }
+
+KEYS = {"left": pygame.K_LEFT, "right": pygame.K_RIGHT, "up": pygame.K_UP, "down": pygame.K_DOWN}
 
 Deed = Callable[[Live], object]
 
@@ -27,10 +30,12 @@ class Claims(NamedTuple):
     """by key"""
     told: tuple[tuple[str, str], ...]
     """keys and what they do, as help names them"""
+    releases: dict[int, Deed]
+    """by key, what is done when it is let go"""
 
     def deed(self, key: int, again: bool) -> Deed | None:
-        """Return what a key does; held, and so pressed again and again, only the arrows go on."""
-        return None if again and key not in ARROWS else self.deeds.get(key)
+        """Return what a key does; held, and so pressed again and again, only arrows that move something go on."""
+        return None if again and (key not in ARROWS or key in self.releases) else self.deeds.get(key)
 
 
 def claims(scene: Scene, hands: Hands) -> Claims:
@@ -45,7 +50,22 @@ def claims(scene: Scene, hands: Hands) -> Claims:
     if generator is not None:
         deeds[pygame.K_SPACE] = partial(_relaunch, generator=generator)
         told.append(("Space", f"launch {generator} again"))
-    return Claims(deeds, tuple(told))
+    releases: dict[int, Deed] = {}
+    for k, thrust in enumerate(scene.thrusts):
+        if thrust.key is not None:
+            name = thrust.name or default_name("thrust", k)
+            key = KEYS[thrust.key]
+            deeds[key] = partial(_throttle, thrust=name, level=1.0, also=deeds.get(key))
+            releases[key] = partial(_throttle, thrust=name, level=0.0, also=releases.get(key))
+            told.append((thrust.key.capitalize(), f"fire {name}"))
+    return Claims(deeds, tuple(told), releases)
+
+
+def _throttle(live: Live, thrust: str, level: float, also: Deed | None) -> None:
+    """Open or close a thrust, after another that has the same key."""
+    if also is not None:
+        also(live)
+    live.act(Throttle(time=0.0, thrust=thrust, level=level))
 
 
 def _shift(live: Live, hands: Hands, body: str, by: tuple[float, float]) -> None:

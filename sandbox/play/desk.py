@@ -74,7 +74,7 @@ class Desk:
     def claims(self, stage: Stage) -> Claims:
         """Return the keys that the scene claims."""
         if not isinstance(stage.show, Live):
-            return Claims({}, ())
+            return Claims({}, (), {})
         key = stage.show.scene.play
         if self._claims is None or self._claims[0] is not key:
             self._claims = key, claims(stage.show.scene, stage.hands)

@@ -4,14 +4,17 @@ import numpy as np
 
 from sandbox.play.camera import Box
 from sandbox.scene.bodies import Bodies
+from sandbox.scene.links import LinkKind
 from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray
+from sandbox.trajectory import BoolArray, FloatArray
 
 LOOKS = 17
 """Moments of free flight that are looked at."""
 OUTLIERS = 0.5
 """Per cent of the places at each side that need not be seen, where there are many."""
 MANY = 1000
+ANCHORED = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.SPRING)
+"""Joints that hold in a point."""
 LARGEST = 1e15
 """m: what lies beyond does not count"""
 FAR = 20.0
@@ -25,6 +28,7 @@ def framing(scene: Scene) -> Box:
     start = around(bodies.position, bodies.radius)
     if start is None:
         start = _union([(corners.min(axis=0), corners.max(axis=0)) for corners in things] or [(-ONE, ONE)])
+    start = _union([start, *_swings(scene, bodies, start)])
     flown = _union([start, *_flight(scene, bodies)])
     met = [(corners.min(axis=0), corners.max(axis=0)) for corners in things]
     met = [each for each in met if (each[0] <= flown[1]).all() and (each[1] >= flown[0]).all()]
@@ -67,7 +71,7 @@ def around(position: FloatArray, radius: FloatArray) -> Corners | None:
 def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
     """Return the box in which the bodies fly, as far as planes and bounds let them."""
     world = scene.world
-    chosen = np.flatnonzero(~bodies.fixed)
+    chosen = np.flatnonzero(~_tethered(scene, bodies))
     chosen = chosen[:: max(1, len(chosen) // 5000)]  # so many are enough to tell
     time = np.linspace(0.0, world.duration, LOOKS)[:, None, None]
     start, velocity = bodies.position[chosen], bodies.velocity[chosen]
@@ -85,6 +89,39 @@ def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
     counts = np.logical_and.accumulate(counts, axis=0)
     found = around(place[counts], radius[counts])
     return [] if found is None else [found]
+
+
+def _tethered(scene: Scene, bodies: Bodies) -> BoolArray:
+    """Return which bodies are fixed, or joined to the world or to such a body, or to one joined so, (N,)."""
+    links, found = scene.links.of(*ANCHORED), bodies.fixed.copy()
+    found[links.b[links.a < 0]] = True
+    a, b = links.a[links.a >= 0], links.b[links.a >= 0]
+    count = -1
+    while (now := int(found.sum())) != count:
+        count, either = now, found[a] | found[b]
+        found[a[either]] = found[b[either]] = True
+    return found
+
+
+def _swings(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
+    """Return the boxes of where the world holds bodies, and of how far those on rods and strings swing to and fro."""
+    links = scene.links
+    if not len(links):
+        return []
+    nails = links.some((links.a < 0) & np.isin(links.kind, ANCHORED))
+    anchor, held = nails.anchor_a, bodies.position[nails.b]
+    size = float((start[1] - start[0]).max())
+    near = ((anchor >= start[0] - FAR * size) & (anchor <= start[1] + FAR * size)).all(axis=1)
+    places = [anchor[near]]
+    if scene.world.gravity[0] == 0.0 and scene.world.gravity[1] < 0.0:
+        swing = near & np.isin(nails.kind, (LinkKind.ROD, LinkKind.SLIDE)) & ~bodies.fixed[nails.b]
+        anchor, held, radius = anchor[swing], held[swing], bodies.radius[nails.b[swing]][:, None]
+        length = np.hypot(*(held - anchor).T)
+        other = np.column_stack((2.0 * anchor[:, 0] - held[:, 0], held[:, 1]))
+        lowest = anchor - np.column_stack((np.zeros(len(length)), length))
+        places += [each + sign * radius for each in (other, lowest) for sign in (-1.0, 1.0)]
+    found = np.concatenate(places)
+    return [(found.min(axis=0), found.max(axis=0))] if len(found) else []
 
 
 def _things(scene: Scene) -> list[FloatArray]:

@@ -148,7 +148,7 @@ class Hands:
         live.act(Impulse(time=0.0, body=live.bodies.names[number], impulse=(0.6 * kick, 0.8 * kick)))
 
     def add(self, live: Live, place: Place, size: float, *, box: bool = False) -> None:
-        """Put a new ball or box at a place: like the picked body, or like the first, else of a size that suits the view.
+        """Put a new ball or box at a place: like the picked body, or like the first, else as suits the view.
 
         What is like a body of another shape is about as large as it, and of its density.
 

@@ -120,25 +120,20 @@ def meeting(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, FloatArray
         a: one.
         b: the other.
         tolerance: places that are farther by no more count as nearest as well; theirs is the mean of all.
-
-    Limits: how deep two overlap is told by the corners of each in the other, and is no least way out; where sides
-    cross and no corner lies in the other, by their radii alone.
     """
     gaps, places = [], []
     for one, other in ((a, b), (b, a)):
-        bare = hull_distance(Hull(other.corners, 0.0))(one.corners[:, 0], one.corners[:, 1])
         foot = _foot(one.corners, other.corners)
         away = one.corners - foot
-        length = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-300)[:, None]
+        length = np.hypot(away[:, 0], away[:, 1])[:, None]
         # Between the two surfaces, in the middle of what is left, or of what overlaps.
         share = 0.5 * (length + other.radius - one.radius)
-        places.append(foot + away / length * share)
-        gaps.append(bare)
+        places.append(foot + away / np.maximum(length, 1e-300) * share)
+        gaps.append(length[:, 0])
     gap, place = np.concatenate(gaps), np.concatenate(places)
-    least = float(gap.min())
-    if least > 0.0 and _cross(a.corners, b.corners):
-        least = 0.0
     kept = gap <= float(gap.min()) + tolerance
+    apart = _separation(a.corners, b.corners)
+    least = apart if -math.inf < apart <= 0.0 else float(gap.min())
     return least - a.radius - b.radius, np.asarray(place[kept].mean(axis=0))
 
 
@@ -159,12 +154,21 @@ def _foot(places: FloatArray, corners: FloatArray) -> FloatArray:
     return np.asarray(foot[np.arange(len(places)), best])
 
 
-def _cross(a: FloatArray, b: FloatArray) -> bool:
-    """Tell whether a side of one crosses a side of the other."""
-    (p, u), (q, v) = _sides(a), _sides(b)
-    gap = q[None] - p[:, None]
-    turn = u[:, None, 0] * v[None, :, 1] - u[:, None, 1] * v[None, :, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = (gap[..., 0] * v[None, :, 1] - gap[..., 1] * v[None, :, 0]) / turn
-        t = (gap[..., 0] * u[:, None, 1] - gap[..., 1] * u[:, None, 0]) / turn
-    return bool(((turn != 0.0) & (s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)).any())
+def _separation(a: FloatArray, b: FloatArray) -> float:
+    """Return how far two hulls without radius are apart along the side that parts them best; negative: they overlap.
+
+    The separating axis theorem. Of places alone, which have no sides, it knows nothing: −inf.
+    """
+    best = -math.inf
+    for one, other in ((a, b), (b, a)):
+        start, along = _sides(one)
+        length = np.hypot(along[:, 0], along[:, 1])
+        normal = (np.column_stack((along[:, 1], -along[:, 0])) / np.maximum(length, 1e-300)[:, None])[length > 0.0]
+        if not len(normal):
+            continue
+        if len(one) == 2:
+            normal, start = np.vstack((normal, -normal)), np.vstack((start, start))
+        elif _area(one) < 0.0:
+            normal = -normal
+        best = max(best, float(((other[None] - start[:, None]) * normal[:, None]).sum(-1).min(axis=1).max()))
+    return best

@@ -7,6 +7,7 @@ from sandbox.action import Action, SetParameter, Switch
 from sandbox.engines.registry import ENGINES
 from sandbox.play.instruments.knob import Knob, Value
 from sandbox.play.running.live import Live
+from sandbox.scene.elements import mover_of
 from sandbox.scene.model import Mover, Scene
 from sandbox.scene.settings import Detection, Integrator, Settings
 
@@ -94,13 +95,13 @@ def _surface(live: Live, file: Scene, picked: int | None, key: str, high: float)
     Where pairs of materials state it, they are turned: they outrank what a ball states.
     """
     scene = live.scene
-    element = int(live.bodies.element[picked]) if picked is not None else 0
-    if element >= len(scene.movers):
+    place = _place(live, picked)
+    if place >= len(scene.movers):
         if picked is None:
             return Knob(key, key, 0.0, high, 0.0, enabled=False, why="there is no ball")
-        value = getattr(live.bodies.elements[element], key) or 0.0
+        value = getattr(live.bodies.elements[live.bodies.element[picked]], key) or 0.0
         return Knob(key, key, 0.0, high, value, enabled=False, why="a ball added by hand keeps its own")
-    disc = scene.movers[element]
+    disc = scene.movers[place]
     label = key if picked is None else f"{key} of {disc.name or 'this'}"
     default = None
     pairs = _pairs(scene, disc if picked is not None else None)
@@ -111,9 +112,14 @@ def _surface(live: Live, file: Scene, picked: int | None, key: str, high: float)
         if picked is not None:
             label = f"{key} of {disc.material}"
         return Knob(key, label, 0.0, high, value, default=default)
-    if element < len(file.movers):
-        default = stated(file, file.movers[element], key)
+    if place < len(file.movers):
+        default = stated(file, file.movers[place], key)
     return Knob(key, label, 0.0, high, stated(scene, disc, key), default=default)
+
+
+def _place(live: Live, picked: int | None) -> int:
+    """Return the place among the scene's movers of a picked body's, or else of the first."""
+    return 0 if picked is None else mover_of(live.scene, int(live.bodies.element[picked]))
 
 
 def _pairs(scene: Scene, disc: Mover | None) -> list[int]:
@@ -143,18 +149,18 @@ def turned(live: Live, key: str, value: Value, picked: int | None) -> list[Actio
 def _paths(live: Live, key: str, picked: int | None) -> list[str]:
     """Return where a figure stands: of the picked body or its material, or of all pairs, balls and generators."""
     scene = live.scene
-    element = int(live.bodies.element[picked]) if picked is not None else 0
-    if element < len(scene.movers):
-        pairs = _pairs(scene, scene.movers[element] if picked is not None else None)
+    place = _place(live, picked)
+    if place < len(scene.movers):
+        pairs = _pairs(scene, scene.movers[place] if picked is not None else None)
         if pairs:
             return [f"pair.{n}.{key}" for n in pairs] if picked is not None else [f"pair.*.{key}"]
     lists: list[tuple[str, Sequence[Mover]]] = list(scene.kinds.items())
     if picked is None:
         return [f"{kind}.{each}.{key}" for kind, discs in lists if discs for each in _every(discs)]
     for kind, discs in lists:
-        if element < len(discs):
-            return [f"{kind}.{_part(discs, element)}.{key}"]
-        element -= len(discs)
+        if place < len(discs):
+            return [f"{kind}.{_part(discs, place)}.{key}"]
+        place -= len(discs)
     return []
 
 

@@ -13,6 +13,7 @@ from types import FrameType
 import pygame
 
 from sandbox.engines.compiling import COMPILING
+from sandbox.play.claims import Deed
 from sandbox.play.commands import Commands
 from sandbox.play.keys import Keyboard
 from sandbox.play.mouse import Mouse
@@ -50,6 +51,7 @@ class Window(Seat):
         """
         super().__init__(open_screen(size, TITLE), unit(), stage, folder or Path(), film, say)
         self._keyboard = Keyboard()
+        self._held: dict[int, Deed] = {}  # claimed keys that are down, and what is done when they are let go
         self.mouse = Mouse(self)
         self.commands = Commands(self, self.mouse)
         self._clock = pygame.time.Clock()
@@ -98,16 +100,31 @@ class Window(Seat):
         elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
             self._resize()
         command = self._keyboard.command(event, self.desk.claimed(self.stage))
+        self._let_go(event)
         if self.desk.handle(event, self.stage):
             return
         if command is not None:
             self.commands.do(command)
         elif event.type == pygame.KEYDOWN:
-            deed = self.desk.claims(self.stage).deed(event.key, self._keyboard.again)
+            claims = self.desk.claims(self.stage)
+            deed = claims.deed(event.key, self._keyboard.again)
             if deed is not None and not event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
                 self.stage.act(deed)
+                if event.key in claims.releases:
+                    self._held[event.key] = claims.releases[event.key]
         else:
             self.mouse.take(event)
+
+    def _let_go(self, event: pygame.event.Event) -> None:
+        """Do what the release of a claimed key asks for, also where the release itself will go elsewhere."""
+        if event.type == pygame.WINDOWFOCUSLOST:
+            gone = list(self._held)
+        else:
+            gone = [event.key] if event.type == pygame.KEYUP else []
+        for key in gone:
+            deed = self._held.pop(key, None)
+            if deed is not None and self.stage.live is not None:
+                self.stage.act(deed)
 
     def _resize(self) -> None:
         surface = pygame.display.get_surface()

@@ -79,9 +79,10 @@ def draw_fixed(panel: Axes, scene: Scene) -> None:
     bodies = scene.bodies
     for number in np.flatnonzero(bodies.fixed).tolist():
         pieces = _pieces(bodies, number)
+        edge = SOLID if len(pieces) == 1 else SOLID | {"lw": 2.0 * SOLID["lw"]}
         for piece in pieces:
-            panel.add_artist(Polygon(piece, fill=False, **SOLID))
-        for piece in pieces if len(pieces) > 1 else ():  # of what several make up, the outer edge alone is seen
+            panel.add_artist(Polygon(piece, fill=False, **edge))
+        for piece in pieces if len(pieces) > 1 else ():  # of what several make up, only the outer half of edges is seen
             inside = {"color": panel.get_facecolor(), "lw": 0.0, "zorder": SOLID["zorder"] + 0.01}
             panel.add_artist(Polygon(piece, **inside))
 

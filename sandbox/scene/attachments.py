@@ -1,14 +1,22 @@
 """Checks of what refers to bodies: joints, thrusts and attractions."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.faults import Location
-from sandbox.scene.joints import Groove, Joint, Pivot, Rod, RotaryLimit, Slide
-from sandbox.scene.model import Scene
+from sandbox.scene.forces import Attraction, Thrust
+from sandbox.scene.joints import Gear, Groove, Joint, Pivot, Rod, RotaryLimit, Slide
+from sandbox.scene.linking import ends_of
+from sandbox.scene.model import Scene, default_name
 
 Found = tuple[Location, str]
+
+SHORTEST = 1e-9
+"""m, of rods and grooves"""
+
+LEAST_RATIO = 1e-6
+"""of gears; engines divide by it"""
 
 
 def attachments(scene: Scene, bodies: Bodies) -> list[Found]:
@@ -18,7 +26,7 @@ def attachments(scene: Scene, bodies: Bodies) -> list[Found]:
 
 def _joints(scene: Scene, bodies: Bodies) -> Iterator[Found]:
     number = {name: k for k, name in enumerate(bodies.names)}
-    seen: set[str] = set()
+    yield from _names("joint", scene.joints)
     for k, joint in enumerate(scene.joints):
         for side, name in enumerate(joint.between):
             if name not in number:
@@ -27,11 +35,33 @@ def _joints(scene: Scene, bodies: Bodies) -> Iterator[Found]:
             yield ("joint", k, "between"), "these are one and the same body; name two, or one to join it to the world"
         elif all(name in number and bodies.fixed[number[name]] for name in joint.between):
             yield ("joint", k, "between"), "nothing here can move: the body, or both of them, are fixed"
+        else:
+            yield from _coincident(k, joint, bodies, number)
         for where, message in _figures(joint):
             yield ("joint", k, where), message
-        if joint.name is not None and joint.name in seen:
-            yield ("joint", k, "name"), f"a second joint named {joint.name!r}; names are unique"
-        seen.add(joint.name or "")
+
+
+def _names(kind: str, those: Sequence[Joint | Thrust | Attraction]) -> Iterator[Found]:
+    """Yield those whose name another one of the kind has, stated or by its place in the file."""
+    seen: set[str] = set()
+    for k, each in enumerate(those):
+        name = each.name or default_name(kind, k)
+        if name in seen:
+            yield (kind, k, "name"), f"a second {kind} named {name!r}; names are unique"
+        seen.add(name)
+
+
+def _coincident(k: int, joint: Joint, bodies: Bodies, number: dict[str, int]) -> Iterator[Found]:
+    """Yield a rod that starts between points in one place, where it has no direction."""
+    if not isinstance(joint, Rod) or any(name not in number for name in joint.between) or joint.length == 0.0:
+        return
+    start, end = ends_of(joint, bodies, number)
+    if math.dist(start, end) < SHORTEST:
+        message = (
+            f"the two points that it holds start at ({start[0]:g}, {start[1]:g}) m both, where a rod has no direction; "
+            "put them apart by `anchors`, or use a pivot"
+        )
+        yield ("joint", k, "anchors" if "anchors" in joint.model_fields_set else "between"), message
 
 
 def _figures(joint: Joint) -> Iterator[tuple[str, str]]:
@@ -41,19 +71,23 @@ def _figures(joint: Joint) -> Iterator[tuple[str, str]]:
             if (joint.at is None) == (joint.anchors is None):
                 yield "at", "state either `at`, a place in the world, or `anchors`, one in each body's own frame"
         case Rod():
-            if joint.length == 0.0:
-                yield "length", "a rod of no length; a pivot holds two points together"
+            if joint.length is not None and joint.length < SHORTEST:
+                yield "length", f"a rod of no length; at least {SHORTEST:g} m. A pivot holds two points together"
+        case Gear():
+            if abs(joint.ratio) < LEAST_RATIO:
+                yield "ratio", f"is next to nothing; from {LEAST_RATIO:g} or -{LEAST_RATIO:g} on, gears turn each other"
         case Slide() | RotaryLimit():
             if joint.least > joint.most:
                 yield "most", "is smaller than `least`"
         case Groove():
-            if math.dist(*joint.groove) < 1e-9:
-                yield "groove", "has no length; its two ends are at least 1e-09 m apart"
+            if math.dist(*joint.groove) < SHORTEST:
+                yield "groove", f"has no length; its two ends are at least {SHORTEST:g} m apart"
         case _:
             pass
 
 
 def _thrusts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    yield from _names("thrust", scene.thrusts)
     for k, thrust in enumerate(scene.thrusts):
         if thrust.body not in bodies.names:
             yield ("thrust", k, "body"), f"no body is named {thrust.body!r}; {_known(bodies)}"
@@ -64,6 +98,7 @@ def _thrusts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
 
 
 def _attractions(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    yield from _names("attraction", scene.attractions)
     for k, attraction in enumerate(scene.attractions):
         toward = attraction.toward
         if isinstance(toward, str) and toward not in bodies.names:

@@ -10,21 +10,22 @@ from functools import cached_property
 
 import numpy as np
 
-from sandbox.scene.discs import Disc, Emitter, Grid, Scatter
-from sandbox.scene.generators import expand as expand_generator
-from sandbox.scene.generators import size
+from sandbox.scene.discs import Disc
+from sandbox.scene.layout import NOBODY, Layout
+from sandbox.scene.layouts import layout_of
 from sandbox.scene.model import Scene, default_name
 from sandbox.scene.near import BoolArray, FloatArray, IntArray
 from sandbox.scene.part import Point
 from sandbox.scene.shapes import Shapes, form_of, shapes_of
 from sandbox.scene.surfaced import Mover, Single
 
-COLUMNS = ("position", "velocity", "angle", "angular_velocity", "radius", "core", "thin", "mass", "moment", "fixed")
+STATE = ("position", "velocity", "angle", "angular_velocity", "fixed")
+COLUMNS = (*STATE, "radius", "core", "thin", "mass", "moment", "group", "born", "lifetime")
 
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """The bodies of a scene at its start; N of them, from `elements` of the file."""
+    """The bodies of a scene at its start; N of them."""
 
     names: tuple[str, ...]
     position: FloatArray
@@ -47,6 +48,12 @@ class Bodies:
     """(N,) of inertia about the centre of mass, kg·m²"""
     fixed: BoolArray
     """(N,) never moves"""
+    group: IntArray
+    """(N,) bodies of one group pass through each other, such as the limbs of a ragdoll; 0 is none"""
+    born: FloatArray
+    """(N,) s, when its life began"""
+    lifetime: FloatArray
+    """(N,) s, after which it is gone; inf for ever"""
     element: IntArray
     """(N,) index into `elements`"""
     elements: tuple[Mover, ...]
@@ -67,8 +74,7 @@ class Bodies:
 
     def joined_by(self, single: Single, name: str) -> "Bodies":
         """Return these bodies and one more, which gets the next number."""
-        speed = (0.0, 0.0) if single.fixed else single.velocity
-        more = _laid_out([name], [single], [1], _rows([centre_of(single)]), _rows([speed]))
+        more = _joined([name], (single,), [_singles([single])])
         both = {key: np.concatenate((getattr(self, key), getattr(more, key))) for key in COLUMNS}
         element = np.append(self.element, len(self.elements))
         return Bodies(names=(*self.names, name), element=element, elements=(*self.elements, single), **both)
@@ -93,24 +99,18 @@ def expand(scene: Scene) -> Bodies:
         OutlineError: an outline cannot be cut into convex pieces.
     """
     names: list[str] = []
-    elements: list[Mover] = []
-    counts: list[int] = []
-    position, velocity = [np.empty((0, 2))], [np.empty((0, 2))]
+    layouts: list[Layout] = []
     for kind, those in scene.kinds.items():
         singles = [each for each in those if isinstance(each, Single)]
-        position.append(_rows([centre_of(each) for each in singles]))
-        velocity.append(_rows([(0.0, 0.0) if each.fixed else each.velocity for each in singles]))
+        if singles:
+            layouts.append(_singles(singles))
+            names += [each.name or default_name(kind, k) for k, each in enumerate(those)]
+            continue
         for k, each in enumerate(those):
-            stem, count = each.name or default_name(kind, k), 1
-            if isinstance(each, Grid | Scatter | Emitter):
-                count = size(each)
-                places, speeds = expand_generator(each, scene.world.seed, k)
-                position.append(places)
-                velocity.append(speeds)
-            names += [stem] if isinstance(each, Single) else [f"{stem}-{n}" for n in range(1, count + 1)]
-            elements.append(each)
-            counts.append(count)
-    return _laid_out(names, elements, counts, np.concatenate(position), np.concatenate(velocity))
+            layout, stem = layout_of(each, scene.world.seed, k, scene.world.gravity), each.name or default_name(kind, k)
+            layouts.append(layout)
+            names += [f"{stem}-{ending}" for ending in layout.endings or range(1, len(layout) + 1)]
+    return _joined(names, scene.elements, layouts)
 
 
 def centre_of(single: Single) -> Point:
@@ -122,28 +122,46 @@ def centre_of(single: Single) -> Point:
     return x + cos * dx - sin * dy, y + sin * dx + cos * dy
 
 
-def _laid_out(
-    names: list[str], elements: list[Mover], counts: list[int], position: FloatArray, velocity: FloatArray
-) -> Bodies:
-    def each(values: list[float]) -> FloatArray:
-        return np.repeat(np.asarray(values, dtype=np.float64), counts)
+def _singles(singles: list[Single]) -> Layout:
+    """Lay out bodies that each are an element of their own."""
+    spins = [0.0 if each.fixed else each.angular_velocity for each in singles]
+    return Layout(
+        position=_rows([centre_of(each) for each in singles]),
+        velocity=_rows([(0.0, 0.0) if each.fixed else each.velocity for each in singles]),
+        angle=np.asarray([each.angle for each in singles], dtype=np.float64),
+        angular_velocity=np.asarray(spins, dtype=np.float64),
+        fixed=np.asarray([each.fixed for each in singles], dtype=np.bool_),
+        element=np.arange(len(singles)),
+        elements=len(singles),
+    )
 
-    fixed = [isinstance(e, Single) and e.fixed for e in elements]
-    forms = [form_of(e) for e in elements]
+
+def _joined(names: list[str], elements: tuple[Mover, ...], layouts: list[Layout]) -> Bodies:
+    """Put layouts one after the other; each has as many of the elements as its bodies are numbered by."""
+    layouts = [*layouts, NOBODY]
+    used = np.cumsum([0, *(each.elements for each in layouts)])
+    element = np.concatenate([each.element + first for each, first in zip(layouts, used.tolist(), strict=False)])
+    alone = np.cumsum([each.alone for each in layouts])
+    group = [np.full(len(each), number if each.alone else 0) for each, number in zip(layouts, alone, strict=True)]
+    lives = [np.full(len(each), np.inf) if each.lifetime is None else each.lifetime for each in layouts]
+    forms = [form_of(each) for each in elements]
+
+    def of_form(values: list[float]) -> FloatArray:
+        return np.asarray(np.asarray(values, dtype=np.float64)[element])
+
     return Bodies(
         names=tuple(names),
-        position=position,
-        velocity=velocity,
-        angle=each([e.angle for e in elements]),
-        angular_velocity=each([0.0 if still else e.angular_velocity for e, still in zip(elements, fixed, strict=True)]),
-        radius=each([form.reach for form in forms]),
-        core=each([form.core for form in forms]),
-        thin=each([form.thin for form in forms]),
-        mass=each([form.mass for form in forms]),
-        moment=each([form.moment for form in forms]),
-        fixed=np.repeat(np.asarray(fixed, dtype=np.bool_), counts),
-        element=np.repeat(np.arange(len(elements)), counts),
-        elements=tuple(elements),
+        **{key: np.concatenate([getattr(each, key) for each in layouts]) for key in STATE},
+        radius=of_form([form.reach for form in forms]),
+        core=of_form([form.core for form in forms]),
+        thin=of_form([form.thin for form in forms]),
+        mass=of_form([form.mass for form in forms]),
+        moment=of_form([form.moment for form in forms]),
+        group=np.concatenate(group),
+        born=np.zeros(len(names)),
+        lifetime=np.concatenate(lives),
+        element=element,
+        elements=elements,
     )
 
 

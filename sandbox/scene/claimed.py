@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.faults import Location
-from sandbox.scene.model import Scene, default_name
+from sandbox.scene.model import Mover, Scene, Single, default_name
 
 
 def claimed(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
@@ -18,9 +18,16 @@ def claimed(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
 
 
 def generator_names(scene: Scene) -> tuple[str, ...]:
-    """Return a name for each grid, scatter and emitter, in scene order."""
-    kinds = (("grid", scene.grids), ("scatter", scene.scatters), ("emitter", scene.emitters))
-    return tuple(each.name or default_name(kind, k) for kind, those in kinds for k, each in enumerate(those))
+    """Return a name for each generator, in scene order."""
+    return tuple(name for name, _, _ in generators(scene))
+
+
+def generators(scene: Scene) -> Iterator[tuple[str, int, Mover]]:
+    """Yield the name of each generator, its place among its kind, and itself, in scene order."""
+    for kind, movers in scene.kinds.items():
+        for k, mover in enumerate(movers):
+            if not isinstance(mover, Single):
+                yield mover.name or default_name(kind, k), k, mover
 
 
 def _some(names: tuple[str, ...]) -> str:

@@ -8,12 +8,15 @@ import numpy as np
 from sandbox.scene.attachments import attachments
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.claimed import claimed
+from sandbox.scene.elements import elements_of
 from sandbox.scene.faults import Location
-from sandbox.scene.generators import GeneratorError, size
-from sandbox.scene.model import Emitter, Generator, Grid, Mover, Plane, Scatter, Scene, Single, Surfaced
-from sandbox.scene.near import FloatArray, IntArray, near_pairs
-from sandbox.scene.outlines import outlines
-from sandbox.scene.part import BACKING, MAX_BODIES, MAX_POSITION, MAX_SPEED, MAX_STEPS
+from sandbox.scene.generated import generated, tied
+from sandbox.scene.generators import GeneratorError
+from sandbox.scene.layouts import count_of
+from sandbox.scene.model import Mover, Plane, Scene, Single, Surfaced
+from sandbox.scene.near import BoolArray, FloatArray, IntArray, near_pairs
+from sandbox.scene.outlines import outlines, sound
+from sandbox.scene.part import BACKING, MAX_POSITION, MAX_SPEED, MAX_STEPS
 from sandbox.scene.repeats import repeats
 from sandbox.scene.shapes import form_of
 from sandbox.scene.surfaces import bearers_of, numbered
@@ -27,29 +30,49 @@ MAX_PASSING = 1_000_000
 """The same for balls that pass through each other, whose pairs an engine still looks at: a second a step or so."""
 OVERLAP_BUDGET = 50_000_000
 """Candidate pairs looked at before the search for overlaps is given up; a few seconds."""
+PLACES = {"grid": "origin", "scatter": "lower", "stack": "base", "rope": "start", "cloth": "corner"}
+"""The keys that say where a generator is; of everything else it is `position`."""
 SHORTEST = 1e-9
 """m, the least length of a wall's segment"""
 
 
 def crosscheck(scene: Scene) -> list[Found]:
     """Return every fault that lies between the parts of a scene; none means that it can be run."""
-    materials, shapeless = list(_materials(scene)), [*_generators(scene), *outlines(scene)]
-    found = [*materials, *_fixed(scene), *repeats(scene), *shapeless, *_world(scene)]
-    if shapeless:
-        return found  # what follows counts on being able to lay the bodies out
-    found += _masses(scene)
+    materials, shapeless = list(_materials(scene)), [*generated(scene), *outlines(scene)]
+    found = [*materials, *_fixed(scene), *shapeless, *_world(scene)]
+    if shapeless:  # what follows counts on being able to lay the bodies out
+        return [*found, *_of_names(scene, {location[:2] for location, _ in shapeless})]
+    found += [*repeats(scene), *_masses(scene)]
     try:
         bodies = scene.bodies
     except GeneratorError as error:
         return [*found, (error.location, str(error))]
     found += [*_names(scene, bodies), *_states(scene, bodies), *_starts(scene, bodies), *claimed(scene, bodies)]
-    found += attachments(scene, bodies)
+    found += [*attachments(scene, bodies), *tied(scene, bodies)]
     return found if materials else [*found, *_surfaces(scene, bodies)]
+
+
+def _of_names(scene: Scene, wrong: set[Location]) -> list[Found]:
+    """Return what can be told of a scene of which some outlines are wrong: whom its parts speak of."""
+    mended = sound(scene)
+    if any(generated(mended)):
+        return []
+    try:
+        bodies = mended.bodies
+    except GeneratorError as error:
+        return [(error.location, str(error))]
+    found = [*_names(mended, bodies), *attachments(mended, bodies)]
+    return [each for each in found if each[0][:2] not in wrong]
 
 
 def _elements(scene: Scene) -> list[tuple[Location, Mover]]:
     """Return the elements that have bodies with their locations, in scene order."""
     return [((kind, k), element) for kind, elements in scene.kinds.items() for k, element in enumerate(elements)]
+
+
+def _owners(scene: Scene) -> list[tuple[Location, Mover]]:
+    """Return what `Bodies.elements` lists, each with the location of what stands for it."""
+    return [(location, each) for location, mover in _elements(scene) for each in elements_of(mover)]
 
 
 def _things(scene: Scene) -> list[tuple[Location, Surfaced]]:
@@ -90,7 +113,7 @@ def _materials(scene: Scene) -> Iterator[Found]:
 
 
 def _masses(scene: Scene) -> Iterator[Found]:
-    for location, element in _elements(scene):
+    for location, element in _owners(scene):
         if element.mass is not None and element.density is not None:
             yield (*location, "density"), "mass and density are both stated; state one of them"
             continue
@@ -120,20 +143,6 @@ def _fixed(scene: Scene) -> Iterator[Found]:
                 yield ("wall", k, "points", n), message
 
 
-def _generators(scene: Scene) -> Iterator[Found]:
-    for k, scatter in enumerate(scene.scatters):
-        if any(low > high for low, high in zip(scatter.lower, scatter.upper, strict=True)):
-            yield ("scatter", k, "upper"), "lies below or left of `lower`; it is the upper right corner"
-    for k, emitter in enumerate(scene.emitters):
-        if any(low > high for low, high in zip(emitter.velocity_min, emitter.velocity_max, strict=True)):
-            yield ("emitter", k, "velocity_max"), "is smaller than `velocity_min` in a component"
-    generators: tuple[Generator, ...] = (*scene.grids, *scene.scatters, *scene.emitters)
-    total = sum(len(those) for those in scene.kinds.values()) - len(generators) + sum(map(size, generators))
-    if total > MAX_BODIES:
-        location = next((where for where, _ in reversed(_elements(scene))), ())
-        yield location, f"the scene would hold {total:,} bodies; at most {MAX_BODIES:,}"
-
-
 def _world(scene: Scene) -> Iterator[Found]:
     if scene.world.bounds is not None:
         lower, upper = scene.world.bounds
@@ -148,11 +157,11 @@ def _world(scene: Scene) -> Iterator[Found]:
 
 def _names(scene: Scene, bodies: Bodies) -> Iterator[Found]:
     seen: set[str] = set()
-    elements, twice = _elements(scene), set[int]()
+    owners, twice = _owners(scene), set[Location]()
     for name, element in zip(bodies.names, bodies.element.tolist(), strict=True):
-        if name in seen and element not in twice:
-            twice.add(element)
-            yield (*elements[element][0], "name"), _taken(name)
+        if name in seen and owners[element][0] not in twice:
+            twice.add(owners[element][0])
+            yield (*owners[element][0], "name"), _taken(name)
         seen.add(name)
     for name, (location, _) in zip(scene.fixed_names, _things(scene), strict=True):
         if name in seen:
@@ -171,23 +180,23 @@ def _surfaces(scene: Scene, bodies: Bodies) -> Iterator[Found]:
 
 def _states(scene: Scene, bodies: Bodies) -> Iterator[Found]:
     """Check places and speeds that a generator may have carried out of range."""
-    elements = _elements(scene)
+    owners = _owners(scene)
     for wrong, message in (
         (np.abs(bodies.position).max(axis=1, initial=0) > MAX_POSITION, f"a body lies beyond ±{MAX_POSITION:g} m"),
         (np.hypot(*bodies.velocity.T) > MAX_SPEED, f"a body is faster than {MAX_SPEED:g} m/s"),
     ):
         for element in _each(bodies.element[wrong]):
-            yield elements[element][0], message
+            yield owners[element][0], message
     if scene.world.bounds is not None:
         lower, upper = np.asarray(scene.world.bounds)
         outside = ((bodies.position < lower) | (bodies.position > upper)).any(axis=1)
         for element in _each(bodies.element[outside]):
-            yield elements[element][0], "starts outside world.bounds, where bodies are retired"
+            yield owners[element][0], "starts outside world.bounds, where bodies are retired"
 
 
 def _starts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
     """Check that bodies start where an engine can tell inside from outside."""
-    elements = _elements(scene)
+    owners, elements = _owners(scene), _elements(scene)
     touches = np.asarray([e.collides != "none" for e in bodies.elements], dtype=bool)[bodies.element]
     for plane, name in zip(scene.planes, scene.fixed_names, strict=False):
         if not has_direction(plane):
@@ -199,14 +208,14 @@ def _starts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
                 f"a centre starts {deepest:g} m behind the plane {name!r}; at most {BACKING:g}, "
                 "or it would leave on the wrong side"
             )
-            location = elements[element][0]
-            key = {"grid": "origin", "scatter": "lower"}.get(str(location[0]), "position")
+            location = owners[element][0]
+            key = PLACES.get(str(location[0]), "position")
             yield (*location, key), message
 
     movers = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
     most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(movers.sum())
     overlaps = count_overlaps(bodies.position[movers], bodies.core[movers], most)
-    location = max(elements, key=lambda e: _population(e[1]))[0] if elements else ()
+    location = max(elements, key=lambda e: count_of(e[1]))[0] if elements else ()
     if overlaps > most:
         message = (
             f"the scene starts with {overlaps:,} or more overlapping pairs of bodies; at most {most:,} can be solved. "
@@ -214,6 +223,12 @@ def _starts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
         )
         yield location, message
         return
+    if _crowd(bodies, movers):
+        message = (
+            f"the scene starts with more than {MAX_PASSING:,} pairs of pieces so near each other that an engine has to "
+            "look at them at every step. Spread the bodies, or use fewer pieces"
+        )
+        yield location, message
     passing = touches & ~bodies.fixed
     most = max(most, MAX_PASSING)
     if passing.sum() > movers.sum() and count_overlaps(bodies.position[passing], bodies.core[passing], most) > most:
@@ -225,12 +240,22 @@ def _starts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
         yield location, message
 
 
+def _crowd(bodies: Bodies, movers: BoolArray) -> bool:
+    """Tell whether the pieces of bodies that are no balls crowd each other: their cores may be anywhere, or nowhere."""
+    among = movers & ~bodies.round
+    if not among.any():
+        return False
+    shapes = bodies.shapes
+    chosen = among[shapes.body]
+    body = shapes.body[chosen]
+    cos, sin = np.cos(bodies.angle[body]), np.sin(bodies.angle[body])
+    x, y = shapes.middle[chosen].T
+    place = bodies.position[body] + np.column_stack((cos * x - sin * y, sin * x + cos * y))
+    return count_overlaps(place, shapes.reach[chosen], MAX_PASSING, body) > MAX_PASSING
+
+
 def _each(elements: IntArray) -> list[int]:
     return sorted(set(elements.tolist()))
-
-
-def _population(element: Mover) -> int:
-    return size(element) if isinstance(element, Grid | Scatter | Emitter) else 1
 
 
 def has_direction(plane: Plane) -> bool:
@@ -244,30 +269,41 @@ def height_above(plane: Plane, position: FloatArray) -> FloatArray:
     return np.asarray((position - np.asarray(plane.point)) @ normal)
 
 
-def count_overlaps(position: FloatArray, radius: FloatArray, enough: float = math.inf) -> int:
+def count_overlaps(
+    position: FloatArray, radius: FloatArray, enough: float = math.inf, owner: IntArray | None = None
+) -> int:
     """Count overlapping pairs, stopping early once more than enough are found or the budget is spent.
 
     Where radii differ much, a great ball makes neighbours of all the small ones, and the budget may be spent before
     a crowd among them is come upon. So each octave of radii is counted by itself first: however the rest goes, of K
     octaves on one spot the pairs are K times those within the octaves at most.
+
+    Args:
+        position: (N, 2) m, of discs.
+        radius: (N,) m.
+        enough: beyond it counting stops.
+        owner: (N,) whose they are; two of one owner are no pair.
     """
-    position, radius = position[radius > 0.0], radius[radius > 0.0]
+    owner = np.arange(len(radius)) if owner is None else owner
+    position, radius, owner = position[radius > 0.0], radius[radius > 0.0], owner[radius > 0.0]
     octave = np.floor(np.log2(radius))
     present = np.unique(octave).tolist()
     alike = 0
     for each in present if len(present) > 1 else ():
-        alike += _overlaps(position[octave == each], radius[octave == each], enough - alike)
+        those = octave == each
+        alike += _overlaps(position[those], radius[those], owner[those], enough - alike)
         if alike > enough:
             return alike
-    return max(alike, _overlaps(position, radius, enough))
+    return max(alike, _overlaps(position, radius, owner, enough))
 
 
-def _overlaps(position: FloatArray, radius: FloatArray, enough: float) -> int:
+def _overlaps(position: FloatArray, radius: FloatArray, owner: IntArray, enough: float) -> int:
     if len(radius) < 2:
         return 0
     overlaps = looked_at = 0
     for i, j in near_pairs(position, 2.0 * float(radius.max())):
-        overlaps += int((np.hypot(*(position[i] - position[j]).T) < radius[i] + radius[j]).sum())
+        near = (np.hypot(*(position[i] - position[j]).T) < radius[i] + radius[j]) & (owner[i] != owner[j])
+        overlaps += int(near.sum())
         looked_at += len(i)
         if overlaps > enough or looked_at > OVERLAP_BUDGET:
             break

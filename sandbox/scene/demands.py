@@ -40,6 +40,7 @@ class Demand(StrEnum):
     ATTRACTION = "attraction"
     THRUST = "thrust"
     BOUNDS = "bounds"
+    LIFETIMES = "lifetimes"
 
 
 BALLS = frozenset(
@@ -55,6 +56,7 @@ BALLS = frozenset(
         Demand.RESTITUTION,
         Demand.FRICTION,
         Demand.BOUNDS,
+        Demand.LIFETIMES,
     }
 )
 """All that a scene of balls and fixed things can demand. Engines list what they have: a new demand is nobody's yet."""
@@ -139,6 +141,8 @@ def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
 
     yield from _joints(scene)
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
+    mortal = int(np.isfinite(bodies.lifetime).sum())
+    yield Demand.LIFETIMES, mortal > 0, _count(mortal, "body lives for a time", "bodies live for a time", "all stay")
 
 
 def _joints(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:

@@ -4,10 +4,11 @@ from typing import Annotated
 
 from pydantic import Field
 
-from sandbox.scene.part import MAX_BODIES, Coordinate, Point, Radius, Velocity
+from sandbox.scene.part import MAX_BODIES, Colour, Coordinate, Point, Radius, Velocity
 from sandbox.scene.surfaced import Collides, Mover, Single
 
 Count = Annotated[int, Field(ge=1, le=MAX_BODIES)]
+Lifetime = Annotated[float, Field(ge=1e-9, le=1e10)]
 
 
 class Disc(Mover):
@@ -57,6 +58,12 @@ class Emitter(Disc):
     """Each component is uniform between the two, m/s."""
     radius: Radius = 0.05
     collides: Collides = "none"
+    lifetime: Lifetime | None = None
+    """s, after which a particle is gone; None for ever"""
+    lifetime_jitter: Annotated[float, Field(ge=0, le=1e10)] = 0.0
+    """Each lives longer or shorter by up to ± this, s; the sooner, the lower its number."""
+    colours: Annotated[tuple[Colour, ...], Field(min_length=2, max_length=64)] | None = None
+    """one after the other over the life of a particle, faded in equal parts; instead of `colour`"""
 
 
 Generator = Grid | Scatter | Emitter

@@ -31,6 +31,7 @@ _EXPECTED = {
     "tuple_type": "an array, such as [0.0, 1.0]",
     "model_type": "a table",
     "model_attributes_type": "a table",
+    "dict_type": "a table",
     "greater_than": "greater than {gt:g}",
     "greater_than_equal": "{ge:g} or more",
     "less_than": "less than {lt:g}",
@@ -46,9 +47,12 @@ _EXPECTED = {
 def explain(details: Any) -> tuple[Location, str]:
     """Return the location of one of pydantic's errors, and what is wrong there and would be right."""
     location = place_of(details)
-    if location[:1] == ("attraction",) and location[2:3] == ("toward",):
-        return location[:3], "is not right here; it should be a place, such as [0.0, 0.0], or the name of a body"
+    if location[:1] == ("cloth",) and location[2:3] == ("pins",):
+        expected = "'top', 'corners', 'left', or the column and row of nodes, such as [[0, 0], [9, 0]]"
+        return location[:3], f"is not right here; it should be {expected}"
     kind, value, context = details["type"], details["input"], details.get("ctx", {})
+    if location[:1] == ("attraction",) and location[2:3] == ("toward",) and (kind != "missing" or len(location) > 3):
+        return location[:3], "is not right here; it should be a place, such as [0.0, 0.0], or the name of a body"
     if kind == "missing":
         return location, "is missing; it must be given"
     if kind == "extra_forbidden":
@@ -66,6 +70,8 @@ def explain(details: Any) -> tuple[Location, str]:
         expected = "text '#rrggbb'" if location[-1] == "colour" else "text without control characters"
     elif kind == "tuple_type" and len(location) == 1:
         expected = f"tables, each headed [[{location[0]}]]"
+    elif location[:1] == ("joint",) and location[-1] == "between":
+        expected = 'the name of one body or of two, such as ["a", "b"]'
     elif kind in ("too_short", "too_long") and location[-1] != "points":
         expected = f"an array of {context.get('max_length', context.get('min_length'))}"
     elif kind in _EXPECTED:

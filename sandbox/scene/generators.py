@@ -45,8 +45,7 @@ def expand(generator: Generator, seed: int, index: int) -> tuple[FloatArray, Flo
     Raises:
         GeneratorError: the balls do not fit.
     """
-    kind = (Grid, Scatter, Emitter).index(type(generator))
-    random = np.random.Generator(np.random.PCG64([seed, kind, index]))
+    random = np.random.Generator(_stream(generator, seed, index))
     match generator:
         case Grid():
             return _grid(generator, random)
@@ -54,6 +53,24 @@ def expand(generator: Generator, seed: int, index: int) -> tuple[FloatArray, Flo
             return _scatter(generator, random, index)
         case Emitter():
             return _emitter(generator, random)
+
+
+def lifetimes(emitter: Emitter, seed: int, index: int) -> FloatArray:
+    """Return how long each particle lives, (N,) s, shortest first; inf for ever.
+
+    What is drawn is independent of the velocities, which all are drawn alike: to sort it changes nothing that can be
+    seen of the particles, and lets those that are left have consecutive numbers.
+    """
+    if emitter.lifetime is None:
+        return np.full(emitter.count, np.inf)
+    stream = _stream(emitter, seed, index)
+    stream.advance(2 * emitter.count)  # past the velocities: a draw is one step of the stream
+    random = np.random.Generator(stream).random(emitter.count)
+    return np.sort(emitter.lifetime + (random * 2.0 - 1.0) * emitter.lifetime_jitter)
+
+
+def _stream(generator: Generator, seed: int, index: int) -> np.random.PCG64:
+    return np.random.PCG64([seed, (Grid, Scatter, Emitter).index(type(generator)), index])
 
 
 def _spread(random: np.random.Generator, count: int, half_width: float) -> FloatArray:

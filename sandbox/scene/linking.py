@@ -21,6 +21,7 @@ from sandbox.scene.joints import (
 from sandbox.scene.links import WORLD, LinkKind, Links
 from sandbox.scene.model import Scene, default_name
 from sandbox.scene.part import Point
+from sandbox.scene.seams import seams_of
 from sandbox.scene.shapes import form_of
 
 KINDS: dict[type, LinkKind] = {
@@ -37,10 +38,14 @@ KINDS: dict[type, LinkKind] = {
 
 
 def links_of(scene: Scene) -> Links:
-    """Lay out the joints of a scene, whose names must be those of its bodies."""
+    """Lay out the joints of a scene, whose names must be those of its bodies: those of the file, then of generators."""
+    return _stated(scene, scene.bodies).joined(seams_of(scene, scene.bodies))
+
+
+def _stated(scene: Scene, bodies: Bodies) -> Links:
+    """Lay out the joints that the file states."""
     if not scene.joints:
         return Links.none()
-    bodies = scene.bodies
     number = {name: k for k, name in enumerate(bodies.names)}
     rows = [_row(joint, bodies, number) for joint in scene.joints]
     a, b, anchor_a, anchor_b, figures = (list(column) for column in zip(*rows, strict=True))
@@ -56,6 +61,12 @@ def links_of(scene: Scene) -> Links:
         collide=np.asarray([joint.collide for joint in scene.joints], dtype=np.bool_),
         names=tuple(joint.name or default_name("joint", k) for k, joint in enumerate(scene.joints)),
     )
+
+
+def ends_of(joint: Anchored, bodies: Bodies, number: dict[str, int]) -> tuple[Point, Point]:
+    """Return where the two points that a joint holds start, m; `number` is each body's."""
+    a, b, anchor_a, anchor_b, _ = _row(joint, bodies, number)
+    return _world(anchor_a, a, bodies), _world(anchor_b, b, bodies)
 
 
 Row = tuple[int, int, Point, Point, tuple[float, float, float]]

@@ -6,6 +6,7 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from sandbox.scene.near import BoolArray, FloatArray, IntArray
 
@@ -82,6 +83,31 @@ class Links:
             most_force=np.empty(0),
             collide=np.empty(0, np.bool_),
             names=(),
+        )
+
+    @classmethod
+    def alike(
+        cls,
+        kind: LinkKind,
+        a: npt.ArrayLike,
+        b: npt.ArrayLike,
+        anchor_a: npt.ArrayLike = (0.0, 0.0),
+        anchor_b: npt.ArrayLike = (0.0, 0.0),
+        figures: npt.ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Self:
+        """Return J nameless links of one kind, whose bodies never meet; what is given once holds for all."""
+        first, second = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
+        count = len(first)
+        return cls(
+            kind=np.full(count, kind, np.int64),
+            a=first,
+            b=second,
+            anchor_a=np.broadcast_to(np.asarray(anchor_a, dtype=np.float64), (count, 2)).copy(),
+            anchor_b=np.broadcast_to(np.asarray(anchor_b, dtype=np.float64), (count, 2)).copy(),
+            figures=np.broadcast_to(np.asarray(figures, dtype=np.float64), (count, 3)).copy(),
+            most_force=np.full(count, np.inf),
+            collide=np.zeros(count, np.bool_),
+            names=("",) * count,
         )
 
     def some(self, which: BoolArray | IntArray) -> Self:

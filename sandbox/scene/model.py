@@ -13,18 +13,21 @@ from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
 from sandbox.scene.part import Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
+from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule, Compound, Polygon
+from sandbox.scene.stacks import Stack
 from sandbox.scene.surfaced import Collides, Mover, Single, Surfaced
+from sandbox.scene.weaves import Cloth, Rope
 
 if TYPE_CHECKING:
     from sandbox.scene.bodies import Bodies
     from sandbox.scene.links import Links
 
 __all__ = [
-    "Attraction", "Ball", "Box", "Capsule", "Collides", "Compound", "Disc", "Emitter", "Generator", "Grid", "Joint",
-    "Material", "Mover", "Pair", "Plane", "Play", "Polygon", "Post", "Scatter", "Scene", "Single", "Surfaced", "Thrust",
-    "Wall", "World", "default_name",
+    "Attraction", "Ball", "Box", "Capsule", "Cloth", "Collides", "Compound", "Disc", "Emitter", "Generator", "Grid",
+    "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene",
+    "Single", "Stack", "Surfaced", "Thrust", "Wall", "World", "default_name",
 ]  # fmt: skip
 
 Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
@@ -100,7 +103,7 @@ class Play(Part):
     arrow_step: Annotated[float, Field(gt=0, le=1e9)] = 0.5
     """m, how far each time"""
     relaunch: Name | None = None
-    """a generator whose balls Space starts anew, with other chances"""
+    """a generator whose bodies Space starts anew, with other chances"""
     show: Literal["overlap"] | None = None
     """Colour bodies by whether they overlap anything."""
 
@@ -127,6 +130,10 @@ class Scene(Part):
     capsules: tuple[Capsule, ...] = Field((), alias="capsule")
     polygons: tuple[Polygon, ...] = Field((), alias="polygon")
     compounds: tuple[Compound, ...] = Field((), alias="body")
+    stacks: tuple[Stack, ...] = Field((), alias="stack")
+    ropes: tuple[Rope, ...] = Field((), alias="rope")
+    cloths: tuple[Cloth, ...] = Field((), alias="cloth")
+    ragdolls: tuple[Ragdoll, ...] = Field((), alias="ragdoll")
     joints: tuple[Joint, ...] = Field((), alias="joint")
     attractions: tuple[Attraction, ...] = Field((), alias="attraction")
     thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
@@ -157,6 +164,10 @@ class Scene(Part):
             "capsule": self.capsules,
             "polygon": self.polygons,
             "body": self.compounds,
+            "stack": self.stacks,
+            "rope": self.ropes,
+            "cloth": self.cloths,
+            "ragdoll": self.ragdolls,
         }
 
     @property
@@ -164,14 +175,26 @@ class Scene(Part):
         """The elements with bodies, in scene order."""
         return tuple(each for those in self.kinds.values() for each in those)
 
-    def placed(self, bodies: "Bodies") -> "Scene":
-        """Return this scene with its bodies as they have come to be: elsewhere, fewer, or more.
+    @cached_property
+    def elements(self) -> tuple[Mover, ...]:
+        """What the bodies look like and are made of, in scene order: the movers, or what these stand for."""
+        from sandbox.scene.elements import elements_of
 
-        Only `bodies` and `links` differ: the file that it would be written to is the same.
+        return tuple(element for mover in self.movers for element in elements_of(mover))
+
+    @cached_property
+    def began(self) -> float:
+        """The time at which this state of the scene begins, s: 0, but of one that goes on (`placed`)."""
+        return 0.0
+
+    def placed(self, bodies: "Bodies", time: float = 0.0) -> "Scene":
+        """Return this scene with its bodies as they have come to be by a time, s: elsewhere, fewer, or more.
+
+        Only `bodies`, `links` and `began` differ: the file that it would be written to is the same.
         """
         links = self.links.among(bodies.names, self.bodies.names)
         scene = self.model_copy()
-        scene.__dict__.update(bodies=bodies, links=links)  # where cached_property looks first
+        scene.__dict__.update(bodies=bodies, links=links, began=time)  # where cached_property looks first
         return scene
 
     @property

@@ -10,6 +10,8 @@ from itertools import pairwise
 
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Ball, Plane, Scene, Single, Wall
+from sandbox.scene.part import Point
+from sandbox.scene.shapes import form_of
 
 MAX_REPEATS = 5_000
 """Equal shapes; half a second."""
@@ -35,19 +37,32 @@ def _shapes(scene: Scene) -> Iterator[tuple[Location, Key]]:
         for n, segment in enumerate(_segments(wall)):
             yield ("wall", k, "points", n), segment
     for k, post in enumerate(scene.posts):
-        yield ("post", k), ("disc", *post.position, post.radius)
+        yield ("post", k), _disc(post.position, post.radius)
     for kind, those in scene.kinds.items():
         for k, single in enumerate(those):
             if isinstance(single, Single) and single.fixed and single.collides != "none":
-                yield (kind, k), _single(single)
+                for key in _boxes(single):
+                    yield (kind, k), key
 
 
-def _single(single: Single) -> Key:
-    """Return where a fixed body is and what it looks like."""
+def _disc(position: Point, radius: float) -> Key:
+    return "disc", *position, radius
+
+
+def _boxes(single: Single) -> Iterator[Key]:
+    """Yield the bounding box of each piece of a fixed body: boxes that are equal are not told apart."""
     if isinstance(single, Ball):
-        return "disc", *single.position, single.radius
-    looks = single.model_dump(exclude={"name", "material", "restitution", "friction", "colour", "mass", "density"})
-    return "solid", repr(looks)
+        yield _disc(single.position, single.radius)
+        return
+    cos, sin = math.cos(single.angle), math.sin(single.angle)
+    form = form_of(single)
+    x, y = form.centre
+    for piece in form.pieces:
+        corners = [(a + x, b + y) for a, b in piece.corners]
+        xs = [single.position[0] + cos * a - sin * b for a, b in corners]
+        ys = [single.position[1] + sin * a + cos * b for a, b in corners]
+        r = piece.radius
+        yield "box", *(round(each, 9) for each in (min(xs) - r, max(xs) + r, min(ys) - r, max(ys) + r))
 
 
 def _plane(plane: Plane) -> Key:

@@ -22,6 +22,12 @@ HARMLESS: dict[str, Any] = {
     "origin": [0.0, 0.0],
     "spacing": [10.0, 10.0],
     "columns": 1,
+    "rows": 1,
+    "base": [0.0, 0.0],
+    "corner": [0.0, 0.0],
+    "start": [0.0, 0.0],
+    "end": [1.0, 0.0],
+    "links": 1,
     "count": 1,
     "lower": [0.0, 0.0],
     "upper": [1.0, 1.0],
@@ -41,7 +47,10 @@ _TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - 
 
 
 REFERRING = {("joint",), ("attraction",), ("thrust",)}
-"""Tables that speak of bodies: one that is faulty is left out, with its like."""
+"""Tables that speak of bodies, of which nobody speaks: one that is faulty is left out."""
+
+PARTS = ("ball", "box", "capsule", "polygon")
+"""Tables of a body's parts, of which it needs one."""
 
 OF_THEIR_OWN = {("material",), ("name",), ("between",)}
 """Keys that no stand-in touches: what the cross-check says of them holds for an element with other faults too."""
@@ -50,14 +59,15 @@ OF_THEIR_OWN = {("material",), ("name",), ("between",)}
 def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> list[Found]:
     """Cross-check a document whose values at `wrong` are faulty.
 
-    Those are left out, or given a harmless value where one must be there; what the cross-check then says of the
+    Those are left out, or given a harmless value where one must be there. What the cross-check then says of the
     elements they belong to does not count, but for keys of their own. Nothing is found where too much is wrong to tell.
     """
     document = copy.deepcopy(document)
     touched: set[Location] = set()
+    wrong = list(wrong)
+    kept = _without_faulty(document, wrong)
     for location in wrong:
         if location[:1] in REFERRING:
-            document.pop(str(location[0]), None)  # nothing rests on them
             continue
         if len(location) == 1 and location[0] in document and location[0] not in _TABLES:
             if difflib.get_close_matches(str(location[0]), _TABLES, n=1) == ["material"]:
@@ -74,6 +84,8 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
         if "duration" not in holder:
             holder.update(ALOOF.get(str(location[0]), {}))
         touched.add(location[:depth])
+        if location[0] == "body" and not any(holder.get(part) for part in PARTS):
+            holder["ball"] = [{"radius": 1.0}]
         for name, field in model_at(location[:depth]).model_fields.items():
             if field.is_required() and name not in holder and name in HARMLESS:
                 holder[name] = HARMLESS[name]
@@ -81,4 +93,39 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
         scene = read_model(document)
     except ValueError:
         return []
-    return [f for f in crosscheck(scene) if touched.isdisjoint((f[0][:1], f[0][:2])) or f[0][2:3] in OF_THEIR_OWN]
+    found = [f for f in crosscheck(scene) if touched.isdisjoint((f[0][:1], f[0][:2])) or f[0][2:3] in OF_THEIR_OWN]
+    return [(_numbered(location, kept), message) for location, message in found]
+
+
+def _without_faulty(document: dict[str, Any], wrong: list[Location]) -> dict[str, list[int]]:
+    """Take the faulty joints and the like out of a document; return which of each kind are still there.
+
+    None of them are where a fault may be that of a body's name, which they would seem to miss.
+    """
+    nameless = any(_hides_a_name(location) for location in wrong)
+    kept: dict[str, list[int]] = {}
+    for (key,) in REFERRING:
+        those = document.get(key)
+        faulty = [location for location in wrong if location[0] == key]
+        if nameless or not isinstance(those, list) or any(len(location) < 2 for location in faulty):
+            document.pop(key, None)
+            continue
+        out = {location[1] for location in faulty}
+        kept[key] = [k for k in range(len(those)) if k not in out]
+        document[key] = [those[k] for k in kept[key]]
+    return kept
+
+
+def _hides_a_name(location: Location) -> bool:
+    """Tell whether a fault may be why a body is not found by its name."""
+    if len(location) < 2:
+        return location not in (("title",), ("about",), *REFERRING)
+    key = str(location[2]) if len(location) == 3 else ""
+    return location[0] in Scene().kinds and bool(difflib.get_close_matches("name", [key]))
+
+
+def _numbered(location: Location, kept: dict[str, list[int]]) -> Location:
+    """Return a location with the number that its joint, or the like, has in the whole document."""
+    if location[:1] in REFERRING and len(location) > 1:
+        return (location[0], kept[str(location[0])][int(location[1])], *location[2:])
+    return location

@@ -29,6 +29,7 @@ from sandbox.scene.solids import (
     Polygon,
     PolygonPart,
 )
+from sandbox.scene.stacks import Stack
 from sandbox.scene.surfaced import Mover
 
 
@@ -116,18 +117,18 @@ def _drawn(element: Mover) -> list[tuple[Piece, float | None]]:
             for bearer, part in enumerate(element.parts)
             for piece in _pieces_of(part)
         ]
-    assert isinstance(element, Box | Capsule | Polygon)
+    assert isinstance(element, Box | Capsule | Polygon | Stack)
     return [(piece, None) for piece in _pieces_of(element)]
 
 
-def _pieces_of(shape: Box | Capsule | Polygon | AnyPart) -> list[Piece]:
+def _pieces_of(shape: Box | Capsule | Polygon | Stack | AnyPart) -> list[Piece]:
     match shape:
         case BallPart():
             return [Piece(((0.0, 0.0),), shape.radius)]
         case Capsule() | CapsulePart():
             half = 0.5 * shape.length
             return [Piece(((-half, 0.0), (half, 0.0)), shape.radius)]
-        case Box() | BoxPart():
+        case Box() | BoxPart() | Stack():
             x, y = 0.5 * shape.size[0], 0.5 * shape.size[1]
             return [Piece(((-x, -y), (x, -y), (x, y), (-x, y)), 0.0)]
         case Polygon() | PolygonPart():

@@ -86,6 +86,13 @@ def test_shift_and_locks_change_no_letter(mod: int) -> None:
     assert command_for(key(pygame.K_EQUALS, mod, unicode="+")) == Command.FASTER
 
 
+@pytest.mark.parametrize("mod", [pygame.KMOD_LSHIFT, pygame.KMOD_RSHIFT, pygame.KMOD_LSHIFT | pygame.KMOD_NUM])
+def test_shift_and_b_add_a_box(mod: int) -> None:
+    assert command_for(key(pygame.K_b, mod, unicode="B")) == Command.ADD_BOX
+    assert command_for(key(pygame.K_b, mod, unicode="B"), frozenset({pygame.K_b})) is None
+    assert command_for(key(pygame.K_b, mod | pygame.KMOD_LALT, unicode="B")) is None
+
+
 def test_claimed_key_gives_nothing_but_the_global_ones_stay() -> None:
     every = frozenset(code for binding in BINDINGS for code in binding.keys)
     kept = {code for code in every if command_for(key(code), every) is not None}

@@ -81,7 +81,7 @@ def test_unknown_key_is_refused_with_the_one_meant(typo: str, meant: str) -> Non
 
 
 def test_unknown_key_unlike_any_lists_those_there_are() -> None:
-    with pytest.raises(SceneError, match=r"zzzz: unknown key; known here: .*radius.*position"):
+    with pytest.raises(SceneError, match=r"zzzz: unknown key; known here: .*position.*radius"):
         loads(f"{BALL}zzzz = 1")
 
 

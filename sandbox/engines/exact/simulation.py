@@ -211,15 +211,15 @@ class ExactSimulation(Running):
             evaluate(self._arena, self.time, *state)
 
     def _look(self) -> None:
-        """Read the state off, stop what is no longer finite and bounded, take out what has left world.bounds."""
+        """Read the state off, stop what is no longer finite and bounded, retire whose time is up."""
         self._evaluate()
         beyond = self._troupe.beyond()
         if beyond is not None:
             self._ended = True
             raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
-        outside = self._troupe.outside()
-        if len(outside):
-            self._take_out(outside)
+        going = self._troupe.going(self.time)
+        if len(going):
+            self._take_out(going)
 
     def _acted(self) -> None:
         """Bring into the kernels' arrays what an action has done to the roster."""

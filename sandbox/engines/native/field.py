@@ -22,6 +22,7 @@ class Field:
     def __init__(self, scene: Scene) -> None:
         self.time = 0.0
         """s, when the substep at hand began"""
+        self._began = scene.began
         self.level = [0.0 if thrust.key else 1.0 for thrust in scene.thrusts]
         """how far each thrust is open"""
         self._thrusts: dict[str, list[tuple[int, Thrust, Point]]] = {}
@@ -82,7 +83,8 @@ class Field:
         """Return force and torque in the body's own frame, N and N·m."""
         x = y = torque = 0.0
         for k, thrust, arm in thrusts:
-            if self.level[k] and thrust.begin <= self.time and (thrust.end is None or self.time < thrust.end):
+            time = self._began + self.time
+            if self.level[k] and thrust.begin <= time and (thrust.end is None or time < thrust.end):
                 fx, fy = thrust.force[0] * self.level[k], thrust.force[1] * self.level[k]
                 x, y, torque = x + fx, y + fy, torque + arm[0] * fy - arm[1] * fx
         return x, y, torque

@@ -3,12 +3,28 @@
 Keys hold the pair and, in the lowest bit, which of its two points: the points of a pair stand one after the other.
 """
 
+from typing import NamedTuple
+
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.convex import meet_half_plane, meet_pieces
 from sandbox.engines.reference.manifolds import KIND, Manifolds
 from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key
 from sandbox.engines.reference.oriented_boxes import box_of, boxes_apart
+from sandbox.engines.reference.pieces import Hulls
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+
+class Look(NamedTuple):
+    """How to look."""
+
+    restitution: FloatArray
+    """(S, S) of pairs of surfaces"""
+    friction: FloatArray
+    """(S, S) of pairs of surfaces"""
+    reach: float
+    """m, below which what parts two pieces is a contact"""
+    scratch: FloatArray
+    """(2, 6)"""
 
 
 @kernel
@@ -59,70 +75,58 @@ def drop_apart(keys: IntArray, offset: int, box: FloatArray, margin: float) -> i
 @kernel
 def meet_bodies(
     keys: IntArray,
-    corner: FloatArray,
-    first: IntArray,
-    radius: FloatArray,
-    body: IntArray,
+    hulls: Hulls,
     position: FloatArray,
-    surface: IntArray,
-    restitution: FloatArray,
-    friction: FloatArray,
-    reach: float,
-    scratch: FloatArray,
+    look: Look,
     out: Manifolds,
     at: int,
 ) -> int:
-    """Write the pairs of pieces nearer than `reach` from row `at` on; return the next free row."""
+    """Write the pairs of pieces that are near from row `at` on; return the next free row."""
+    body, surface, scratch = hulls.body, hulls.surface, look.scratch
     for k in range(len(keys)):
         p, q = keys[k] >> FIRST, keys[k] & SECOND
-        count = meet_pieces(corner, first, radius, p, q, reach, scratch)
+        count = meet_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, scratch)
         for n in range(count):
             if at < len(out.key):
                 i, j = body[p], body[q]
                 out.key[at] = 2 * keys[k] + int(scratch[n, 5])
                 out.first[at], out.second[at] = i, j
                 _place(out, at, scratch, n, position[i, 0], position[i, 1], position[j, 0], position[j, 1])
-                out.coefficient[at, 0] = restitution[surface[p], surface[q]]
-                out.coefficient[at, 1] = friction[surface[p], surface[q]]
+                out.coefficient[at, 0] = look.restitution[surface[p], surface[q]]
+                out.coefficient[at, 1] = look.friction[surface[p], surface[q]]
             at += 1
     return at
 
 
 @kernel
 def meet_half_planes(
-    corner: FloatArray,
-    first: IntArray,
-    radius: FloatArray,
-    body: IntArray,
+    hulls: Hulls,
     able: BoolArray,
     position: FloatArray,
-    surface: IntArray,
     planes: FloatArray,
     thing: IntArray,
     thing_surface: IntArray,
-    restitution: FloatArray,
-    friction: FloatArray,
-    reach: float,
-    scratch: FloatArray,
+    look: Look,
     out: Manifolds,
     at: int,
 ) -> int:
-    """Write the pieces nearer than `reach` to half-planes from row `at` on; return the next free row."""
+    """Write the pieces near half-planes from row `at` on; return the next free row."""
+    body, surface, scratch = hulls.body, hulls.surface, look.scratch
     for p in range(len(body)):
         if not able[p]:
             continue
         i = body[p]
         for s in range(len(planes)):
             px, py, nx, ny = planes[s, 0], planes[s, 1], planes[s, 2], planes[s, 3]
-            count = meet_half_plane(corner, first, radius, p, px, py, nx, ny, reach, scratch)
+            count = meet_half_plane(hulls.corner, hulls.first, hulls.radius, p, px, py, nx, ny, look.reach, scratch)
             for n in range(count):
                 if at < len(out.key):
                     other = thing_surface[thing[s]]
                     out.key[at] = (1 << KIND) + 2 * pair_key(p, s) + int(scratch[n, 5])
                     out.first[at], out.second[at] = i, -1 - thing[s]
                     _place(out, at, scratch, n, position[i, 0], position[i, 1], px, py)
-                    out.coefficient[at, 0] = restitution[surface[p], other]
-                    out.coefficient[at, 1] = friction[surface[p], other]
+                    out.coefficient[at, 0] = look.restitution[surface[p], other]
+                    out.coefficient[at, 1] = look.friction[surface[p], other]
                 at += 1
     return at
 
@@ -130,33 +134,27 @@ def meet_half_planes(
 @kernel
 def meet_fixed_segments(
     keys: IntArray,
-    corner: FloatArray,
-    first: IntArray,
-    radius: FloatArray,
-    body: IntArray,
+    hulls: Hulls,
     position: FloatArray,
-    surface: IntArray,
     thing: IntArray,
     thing_surface: IntArray,
-    restitution: FloatArray,
-    friction: FloatArray,
-    reach: float,
-    scratch: FloatArray,
+    look: Look,
     out: Manifolds,
     at: int,
 ) -> int:
-    """Write the pieces nearer than `reach` to segments from row `at` on; return the next free row."""
+    """Write the pieces near segments from row `at` on; return the next free row."""
+    body, surface, scratch = hulls.body, hulls.surface, look.scratch
     for k in range(len(keys)):
         p, s = keys[k] >> FIRST, keys[k] & SECOND
-        count = meet_pieces(corner, first, radius, p, len(body) + s, reach, scratch)
+        count = meet_pieces(hulls.corner, hulls.first, hulls.radius, p, len(body) + s, look.reach, scratch)
         for n in range(count):
             if at < len(out.key):
                 i, other = body[p], thing_surface[thing[s]]
                 out.key[at] = (2 << KIND) + 2 * keys[k] + int(scratch[n, 5])
                 out.first[at], out.second[at] = i, -1 - thing[s]
                 _place(out, at, scratch, n, position[i, 0], position[i, 1], scratch[n, 3], scratch[n, 4])
-                out.coefficient[at, 0] = restitution[surface[p], other]
-                out.coefficient[at, 1] = friction[surface[p], other]
+                out.coefficient[at, 0] = look.restitution[surface[p], other]
+                out.coefficient[at, 1] = look.friction[surface[p], other]
             at += 1
     return at
 

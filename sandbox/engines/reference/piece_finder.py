@@ -9,6 +9,7 @@ import numpy as np
 from sandbox.engines.reference.finder import Candidates, Finder
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.piece_contacts import (
+    Look,
     drop,
     drop_apart,
     lay_boxes,
@@ -78,16 +79,16 @@ class PieceFinder(Finder):
         """Write the contacts as far as there is room; return how many there are."""
         self._lay_out(position)
         roster, fixtures, pieces, size = self._roster, self._roster.fixtures, self._pieces, 0
-        hulls = pieces.corner, pieces.first, pieces.radius, pieces.body
-        how = self._tables[0], self._tables[1], reach, self._scratch, self._out
+        hulls = pieces.hulls
+        look = Look(*self._tables, reach, self._scratch)
         if len(near.balls):
-            size = meet_bodies(near.balls, *hulls, position, pieces.surface, *how, size)
+            size = meet_bodies(near.balls, hulls, position, look, self._out, size)
         if self._planes:
             things = fixtures.planes, fixtures.plane_thing, roster.fixed_surface
-            size = meet_half_planes(*hulls, pieces.able, position, pieces.surface, *things, *how, size)
+            size = meet_half_planes(hulls, pieces.able, position, *things, look, self._out, size)
         if len(near.segments):
             walls = fixtures.segment_thing, roster.fixed_surface
-            size = meet_fixed_segments(near.segments, *hulls, position, pieces.surface, *walls, *how, size)
+            size = meet_fixed_segments(near.segments, hulls, position, *walls, look, self._out, size)
         return size
 
     def farthest(self, start: FloatArray, end: FloatArray) -> float:

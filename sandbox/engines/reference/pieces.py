@@ -1,11 +1,28 @@
 """Pieces: the convex pieces of bodies, and after them the segments of walls and posts, laid out in the world."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.meeting import pair_key
 from sandbox.engines.roster import NOTHING, Roster
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+
+class Hulls(NamedTuple):
+    """P pieces in the world, of which the first S belong to bodies."""
+
+    corner: FloatArray
+    """(V, 2) m"""
+    first: IntArray
+    """(P + 1,) row of each one's first corner"""
+    radius: FloatArray
+    """(P,) m"""
+    body: IntArray
+    """(S,) number of each one's body"""
+    surface: IntArray
+    """(S,)"""
 
 
 class Pieces:
@@ -34,6 +51,11 @@ class Pieces:
         """(K,) keys of the pairs of bodies that joints keep from meeting, ascending"""
         self.group: IntArray = roster.bodies.group
         """(N,) of each body"""
+
+    @property
+    def hulls(self) -> Hulls:
+        """Where and what they are, as they were last laid out."""
+        return Hulls(self.corner, self.first, self.radius, self.body, self.surface)
 
     def lay_out(self, position: FloatArray, angle: FloatArray) -> None:
         """Put corners and middles where bodies now lie, at (N, ≥ 2) m and (N,) rad."""

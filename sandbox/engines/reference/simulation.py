@@ -106,15 +106,15 @@ class ReferenceSimulation(Running):
             raise
 
     def _settle(self) -> None:
-        """Write the state down, stop what is no longer finite and bounded, retire who has left world.bounds."""
+        """Write the state down, stop what is no longer finite and bounded, retire whose time is up."""
         self._stage.leave()
         beyond = self._roster.beyond()
         if beyond is not None:
             self._ended = True
             raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
-        outside = self._roster.outside()
-        if len(outside):
-            self._take_out(outside)
+        going = self._roster.going(self.time)
+        if len(going):
+            self._take_out(going)
 
     def _take_out(self, numbers: IntArray) -> None:
         self._roster.take_out(numbers, self.time)

@@ -76,7 +76,8 @@ class Stage:
     def enter(self) -> None:
         """Take the state from the roster, whose bodies may have been changed."""
         roster = self._roster
-        turns = bool(roster.inverse_moment.any() or roster.angular_velocity.any() or len(self._links))
+        posed = len(self._links) > 0 or not self._field.empty  # these work on poses, whether anything turns or not
+        turns = posed or bool(roster.inverse_moment.any() or roster.angular_velocity.any())
         parts = [roster.position, roster.velocity]
         if turns:
             parts = [

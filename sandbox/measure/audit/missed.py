@@ -49,12 +49,18 @@ class Audit:
 
     So a passage counts once: a pair that is through or still inside is not clear, or moves away.
 
+    All this is exact for discs. Of any other body it takes `Bodies.core`, the largest disc about the centre of mass
+    that lies inside it, for the radius: what passes through that was surely missed, so that there is no false alarm,
+    but what only clips a corner is not counted. A body whose core is 0, as its centre of mass lies outside of it, is
+    left out. Pairs that a joint keeps from meeting miss nothing.
+
     Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
     planes), and among balls with the pairs that are near.
     """
 
     def __init__(self, scene: Scene, bodies: Bodies | None = None) -> None:
         self._obstacles = Obstacles.of(scene)
+        self._apart = scene.links.apart()
         self._times: list[FloatArray] = []
         self._pairs: list[IntArray] = []
         self._looks = Looks()
@@ -80,7 +86,7 @@ class Audit:
         """
         if len(start) != self._number:
             raise ValueError(f"{len(start)} bodies, where the audit knows of {self._number}")
-        if not len(self._radius):
+        if not len(self._core):
             return
         row = len(self._time)
         self._start[row] = start[self._part]
@@ -110,16 +116,17 @@ class Audit:
         """Derive who can meet what, and how far each must move at least to skip a look."""
         every = np.asarray([e.collides == "all" for e in bodies.elements], np.bool_)[bodies.element]
         some = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element]
+        every, some = every & (bodies.core > 0.0), some & (bodies.core > 0.0)
         moves, to_all, still = some & ~bodies.fixed, every & ~bodies.fixed, every & bodies.fixed
         member = to_all | still | (moves & bool(still.any()))
 
         # Of two that jump together, one moves half as far at least.
         least = np.full(len(bodies), np.inf)
-        balls = bodies.radius[member]
-        if len(balls) > 1:
-            least[member] = JUMP * (balls + balls.min()) / 2
+        cores = bodies.core[member]
+        if len(cores) > 1:
+            least[member] = JUMP * (cores + cores.min()) / 2
         if len(self._obstacles):
-            least[moves] = np.minimum(least, JUMP * bodies.radius)[moves]
+            least[moves] = np.minimum(least, JUMP * bodies.core)[moves]
 
         # Bodies of a kind stand together: those before the first and after the last that matter cost nothing.
         matter = np.flatnonzero(np.isfinite(least))
@@ -127,13 +134,13 @@ class Audit:
         self._offset = int(matter[0]) if len(matter) else 0
         self._part = part = slice(self._offset, int(matter[-1]) + 1 if len(matter) else 0)
         self._moves, self._to_all, self._still = moves[part], to_all[part], still[part]
-        self._radius = bodies.radius[part]
+        self._core = bodies.core[part]
         self._least2 = least[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
-        self._neighbours = Neighbours(self._radius, member[part], self._meet)
+        self._neighbours = Neighbours(self._core, member[part], self._meet)
 
-        batch = max(1, min(LONGEST_BATCH, BATCH_ROWS // max(1, len(self._radius))))
+        batch = max(1, min(LONGEST_BATCH, BATCH_ROWS // max(1, len(self._core))))
         self._time: list[float] = []
-        self._start = np.empty((batch, len(self._radius), 2))
+        self._start = np.empty((batch, len(self._core), 2))
         self._end = np.empty_like(self._start)
 
     def _examine(self) -> None:
@@ -166,7 +173,7 @@ class Audit:
     def _fixed(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
         """Return when (M,) which pairs (M, 2) of a body and a fixed thing were missed."""
         when, who = np.nonzero(fast & self._moves)
-        paths = Paths(when, who + self._offset, start[when, who], end[when, who], self._radius[who])
+        paths = Paths(when, who + self._offset, start[when, who], end[when, who], self._core[who])
         return self._obstacles.missed(paths, self._looks)
 
     def _meet(self, i: IntArray, j: IntArray) -> BoolArray:
@@ -174,6 +181,9 @@ class Audit:
         able = self._to_all[i] & self._to_all[j]
         able |= self._moves[i] & self._still[j]
         able |= self._still[i] & self._moves[j]
+        if len(self._apart):
+            pair = _coded(np.minimum(i, j) + self._offset, np.maximum(i, j) + self._offset)
+            able &= ~np.isin(pair, _coded(*self._apart.T))
         return np.asarray(able)
 
     def _balls(self, start: FloatArray, end: FloatArray, fast: BoolArray, nearing: float) -> tuple[IntArray, IntArray]:
@@ -199,13 +209,18 @@ class Audit:
     ) -> IntArray:
         """Return which encounters lead from clear into deep contact on a path that can skip a look."""
         gap = _offset(start, when, i, j)
-        distance2, contact = dot(gap, gap), self._radius[i] + self._radius[j]
+        distance2, contact = dot(gap, gap), self._core[i] + self._core[j]
         at = np.flatnonzero((distance2 >= (CLEAR * contact) ** 2) & (distance2 <= (contact + nearing) ** 2))
         gap, contact = gap[at], contact[at]
         move = _offset(end, when[at], i[at], j[at]) - gap
         able = (dot(gap, move) < 0) & (dot(move, move) >= (JUMP * contact) ** 2)
         able &= closest_to_origin(gap, move) < (DEEP * contact) ** 2
         return at[able]
+
+
+def _coded(first: IntArray, second: IntArray) -> IntArray:
+    """Return a number for each pair of bodies, of which there are less than 2³¹."""
+    return np.asarray(first * (1 << 32) + second)
 
 
 def _offset(place: FloatArray, when: IntArray, i: IntArray, j: IntArray) -> FloatArray:

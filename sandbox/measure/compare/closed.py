@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sandbox.measure.closed_form import Bouncing, bouncing, free_flight, why_not
+from sandbox.measure.closed_form import Bouncing, bouncing, driven, free_flight, why_not
 from sandbox.measure.compare.runs import frames_as_run
 from sandbox.measure.recorder import frame_count
 from sandbox.scene.bodies import Bodies
@@ -30,14 +30,14 @@ def frame_times(scene: Scene, settings: Settings) -> FloatArray:
 def solved(scene: Scene, settings: Settings) -> Trajectory | None:
     """Return the run that formulas make of a scene, or None where they do not cover all of it.
 
-    They do where each body that moves either can meet nothing, and flies under gravity and linear drag, or can
-    meet only the one plane there is, and bounces straight (`closed_form.bouncing`); no two bodies can meet.
-    Nothing turns a body then. One that leaves `world.bounds` is retired at the first frame outside. Contacts are
-    the impacts, in the order of time; from the one on after which a flight would be shorter than dt, a single row
-    that lasts to the end.
+    They do where each body that moves either can meet nothing, and flies under gravity and linear drag, or is a ball
+    that can meet only the one plane there is, and bounces straight (`closed_form.bouncing`); no two bodies can meet,
+    and nothing joins, attracts or thrusts them. Nothing turns a body then. One that leaves `world.bounds` is retired
+    at the first frame outside. Contacts are the impacts, in the order of time; from the one on after which a flight
+    would be shorter than dt, a single row that lasts to the end.
     """
     bodies, meet = scene.bodies, meetings(scene)
-    if why_not(scene) is not None or meet.ball_ball:
+    if why_not(scene) is not None or meet.mutual or driven(scene, bodies).any():
         return None
     moving = np.flatnonzero(~bodies.fixed)
     bouncers: dict[int, Bouncing] = {}

@@ -24,7 +24,7 @@ Told = Callable[[str], None]
 """Called with what is being done now."""
 
 TOLERANCE = 0.01
-"""The share of the smallest moving ball's radius that is the tolerance where none is given."""
+"""The share of the smallest radius, or half width, of what moves that is the tolerance where none is given."""
 WORTH_REPEATING = 5.0
 """s: a run no longer than this is timed a second time, as the first may have read compiled code from disk."""
 NEGLIGIBLE = 1e-6
@@ -49,7 +49,7 @@ def compare(
         scene: what to run.
         engines: their names; by default all there are. One that cannot run the scene is a row that says why.
         tolerance: of positions, m: beyond it a run has diverged from the truth. By default 1 % of the radius of
-            the smallest ball that moves.
+            the smallest ball that moves, or of the half width of what is thinner.
         why: rerun each engine that is off with one knob changed at a time, and say which one matters.
         told: who is told what is being done.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
@@ -88,10 +88,10 @@ def compare(
 
 
 def usual_tolerance(scene: Scene) -> float:
-    """Return 1 % of the radius of the smallest ball that moves, m; where none does, 1 mm."""
+    """Return 1 % of the smallest radius, or half width, of the bodies that move, m; where none does, 1 mm."""
     bodies = scene.bodies
-    radius = bodies.radius[~bodies.fixed]
-    return TOLERANCE * float(radius.min()) if len(radius) else 1e-3
+    thin = bodies.thin[~bodies.fixed]
+    return TOLERANCE * float(thin.min()) if len(thin) else 1e-3
 
 
 def timed(scene: Scene, engine: str, settings: Settings) -> Trajectory:

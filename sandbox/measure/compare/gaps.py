@@ -1,40 +1,82 @@
 """Gaps: how far apart the two of a pair are, frame by frame."""
 
 import math
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
 
+from sandbox.measure.distance import hull_distance
+from sandbox.measure.lying import gap_above, pieces_over_time
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Plane, Post, Scene
+from sandbox.scene.model import Plane, Post, Scene, Wall
 from sandbox.trajectory import FloatArray
 
 
-def gap(scene: Scene, bodies: Bodies, position: FloatArray, pair: tuple[int, int]) -> FloatArray:
+def gap(scene: Scene, bodies: Bodies, position: FloatArray, angle: FloatArray, pair: tuple[int, int]) -> FloatArray:
     """Return the distance between two surfaces, (T,) m, negative where they overlap.
 
     Args:
         scene: gives the fixed things.
         bodies: its bodies.
         position: (T, N, 2) m.
+        angle: (T, N) rad.
         pair: numbers as in `Contacts`: the second may be −1 − k for the k-th fixed thing.
     """
     first, second = pair
     centre = position[:, first]
-    radius = float(bodies.radius[first])
-    if second >= 0:
-        return _distance(centre - position[:, second]) - radius - float(bodies.radius[second])
-    thing = scene.fixed[-1 - second]
+    thing = scene.fixed[-1 - second] if second < 0 else None
     if isinstance(thing, Plane):
         normal = np.asarray(thing.normal) / math.hypot(*thing.normal)
-        return np.asarray((centre - np.asarray(thing.point)) @ normal - radius)
+        return gap_above(bodies, first, centre, angle[:, first], np.asarray(thing.point), normal)
+    if bodies.round[first] and (second < 0 or bodies.round[second]):
+        return _of_disc(centre, float(bodies.radius[first]), thing, position[:, second], float(bodies.radius[second]))
+    if thing is None:
+        others = list(pieces_over_time(bodies, second, position[:, second], angle[:, second]))
+    else:
+        others = list(_pieces_of(thing, len(position)))
+    gaps = np.full(len(position), np.inf)
+    for corners, radius in pieces_over_time(bodies, first, centre, angle[:, first]):
+        for its_corners, its_radius in others:
+            _lower(gaps, corners, its_corners, radius + its_radius)
+    return gaps
+
+
+def _of_disc(
+    centre: FloatArray, radius: float, thing: Wall | Post | None, other: FloatArray, its_radius: float
+) -> FloatArray:
+    """Return the gap of a disc from another, or from a fixed thing."""
+    if thing is None:
+        return _distance(centre - other) - radius - its_radius
     if isinstance(thing, Post):
         return _distance(centre - np.asarray(thing.position)) - radius - thing.radius
-    points = [*thing.points, thing.points[0]] if thing.closed else list(thing.points)
     nearest = np.full(len(centre), np.inf)
-    for tail, tip in pairwise(points):
+    for tail, tip in pairwise(_line(thing)):
         nearest = np.fmin(nearest, _from_segment(centre, np.asarray(tail), np.asarray(tip)))
     return nearest - radius - 0.5 * thing.thickness
+
+
+def _line(wall: Wall) -> list[tuple[float, float]]:
+    return [*wall.points, wall.points[0]] if wall.closed else list(wall.points)
+
+
+def _pieces_of(thing: Wall | Post, frames: int) -> Iterator[tuple[FloatArray, float]]:
+    """Yield the corners, (T, 1 or 2, 2) m, and the radius of what a fixed thing consists of."""
+    if isinstance(thing, Post):
+        yield np.broadcast_to(np.asarray(thing.position), (frames, 1, 2)), thing.radius
+        return
+    for ends in pairwise(_line(thing)):
+        yield np.broadcast_to(np.asarray(ends), (frames, 2, 2)), 0.5 * thing.thickness
+
+
+def _lower(gaps: FloatArray, first: FloatArray, second: FloatArray, radii: float) -> None:
+    """Lower gaps (T,) to the distance of two pieces, where discs around them tell that it may be less."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        a, b = first.mean(axis=1), second.mean(axis=1)
+        reach = np.hypot(*np.moveaxis(first - a[:, None], 2, 0)).max(axis=1)
+        reach = reach + np.hypot(*np.moveaxis(second - b[:, None], 2, 0)).max(axis=1)
+        near = np.flatnonzero(~(_distance(a - b) - reach - radii >= gaps))
+    gaps[near] = np.fmin(gaps[near], hull_distance(first[near], second[near]) - radii)
 
 
 def _distance(vector: FloatArray) -> FloatArray:

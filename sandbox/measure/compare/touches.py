@@ -60,7 +60,7 @@ def touches(run: Trajectory, scene: Scene, dt: float, reach: float, until: float
 
 def _ends(run: Trajectory, scene: Scene, pair: Pair, time: FloatArray, reach: float) -> FloatArray:
     """Return until when the two stay within reach after each of the times: the last frame before they part."""
-    apart = ~(gap(scene, scene.bodies, run.position, pair) <= reach)
+    apart = ~(gap(scene, scene.bodies, run.position, run.angle, pair) <= reach)
     # For every frame the number of the next one apart, the frame itself included.
     number = np.where(apart, np.arange(len(apart)), len(apart))
     following = np.minimum.accumulate(number[::-1])[::-1]

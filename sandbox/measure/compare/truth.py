@@ -88,4 +88,4 @@ def _horizon(scene: Scene, engine: str, settings: Settings, found: Trajectory, t
 
 
 def _limit(scene: Scene, until: float) -> str:
-    return f"; moving a ball by {NUDGE:g} m changes what comes later" if until < scene.world.duration else ""
+    return f"; moving a body by {NUDGE:g} m changes what comes later" if until < scene.world.duration else ""

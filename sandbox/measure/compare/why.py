@@ -11,7 +11,7 @@ from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.errors import errors
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.scene.model import Scene
-from sandbox.scene.settings import Detection, Integrator, Settings
+from sandbox.scene.settings import Detection, Integrator, Joints, Settings
 from sandbox.trajectory import Trajectory
 
 MATTERS = 0.9
@@ -45,17 +45,21 @@ class Knob:
         return dict(vars(self))
 
 
-def knobs(settings: Settings) -> Iterator[tuple[str, Any, dict[str, Any]]]:
+def knobs(settings: Settings, joints: bool = False) -> Iterator[tuple[str, Any, dict[str, Any]]]:
     """Yield each knob, what it is set to, and the settings that this changes.
 
     Args:
         settings: as the engine filled them in.
+        joints: the scene has some, so that it matters how they are held.
     """
     # Every frame that was kept still is.
     yield "dt", settings.dt / 2.0, {"dt": settings.dt / 2.0, "record_every": settings.record_every * 2}
     yield "slop", 0.0, {"slop": 0.0}
     yield "iterations", settings.iterations * 4, {"iterations": settings.iterations * 4}
-    for name, words in (("integrator", get_args(Integrator)), ("detection", get_args(Detection))):
+    choices = [("integrator", get_args(Integrator)), ("detection", get_args(Detection))]
+    if joints:
+        choices.append(("joints", get_args(Joints)))
+    for name, words in choices:
         for word in words:
             if word != getattr(settings, name):
                 yield name, word, {name: word}
@@ -79,7 +83,7 @@ def turned(
     """
     found = []
     filled = ENGINES[engine].resolve(scene, asked)
-    for knob, value, changes in knobs(filled):
+    for knob, value, changes in knobs(filled, len(scene.links) > 0):
         if all(getattr(filled, key) == new for key, new in changes.items()):
             found.append(Knob(knob, value, "same", "it is so already", before, 1.0))
             continue

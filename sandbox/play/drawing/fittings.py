@@ -26,7 +26,6 @@ MOST_DIALS = 60
 """Of what turns, as their arcs take longer."""
 SMALL, LARGE = 12.0, 34.0
 """px: radii of the arcs of what turns"""
-FULL = 2.0 * math.pi
 _TINTS: dict[LinkKind, Colour] = {
     LinkKind.ROD: INK,
     LinkKind.PIVOT: YELLOW,
@@ -104,10 +103,11 @@ def _rods(view: View, rods: Held) -> None:
 
 
 def _gears(view: View, gears: Held) -> None:
-    for ax, ay, bx, by in _from_bodies(view, gears).tolist():
-        dashes(view.surface, [((ax, ay), (bx, by))], INK, 2.0 * view.unit, view.antialias)
-    for x, y in _from_bodies(view, gears)[:MOST_DIALS, 2:].tolist():
-        _arc(view, (x, y), 0.7 * SMALL * view.unit, 0.0, FULL, INK, 1.2)
+    rows = _from_bodies(view, gears)
+    dashes(view.surface, [((ax, ay), (bx, by)) for ax, ay, bx, by in rows.tolist()], INK, 2.0 * view.unit)
+    places = rows[:, 2:]
+    for x, y in places[view.inside(places, 2.0 * LARGE)][:MOST_DIALS].tolist():
+        _arc(view, (x, y), 0.7 * SMALL * view.unit, 0.0, math.tau, INK, 1.2)
 
 
 def _slides(view: View, slides: Held) -> None:
@@ -129,20 +129,19 @@ def _grooves(view: View, grooves: Held) -> None:
     links, frame = grooves.links, view.sight.frame
     angle = np.where(links.a < 0, 0.0, frame.angle[links.a])
     place = np.where((links.a < 0)[:, None], 0.0, frame.position[links.a])
-    x, y = links.figures[:, 0], links.figures[:, 1]
-    cos, sin = np.cos(angle), np.sin(angle)
+    (x, y, _), cos, sin = links.figures.T, np.cos(angle), np.sin(angle)
     with np.errstate(invalid="ignore", over="ignore"):
         far = view.camera.to_screen(place + np.column_stack((cos * x - sin * y, sin * x + cos * y)))
     half = 5.0 * view.unit
     for (ax, ay, *_), (bx, by) in zip(grooves.ends.tolist(), far.tolist(), strict=True):
         length = math.hypot(bx - ax, by - ay)
-        if not 0.0 < length < math.inf:
+        if not 0.0 < length < 30_000.0 or max(abs(ax), abs(ay)) > 30_000.0:
             continue
         ux, uy = (bx - ax) / length, (by - ay) / length
         for side in (-half, half):
             shift = -uy * side, ux * side
-            ends = (ax + shift[0], ay + shift[1]), (bx + shift[0], by + shift[1])
-            stroke(view.surface, *ends, SKY, 1.4 * view.unit, view.antialias)
+            start, end = (ax + shift[0], ay + shift[1]), (bx + shift[0], by + shift[1])
+            stroke(view.surface, start, end, SKY, 1.4 * view.unit, view.antialias)
         turned = math.atan2(-uy, ux)
         _arc(view, (ax, ay), half, turned + 0.5 * math.pi, math.pi, SKY, 1.4)
         _arc(view, (bx, by), half, turned - 0.5 * math.pi, math.pi, SKY, 1.4)
@@ -151,7 +150,7 @@ def _grooves(view: View, grooves: Held) -> None:
 def _limits(view: View, limits: Held) -> None:
     """Draw the arc within which the second body may turn, and a hand that shows where it is."""
     for (x, y), size, base, turned, (least, most, _) in _dials(view, limits):
-        first, span = base + least, min(max(most - least, 0.0), FULL)
+        first, span = base + least, min(max(most - least, 0.0), math.tau)
         _arc(view, (x, y), size, first, span, INK, 2.0)
         for stop in (first, first + span):
             inner, outer = _spot((x, y), 0.8 * size, stop), _spot((x, y), 1.2 * size, stop)
@@ -163,8 +162,8 @@ def _limits(view: View, limits: Held) -> None:
 def _turning_springs(view: View, springs: Held) -> None:
     """Draw a spiral that winds up as the spring does."""
     for (x, y), size, base, turned, (rest, _, _) in _dials(view, springs):
-        strained = max(min(turned - rest, 2.0 * FULL), -2.0 * FULL)
-        wound = 1.5 * FULL + strained
+        strained = max(min(turned - rest, 2.0 * math.tau), -2.0 * math.tau)
+        wound = 1.5 * math.tau + strained
         colour = tuple(SHADES[round(32.0 + 32.0 * strained / (abs(strained) + 0.5))].tolist())
         count = 28
         spots = [
@@ -188,8 +187,7 @@ def _motors(view: View, motors: Held) -> None:
 def _dials(view: View, joints: Held) -> list[Dial]:
     """Return where joints that turn are drawn: where a pivot holds the same two, else in the second body's middle."""
     frame, bodies, links = view.sight.frame, view.sight.bodies, joints.links
-    every = view.sight.scene.links
-    pivots = {}
+    every, pivots = view.sight.scene.links, {}
     for k in np.flatnonzero(every.kind == LinkKind.PIVOT).tolist():
         pivots[int(every.a[k]), int(every.b[k])] = k
     _, hinge = every.ends(frame.position, frame.angle)

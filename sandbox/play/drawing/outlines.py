@@ -132,7 +132,7 @@ def _arcs(
                 runs[-1][1] = last
             else:
                 runs.append([first, last])
-    rows = []
+    rows: list[tuple[float, ...]] = []
     for first, last in runs:
         middle, half = 0.5 * (first + last), 0.5 * (last - first)
         rows.append((1.0, *centre, radius, math.cos(middle), math.sin(middle), math.cos(min(half, math.pi))))

@@ -10,9 +10,9 @@ import numpy as np
 import pygame
 
 from sandbox.play.drawing.anatomy import Anatomy, Place, clipped_box
-from sandbox.play.drawing.discs import Style, dark
+from sandbox.play.drawing.discs import DARK, Style, dark
 from sandbox.play.drawing.palette import BACKGROUND, Colour, ColourArray
-from sandbox.play.drawing.points import flat_pixels, is_flat
+from sandbox.play.drawing.points import flat_pixels, is_flat, packed
 from sandbox.play.drawing.shade import Look, paint
 from sandbox.play.drawing.strokes import fill
 from sandbox.play.drawing.view import View
@@ -134,10 +134,10 @@ def _in_one_pass(
 
     area = surface.get_clip()
     edges = area.left, area.top, area.right, area.bottom
-    red, green, blue, _ = surface.get_shifts()
     pose = np.column_stack((centre, np.cos(angle), np.sin(angle), np.full(len(who), scale)))
-    inner = colours.astype(np.int64)
-    outer = inner if style.hollow else np.rint((inner + np.asarray(BACKGROUND)) / 2.0).astype(np.int64)
+    inner = outer = packed(colours, surface)
+    if not style.hollow and style.line:
+        outer = packed(np.rint(colours * (1.0 - DARK) + np.asarray(BACKGROUND) * DARK).astype(np.uint8), surface)
     stencil(
         flat_pixels(surface),
         surface.get_pitch() // 4,
@@ -149,7 +149,6 @@ def _in_one_pass(
         line,
         inner,
         outer,
-        (red, green, blue),
         style.hollow,
         style.antialias,
     )

@@ -8,13 +8,10 @@ import numpy.typing as npt
 
 from sandbox.engines.kernel import bare_kernel
 from sandbox.play.drawing.anatomy import SEAM, Pieces
+from sandbox.play.drawing.blend import FULL, blended
+from sandbox.play.drawing.spans import inner_span, span
 from sandbox.scene.near import IntArray
 from sandbox.trajectory import FloatArray
-
-Tone = tuple[float, float, float]
-"""Red, green and blue, 0 to 255."""
-Shift = tuple[int, int, int]
-"""Bits by which a surface shifts red, green and blue."""
 
 
 class Pose(NamedTuple):
@@ -80,62 +77,6 @@ def _outline_distance(x: float, y: float, edge: FloatArray, first: int, last: in
 
 
 @bare_kernel
-def _blended(under: int, shade: float, cover: float, fill: Tone, rim: Tone, shift: Shift) -> int:
-    """Return a pixel with a colour between filling and rim laid over it."""
-    pixel = under
-    for channel in range(3):
-        colour = fill[channel] + (rim[channel] - fill[channel]) * shade
-        below = (under >> shift[channel]) & 255
-        value = int(below + (colour - below) * cover + 0.5)
-        pixel = (pixel & ~(255 << shift[channel])) | (value << shift[channel])
-    return pixel
-
-
-@bare_kernel
-def _span(
-    y: float, room: FloatArray, first: int, last: int, offset: float, left: float, right: float
-) -> tuple[float, float]:
-    """Return from where to where a row lies no farther than an offset outside all sides of a polygon."""
-    from_x, to_x = left, right
-    for k in range(first, last):
-        across, bound = room[k, 2], offset - (room[k, 3] * y + room[k, 4])
-        if across > 1e-9:
-            to_x = min(to_x, bound / across)
-        elif across < -1e-9:
-            from_x = max(from_x, bound / across)
-        elif bound < 0.0:
-            to_x = left - 1.0
-    return from_x, to_x
-
-
-@bare_kernel
-def _inner_span(
-    y: float, room: FloatArray, first: int, last: int, radius: float, left: float, right: float
-) -> tuple[float, float]:
-    """Return from where to where a row surely lies within a piece whose radius is this, which may be negative."""
-    if last - first > 2:
-        return _span(y, room, first, last, min(radius, 0.0), left, right)
-    if radius <= 0.0:
-        return left, left - 1.0
-    if last - first == 1:
-        under = radius * radius - (y - room[first, 1]) ** 2
-        half = math.sqrt(max(under, 0.0))
-        return max(left, room[first, 0] - half), min(right, room[first, 0] + half) if under > 0.0 else left - 1.0
-    from_x, to_x = _span(y, room, first, last, radius, left, right)
-    for k in range(first, last):  # no farther than the ends
-        after = 2 * first + 1 - k
-        dx, dy = room[after, 0] - room[k, 0], room[after, 1] - room[k, 1]
-        bound = dy * (room[k, 1] - y)
-        if dx > 1e-9:
-            from_x = max(from_x, room[k, 0] + bound / dx)
-        elif dx < -1e-9:
-            to_x = min(to_x, room[k, 0] + bound / dx)
-        elif bound > 0.0:
-            to_x = left - 1.0
-    return from_x, to_x
-
-
-@bare_kernel
 def _body_distance(
     x: float, y: float, body: int, pieces: Pieces, room: FloatArray, pose: Pose, edges: tuple[int, int], deep: float
 ) -> float:
@@ -185,6 +126,53 @@ def _place(pieces: Pieces, body: int, pose: Pose, room: FloatArray) -> tuple[flo
 
 
 @bare_kernel
+def _shaded(pixel: int, away: float, deep: float, fill: int, rim: int, hollow: bool, antialias: bool) -> int:
+    """Return a pixel with what a body covers of it, so far from its edge, laid over it."""
+    cover, shade = min(max(0.5 - away, 0.0), 1.0), min(max(away - deep, 0.0), 1.0)
+    if not antialias:
+        cover, shade = math.floor(cover + 0.5), math.floor(shade + 0.5)
+    if hollow:
+        cover, shade = cover * shade, 1.0
+    tone = blended(fill, rim, int(shade * FULL + 0.5)) if shade < 1.0 else rim
+    part = int(cover * FULL + 0.5)
+    return tone if part == FULL else blended(pixel, tone, part)
+
+
+@bare_kernel
+def _polygon_row(
+    pixels: npt.NDArray[np.uint32],
+    start: int,
+    y: float,
+    room: FloatArray,
+    corners: tuple[int, int],
+    ends: tuple[float, float],
+    deep: float,
+    fill: int,
+    rim: int,
+    hollow: bool,
+    antialias: bool,
+) -> None:
+    """Draw a row of a lone polygon: most are such, and it need not look for the other pieces of each pixel's body."""
+    first, last = corners
+    from_x, to_x = span(y, room, first, last, 0.5, ends[0], ends[1])
+    from_in, to_in = span(y, room, first, last, deep, ends[0], ends[1])
+    column, stop = int(from_x), math.ceil(to_x)
+    inner, outer = stop, stop
+    if from_in <= to_in:
+        inner, outer = max(math.ceil(from_in - 0.5), column), min(math.floor(to_in - 0.5) + 1, stop)
+    while column < stop:
+        if column == inner and inner < outer:
+            if not hollow:
+                pixels[start + inner : start + outer] = fill
+            column = outer
+            continue
+        away = _piece_distance(column + 0.5, y, room, first, last, 0.0)
+        if away < 0.5:
+            pixels[start + column] = _shaded(int(pixels[start + column]), away, deep, fill, rim, hollow, antialias)
+        column += 1
+
+
+@bare_kernel
 def stencil(
     pixels: npt.NDArray[np.uint32],
     stride: int,
@@ -194,9 +182,8 @@ def stencil(
     who: IntArray,
     pose: FloatArray,
     line: FloatArray,
-    fill: IntArray,
-    rim: IntArray,
-    shift: Shift,
+    fill: npt.NDArray[np.uint32],
+    rim: npt.NDArray[np.uint32],
     hollow: bool,
     antialias: bool,
 ) -> None:
@@ -211,13 +198,11 @@ def stencil(
         who: (K,) their numbers.
         pose: (K, 5) as in `Pose`.
         line: (K,) widths of their rims, px.
-        fill: (K, 3) their colours.
-        rim: (K, 3) the colours of their rims.
-        shift: of the surface.
+        fill: (K,) their colours, as the surface holds them.
+        rim: (K,) the colours of their rims.
         hollow: the rims alone.
         antialias: whether edges are smooth.
     """
-    others = ~(255 << shift[0] | 255 << shift[1] | 255 << shift[2])
     for k in range(len(who)):
         body, here = who[k], Pose(pose[k, 0], pose[k, 1], pose[k, 2], pose[k, 3], pose[k, 4])
         begin, end = pieces.piece[body], pieces.piece[body + 1]
@@ -231,18 +216,16 @@ def stencil(
         element, radius = pieces.element[body], pieces.radius[begin] * here.scale
         edges = pieces.edge_first[element], pieces.edge_first[element + 1]
         deep = -(line[k] + 0.5)
-        inner = float(fill[k, 0]), float(fill[k, 1]), float(fill[k, 2])
-        outer = float(rim[k, 0]), float(rim[k, 1]), float(rim[k, 2])
-        plain, edge = _blended(0, 0.0, 1.0, inner, outer, shift), _blended(0, 1.0, 1.0, inner, outer, shift)
+        inner, outer = int(fill[k]), int(rim[k])
         for row in range(int(top), math.ceil(bottom)):
             y, start = row + 0.5, row * stride
-            column, stop = int(left), math.ceil(right)
             if polygon:
-                from_x, to_x = _span(y, room, low, high, 0.5, left, right)
-                column, stop = int(from_x), math.ceil(to_x)
+                _polygon_row(pixels, start, y, room, (low, high), (left, right), deep, inner, outer, hollow, antialias)
+                continue
             for piece in range(begin, end):
                 first, last, wide = pieces.first[piece], pieces.first[piece + 1], pieces.radius[piece] * here.scale
-                room[first, 5], room[first, 6] = _inner_span(y, room, first, last, wide + deep, left, right)
+                room[first, 5], room[first, 6] = inner_span(y, room, first, last, wide + deep, left, right)
+            column, stop = int(left), math.ceil(right)
             while column < stop:
                 x, beyond = column + 0.5, column
                 for piece in range(begin, end):
@@ -251,21 +234,13 @@ def stencil(
                         beyond = max(beyond, min(int(room[first, 6] - 0.5) + 1, stop))
                 if beyond > column:
                     if not hollow:
-                        for there in range(start + column, start + beyond):
-                            pixels[there] = int(pixels[there]) & others | plain
+                        pixels[start + column : start + beyond] = inner
                     column = beyond
                     continue
                 if end - begin == 1:  # a call with all arrays takes longer than the rest
                     away = _piece_distance(x, y, room, low, high, radius)
                 else:
                     away = _body_distance(x, y, body, pieces, room, here, edges, deep)
-                cover, shade = min(max(0.5 - away, 0.0), 1.0), min(max(away - deep, 0.0), 1.0)
-                if not antialias:
-                    cover, shade = math.floor(cover + 0.5), math.floor(shade + 0.5)
-                if hollow:
-                    cover, shade = cover * shade, 1.0
-                if cover == 1.0 and shade == 1.0:
-                    pixels[start + column] = int(pixels[start + column]) & others | edge
-                elif cover > 0.0:
-                    pixels[start + column] = _blended(int(pixels[start + column]), shade, cover, inner, outer, shift)
+                pixel = int(pixels[start + column])
+                pixels[start + column] = _shaded(pixel, away, deep, inner, outer, hollow, antialias)
                 column += 1

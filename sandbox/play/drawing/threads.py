@@ -4,7 +4,7 @@ import numpy as np
 import pygame
 
 from sandbox.play.drawing.points import Packed, flat_pixels, is_flat
-from sandbox.trajectory import FloatArray
+from sandbox.trajectory import BoolArray, FloatArray
 
 MANY = 300
 """Lines from which on a compiled pass is worth its import."""
@@ -40,17 +40,17 @@ def draw_threads(surface: pygame.Surface, ends: FloatArray, tones: Packed, antia
         line(surface, tone, (ax, ay), (bx, by))
 
 
-def _cut(surface: pygame.Surface, ends: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _cut(surface: pygame.Surface, ends: FloatArray) -> tuple[BoolArray, FloatArray]:
     """Return which lines come near the picture, (K,), and those, cut to some distance around it as by `clipped`."""
     area = surface.get_clip()
     low = np.asarray((area.left, area.top)) - BEYOND
     high = np.asarray((area.right, area.bottom)) + BEYOND
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         a, b = ends[:, :2], ends[:, 2:]
-        sound = np.isfinite(ends).all(axis=1)
-        near = sound & (np.maximum(a, b) >= (area.left, area.top)).all(axis=1)
+        near = np.asarray(np.isfinite(ends).all(axis=1), np.bool_)
+        near &= (np.maximum(a, b) >= (area.left, area.top)).all(axis=1)
         near &= (np.minimum(a, b) <= (area.right, area.bottom)).all(axis=1)
-        inside = ((ends >= np.tile(low, 2)) & (ends <= np.tile(high, 2))).all(axis=1)
+        inside = np.asarray(((ends >= np.tile(low, 2)) & (ends <= np.tile(high, 2))).all(axis=1), np.bool_)
         if bool(inside[near].all()):
             return near, ends[near]
         way = b - a

@@ -6,17 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sandbox.engines.kernel import bare_kernel
+from sandbox.play.drawing.blend import FULL, blended
 from sandbox.trajectory import FloatArray
-
-
-@bare_kernel
-def _laid_over(under: int, tone: int, cover: float) -> int:
-    """Return a pixel with a colour laid over it, channel by channel, whichever way round they are."""
-    pixel = 0
-    for shift in (0, 8, 16, 24):
-        below, colour = under >> shift & 255, tone >> shift & 255
-        pixel |= int(below + (colour - below) * cover + 0.5) << shift
-    return pixel
 
 
 @bare_kernel
@@ -56,6 +47,6 @@ def wires(
             part = across - row
             for side in range(2):
                 cover = share * (part if side else 1.0 - part)
-                if across_low <= row + side < across_high and cover > 0.004:
+                if across_low <= row + side < across_high:
                     place = along * stride + row + side if steep else (row + side) * stride + along
-                    pixels[place] = _laid_over(int(pixels[place]), tone, cover)
+                    pixels[place] = blended(int(pixels[place]), tone, int(cover * FULL + 0.5))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from sandbox.play.camera import Box
+from sandbox.play.framing import ANCHORED
 from sandbox.scene.model import Scene
 from sandbox.trajectory import FloatArray
 
@@ -36,9 +37,11 @@ def crowd(position: FloatArray, radius: FloatArray, anchors: FloatArray) -> Box:
 
 
 def anchors_of(scene: Scene) -> FloatArray:
-    """Return the places of fixed things: the ends of walls and the edges of posts, (K, 2) m; planes have no end."""
+    """Return the places of fixed things, (K, 2) m: ends of walls, edges of posts, nails of joints; of planes none."""
     places = [point for wall in scene.walls for point in wall.points]
     for post in scene.posts:
         (x, y), r = post.position, post.radius
         places += [(x - r, y - r), (x + r, y + r)]
+    links = scene.links.some((scene.links.a < 0) & np.isin(scene.links.kind, ANCHORED))
+    places += [(x, y) for x, y in links.anchor_a.tolist()]
     return np.asarray(places, np.float64).reshape(-1, 2)

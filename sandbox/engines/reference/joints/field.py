@@ -17,7 +17,7 @@ class Field:
     """What acts on the bodies of a running scene from afar and from within."""
 
     def __init__(self, roster: Roster) -> None:
-        self._roster = roster
+        self._roster, self._began = roster, roster.scene.began
         scene, bodies = roster.scene, roster.bodies
         number = {name: k for k, name in enumerate(bodies.names)}
         toward = [a.toward for a in scene.attractions]
@@ -48,7 +48,8 @@ class Field:
             some = self._target[there], self._place[there], self._strength[there], self._softening[there]
             attract(x[0], *some, roster.inverse_mass, out[: len(roster.inverse_mass)])
         if len(self._body):
-            level = roster.throttles * ((self._begin <= time) & (time < self._end))
+            now = self._began + time
+            level = roster.throttles * ((self._begin <= now) & (now < self._end))
             inverse = roster.inverse_mass, roster.inverse_moment
             thrust(x[0], self._body, self._point, self._force, level, *inverse, out)
         return out

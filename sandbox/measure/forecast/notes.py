@@ -1,0 +1,66 @@
+"""Notes: what is worth knowing of a scene and is no warning."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sandbox.measure.forecast.warning import Warning
+from sandbox.scene.meetings import meetings
+from sandbox.scene.model import Mover, Scene
+from sandbox.scene.shapes import form_of
+from sandbox.scene.solids import Compound, Polygon, PolygonPart
+
+MOST_TOLD = 20
+"""Outlines told of one by one."""
+
+
+def notes(scene: Scene) -> list[Warning]:
+    """Return notes: into how many convex pieces each concave outline is cut, and what an audit cannot count."""
+    return [*_outlines(scene), *_audit(scene)]
+
+
+def _outlines(scene: Scene) -> Iterator[Warning]:
+    bodies = scene.bodies
+    several = [(k, element) for k, element in enumerate(bodies.elements) if isinstance(element, Polygon | Compound)]
+    told = 0
+    for k, element in several:
+        name = bodies.names[int(np.flatnonzero(bodies.element == k)[0])]
+        for part, count in _pieces(element):
+            told += 1
+            if told > MOST_TOLD:
+                return
+            which = f"the outline of {name!r}" if part is None else f"outline {part + 1} of {name!r}"
+            message = f"{which} is concave and is cut into {count} convex pieces"
+            yield Warning("outline", message, {"body": name, "pieces": count})
+
+
+def _pieces(element: Mover) -> list[tuple[int | None, int]]:
+    """Return which outlines of an element are cut, by their number among its polygons, and into how many pieces."""
+    pieces = form_of(element).pieces
+    if isinstance(element, Polygon):
+        return [(None, len(pieces))] if len(pieces) > 1 else []
+    assert isinstance(element, Compound)
+    found: list[tuple[int | None, int]] = []
+    outlines = 0
+    for bearer, part in enumerate(element.parts):
+        if isinstance(part, PolygonPart):
+            count = sum(piece.bearer == bearer for piece in pieces)
+            if count > 1:
+                found.append((outlines, count))
+            outlines += 1
+    return found
+
+
+def _audit(scene: Scene) -> Iterator[Warning]:
+    bodies = scene.bodies
+    some = meetings(scene).touches & ~bodies.round
+    count, without = int(some.sum()), int((some & (bodies.core <= 0.0)).sum())
+    if not count:
+        return
+    message = (
+        f"missed contacts are a least figure: of {count:,} bodies that are no balls one counts only where the largest "
+        "disc inside, about the centre of mass, went through"
+    )
+    if without:
+        message += f"; {without:,} have no such disc, and theirs are not counted"
+    yield Warning("audit", message, {"bodies": count, "without": without})

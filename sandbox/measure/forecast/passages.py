@@ -1,0 +1,127 @@
+"""Passages: how a body may get past what it should have met.
+
+A discrete engine tests for overlap once a substep. A ball whose centre crosses a thin thing's middle within one
+substep is not stopped: it tunnels. With a random phase the odds are 1 − reach/(v·h), where reach is the ball's
+radius and half the thing's thickness, or for two balls both radii and their relative speed. Of any other body half its
+width counts, where it is narrowest, for a radius: flying sideways it reaches no farther.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sandbox.measure.forecast.held import farthest_fall
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.crosscheck import height_above
+from sandbox.scene.meetings import Meetings, meetings
+from sandbox.scene.model import Plane, Post, Scene, Wall
+from sandbox.scene.near import BoolArray, FloatArray
+from sandbox.scene.part import BACKING
+from sandbox.scene.settings import Settings
+
+ANOTHER = "another ball"
+ANOTHER_BODY = "another body"
+
+
+@dataclass(frozen=True)
+class Passage:
+    """The likeliest way to tunnel: who through what, and from which substep on."""
+
+    ball: str
+    thing: str
+    speed: float
+    """m/s at which they close, at most"""
+    reach: float
+    """m, that one substep may cover"""
+
+    @property
+    def safe_h(self) -> float:
+        """The longest substep in which this cannot happen, s."""
+        return self.reach / self.speed if self.speed > 0 else math.inf
+
+    def odds(self, h: float) -> float:
+        """Return the chance of a miss at a substep h, for a random phase."""
+        way = self.speed * h
+        return 1.0 - self.reach / way if way > self.reach else 0.0
+
+
+def largest_safe_dt(scene: Scene, settings: Settings | None = None) -> float:
+    """Return the largest dt, s, at which nothing in the scene can tunnel, at its number of substeps; inf if at any."""
+    settings = scene.solver if settings is None else settings
+    return min((p.safe_h for p in passages(scene)), default=math.inf) * settings.substeps
+
+
+def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
+    """Return for each thing, and for bodies among themselves, the passage that needs the shortest substep."""
+    meet = meetings(scene) if meet is None else meet
+    bodies = scene.bodies
+    movers = np.flatnonzero(meet.touches & ~bodies.fixed)
+    if not len(movers):
+        return []
+    speed, half = top_speeds(scene, meet)[movers], bodies.thin[movers]
+    found = []
+
+    def worst(reach: FloatArray, speeds: FloatArray, thing: str) -> None:
+        with np.errstate(divide="ignore", over="ignore"):  # at rest, or as good as: never
+            k = int(np.argmin(reach / speeds))
+        found.append(Passage(bodies.names[movers[k]], thing, float(speeds[k]), float(reach[k])))
+
+    for thing, name in zip(scene.fixed, scene.fixed_names, strict=True):
+        worst(half + _half_depth(thing), speed, name)
+    among = meet_each_other(bodies)[movers]
+    fixed = np.flatnonzero(bodies.fixed & meet.touches)
+    if meet.mutual and len(fixed):
+        worst(half + float(bodies.thin[fixed].min()), speed, bodies.names[fixed[bodies.thin[fixed].argmin()]])
+    if meet.mutual and int(among.sum()) > 1:
+        another = ANOTHER if bodies.round[movers].all() else ANOTHER_BODY
+        worst(half[among] + float(half[among].min()), speed[among] + float(speed[among].max()), another)
+    return found
+
+
+def meet_each_other(bodies: Bodies) -> BoolArray:
+    """Return which bodies can meet their like, (N,)."""
+    return np.asarray([e.collides == "all" for e in bodies.elements], dtype=np.bool_)[bodies.element]
+
+
+def _half_depth(thing: Plane | Wall | Post) -> float:
+    """Return how deep behind its face a thing still pushes a centre back the way it came, m."""
+    match thing:
+        case Plane():
+            return BACKING
+        case Wall():
+            return thing.thickness / 2.0
+        case Post():
+            return thing.radius
+
+
+def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
+    """Return about how fast each body can get, (N,) m/s.
+
+    By its own fall: from rest on the speed it starts with, until a level floor below it, the end of what it hangs on,
+    or the end of the run. Where balls can meet, any may be hit by the fastest: an equal one takes over its speed, a
+    lighter one gets up to twice it. What springs, motors, attraction and thrusts add is left out.
+    """
+    bodies, world = scene.bodies, scene.world
+    start = np.hypot(*bodies.velocity.T)
+    gravity = math.hypot(*world.gravity)
+    speed = start + gravity * world.duration
+    if gravity > 0:
+        down = np.asarray(world.gravity) / gravity
+        for plane in scene.planes:
+            normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+            if float(normal @ down) < -1.0 + 1e-12:  # level to rounding: anything else can be slid down for ever
+                drop = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
+                speed = np.where(~meet.touches, speed, np.minimum(speed, np.sqrt(start**2 + 2.0 * gravity * drop)))
+        if len(scene.links):
+            drop = np.maximum(farthest_fall(scene, down), 0.0)
+            speed = np.minimum(speed, np.sqrt(start**2 + 2.0 * gravity * drop))
+    speed = np.where(bodies.fixed, 0.0, speed)
+    if world.linear_drag or world.quadratic_drag:
+        speed += math.hypot(*world.wind)
+    if meet.mutual:
+        movers = ~bodies.fixed & meet.touches
+        heaviest, fastest = float(bodies.mass[movers].max()), float(speed[movers].max())
+        gained = fastest * 2.0 * heaviest / (heaviest + bodies.mass)
+        speed = np.where(movers, np.maximum(speed, gained), speed)
+    return np.asarray(speed)

@@ -1,0 +1,127 @@
+"""Thrusts: constant, timed, opened and closed by actions, kept by a running scene that changes its engine."""
+
+import math
+
+import numpy as np
+import pytest
+
+import sandbox
+from sandbox.action import ActionError, Switch, Throttle
+from sandbox.engines.contract import Refusal
+from sandbox.engines.relay import Relay
+from sandbox.scene.file import from_document
+
+ENGINES = ("pymunk", "reference")
+every_engine = pytest.mark.parametrize("engine", ENGINES)
+
+
+def ship(*thrusts, collides="none", duration=1.0, **keys):
+    body = {"name": "ship", "position": [0.0, 0.0], "size": [2.0, 1.0], "mass": 2.0, "collides": collides, **keys}
+    thrusts = [{"body": "ship", "force": [4.0, 0.0], **each} for each in thrusts]
+    return from_document({"world": {"duration": duration}, "box": [body], "thrust": thrusts})
+
+
+def stepped(simulation, count):
+    for _ in range(count):
+        simulation.step()
+    return simulation.frame()
+
+
+@every_engine
+@pytest.mark.parametrize("collides", ["none", "all"])
+def test_thrust_through_the_centre_is_a_constant_acceleration(engine, collides):
+    done = sandbox.run(ship({}, collides=collides), engine, dt=0.01)
+    assert done.velocity[-1, 0] == pytest.approx([2.0, 0.0], abs=1e-14)  # 100 sums of 0.02
+    # Half a step early or late, as the scheme kicks: a·h·T/2.
+    assert done.position[-1, 0, 0] == pytest.approx(1.0, abs=2.0 * 0.01 / 2 + 1e-12)
+    assert not done.angular_velocity.any()
+
+
+@every_engine
+def test_thrust_turns_with_its_body(engine):
+    """Off the centre by 0.5 m: τ = 2 N·m on I = m(w² + h²)/12 = 5/6 kg·m², and the force points where the body does."""
+    h = 0.0005
+    done = sandbox.run(ship({"point": [0.0, -0.5]}), engine, dt=h)
+    alpha = 2.0 / (2.0 * 5.0 / 12.0)
+    t = done.time
+    np.testing.assert_allclose(done.angular_velocity[:, 0], alpha * t, atol=1e-11)  # 2,000 rounded sums
+    phi = 0.5 * alpha * t**2
+    # ∫ a·(cos φ, sin φ) dt by the trapezium rule, whose own error is h²
+    a = 2.0 * np.column_stack((np.cos(phi), np.sin(phi)))
+    velocity = np.concatenate((np.zeros((1, 2)), np.cumsum(0.5 * h * (a[1:] + a[:-1]), axis=0)))
+    assert (
+        np.abs(done.velocity[:, 0] - velocity).max() <= 2.0 * h * 2.0
+    )  # a step's force early or late: a·h, and φ with it
+
+
+@every_engine
+def test_timed_thrust_burns_from_begin_to_end(engine):
+    done = sandbox.run(ship({"begin": 0.25, "end": 0.75}), engine, dt=0.01)
+    assert done.velocity[done.time <= 0.25 + 1e-9, 0].max() == 0.0
+    assert done.velocity[-1, 0, 0] == pytest.approx(1.0, abs=1e-12)  # 50 of 100 steps
+    late = done.velocity[done.time >= 0.76, 0, 0]
+    assert np.ptp(late) == 0.0
+
+
+@every_engine
+def test_thrust_with_a_key_waits_for_a_throttle(engine):
+    simulation = sandbox.start(ship({"key": "up", "name": "main"}), engine)
+    assert not stepped(simulation, 10).velocity.any()
+    simulation.apply(Throttle(time=0.1, thrust="main", level=0.5))
+    assert stepped(simulation, 50).velocity[0, 0] == pytest.approx(0.5, abs=1e-14)
+    simulation.apply(Throttle(time=0.6, thrust="main", level=0.0))
+    assert stepped(simulation, 50).velocity[0, 0] == pytest.approx(0.5, abs=1e-14)
+
+
+@every_engine
+def test_unknown_thrust_is_refused_with_those_there_are(engine):
+    simulation = sandbox.start(ship({"name": "main"}, {}), engine)
+    with pytest.raises(ActionError, match="no thrust is named 'mian'; there are main, thrust-2"):
+        simulation.apply(Throttle(time=0.0, thrust="mian", level=1.0))
+
+
+def test_throttle_is_kept_where_the_engine_changes_and_where_a_checkpoint_is_taken_up():
+    simulation = sandbox.start(ship({"key": "up", "name": "main"}), "pymunk")
+    simulation.apply(Throttle(time=0.0, thrust="main", level=1.0))
+    stepped(simulation, 10)
+    simulation.apply(Switch(time=0.1, engine="reference"))
+    assert stepped(simulation, 10).velocity[0, 0] == pytest.approx(0.4, abs=1e-14)
+    resumed = Relay.resumed(simulation.checkpoint())
+    assert stepped(resumed, 10).state_hash() == stepped(simulation, 10).state_hash()
+    assert resumed.frame().velocity[0, 0] == pytest.approx(0.6, abs=1e-14)
+
+
+def test_timed_thrust_keeps_to_the_time_of_the_scene_on_the_next_engine():
+    simulation = sandbox.start(ship({"begin": 0.3, "end": 0.5}), "pymunk")
+    stepped(simulation, 10)
+    simulation.apply(Switch(time=0.1, engine="reference"))
+    assert not stepped(simulation, 20).velocity.any()
+    simulation.apply(Switch(time=0.3, engine="pymunk"))
+    assert stepped(simulation, 50).velocity[0, 0] == pytest.approx(0.4, abs=1e-14)  # 0.2 s at 2 m/s²
+
+
+def test_exact_refuses_thrust_and_attraction_by_name():
+    with pytest.raises(Refusal, match="does not model thrust"):
+        sandbox.start(ship({}), "exact")
+    ball = {"position": [1.0, 0.0], "radius": 0.1}
+    pulled = from_document({"ball": [ball], "attraction": [{"toward": [0.0, 0.0], "strength": 1.0}]})
+    with pytest.raises(Refusal, match="does not model attraction"):
+        sandbox.start(pulled, "exact")
+
+
+@every_engine
+def test_thrust_presses_what_rests_on_the_ground(engine):
+    """A box pushed down by 10 N bears on the ground with its weight and that."""
+    scene = from_document(
+        {
+            "world": {"gravity": [0.0, -9.81], "duration": 2.0},
+            "plane": [{"point": [0.0, 0.0], "normal": [0.0, 1.0]}],
+            "box": [{"name": "box", "position": [0.0, 0.5], "size": [1.0, 1.0]}],
+            "thrust": [{"body": "box", "force": [0.0, -10.0]}],
+        }
+    )
+    done = sandbox.run(scene, engine, dt=0.01)
+    given = -done.contact_impulse[:, 1].sum()
+    momentum = float(done.velocity[-1, 0, 1])  # what it still has
+    assert given - (9.81 + 10.0) * 2.0 == pytest.approx(momentum, abs=1e-9)  # the balance of momentum, rounded
+    assert math.isclose(done.position[-1, 0, 1], 0.5, abs_tol=0.01)  # the slop

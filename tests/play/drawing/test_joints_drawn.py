@@ -1,0 +1,167 @@
+"""Joints: what is drawn of each kind, where, and when."""
+
+import math
+
+import numpy as np
+import pygame
+import pytest
+from drawn import CAMERA, ball, changed, drawn, frame, scene, sight
+
+from sandbox.engines import kernel
+from sandbox.play.drawing import threads as module
+from sandbox.play.drawing import wires
+from sandbox.play.drawing.joints import COILED, SHADES, Held, strain
+from sandbox.play.drawing.palette import ORANGE, SKY
+from sandbox.play.drawing.threads import draw_threads
+from sandbox.scene.model import Scene
+
+TWO = [ball(-3, 0, 0.3, name="a", angle=0.1), ball(3, 0, 0.3, name="b", angle=0.1)]
+PAIR = {"between": ["a", "b"]}
+KINDS = {
+    "rod": PAIR | {"kind": "rod"},
+    "pivot": PAIR | {"kind": "pivot", "at": [0, 1]},
+    "slide": PAIR | {"kind": "slide", "most": 9.0},
+    "groove": PAIR | {"kind": "groove", "groove": [[1, 1], [3, 1]]},
+    "rotary_limit": PAIR | {"kind": "rotary_limit", "least": -1.0, "most": 1.0},
+    "motor": PAIR | {"kind": "motor", "rate": 2.0},
+    "gear": PAIR | {"kind": "gear", "ratio": 2.0},
+    "spring": PAIR | {"kind": "spring", "stiffness": 1.0},
+    "rotary_spring": PAIR | {"kind": "rotary_spring", "stiffness": 1.0},
+}
+QUIET = {"rod", "slide", "spring"}
+
+
+def joined(*joints: dict) -> Scene:
+    return scene(balls=TWO, joint=list(joints))
+
+
+def shown(which: Scene, *overlays: str, **more: object) -> np.ndarray:
+    """Return which pixels joints change."""
+    return changed(drawn(sight(scene(balls=TWO)), **more), drawn(sight(which, *overlays), **more))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_carries_the_picture_is_seen_without_the_overlay(kind):
+    assert shown(joined(KINDS[kind])).any() == (kind in QUIET)
+
+
+@pytest.mark.parametrize("antialias", [True, False])
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_has_its_mark_in_the_overlay(kind, antialias):
+    without = drawn(sight(joined(KINDS[kind])), antialias=antialias)
+    differ = changed(without, drawn(sight(joined(KINDS[kind]), "joints"), antialias=antialias))
+    assert differ.sum() > 10
+
+
+def test_kinds_are_told_apart_by_more_than_colour():
+    marks = [shown(joined(joint), "joints") for joint in KINDS.values()]
+    for k, one in enumerate(marks):
+        assert all((one != other).sum() > 10 for other in marks[:k])
+
+
+def test_a_rod_is_a_line_between_its_anchors():
+    which = joined(PAIR | {"kind": "rod", "anchors": [[0.0, 0.2], [0.0, 0.2]]})
+    differ = shown(which)
+    assert differ[60:140, 60 - 4].all()
+    assert not differ[60:140, :50].any()
+    assert not differ[:30].any()
+
+
+def test_a_rod_to_the_world_reaches_its_place():
+    which = joined({"kind": "rod", "between": ["a"], "anchors": [[0, 0], [-3, 2]]})
+    differ = shown(which)
+    assert differ[38:43, 20:50].any(axis=0).all()
+    assert not differ[70:].any()
+
+
+def test_a_joint_of_a_body_that_is_gone_is_gone():
+    which = joined(KINDS["rod"])
+    there = np.asarray([True, False])
+    gone = drawn(sight(which, "joints", frame=frame(which, present=there)))
+    alone = scene(balls=TWO)
+    assert not changed(gone, drawn(sight(alone, frame=frame(alone, present=there)))).any()
+
+
+@pytest.mark.parametrize("place", [math.nan, math.inf, 1e300])
+def test_a_joint_that_leads_nowhere_is_left_out(place):
+    for joint in KINDS.values():
+        which = joined(joint)
+        drawn(sight(which, "joints", frame=frame(which, position=np.asarray([[-3.0, 0.0], [place, 0.0]]))))
+
+
+def test_a_spring_is_a_zigzag_as_long_as_it_is():
+    column, row = np.nonzero(shown(joined(KINDS["spring"])))
+    assert column.min() >= 40
+    assert column.max() <= 160
+    assert row.max() - row.min() > 6, "not a line"
+
+
+def test_a_spring_narrows_as_it_stretches():
+    width = []
+    for rest in (10.0, 6.0, 3.0):
+        _, row = np.nonzero(shown(joined(KINDS["spring"] | {"rest_length": rest})))
+        width.append(row.max() - row.min())
+    assert width == sorted(width, reverse=True)
+    assert width[0] > width[2]
+
+
+def test_strain_is_blue_grey_orange():
+    which = joined(*(KINDS["spring"] | {"rest_length": rest} for rest in (60.0, 6.0, 0.06, 0.0)))
+    held = Held(which.links, np.tile((0.0, 0.0, 6.0 * CAMERA.scale, 0.0), (4, 1)))
+    short, rest, long, none = SHADES[strain(held, CAMERA.scale)].astype(int)
+    assert np.abs(short - SKY).max() <= 20  # nine tenths of the way
+    assert (rest == SHADES[32]).all()
+    assert np.abs(long - ORANGE).max() <= 8  # all but the whole way
+    assert (none == SHADES[61]).all() or np.abs(none - ORANGE).max() <= 20  # of no length at rest: as if twice as long
+
+
+def cloth(columns: int, rows: int) -> Scene:
+    def name(column: int, row: int) -> str:
+        return f"g-{row * columns + column + 1}"
+
+    across = [(name(c, r), name(c + 1, r)) for r in range(rows) for c in range(columns - 1)]
+    down = [(name(c, r), name(c, r + 1)) for r in range(rows - 1) for c in range(columns)]
+    springs = [{"kind": "spring", "between": list(pair), "stiffness": 1.0} for pair in across + down]
+    grid = {"name": "g", "origin": [-4.0, -2.0], "columns": columns, "rows": rows, "spacing": [0.4, 0.4]}
+    return scene(grid=[grid | {"radius": 0.001}], joint=springs)
+
+
+def test_springs_of_a_cloth_are_lines():
+    which = cloth(20, 16)
+    assert len(which.links) > COILED
+    picture = drawn(sight(which))
+    differ = changed(picture, drawn(sight(scene(world={}))))
+    assert differ[21:170, 68].all(), "a row of it, from its left to its right"
+    tone = SHADES[32].astype(int)
+    assert np.abs(picture[50, 66:71].astype(int) - tone).max(axis=1).min() < 60  # two rows of pixels share a line
+
+
+assert wires.wires, "imported before a test says that there is numba"
+
+
+def threads(ends: list, compiled: bool) -> np.ndarray:
+    surface = pygame.Surface((200, 120), 0, 32)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernel, "COMPILED", True)  # without numba the same pass runs as plain Python
+        patch.setattr(module, "MANY", 0 if compiled else 10**9)
+        draw_threads(surface, np.asarray(ends, np.float64), np.full(len(ends), 0xFFFFFF, np.uint32))
+    return pygame.surfarray.array3d(surface)[..., 0] / 255.0
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("ends", [(10, 20, 110, 20), (10, 20, 90, 80), (90, 110, 60, 10), (150, 90, 20, 85)])
+def test_a_thread_has_the_ink_of_its_longer_way(ends, compiled):
+    ink = threads([ends], compiled).sum()
+    assert ink == pytest.approx(
+        max(abs(ends[2] - ends[0]), abs(ends[3] - ends[1])), abs=2.5
+    )  # whole pixels at its ends
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_threads_are_cut_where_the_picture_ends(compiled):
+    far = threads([(-1e9, 60.0, 1e9, 60.0), (100.0, -1e7, 100.0, 1e7)], compiled)
+    assert (far[:, 58:62].sum(axis=1) > 0.9).all()  # eight bits a pixel
+    assert (far[98:102].sum(axis=0) > 0.9).all()  # the same
+    none = [(math.nan, 0, 9, 9), (0, 0, math.inf, 3), (-50, -50, -3, 400), (0, 500, 200, 500), (1e300, 1, -1e300, 2)]
+    assert threads([*none[:4]], compiled).sum() == 0.0
+    threads(none, compiled)

@@ -1,0 +1,193 @@
+"""Bodies that are no lone discs: where they are filled, where their edges are, and that all ways of drawing agree."""
+
+import math
+
+import numpy as np
+import pygame
+import pytest
+from drawn import CAMERA, at, ball, changed, drawn, frame, scene, sight
+
+from sandbox.engines import kernel
+from sandbox.play.drawing import polygons as module
+from sandbox.play.drawing import stencil
+from sandbox.play.drawing.discs import Style, dark
+from sandbox.play.drawing.palette import ACCENTS, NEUTRAL, YELLOW
+from sandbox.play.drawing.polygons import Polygons
+from sandbox.scene.model import Scene
+
+STAR = [
+    [math.cos(k * math.pi / 5) * (1.0 if k % 2 else 2.5), math.sin(k * math.pi / 5) * (1.0 if k % 2 else 2.5)]
+    for k in range(10)
+]
+HAMMER = {"position": [0, 0], "box": [{"size": [4.0, 0.5]}, {"size": [1.0, 2.0], "position": [2.0, 0.0]}]}
+ABUTTING = {"position": [0, 0], "box": [{"size": [2, 2], "position": [-1, 0]}, {"size": [2, 2], "position": [1, 0]}]}
+FLUSH = {"position": [0, 0], "box": [{"size": [3, 2], "position": [-1, 0]}, {"size": [3, 2], "position": [1, 0]}]}
+BONE = {
+    "position": [0, 0],
+    "ball": [{"radius": 1.0, "position": [-2, 0]}, {"radius": 1.0, "position": [2, 0]}],
+    "capsule": [{"length": 4.0, "radius": 0.5}],
+}
+SHAPES = {
+    "box": {"box": [{"position": [0, 0], "size": [4, 2], "angle": 0.4}]},
+    "triangle": {"polygon": [{"position": [0, 0], "points": [[-2, -1], [2, -1], [0, 2]]}]},
+    "capsule": {"capsule": [{"position": [0, 0], "length": 3, "radius": 1, "angle": -0.7}]},
+    "star": {"polygon": [{"position": [0, 0], "points": STAR, "angle": 0.1}]},
+    "hammer": {"body": [HAMMER | {"angle": 2.0}]},
+    "abutting": {"body": [ABUTTING | {"angle": 0.3}]},
+    "bone": {"body": [BONE | {"angle": 0.9}]},
+}
+AREAS = {
+    "box": 8.0,
+    "triangle": 6.0,
+    "capsule": 6.0 + math.pi,
+    "star": 10 * 0.5 * 2.5 * 1.0 * math.sin(math.pi / 5),
+    "hammer": 2.0 + 2.0 - 0.25,
+    "abutting": 8.0,
+}
+
+
+assert stencil.stencil, "imported before a test says that there is numba"
+
+
+def white(which: Scene, *, few: int, antialias: bool = True, hollow: bool = False, scale: float = 20.0) -> np.ndarray:
+    """Return a body drawn white without a rim, on black: how much of each pixel it covers."""
+    surface, bodies = pygame.Surface((240, 240), 0, 32), which.bodies
+    who = np.arange(len(bodies))
+    style = Style(2.0 if hollow else 0.0, hollow, antialias)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "FEW", few)
+        patch.setattr(kernel, "COMPILED", True)  # without numba the same pass runs as plain Python
+        if few:
+            patch.setattr(module, "_in_one_pass", lambda *_: False)
+        tint = np.full((len(who), 3), 255, np.uint8)
+        Polygons().draw(surface, bodies, who, np.full((len(who), 2), 120.3), bodies.angle, scale, tint, style)
+    return pygame.surfarray.array3d(surface)[..., 0] / 255.0
+
+
+@pytest.mark.parametrize("few", [0, 100])
+@pytest.mark.parametrize("shape", AREAS)
+def test_area_is_that_of_the_shape(shape, few):
+    pixels = white(scene(**SHAPES[shape]), few=few).sum()
+    assert pixels == pytest.approx(AREAS[shape] * 400, rel=0.012)  # coverage at corners is rounded, 8 bits a pixel
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("antialias", [True, False])
+@pytest.mark.parametrize("hollow", [True, False])
+def test_one_pass_and_distances_draw_the_same(shape, antialias, hollow):
+    one, other = (white(scene(**SHAPES[shape]), few=few, antialias=antialias, hollow=hollow) for few in (0, 100))
+    differ = np.abs(one - other)
+    if antialias:
+        assert differ.max() < 0.02  # a colour is rounded once or twice
+    else:
+        assert (differ > 0.02).sum() <= 4  # a pixel's middle may lie on the edge but for rounding
+
+
+@pytest.mark.parametrize("antialias", [True, False])
+def test_a_crowd_without_numba_is_drawn_where_it_is(antialias, monkeypatch):
+    monkeypatch.setattr(module, "_in_one_pass", lambda *_: False)
+    rows = [{"position": [x, y], "size": [0.8, 0.4], "angle": 0.5} for x in (-4, -2, 0, 2, 4) for y in (-1, 0.5, 2)]
+    picture = drawn(sight(scene(box=rows)), antialias=antialias)
+    for k, row in enumerate(rows):
+        assert at(picture, *row["position"]) == ACCENTS[k % len(ACCENTS)]
+    assert not changed(picture, drawn(sight(scene(world={})), antialias=antialias))[115:125].any(), "between them"
+
+
+@pytest.mark.parametrize("few", [0, 100])
+@pytest.mark.parametrize(("body", "inside"), [(ABUTTING, (0.0, 0.5)), (HAMMER, (1.5, 0.0)), (FLUSH, (0.5, 0.3))])
+def test_no_edge_shows_within_a_body(body, inside, few):
+    which = scene(body=[body])
+    assert (white(which, few=few)[100:140, 118:122] == 1.0).all()
+    hollow = white(which, few=few, hollow=True)
+    x, y = (np.asarray(inside) - which.bodies.position[0]) * (20, -20) + 120.3
+    assert hollow[round(x) - 3 : round(x) + 3, round(y) - 2 : round(y) + 2].max() == 0.0
+
+
+@pytest.mark.parametrize("few", [0, 100])
+def test_flush_edges_of_two_pieces_are_still_seen(few):
+    hollow = white(scene(body=[FLUSH]), few=few, hollow=True)
+    rows = hollow[75:165].max(axis=1)
+    assert rows.min() > 0.9  # 5 m long, 100 px; of a line 2 px wide some pixel is all but covered
+
+
+def test_a_polygon_has_its_colour_and_a_darker_rim():
+    picture = drawn(sight(scene(box=[{"position": [0, 0], "size": [4, 3]}])))
+    assert at(picture, 0.0, 0.0) == ACCENTS[0]
+    assert at(picture, 0.0, 1.46) == dark(ACCENTS[0])
+    assert at(picture, 0.0, 1.6) != dark(ACCENTS[0])
+
+
+def test_a_fixed_box_is_neutral():
+    assert at(drawn(sight(scene(box=[{"position": [0, 0], "size": [4, 3], "fixed": True}]))), 0.0, 0.0) == NEUTRAL
+
+
+def test_a_box_turns_with_y_up():
+    which = scene(box=[{"position": [0, 0], "size": [6, 0.6]}])
+    turned = drawn(sight(which, frame=frame(which, angle=np.asarray([math.pi / 4]))))
+    assert at(turned, 1.5, 1.5) == ACCENTS[0]
+    assert at(turned, 1.5, -1.5) != ACCENTS[0]
+
+
+def test_what_looks_round_has_a_spoke_and_what_does_not_has_none():
+    corners = [[math.cos(k * math.pi / 8), math.sin(k * math.pi / 8)] for k in range(16)]
+    plane = [{"point": [0, -3], "normal": [0, 1]}]
+    for points, has in ((corners, True), (corners[::4], False)):
+        which = scene(polygon=[{"position": [0, 0], "points": points}], plane=plane)
+        assert (at(drawn(sight(which)), 0.6, 0.0) != ACCENTS[0]) is has
+
+
+def test_what_is_outside_changes_no_pixel():
+    inside = [{"position": [0, 0], "size": [1, 1]}]
+    outside = [{"position": [x, y], "size": [1, 1]} for x, y in ((7, 0), (-6, 3), (0, 4), (1e12, -1e12), (0, -9))]
+    one, other = (drawn(sight(scene(box=boxes))) for boxes in (inside, inside + outside))
+    assert not changed(one, other).any()
+
+
+@pytest.mark.parametrize("size", [1e3, 1e6, 1e9])
+def test_a_box_of_any_size_reaches_to_its_edge_and_no_farther(size):
+    picture = drawn(sight(scene(box=[{"position": [-size / 2, 0], "size": [size, size]}])))
+    assert at(picture, -2.0, 0.0) == ACCENTS[0]
+    assert at(picture, 0.2, 0.0) != ACCENTS[0]
+
+
+def test_bodies_at_nan_are_left_out():
+    which = scene(box=[{"position": [0, 0], "size": [1, 1]}, {"position": [2, 0], "size": [1, 1]}])
+    broken = frame(which, position=np.asarray([[math.nan, 0.0], [2.0, 0.0]]), angle=np.asarray([0.0, math.nan]))
+    assert at(drawn(sight(which, frame=broken)), 2.0, 0.0) == ACCENTS[1]
+
+
+def test_discs_beside_boxes_are_those_without_boxes():
+    alone = drawn(sight(scene(balls=[ball(-3, 0), ball(-1, 1.5, 0.4, angle=1.0)])))
+    both = scene(balls=[ball(-3, 0), ball(-1, 1.5, 0.4, angle=1.0)], box=[{"position": [3, 0], "size": [2, 2]}])
+    assert not changed(alone, drawn(sight(both)))[:110].any()
+
+
+def test_bounds_of_a_turned_box_lie_about_it():
+    which = scene(box=[{"position": [0, 0], "size": [4, 2], "angle": math.pi / 2}])
+    column, row = np.nonzero(changed(drawn(sight(which)), drawn(sight(which, "bounds"))))
+    assert (column.min(), row.min(), column.max() + 1, row.max() + 1) == pytest.approx(
+        (80, 20, 120, 100), abs=1
+    )  # 1 px
+
+
+def test_a_ghost_is_hollow():
+    which = scene(box=[{"position": [-2, 0], "size": [2, 2]}])
+    ghost = frame(which, position=np.asarray([[3.0, 0.0]]))
+    differ = changed(drawn(sight(which)), drawn(sight(which, ghost=ghost)))
+    column = int(CAMERA.to_screen(np.asarray((3.95, 0.0)))[0])
+    assert differ[column, 55:65].all()
+    assert not differ[165:170, 50:70].any()
+
+
+def test_the_picked_body_has_a_line_around_its_outline():
+    which = scene(box=[{"position": [0, 0], "size": [6, 1]}])
+    picture = drawn(sight(which, picked=0))
+    assert tuple(picture[100, 60 - 10 - 3]) == YELLOW
+    assert not changed(drawn(sight(which)), picture)[95:105, 10:40].any()
+
+
+def test_names_stand_above_the_outline():
+    which = scene(box=[{"position": [0, 0], "size": [8, 0.4], "name": "beam"}])
+    _, row = np.nonzero(changed(drawn(sight(which)), drawn(sight(which, "names"))))
+    assert row.min() > 60 - 4 - 20
+    assert row.max() < 60 - 4
