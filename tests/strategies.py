@@ -182,6 +182,93 @@ def documents(draw: st.DrawFn, most: int = 2) -> Document:
     return kept or {"title": ""}
 
 
+OUTLINES = (
+    [[0, 0], [1, 0], [0, 1]],
+    [[0, 0], [0, 1], [1, 1], [1, 0]],
+    [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]],
+    [[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [3, 2], [3, 3], [0, 3]],
+)
+"""Clockwise and not, convex and not."""
+
+
+@st.composite
+def solids(draw: st.DrawFn) -> Document:
+    """The tables of some boxes, capsules, polygons and bodies of several parts, all named, and of their joints."""
+    size, spot = numbers(1e-3, 3), pairs(-100, 100)
+    shape: dict[str, Document] = {
+        "ball": {"radius": size},
+        "box": {"size": st.lists(size, min_size=2, max_size=2)},
+        "capsule": {"length": size, "radius": size},
+        "polygon": {"points": st.sampled_from(OUTLINES)},
+    }
+    part = {**_coefficients(), "colour": _colours(), "density": numbers(1e-3, 1e3), "angle": numbers(-4, 4)}
+    state = {"angle": numbers(-1e3, 1e3), "collides": st.sampled_from(["all", "fixed", "none"]), **_coefficients()}
+    moving = {"velocity": pairs(-10, 10), "angular_velocity": numbers(-10, 10), "mass": numbers(1e-2, 1e2)}
+    document: Document = {}
+    for kind in ("box", "capsule", "polygon"):
+        either = st.fixed_dictionaries({"position": spot, **shape[kind]}, optional={**state, **moving})
+        fixed = st.fixed_dictionaries({"position": spot, **shape[kind], "fixed": st.just(True)}, optional=state)
+        document[kind] = draw(st.lists(either | fixed, max_size=2))
+    parts = {
+        kind: st.lists(st.fixed_dictionaries(keys, optional={**part, "position": pairs(-2, 2)}), min_size=1, max_size=2)
+        for kind, keys in shape.items()
+    }
+    more = {kind: those for kind, those in parts.items() if kind != "box"}
+    some = st.fixed_dictionaries({"position": spot, "box": parts["box"]}, optional={**state, **moving, **more})
+    document["body"] = draw(st.lists(some, max_size=2))
+    names = []
+    for kind, those in document.items():
+        for k, each in enumerate(those):
+            each["name"] = f"{kind} {k}"
+            names += [] if each.get("fixed") else [each["name"]]
+    if names:
+        document["joint"] = draw(st.lists(_joints(names), max_size=4))
+        document["thrust"] = draw(st.lists(_thrusts(names), max_size=2))
+        toward = st.sampled_from(names) | spot
+        pull = st.fixed_dictionaries({"toward": toward, "strength": numbers(-10, 10)}, optional={"softening": size})
+        document["attraction"] = draw(st.lists(pull, max_size=2))
+    return {kind: those for kind, those in document.items() if those}
+
+
+@st.composite
+def _joints(draw: st.DrawFn, names: list[str]) -> Document:
+    """A joint of movable bodies, sound whatever it joins."""
+    spot, figure = pairs(-3, 3), numbers(1e-3, 10)
+    kinds: dict[str, Document] = {
+        "pivot": {"at": spot},
+        "slide": {"most": figure},
+        "groove": {"groove": st.just([[0, 0], [1, 2]]), "anchor": spot},
+        "rotary_limit": {"least": numbers(-3, 0), "most": numbers(0, 3)},
+        "motor": {"rate": numbers(-10, 10), "max_torque": figure},
+        "gear": {"ratio": figure},
+        "spring": {"stiffness": figure, "damping": figure, "rest_length": figure},
+        "rotary_spring": {"stiffness": figure, "rest_angle": numbers(-3, 3)},
+    }
+    kind = draw(st.sampled_from(list(kinds)))
+    between = st.lists(st.sampled_from(names), min_size=1, max_size=2, unique=True)
+    joint = st.fixed_dictionaries({"between": between, **kinds[kind]}, optional={"collide": st.booleans()})
+    return {"kind": kind, **draw(joint)}
+
+
+def _thrusts(names: list[str]) -> st.SearchStrategy[Document]:
+    optional = {"point": pairs(-3, 3), "begin": numbers(0, 1), "key": st.sampled_from(["up", "left"])}
+    return st.fixed_dictionaries({"body": st.sampled_from(names), "force": pairs(-10, 10)}, optional=optional)
+
+
+@st.composite
+def solid_documents(draw: st.DrawFn) -> Document:
+    """Sound scene documents of solids, joints and forces over a floor, small and slow enough to be run."""
+    world = st.fixed_dictionaries({}, optional={"gravity": pairs(-10, 10), "linear_drag": numbers(0, 1)})
+    floor = {"point": [0, -200], "normal": [0, 1], "restitution": 0.5, "friction": 0.5}
+    document: Document = {"world": draw(world), "plane": [floor], "solver": {"dt": 0.01}, **draw(solids())}
+    return {kind: value for kind, value in document.items() if value}
+
+
+def solid_scenes() -> st.SearchStrategy[Scene]:
+    """Sound scenes of solids, joints and forces."""
+    return solid_documents().map(from_document)
+
+
 def any_length(vector: list[float]) -> bool:
     """Tell whether a vector is long enough to have a direction."""
     return math.hypot(*vector) > 1e-90

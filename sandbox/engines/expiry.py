@@ -1,11 +1,12 @@
-"""Expiry: whose life is over, told at the first frame at which it is."""
+"""Expiry: who is to be retired at a frame: whose life is over by then, or who has left world.bounds."""
 
 import math
 
 import numpy as np
 
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.near import IntArray
+from sandbox.scene.near import BoolArray, FloatArray, IntArray
+from sandbox.scene.part import Point
 
 SLACK = 1e-6
 """Share of a step by which a frame may come before the end of a life and still be the first after it.
@@ -46,6 +47,30 @@ class Expiry:
         first, self._told = self._told, int(np.searchsorted(self._ends, latest, side="right"))
         self._next = self._first_end()
         return np.sort(self._numbers[first : self._told])
+
+    def going(
+        self,
+        time: float,
+        position: FloatArray,
+        present: BoolArray,
+        fixed: BoolArray,
+        bounds: tuple[Point, Point] | None,
+    ) -> IntArray:
+        """Return the numbers, in order, of those to be retired at a time of the run, s.
+
+        Args:
+            time: as of `due`.
+            position: (N, 2) m; only looked at where there are bounds.
+            present: (N,) who is there.
+            fixed: (N,) who stays whatever happens.
+            bounds: lower left and upper right corner, m.
+        """
+        due = self.due(time)
+        if bounds is None:
+            return due[present[due]] if len(due) else due
+        out: BoolArray = np.asarray(((position < bounds[0]) | (position > bounds[1])).any(axis=1))
+        out[due] = True
+        return np.flatnonzero(out & present & ~fixed)
 
     def _first_end(self) -> float:
         return float(self._ends[self._told]) if self._told < len(self._ends) else math.inf

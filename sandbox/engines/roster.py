@@ -153,12 +153,7 @@ class Roster:
 
     def going(self, time: float) -> IntArray:
         """Return who is to be retired at a time, s: whose life is over or whose centre has left world.bounds, (K,)."""
-        due, bounds = self._expiry.due(time), self.scene.world.bounds
-        if bounds is None:
-            return due[self.present[due]] if len(due) else due
-        out = ((self.position < bounds[0]) | (self.position > bounds[1])).any(axis=1)
-        out[due] = True
-        return np.flatnonzero(out & self.moving)
+        return self._expiry.going(time, self.position, self.present, self.bodies.fixed, self.scene.world.bounds)
 
     def beyond(self) -> int | None:
         """Return a body that is not finite, or beyond all bounds; else None."""

@@ -6,6 +6,7 @@ from sandbox.play.instruments.figures import figure
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule
+from sandbox.scene.stacks import Stack
 from sandbox.trajectory import Contacts, Frame
 
 
@@ -45,7 +46,7 @@ def facts(bodies: Bodies, frame: Frame, contacts: Contacts, number: int) -> tupl
 def _size(bodies: Bodies, number: int) -> str:
     """Return in words how large a body is, by what its kind is known by."""
     element = bodies.elements[int(bodies.element[number])]
-    if isinstance(element, Box):
+    if isinstance(element, Box | Stack):
         return f"{figure(element.size[0], 'm')} × {figure(element.size[1], 'm')}"
     if isinstance(element, Capsule):
         return f"l {figure(element.length, 'm')}, r {figure(element.radius, 'm')}"

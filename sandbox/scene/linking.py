@@ -63,7 +63,7 @@ def _stated(scene: Scene, bodies: Bodies) -> Links:
     )
 
 
-def ends_of(joint: Anchored, bodies: Bodies, number: dict[str, int]) -> tuple[Point, Point]:
+def ends_of(joint: Rod, bodies: Bodies, number: dict[str, int]) -> tuple[Point, Point]:
     """Return where the two points that a joint holds start, m; `number` is each body's."""
     a, b, anchor_a, anchor_b, _ = _row(joint, bodies, number)
     return _world(anchor_a, a, bodies), _world(anchor_b, b, bodies)

@@ -65,6 +65,8 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
     document = copy.deepcopy(document)
     touched: set[Location] = set()
     wrong = list(wrong)
+    if () in wrong:
+        return []  # the document as a whole cannot be read
     kept = _without_faulty(document, wrong)
     for location in wrong:
         if location[:1] in REFERRING:

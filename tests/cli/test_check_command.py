@@ -6,15 +6,16 @@ import pytest
 from calling import DROP, FAULTY, json_of, lines_of, written
 
 from sandbox.engines.registry import ENGINES
+from sandbox.scene.demands import Demand
 
 
 def test_json_of_a_sound_scene_has_every_key(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene = written(tmp_path)
     status, document, err = json_of(capfd, "check", scene)
     assert (status, err) == (0, [])
-    assert {"scene", "title", "ok", "faults", "demands", "engines", "warnings"} <= set(document)
+    assert {"scene", "title", "ok", "faults", "demands", "engines", "warnings", "notes"} <= set(document)
     assert (document["scene"], document["title"], document["ok"]) == (scene, "Drop", True)
-    assert (document["faults"], document["warnings"]) == ([], [])
+    assert (document["faults"], document["warnings"], document["notes"]) == ([], [], [])
     assert sorted(document["demands"]) == ["ball-plane", "gravity", "restitution", "translation"]
     assert document["engines"] == {name: {"ok": True, "missing": []} for name in ENGINES}
 
@@ -89,10 +90,11 @@ def test_bill_is_printed_a_line_each(tmp_path: Path, capfd: pytest.CaptureFixtur
     scene = written(tmp_path)
     status, out, err = lines_of(capfd, "check", scene)
     assert (status, out[0], err) == (0, f"{scene}: Drop", [])
-    marks = {line.split()[1]: line.split()[0] for line in out[1:12]}
+    bill = 1 + len(Demand)
+    marks = {line.split()[1]: line.split()[0] for line in out[1:bill]}
     assert (marks["gravity"], marks["drag"], marks["rotation"]) == ("on", "off", "off")
-    assert out[12 : 12 + len(ENGINES)] == [f"  engine {name}: models all of it" for name in ENGINES]
-    assert len(out) == 13 + len(ENGINES)
+    assert out[bill : bill + len(ENGINES)] == [f"  engine {name}: models all of it" for name in ENGINES]
+    assert len(out) == bill + 1 + len(ENGINES)
 
 
 def test_quiet_tells_only_what_is_wrong(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -100,3 +102,15 @@ def test_quiet_tells_only_what_is_wrong(tmp_path: Path, capfd: pytest.CaptureFix
     status, out, err = lines_of(capfd, "check", "bullet", "--quiet")
     assert (status, len(out), err) == (0, 1, [])
     assert out[0].startswith("bullet: warning: 'bullet' can close on 'wall' at up to 100 m/s, 0.1 m a substep")
+
+
+def test_note_is_told_of_a_concave_outline(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    outline = "[[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]"
+    scene = written(tmp_path, f'[[polygon]]\nname = "L"\nposition = [0, 0]\npoints = {outline}\ncollides = "none"\n')
+    status, document, err = json_of(capfd, "check", scene)
+    message = "the outline of 'L' is concave and is cut into 2 convex pieces"
+    assert (status, err) == (0, [])
+    assert document["notes"] == [{"kind": "outline", "message": message, "body": "L", "pieces": 2}]
+    status, out, _ = lines_of(capfd, "check", scene)
+    assert (status, out[-1]) == (0, f"  note: {message}")
+    assert lines_of(capfd, "check", scene, "--quiet") == (0, [], [])  # nothing is wrong

@@ -8,7 +8,7 @@ import strategies
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.measure.forecast import at_most, largest_safe_dt, passages, top_speeds, warnings
+from sandbox.measure.forecast import at_most, largest_safe_dt, notes, passages, top_speeds, warnings
 from sandbox.measure.run import run
 from sandbox.scene.file import loads
 from sandbox.scene.meetings import meetings
@@ -212,3 +212,228 @@ def test_limit_that_is_short_stays_as_it_is() -> None:
 def test_step_longer_than_the_run_is_warned_of(dt: float, warned: bool) -> None:
     text = f"[world]\nduration = 1.0\n[solver]\ndt = {dt}\n[[ball]]\nposition = [0.0, 0.0]\nradius = 1.0\n"
     assert ["duration" in w.kind for w in warnings(loads(text))] == [True] * warned
+
+
+def spring_scene(omega_h: float, solver: str = "", count: int = 1, damping: float = 0.0) -> Scene:
+    """A row of balls of 1 kg on springs, from a wall on; at dt = 0.01 one alone has this ω·h."""
+    text = f"[world]\nduration = 5.0\n[solver]\ndt = 0.01\n{solver}\n"
+    for k in range(1, count + 1):
+        text += f'[[ball]]\nname = "b{k}"\nposition = [{k}.001, 0]\nradius = 0.1\ncollides = "none"\n'
+    for k in range(1, count + 1):
+        ends = f'["b{k - 1}", "b{k}"]' if k > 1 else '["b1"]'
+        text += f'[[joint]]\nkind = "spring"\nbetween = {ends}\nrest_length = 1.0\n'
+        text += f"anchors = [[0, 0], [0, 0]]\nstiffness = {(omega_h / 0.01) ** 2!r}\ndamping = {damping!r}\n"
+    return loads(text)
+
+
+@pytest.mark.parametrize(("omega_h", "told"), [(1.49, False), (1.51, True), (1.99, True), (2.01, True)])
+def test_spring_near_the_limit_of_the_scheme_is_warned_of(omega_h: float, told: bool) -> None:
+    found = warnings(spring_scene(omega_h))
+    assert [w.kind for w in found] == ["spring"] * told
+    for warning in found:
+        assert warning.figures["omega_h"] == pytest.approx(omega_h, rel=1e-12)  # a root of a square
+        assert warning.figures["safe_dt"] == pytest.approx(1.5 * 0.01 / omega_h, rel=1e-12)  # likewise
+        assert ("grows without bound" in warning.message) == (omega_h > 2.0)
+        assert warnings(spring_scene(omega_h), spring_scene(1.0).solver.replace(dt=0.99 * 0.015 / omega_h)) == []
+
+
+@pytest.mark.parametrize(("omega_h", "bounded"), [(1.99, True), (2.01, False)])
+def test_the_limit_of_springs_is_where_pymunk_has_it(omega_h: float, bounded: bool) -> None:
+    away = np.abs(run(spring_scene(omega_h), audit=False).position[:, 0, 0] - 1.0).max()
+    # From 1 mm: within the scheme's band, 1/√(1 − ωh/2) = 14 times; else e^(2·acosh(ωh/2)) a step, 500 times over.
+    assert (away < 0.02) == bounded
+
+
+def test_chain_of_springs_is_twice_as_fast_as_one() -> None:
+    (warning,) = warnings(spring_scene(0.99, count=40))
+    # The highest mode of 40 that are held at one end: 2 ω·cos(π/(2·40 + 1)).
+    assert warning.figures["omega_h"] == pytest.approx(0.99 * 2.0 * math.cos(math.pi / 81.0), rel=1e-6)  # small angles
+    (many,) = warnings(spring_scene(0.99, count=400))  # more rows than are written out: by iteration
+    assert many.figures["omega_h"] == pytest.approx(1.98, rel=1e-3)  # 160 iterations for one end of the spectrum
+
+
+def test_lever_arm_makes_a_spring_faster() -> None:
+    text = (
+        "[solver]\ndt = 0.01\n[[box]]\nname = 'b'\nposition = [0, 0]\nsize = [2.0, 1.0]\nmass = 3.0\n"
+        "[[joint]]\nkind = 'spring'\nbetween = ['b']\nanchors = [[1.0, 0.0], [1.0, 5.0]]\nstiffness = 30000.0\n"
+    )
+    (warning,) = warnings(loads(text))
+    moment = 3.0 * (4.0 + 1.0) / 12.0
+    # Pulling up at the end of an arm of 1 m.
+    expected = math.sqrt(30000.0 * (1.0 / 3.0 + 1.0 / moment))
+    assert warning.figures["omega"] == pytest.approx(expected, rel=1e-12)  # an eigenvalue's rounding
+
+
+def test_explicit_euler_is_told_what_it_gains_and_damping_undoes_it() -> None:
+    euler = "integrator = 'explicit_euler'"
+    (warning,) = warnings(spring_scene(0.1, euler))
+    assert warning.figures["growth"] == pytest.approx((1.0 + 0.01) ** 50, rel=1e-9)  # a power of rounding
+    found = run(spring_scene(0.1, euler), "reference", audit=False)
+    grown = np.abs(found.position[-100:, 0, 0] - 1.0).max() / 0.001
+    # After the 4 to 5 s that the last second has; the top of a swing of 0.63 s is met within a step of 0.06 rad.
+    assert 1.01**200 * 0.99 < grown < 1.01**250 * 1.01
+    # c = k·h is where |R| = 1.
+    assert warnings(spring_scene(0.1, euler, damping=1.001)) == []
+    assert len(warnings(spring_scene(0.1, euler, damping=0.9))) == 1
+
+
+def test_rk4_has_a_limit_of_its_own() -> None:
+    assert warnings(spring_scene(2.0, "integrator = 'rk4'")) == []
+    (warning,) = warnings(spring_scene(2.5, "integrator = 'rk4'"))
+    assert warning.figures["limit"] == 2.0 * math.sqrt(2.0)
+
+
+def chain(links: int, load: float = 1.0, solver: str = "") -> Scene:
+    """Balls on rods, hung up at one end, the last of another mass."""
+    text = f"[world]\ngravity = [0, -9.81]\nduration = 3.0\n[solver]\n{solver}\n"
+    for k in range(1, links + 1):
+        mass = load if k == links else 1.0
+        text += f'[[ball]]\nname = "b{k}"\nposition = [0, {-0.1 * k!r}]\nradius = 0.03\nmass = {mass}\n'
+        text += 'collides = "none"\n'
+    for k in range(1, links + 1):
+        ends = f'["b{k - 1}", "b{k}"]' if k > 1 else '["b1"]'
+        text += f'[[joint]]\nname = "j{k}"\nkind = "rod"\nbetween = {ends}\n'
+    return loads(text)
+
+
+@pytest.mark.parametrize("links", [5, 10, 20, 40])
+def test_chain_needs_what_was_measured(links: int) -> None:
+    (warning,) = warnings(chain(links, solver="dt = 0.02\niterations = 1"))
+    assert warning.kind == "chain"
+    needed = warning.figures["needed"]
+    # 2.4 n² iterations a second; the chain is half a link longer than n for its slowest mode.
+    assert needed == pytest.approx(2.4 * links**2, rel=0.15)
+
+
+@pytest.mark.parametrize(("share", "holds"), [(0.5, False), (1.1, True)])
+@pytest.mark.parametrize(("links", "load"), [(20, 1.0), (2, 100.0), (5, 100.0)])
+def test_chain_holds_or_not_as_was_told(links: int, load: float, share: float, holds: bool) -> None:
+    told = [w for w in warnings(chain(links, load, "dt = 0.005\niterations = 1")) if w.kind in ("chain", "mass_ratio")]
+    iterations = share * float(told[0].figures["needed"]) * 0.005
+    solver = f"dt = {0.005 * math.ceil(iterations) / iterations!r}\niterations = {math.ceil(iterations)}"
+    scene = chain(links, load, solver)
+    assert (warnings(scene) == []) == holds
+    error = run(scene, audit=False).info["joint_error"]
+    # Torn apart it is off by half a link and more; else by what a step's fall stretches it, some percent of one.
+    assert (error < 0.25) == holds
+
+
+def test_what_is_torn_apart_by_a_load_is_a_mass_ratio() -> None:
+    (warning,) = warnings(chain(3, 100.0, "dt = 0.016666\niterations = 10"))
+    assert (warning.kind, warning.figures["joint"], warning.figures["ratio"]) == ("mass_ratio", "j3", 100.0)
+    assert warning.message.startswith("the joint 'j3' is between 'b2' and 'b3', of which one is 100 times as heavy")
+
+
+def test_joints_that_are_not_held_by_impulses_need_no_iterations_for_that() -> None:
+    assert warnings(chain(40, solver="dt = 0.016666\njoints = 'xpbd'")) == []
+
+
+def test_loose_and_doubly_held_chains_have_a_slowest_mode_too() -> None:
+    """Of n bodies and n − 1 joints with both ends free, of n + 1 with both held: 4 times as fast as with one."""
+    links = chain(41, solver="dt = 0.016666\niterations = 1")
+    loose = links.model_copy(update={"joints": links.joints[1:]})
+    (one,), (none,) = warnings(links), warnings(loose)
+    assert float(one.figures["needed"]) == pytest.approx(4.0 * float(none.figures["needed"]), rel=0.05)  # ends
+
+
+def tower(boxes: int, masses: tuple[float, ...] = (), solver: str = "", gap: float = 0.0) -> Scene:
+    text = f"[world]\ngravity = [0, -9.81]\nduration = 10.0\n[solver]\n{solver}\n"
+    text += "[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\nfriction = 0.5\n"
+    for k in range(boxes):
+        mass = masses[k] if masses else 1.0
+        text += f'[[box]]\nname = "b{k + 1}"\nposition = [0, {0.5 + k * (1.0 + gap)!r}]\nsize = [1, 1]\n'
+        text += f"mass = {mass!r}\nfriction = 0.5\n"
+    return loads(text)
+
+
+@pytest.mark.parametrize(("iterations", "told"), [(10, True), (32, False)])
+def test_tower_that_will_fall_is_warned_of(iterations: int, told: bool) -> None:
+    scene = tower(10, solver=f"dt = 0.016666\niterations = {iterations}")
+    found = warnings(scene)
+    assert [w.kind for w in found] == ["stack"] * told
+    for warning in found:
+        assert (warning.figures["body"], warning.figures["bodies"]) == ("b1", 10)
+        assert warning.figures["needed"] == pytest.approx(60.0 * 10.0 * math.sqrt(9.81), rel=1e-12)  # roundings
+    top = run(scene, audit=False).position[-1, 9, 1]
+    assert (top < 8.5) == told  # it lost more than a box's height, or none
+
+
+def test_what_is_no_tower_is_not_warned_of() -> None:
+    few = "dt = 0.016666\niterations = 5"
+    assert warnings(tower(4, solver=few)) == []
+    assert warnings(tower(10, solver=few, gap=0.1)) == []
+    side_by_side = tower(10, solver=few).model_copy(update={"world": loads("[world]\nduration = 6.0\n").world})
+    assert warnings(side_by_side) == []
+
+
+@pytest.mark.parametrize(("iterations", "told"), [(10, True), (160, False)])
+def test_light_box_under_a_heavy_one_is_warned_of(iterations: int, told: bool) -> None:
+    scene = tower(2, (1.0, 100.0), f"dt = 0.016666\niterations = {iterations}")
+    found = warnings(scene)
+    assert [w.kind for w in found] == ["mass_ratio"] * told
+    for warning in found:
+        assert (warning.figures["body"], warning.figures["other"], warning.figures["ratio"]) == ("b2", "b1", 100.0)
+    # Crushed, the upper comes down by its whole height; else it sinks by a part of it at most.
+    assert (run(scene, audit=False).position[-1, 1, 1] < 1.1) == told
+
+
+def test_boxes_laid_out_to_touch_do_not_overlap_and_joined_ones_may() -> None:
+    fine = "dt = 0.001\niterations = 50"
+    assert warnings(tower(3, solver=fine)) == []
+    (warning,) = warnings(tower(3, solver=fine, gap=-0.1))
+    assert (warning.kind, warning.figures) == ("overlap", {"pairs": 2})
+    assert warning.message == "2 pair(s) of bodies overlap at the start; the engine will push them apart"
+    two = tower(2, solver=fine, gap=-0.1)
+    joined = loads(
+        "[[box]]\nname = 'a'\nposition = [0, 0]\nsize = [1, 1]\n[[box]]\nname = 'b'\n"
+        "position = [0.9, 0]\nsize = [1, 1]\n[[joint]]\nkind = 'pivot'\nbetween = ['a', 'b']\nat = [0.45, 0]\n"
+    )
+    assert [w.kind for w in warnings(two)] == ["overlap"]
+    assert warnings(joined) == []
+
+
+def test_thin_box_tunnels_by_its_half_width() -> None:
+    scene = loads(
+        "[[wall]]\nname = 'w'\npoints = [[5, -1], [5, 1]]\nthickness = 0.1\n"
+        "[[box]]\nname = 'b'\nposition = [0, 0]\nvelocity = [30, 0]\nsize = [2.0, 0.5]\n"
+    )
+    (passage,) = passages(scene)
+    assert passage.reach == pytest.approx(0.25 + 0.05, rel=1e-15)  # a sum
+
+
+def test_what_hangs_falls_no_farther_than_it_is_held() -> None:
+    pendulum = loads(
+        "[world]\ngravity = [0, -10]\nduration = 60.0\n[[post]]\nname = 'p'\nposition = [0, -3]\nradius = 0.1\n"
+        "[[ball]]\nname = 'b'\nposition = [2, 0]\nradius = 0.1\n[[joint]]\nkind = 'rod'\nbetween = ['b']\n"
+        "anchors = [[0, 0], [0, 0]]\n"
+    )
+    slack = pendulum.model_copy(update={"joints": ()})
+    # 2 m below the place it hangs on at most, from the height of that.
+    assert top_speeds(pendulum, meetings(pendulum)).tolist() == pytest.approx([math.sqrt(2 * 10 * 2)], rel=1e-12)
+    assert top_speeds(slack, meetings(slack)).tolist() == [600.0]
+
+
+def test_box_that_is_past_all_that_could_stop_it_falls_unheeded() -> None:
+    scene = loads(
+        "[world]\ngravity = [0, -10]\nduration = 60.0\n[[wall]]\npoints = [[-1, 0], [1, 0]]\nthickness = 0.2\n"
+        "[[box]]\nposition = [0, 4]\nsize = [0.6, 0.8]\n"
+    )
+    # From 4 m to where its highest point, half a diagonal up, leaves the wall's lower side.
+    assert top_speeds(scene, meetings(scene)).tolist() == pytest.approx(
+        [math.sqrt(2 * 10 * (4 + 0.1 + 0.5))], rel=1e-12
+    )
+
+
+def test_notes_tell_of_concave_outlines_and_of_what_an_audit_counts() -> None:
+    scene = loads(
+        "[[polygon]]\nname = 'L'\npoints = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]\nposition = [5, 1]\n"
+        "[[polygon]]\nname = 'convex'\npoints = [[0, 0], [2, 0], [2, 1]]\nposition = [9, 1]\n"
+        "[[body]]\nname = 'two'\nposition = [0, 0]\n[[body.box]]\nsize = [1, 1]\n[[body.polygon]]\n"
+        "points = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]\n"
+    )
+    told = {note.figures["body"]: note for note in notes(scene) if note.kind == "outline"}
+    assert {name: note.figures["pieces"] for name, note in told.items()} == {"L": 2, "two": 2}
+    assert told["L"].message == "the outline of 'L' is concave and is cut into 2 convex pieces"
+    (audit,) = [note for note in notes(scene) if note.kind == "audit"]
+    assert audit.figures["bodies"] == 3
+    assert notes(loads("[[ball]]\nposition = [0, 0]\nradius = 1\n")) == []

@@ -1,6 +1,7 @@
 """Joint errors against distances known by hand, and against what engines leave."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -111,5 +112,5 @@ def test_joint_error_of_a_pendulum_falls_with_the_step(engine: str) -> None:
         )
         found.append(run(scene, engine, audit=False).info["joint_error"])
     assert found[0] < 0.1
-    orders = [math.log2(a / b) for a, b in zip(found, found[1:], strict=False)]
+    orders = [math.log2(a / b) for a, b in pairwise(found)]
     assert orders == pytest.approx([1.0, 1.0], abs=0.2)  # higher powers of h

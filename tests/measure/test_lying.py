@@ -64,8 +64,8 @@ def test_distance_of_hulls_is_that_of_points_sampled_along_them(seed: int) -> No
 
 def test_hulls_that_touch_or_cross_are_no_distance_apart() -> None:
     square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
-    assert hull_distance(square, square + (1.0, 0.0)).tolist() == [0.0]
-    assert hull_distance(square, square + (0.75, 0.0)).tolist() == [-0.25]
+    assert hull_distance(square, square + np.array([1.0, 0.0])).tolist() == [0.0]
+    assert hull_distance(square, square + np.array([0.75, 0.0])).tolist() == [-0.25]
     cross = np.array([[[0.5, -1.0], [0.5, 2.0]]])
     assert hull_distance(square, cross).tolist() == [-0.5]
     assert hull_distance(cross, np.array([[[0.0, 0.0], [1.0, 0.0]]])).tolist() == [-0.5]

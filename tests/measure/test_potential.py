@@ -117,7 +117,8 @@ def test_attraction_between_two_that_move_counts_once() -> None:
         # The semi-implicit scheme's own band is ±ωh/2, ω = √(k/m) = 10: 0.005 of ½·100·0.25 J.
         (
             '[[ball]]\nname = "b"\nposition = [1.5, 0]\nradius = 0.1\n'
-            '[[joint]]\nkind = "spring"\nbetween = ["b"]\nanchors = [[0, 0], [0, 0]]\nrest_length = 1.0\nstiffness = 100\n',
+            '[[joint]]\nkind = "spring"\nbetween = ["b"]\nanchors = [[0, 0], [0, 0]]\n'
+            "rest_length = 1.0\nstiffness = 100\n",
             0.006 * 12.5,
         ),
         # Kepler, e = 0.5 from the far end: at the near one ω = |v|/r is √(1.5/0.125), and h·ω/2 = 0.0017 of 1.5 J.

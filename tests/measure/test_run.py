@@ -329,7 +329,7 @@ def test_run_tells_everything_that_it_was() -> None:
     info = json.loads(json.dumps(dict(result.info), allow_nan=False))
     assert set(info) >= {
         "scene", "engine", "settings", "actions", "seed", "versions", "status", "reason", "steps", "seconds",
-        "energy_start", "energy_end", "audited",
+        "energy_start", "energy_end", "joint_error", "audited",
     }  # fmt: skip
     assert from_document(info["scene"]) == scene
     assert (info["engine"], info["seed"], info["status"], info["reason"], info["steps"]) == (

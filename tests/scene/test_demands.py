@@ -16,6 +16,21 @@ GHOST: dict[str, Any] = {**BALL, "collides": "none"}
 PLANE: dict[str, Any] = {"point": [0, 0], "normal": [0, 1]}
 WALL: dict[str, Any] = {"points": [[0, 0], [1, 0]]}
 POST: dict[str, Any] = {"position": [0, 0], "radius": 1}
+SPARKS: dict[str, Any] = {"position": [0, 0], "count": 3, "velocity_min": [0, 0], "velocity_max": [1, 1], "lifetime": 2}
+BOX: dict[str, Any] = {"position": [0, 0], "size": [1, 1]}
+NAMED: dict[str, Any] = {**BALL, "name": "a"}
+OFF: dict[str, Any] = {"kind": "rod", "between": ["a"], "anchors": [[0, 1], [5, 5]]}
+JOINTED: dict[Demand, dict[str, Any]] = {
+    Demand.RODS: {"kind": "rod", "anchors": [[0, 0], [5, 5]]},
+    Demand.PIVOTS: {"kind": "pivot", "at": [0, 0]},
+    Demand.SLIDES: {"kind": "slide", "most": 3},
+    Demand.GROOVES: {"kind": "groove", "groove": [[0, 0], [1, 0]]},
+    Demand.ROTARY_LIMITS: {"kind": "rotary_limit", "least": 0, "most": 1},
+    Demand.MOTORS: {"kind": "motor", "rate": 1},
+    Demand.GEARS: {"kind": "gear", "ratio": 2},
+    Demand.SPRINGS: {"kind": "spring", "stiffness": 1},
+    Demand.ROTARY_SPRINGS: {"kind": "rotary_spring", "stiffness": 1},
+}
 
 CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.TRANSLATION, True, {"ball": [BALL, BALL, ROCK]}, "2 bodies move"),
@@ -65,6 +80,31 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     ),
     (Demand.BOUNDS, True, {"world": {"bounds": [[-1, -1], [1, 1]]}, "ball": [BALL]}, "given"),
     (Demand.BOUNDS, False, {"ball": [BALL]}, "no bounds"),
+    (Demand.POLYGONS, True, {"box": [BOX], "plane": [PLANE]}, "1 body is no ball, 1 of them can meet something"),
+    (Demand.POLYGONS, True, {"box": [{**BOX, "fixed": True}], "ball": [BALL]}, "0 of them can meet"),
+    (Demand.POLYGONS, False, {"box": [BOX]}, "1 body is no ball"),
+    (Demand.POLYGONS, False, {"box": [{**BOX, "collides": "none"}], "plane": [PLANE]}, "1 body is no ball"),
+    (Demand.POLYGONS, False, {"ball": [BALL, BALL]}, "all bodies are balls"),
+    (Demand.ROTATION, True, {"box": [BOX], "plane": [PLANE]}, "1 body can be turned"),
+    (Demand.ROTATION, False, {"box": [BOX]}, "nothing can turn"),
+    (Demand.ROTATION, True, {"ball": [NAMED], "joint": [OFF]}, "1 body can be turned"),
+    (Demand.ROTATION, False, {"ball": [NAMED], "joint": [{**OFF, "anchors": [[0, 0], [5, 5]]}]}, "nothing can turn"),
+    (Demand.ROTATION, False, {"ball": [NAMED], "thrust": [{"body": "a", "force": [1, 0]}]}, "nothing can turn"),
+    (Demand.ROTATION, True, {"ball": [NAMED], "thrust": [{"body": "a", "force": [1, 0], "point": [0, 1]}]}, "1 body"),
+    *(
+        case
+        for demand, joint in JOINTED.items()
+        for case in (
+            (demand, True, {"ball": [NAMED], "joint": [{"between": ["a"], **joint}] * 2}, "2"),
+            (demand, False, {"ball": [NAMED]}, "none"),
+        )
+    ),
+    (Demand.ATTRACTION, True, {"ball": [BALL], "attraction": [{"toward": [0, 0], "strength": 1}]}, "1"),
+    (Demand.ATTRACTION, False, {"ball": [BALL]}, "none"),
+    (Demand.THRUST, True, {"ball": [NAMED], "thrust": [{"body": "a", "force": [1, 0]}]}, "1"),
+    (Demand.THRUST, False, {"ball": [BALL]}, "none"),
+    (Demand.LIFETIMES, True, {"emitter": [SPARKS]}, "3 bodies live for a time"),
+    (Demand.LIFETIMES, False, {"ball": [BALL]}, "all stay"),
 ]
 
 

@@ -22,10 +22,15 @@ def acceleration(world: World, velocity: FloatArray, push: FloatArray | None, h:
     """
     relative = velocity - np.asarray(world.wind)
     rate = world.linear_drag + world.quadratic_drag * np.hypot(relative[:, 0], relative[:, 1])
-    z = rate * h
-    # (1 − e^−z)/z loses nothing near 0 by expm1, and is 1 where z is 0.
-    share = np.divide(-np.expm1(-z), z, out=np.ones_like(z), where=z > 0)
+    share = mean_share(rate, h)
     total = np.asarray(world.gravity) - rate[:, None] * relative
     if push is not None:
         total += push
     return np.asarray(total * share[:, None])
+
+
+def mean_share(rate: FloatArray, h: float) -> FloatArray:
+    """Return (1 − e^(−κh))/(κh) for rates κ (N,), 1/s: what share of its first acceleration a substep's mean is."""
+    z = rate * h
+    # By expm1 nothing is lost near 0; where z is 0 the share is 1.
+    return np.asarray(np.divide(-np.expm1(-z), z, out=np.ones_like(z), where=z > 0))

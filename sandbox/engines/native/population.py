@@ -63,7 +63,7 @@ class Population:
 
     def half_of(self, number: int) -> FreeFlight | MeetingBodies | None:
         """Return the half that holds a body; none holds a fixed one that nothing can meet."""
-        if number in self.free.numbers:
+        if self.free.holds(number):
             return self.free
         return self.meeting if self.meeting.holds(number) else None
 
@@ -81,23 +81,20 @@ class Population:
         if self._fresh:
             return
         self._fresh = True
-        for half in (self.free, self.meeting):
-            half.write(self.position, self.velocity, self.angle, self.angular_velocity)
+        self.meeting.write(self.position, self.velocity, self.angle, self.angular_velocity)
 
     def _place(self, numbers: IntArray) -> None:
         """Give each body to the half that it belongs to, and its surface, as things now stand."""
         meet, bodies = self._meet, self.bodies
         flying = meet.free[numbers] & ~self._driven[numbers]
+        state = self.position, self.velocity, self.angle, self.angular_velocity
+        self.free.live_in(*state, bodies)
+        self.free.join(numbers[flying & ~bodies.fixed[numbers]])
         # What nothing can turn gets no moment in the space; in flight it keeps it, for the torques of actions.
         turned = np.where(meet.turnable, bodies.moment, math.inf)
-        state = self.position, self.velocity, self.angle, self.angular_velocity
-        for half, chosen, moment in (
-            (self.free, numbers[flying & ~bodies.fixed[numbers]], bodies.moment),
-            (self.meeting, numbers[~flying], turned),
-        ):
-            position, velocity, angle, spin = (array[chosen] for array in state)
-            half.join(chosen, bodies, position, velocity, angle, spin, moment[chosen])
-        self.free.live_in(*state)
+        chosen = numbers[~flying]
+        position, velocity, angle, spin = (array[chosen] for array in state)
+        self.meeting.join(chosen, bodies, position, velocity, angle, spin, turned[chosen])
         self.meeting.link(self.scene.links)
 
     @property
@@ -126,7 +123,6 @@ class Population:
         self.scene, self.bodies, self._meet = scene, bodies, meet
         self.velocity[self.moving] += self.ahead
         if self._half_kick:
-            self.free.velocity[:] = self.velocity[self.free.numbers]
             for number in self.meeting.movers():
                 self.meeting.set_velocity(number, self.velocity[number])
         self.free.world = scene.world
@@ -149,7 +145,7 @@ class Population:
     def push(self, number: int, force: FloatArray, torque: float) -> None:
         """Let a steady force (N) and torque (N·m) act on a body from now on."""
         half = self._home(number)
-        if torque and not math.isfinite(half.moment(number)):
+        if torque and half is self.meeting and not math.isfinite(half.moment(number)):
             half.give_moment(number, float(self.bodies.moment[number]))
         half.push(number, force, torque)
 
@@ -162,7 +158,7 @@ class Population:
             half.set_position(number, position)
 
     def _home(self, number: int) -> FreeFlight | MeetingBodies:
-        return self.free if number in self.free.numbers else self.meeting
+        return self.free if self.free.holds(number) else self.meeting
 
     def throttle(self, number: int, level: float) -> None:
         """Open the scene's thrust of that number to a share of its force."""

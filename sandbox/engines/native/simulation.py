@@ -8,6 +8,7 @@ import numpy as np
 from sandbox.action import Action
 from sandbox.engines.acting import perform
 from sandbox.engines.contract import Divergence, Observer
+from sandbox.engines.expiry import Expiry
 from sandbox.engines.ledger import ContactLedger
 from sandbox.engines.native.population import Population
 from sandbox.engines.running import Running
@@ -34,6 +35,7 @@ class NativeSimulation(Running):
         self._ledger: ContactLedger | None = None
         self._observer: Observer | None = None
         self._retired: dict[int, float] = {}
+        self._expiry = Expiry(scene.bodies, scene.began, settings.h)
         self._still: tuple[FloatArray, FloatArray] | None = None  # angles and spins, which frames share if they can
 
     @property
@@ -69,8 +71,7 @@ class NativeSimulation(Running):
         """
         with self._turn:
             self._check_running()
-            for k in range(self._settings.substeps):
-                self._substep(k)
+            self._advance(self._settings.substeps)
             self._steps += 1
             self._guard()
             self._retire()
@@ -92,8 +93,7 @@ class NativeSimulation(Running):
 
     def _finish(self, part: float) -> None:
         whole, rest = divmod(part * self._settings.substeps, 1.0)
-        for k in range(int(whole)):
-            self._substep(k)
+        self._advance(int(whole))
         before = [array.copy() for array in self._state()]
         self._substep(int(whole), look=False)  # its contacts lie beyond the end
         self._part = part
@@ -154,12 +154,22 @@ class NativeSimulation(Running):
         if self._population.ended:
             raise RuntimeError("the simulation has ended; it can be read, but not go on")
 
-    def _substep(self, k: int, look: bool = True) -> None:
-        """Advance by h, the k-th time in this step: both halves apart, as they never meet."""
+    def _advance(self, substeps: int) -> None:
+        """Advance by some substeps from the beginning of a step: both halves apart, as they never meet."""
+        together = self._observer is not None  # who is told of all bodies after each
+        if not together:
+            self._population.free.step(substeps)
+        if together or self._ledger is not None or len(self._population.meeting):
+            for k in range(substeps):
+                self._substep(k, fly=together)
+
+    def _substep(self, k: int, look: bool = True, fly: bool = True) -> None:
+        """Advance by h, the k-th time in this step; those in flight may have done so already."""
         population, h = self._population, self._settings.h
         start = self.time + k * h
         before = self._state()[0].copy() if self._observer is not None else None
-        population.free.step()
+        if fly:
+            population.free.step()
         population.meeting.step(start)
         population.changed()
         if self._ledger is not None and look:
@@ -187,14 +197,13 @@ class NativeSimulation(Running):
                 raise Divergence(self.time, self.bodies.names[number], what)
 
     def _retire(self) -> None:
-        """Take out what has left world.bounds."""
-        bounds = self._population.scene.world.bounds
-        if bounds is None:
-            return
-        position = self._state()[0]
-        outside = ((position < bounds[0]) | (position > bounds[1])).any(axis=1) & self._population.moving
-        if outside.any():
-            self._take_out(np.flatnonzero(outside))
+        """Take out whose life is over, and who has left world.bounds."""
+        population, bounds = self._population, self._population.scene.world.bounds
+        if bounds is not None:
+            population.refresh()
+        going = self._expiry.going(self.time, population.position, population.present, population.bodies.fixed, bounds)
+        if len(going):
+            self._take_out(going)
 
     def _take_out(self, numbers: IntArray) -> None:
         self._still = None

@@ -8,6 +8,8 @@ import numpy as np
 
 from sandbox.engines.reference.broad_phase import BROAD_PHASES
 from sandbox.engines.reference.manifolds import KIND, Manifolds, meet_balls, meet_planes, meet_segments
+from sandbox.engines.reference.piece_contacts import drop
+from sandbox.engines.reference.pieces import apart_keys
 from sandbox.engines.reference.segments import SegmentBoxes, near_segments
 from sandbox.engines.reference.touch import first_touch
 from sandbox.engines.roster import NOTHING, Roster
@@ -40,6 +42,7 @@ class Finder:
         self.able: BoolArray = roster.moving & (roster.meets > NOTHING)
         self._moves: BoolArray = roster.moving
         self._order: IntArray = np.arange(len(roster.position))
+        self._apart: IntArray = apart_keys(roster.links)
         self._boxes = SegmentBoxes(roster.fixtures)
         self._planes = len(roster.fixtures.planes) if self.able.any() else 0
         self._plane_tests = self._planes * int(np.count_nonzero(self.able))
@@ -66,6 +69,8 @@ class Finder:
                     self._order, position, roster.radius, roster.meets, self._moves, margin, room
                 ),
             )
+            if len(self._apart):
+                balls = balls[: drop(balls, self._order, self._apart, roster.bodies.group)]
         if len(boxes):
             self._segment_keys, segments = self._filled(
                 self._segment_keys,

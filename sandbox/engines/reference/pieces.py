@@ -7,6 +7,7 @@ import numpy as np
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.meeting import pair_key
 from sandbox.engines.roster import NOTHING, Roster
+from sandbox.scene.links import Links
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 
@@ -46,9 +47,7 @@ class Pieces:
         self.meets: IntArray = roster.meets[self.body]
         self.moves: BoolArray = roster.moving[self.body]
         self.able: BoolArray = self.moves & (self.meets > NOTHING)
-        links = roster.links
-        self.apart: IntArray = np.sort([pair_key(a, b) for a, b in links.apart().tolist()]).astype(np.int64)
-        """(K,) keys of the pairs of bodies that joints keep from meeting, ascending"""
+        self.apart: IntArray = apart_keys(roster.links)
         self.group: IntArray = roster.bodies.group
         """(N,) of each body"""
 
@@ -60,6 +59,11 @@ class Pieces:
     def lay_out(self, position: FloatArray, angle: FloatArray) -> None:
         """Put corners and middles where bodies now lie, at (N, ≥ 2) m and (N,) rad."""
         lay_out(self.body, self.first, self.local, self.local_middle, position, angle, self.corner, self.middle)
+
+
+def apart_keys(links: Links) -> IntArray:
+    """Return keys of the pairs of bodies that joints keep from meeting, (K,), ascending."""
+    return np.sort([pair_key(a, b) for a, b in links.apart().tolist()]).astype(np.int64)
 
 
 @kernel

@@ -52,7 +52,8 @@ class Audit:
     All this is exact for discs. Of any other body it takes `Bodies.core`, the largest disc about the centre of mass
     that lies inside it, for the radius: what passes through that was surely missed, so that there is no false alarm,
     but what only clips a corner is not counted. A body whose core is 0, as its centre of mass lies outside of it, is
-    left out. Pairs that a joint keeps from meeting miss nothing.
+    left out. Pairs that a joint keeps from meeting, and bodies of one
+    group, miss nothing.
 
     Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
     planes), and among balls with the pairs that are near.
@@ -135,6 +136,7 @@ class Audit:
         self._part = part = slice(self._offset, int(matter[-1]) + 1 if len(matter) else 0)
         self._moves, self._to_all, self._still = moves[part], to_all[part], still[part]
         self._core = bodies.core[part]
+        self._group = bodies.group[part] if bodies.group.any() else None
         self._least2 = least[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
         self._neighbours = Neighbours(self._core, member[part], self._meet)
 
@@ -181,6 +183,8 @@ class Audit:
         able = self._to_all[i] & self._to_all[j]
         able |= self._moves[i] & self._still[j]
         able |= self._still[i] & self._moves[j]
+        if self._group is not None:
+            able &= (self._group[i] == 0) | (self._group[i] != self._group[j])
         if len(self._apart):
             pair = _coded(np.minimum(i, j) + self._offset, np.maximum(i, j) + self._offset)
             able &= ~np.isin(pair, _coded(*self._apart.T))

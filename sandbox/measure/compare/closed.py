@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from sandbox.engines.expiry import SLACK
 from sandbox.measure.closed_form import Bouncing, bouncing, driven, free_flight, why_not
 from sandbox.measure.compare.runs import frames_as_run
 from sandbox.measure.recorder import frame_count
@@ -32,9 +33,9 @@ def solved(scene: Scene, settings: Settings) -> Trajectory | None:
 
     They do where each body that moves either can meet nothing, and flies under gravity and linear drag, or is a ball
     that can meet only the one plane there is, and bounces straight (`closed_form.bouncing`); no two bodies can meet,
-    and nothing joins, attracts or thrusts them. Nothing turns a body then. One that leaves `world.bounds` is retired
-    at the first frame outside. Contacts are the impacts, in the order of time; from the one on after which a flight
-    would be shorter than dt, a single row that lasts to the end.
+    and nothing joins, attracts or thrusts them. Nothing turns a body then. One that leaves `world.bounds`, or whose
+    life is over, is retired at the first frame of that. Contacts are the impacts, in the order of time; from the one
+    on after which a flight would be shorter than dt, a single row that lasts to the end.
     """
     bodies, meet = scene.bodies, meetings(scene)
     if why_not(scene) is not None or meet.mutual or driven(scene, bodies).any():
@@ -56,7 +57,7 @@ def solved(scene: Scene, settings: Settings) -> Trajectory | None:
         position[:, part], velocity[:, part] = free_flight(time, *start, scene.world)
     for number, form in bouncers.items():
         position[:, number], velocity[:, number] = form.at(time)
-    retired = _retire(scene, bodies, time, position, velocity)
+    retired = _retire(scene, bodies, time, position, velocity, settings.dt)
     contacts = _impacts(bodies, bouncers, settings.dt, np.fmin(retired, scene.world.duration))
     spin = np.where(bodies.fixed, 0.0, bodies.angular_velocity)
     return frames_as_run(
@@ -64,16 +65,25 @@ def solved(scene: Scene, settings: Settings) -> Trajectory | None:
     )
 
 
-def _retire(scene: Scene, bodies: Bodies, time: FloatArray, position: FloatArray, velocity: FloatArray) -> FloatArray:
-    """Stop what leaves the bounds at the first frame outside, in place; return when, (N,) s, nan for never."""
+def _retire(
+    scene: Scene, bodies: Bodies, time: FloatArray, position: FloatArray, velocity: FloatArray, dt: float
+) -> FloatArray:
+    """Stop what leaves the bounds, or whose life is over, at the first frame of that, in place; return when, (N,) s.
+
+    It is nan for never.
+    """
     retired = np.full(len(bodies), np.nan)
-    if scene.world.bounds is None:
+    end = bodies.born + bodies.lifetime - scene.began
+    if scene.world.bounds is None and not np.isfinite(end).any():
         return retired
-    lower, upper = scene.world.bounds
-    outside = ((position < lower) | (position > upper)).any(axis=2) & ~bodies.fixed
-    outside[0] = False  # engines look after each step
-    for number in np.flatnonzero(outside.any(axis=0)).tolist():
-        first = int(outside[:, number].argmax())
+    gone = time[:, None] + SLACK * dt >= end
+    if scene.world.bounds is not None:
+        lower, upper = scene.world.bounds
+        gone |= ((position < lower) | (position > upper)).any(axis=2)
+    gone &= ~bodies.fixed
+    gone[0] = False  # engines look after each step
+    for number in np.flatnonzero(gone.any(axis=0)).tolist():
+        first = int(gone[:, number].argmax())
         retired[number] = time[first]
         position[first:, number], velocity[first:, number] = position[first, number], 0.0
     return retired

@@ -11,7 +11,6 @@ from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
-
 TREMBLING = 1e-4
 """The share of what lifts all bodies by their own width below which a scene with other bodies than balls stands still:
 what little they move then is the solver's own, and a share of that says nothing."""

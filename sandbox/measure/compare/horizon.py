@@ -27,7 +27,7 @@ def nudged(scene: Scene) -> Scene | None:
         return None
     position = bodies.position.copy()
     position[able[0]] = [_nudge(x) for x in position[able[0]].tolist()]
-    return scene.placed(replace(bodies, position=position))
+    return scene.placed(replace(bodies, position=position), scene.began)
 
 
 def _nudge(x: float) -> float:

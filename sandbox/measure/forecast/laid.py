@@ -42,7 +42,8 @@ def laid(scene: Scene) -> Laid:
         a, b = np.minimum(among[i], among[j]), np.maximum(among[i], among[j])
         slack = CLOSE * np.minimum(bodies.thin[a], bodies.thin[b])
         away = np.hypot(*(bodies.position[a] - bodies.position[b]).T) - bodies.radius[a] - bodies.radius[b]
-        able = (away < slack) & ~(bodies.round[a] & bodies.round[b]) & ~(bodies.fixed[a] & bodies.fixed[b])
+        able = (bodies.group[a] == 0) | (bodies.group[a] != bodies.group[b])
+        able &= (away < slack) & ~(bodies.round[a] & bodies.round[b]) & ~(bodies.fixed[a] & bodies.fixed[b])
         for first, second, most in zip(a[able].tolist(), b[able].tolist(), slack[able].tolist(), strict=True):
             looked += 1
             if looked > MOST:

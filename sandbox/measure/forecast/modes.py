@@ -30,24 +30,25 @@ def extremes(product: Product, size: int, null: FloatArray | None = None) -> tup
         values = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
         return float(values[0 if null is None else min(1, size - 1)]), float(values[-1])
     vector = np.random.default_rng(1).normal(size=size)  # any start will do, but always the same
-    basis = [] if null is None else [null]
-    skipped = len(basis)
+    basis = np.empty((STEPS + 1, size))
+    begin = known = 0
+    if null is not None:
+        basis[0] = null
+        begin = known = 1
     diagonal: list[float] = []
     beside: list[float] = []
-    for _ in range(STEPS):
+    while known < len(basis):
         for _ in range(2):  # once is not enough for rounding
-            known = np.asarray(basis).reshape(len(basis), size)
-            vector = vector - known.T @ (known @ vector)
+            vector = vector - basis[:known].T @ (basis[:known] @ vector)
         length = float(np.linalg.norm(vector))
-        if basis[skipped:]:
-            beside.append(length)
-        if length < 1e-12:
-            beside.pop()
+        if length < 1e-12:  # there are no more
             break
-        basis.append(vector / length)
-        vector = product(basis[-1])
-        diagonal.append(float(vector @ basis[-1]))
-    beside = beside[: len(diagonal) - 1]
+        if known > begin:
+            beside.append(length)
+        basis[known] = vector / length
+        vector = product(basis[known])
+        diagonal.append(float(vector @ basis[known]))
+        known += 1
     values = np.linalg.eigvalsh(np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1))
     return float(values[0]), float(values[-1])
 

@@ -98,9 +98,10 @@ def _half_depth(thing: Plane | Wall | Post) -> float:
 def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
     """Return about how fast each body can get, (N,) m/s.
 
-    By its own fall: from rest on the speed it starts with, until a level floor below it, the end of what it hangs on,
-    or the end of the run. Where balls can meet, any may be hit by the fastest: an equal one takes over its speed, a
-    lighter one gets up to twice it. What springs, motors, attraction and thrusts add is left out.
+    By its own fall: from rest on the speed it starts with, until a level floor below it or the end of the run; in
+    scenes with other bodies than balls, or joints, also the end of what it hangs on, or past all that could stop it.
+    Where balls can meet, any may be hit by the fastest: an equal one takes over its speed, a lighter one gets up to
+    twice it. What springs, motors, attraction and thrusts add is left out.
     """
     bodies, world = scene.bodies, scene.world
     start = np.hypot(*bodies.velocity.T)
@@ -113,8 +114,8 @@ def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
             if float(normal @ down) < -1.0 + 1e-12:  # level to rounding: anything else can be slid down for ever
                 drop = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
                 speed = np.where(~meet.touches, speed, np.minimum(speed, np.sqrt(start**2 + 2.0 * gravity * drop)))
-        if len(scene.links):
-            drop = np.maximum(farthest_fall(scene, down), 0.0)
+        if len(scene.links) or not bodies.round.all():
+            drop = np.maximum(_fall(scene, down), 0.0)
             speed = np.minimum(speed, np.sqrt(start**2 + 2.0 * gravity * drop))
     speed = np.where(bodies.fixed, 0.0, speed)
     if world.linear_drag or world.quadratic_drag:
@@ -125,3 +126,19 @@ def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
         gained = fastest * 2.0 * heaviest / (heaviest + bodies.mass)
         speed = np.where(movers, np.maximum(speed, gained), speed)
     return np.asarray(speed)
+
+
+def _fall(scene: Scene, down: FloatArray) -> FloatArray:
+    """Return how far each body can fall, (N,) m, until what holds it is taut or nothing is left that it could meet."""
+    bodies = scene.bodies
+    held = farthest_fall(scene, down)
+    if scene.planes:  # what is no level floor goes down for ever
+        return held
+    depth = bodies.position @ down
+    stays = np.where(bodies.fixed, 0.0, held)
+    lowest = float(np.max((depth + stays + bodies.radius)[np.isfinite(stays)], initial=-np.inf))
+    for wall in scene.walls:
+        lowest = max(lowest, float((np.asarray(wall.points) @ down).max()) + wall.thickness / 2.0)
+    for post in scene.posts:
+        lowest = max(lowest, float(np.asarray(post.position) @ down) + post.radius)
+    return np.minimum(held, lowest - depth + bodies.radius) if math.isfinite(lowest) else held

@@ -86,7 +86,7 @@ def fastest(scene: Scene) -> list[tuple[float, float, str, int]]:
 
 def _fastest_of(links: Links, position: FloatArray, angle: FloatArray, root: FloatArray) -> tuple[float, float]:
     """Return ω and the damping ratio of one group; `root` (N, 3) is M^−½."""
-    rows, stiff, damp = _rows(links, position, angle)
+    rows, stiff = _rows(links, position, angle)
     known, place = np.unique(np.concatenate((np.where(links.a >= 0, links.a, links.b), links.b)), return_inverse=True)
     place = place.reshape(-1)
     first, second = np.tile(place[: len(links)], 3), np.tile(place[len(links) :], 3)
@@ -103,8 +103,7 @@ def _fastest_of(links: Links, position: FloatArray, angle: FloatArray, root: Flo
     _, largest = extremes(product, size)
     omega = math.sqrt(max(largest, 0.0))
     # Of springs of one material damping is as stiffness in every mode; of several, the least damped is taken.
-    ratio = float(np.min(damp[stiff > 0.0] / stiff[stiff > 0.0], initial=math.inf))
-    return omega, 0.5 * ratio * omega if math.isfinite(ratio) else 0.0
+    return omega, 0.5 * omega * float(np.min(links.figures[:, 2] / links.figures[:, 1]))
 
 
 def _gathered(first: IntArray, on_a: FloatArray, second: IntArray, on_b: FloatArray, count: int) -> FloatArray:
@@ -114,8 +113,8 @@ def _gathered(first: IntArray, on_a: FloatArray, second: IntArray, on_b: FloatAr
     return total.reshape(-1)
 
 
-def _rows(links: Links, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return along, across and about each spring how x, y and angle of both bodies strain it, (3J, 6); k; c."""
+def _rows(links: Links, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return along, across and about each spring how x, y and angle of both bodies strain it, (3J, 6), and k, (3J,)."""
     first, second = links.ends(position, angle)
     arm_a = np.where((links.a >= 0)[:, None], first - position[links.a], 0.0)
     arm_b = second - position[links.b]
@@ -124,13 +123,13 @@ def _rows(links: Links, position: FloatArray, angle: FloatArray) -> tuple[FloatA
     unit = np.where(length[:, None] > 0.0, line / np.where(length > 0.0, length, 1.0)[:, None], (1.0, 0.0))
     across = np.column_stack((-unit[:, 1], unit[:, 0]))
     straight = links.kind == LinkKind.SPRING
-    rest, stiffness, damping = links.figures.T
+    rest, stiffness, _ = links.figures.T
     taut = np.clip(1.0 - rest / np.where(length > 0.0, length, np.inf), 0.0, 1.0)
     taut = np.where((length == 0.0) & (rest == 0.0), 1.0, taut)  # a spring of no length pulls alike every way
     rows = [np.column_stack((-n, -_cross(arm_a, n), n, _cross(arm_b, n))) * straight[:, None] for n in (unit, across)]
     rows.append(np.tile((0.0, 0.0, -1.0, 0.0, 0.0, 1.0), (len(links), 1)) * ~straight[:, None])
     stiff = np.concatenate((stiffness * straight, stiffness * taut * straight, stiffness * ~straight))
-    return np.concatenate(rows), stiff, np.concatenate((damping * straight, 0.0 * damping, damping * ~straight))
+    return np.concatenate(rows), stiff
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -79,9 +79,11 @@ def _overlaps(scene: Scene, meet: Meetings, close: Laid) -> Iterator[Warning]:
         return
     among = np.flatnonzero(meet_each_other(bodies) & meet.touches & ~bodies.fixed & bodies.round)
     most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(among)  # a scene with more is refused
-    balls = count_overlaps(bodies.position[among], bodies.radius[among], most)
+    owner = np.where(bodies.group > 0, bodies.group, -1 - np.arange(len(bodies)))[among]
+    balls = count_overlaps(bodies.position[among], bodies.radius[among], most, owner)
     first, second = scene.links.apart().T
     joined = np.isin(first, among) & np.isin(second, among)
+    joined &= (bodies.group[first] == 0) | (bodies.group[first] != bodies.group[second])
     away = (
         np.hypot(*(bodies.position[first] - bodies.position[second]).T) - bodies.radius[first] - bodies.radius[second]
     )

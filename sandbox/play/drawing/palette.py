@@ -85,7 +85,7 @@ def colour_of_fixed(thing: Surfaced, otherwise: Colour = NEUTRAL) -> Colour:
 def colour_of(bodies: Bodies) -> ColourArray:
     """Return the colours of bodies, (N, 3), which stay what they are when another body joins.
 
-    An element's own colour, else the accents in turn; fixed ones are neutral.
+    An element's own colour, or the first that it fades from, else the accents in turn; fixed ones are neutral.
     """
     colours = np.empty((len(bodies), 3), np.uint8)
     first = np.searchsorted(bodies.element, np.arange(len(bodies.elements) + 1))
@@ -93,6 +93,8 @@ def colour_of(bodies: Bodies) -> ColourArray:
         start, end = int(first[k]), int(first[k + 1])
         if element.colour is not None:
             colours[start:end] = hex_colour(element.colour)
+        elif isinstance(element, Emitter) and element.colours is not None:
+            colours[start:end] = hex_colour(element.colours[0])
         elif isinstance(element, Single):
             colours[start:end] = NEUTRAL if element.fixed else accent(k)
         elif end - start <= FEW:

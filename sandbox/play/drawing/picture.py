@@ -6,6 +6,7 @@ import numpy as np
 import pygame
 
 from sandbox.play.camera import Camera
+from sandbox.play.drawing.ageing import Ageing
 from sandbox.play.drawing.discs import Discs, spokes
 from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
 from sandbox.play.drawing.grid import draw_grid, draw_scale
@@ -69,6 +70,7 @@ class Picture:
         self._colours: ColourArray = np.empty((0, 3), np.uint8)
         self._turning: BoolArray = np.empty(0, np.bool_)
         self._tones: tuple[ColourArray, tuple[object, ...], Packed] | None = None
+        self._ageing: Ageing | None = None
 
     def draw(
         self,
@@ -93,13 +95,15 @@ class Picture:
         self._blit_background(surface, camera, sight, antialias, unit)
         self._know(sight)
         sizes = self._sized(sight.bodies, camera.scale, unit)
-        colours = self._colours
+        colours, ageing = self._colours, self._ageing
         if sight.overlapping is not None:
-            colours = _by_contact(sight.overlapping, len(sight.bodies))
+            colours, ageing = _by_contact(sight.overlapping, len(sight.bodies)), None
+        shade = None if ageing is None else ageing.at(sight.frame.time)
         if "shapes" in sight.overlays and sizes.side:
-            self._draw_points(surface, camera, sight, sizes, colours)
+            self._draw_points(surface, camera, sight, sizes, colours, shade)
 
         shown = _in_sight(camera, sight, None if self._overlays.need_bodies(sight) else sizes.large)
+        tint = colours[shown] if ageing is None or shade is None else ageing.over(colours[shown], shown, shade)
         view = View(
             surface=surface,
             camera=camera,
@@ -109,7 +113,7 @@ class Picture:
             shown=shown,
             centre=camera.to_screen(sight.frame.position[shown]),
             radius=sight.bodies.radius[shown] * camera.scale,
-            colours=colours[shown],
+            colours=tint,
         )
         self._overlays.below(view)
         if "shapes" in sight.overlays:
@@ -140,12 +144,20 @@ class Picture:
             spokes(view.surface, centre, radius, frame.angle[shown], colours, view.antialias)
 
     def _draw_points(
-        self, surface: pygame.Surface, camera: Camera, sight: Sight, sizes: "Sizes", colours: ColourArray
+        self,
+        surface: pygame.Surface,
+        camera: Camera,
+        sight: Sight,
+        sizes: "Sizes",
+        colours: ColourArray,
+        shade: IntArray | None,
     ) -> None:
-        """Draw the bodies that are too small for discs."""
+        """Draw the bodies that are too small for discs, those who fade in their shades."""
         form = (surface.get_masks(), surface.get_bytesize())
         if self._tones is None or self._tones[0] is not colours or self._tones[1] != form:
             self._tones = colours, form, packed(colours, surface)
+        if shade is not None and self._ageing is not None:
+            self._tones[2][self._ageing.who] = packed(self._ageing.shades, surface)[shade]
         frame = sight.frame
         count = min(len(frame.position), len(colours))
         who = None if sizes.all_tiny and frame.present.all() else frame.present[:count] & sizes.tiny[:count]
@@ -171,6 +183,8 @@ class Picture:
         if self._known is not None and self._known[0] is bodies and self._known[1] is scene:
             return
         self._known, self._colours = (bodies, scene), colour_of(bodies)
+        ageing = Ageing(bodies)
+        self._ageing = ageing if len(ageing) else None
         turned = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
         self._turning = turned | meetings(scene, bodies).turnable
 

@@ -106,3 +106,15 @@ def test_body_that_leaves_the_bounds_is_retired_as_by_an_engine() -> None:
     assert form.retired_time.tolist() == found.retired_time.tolist() == [pytest.approx(1.05)]  # ½·10·1.05² > 5.5 first
     assert form.position[-1, 0] == pytest.approx(found.position[-1, 0], abs=1e-12)  # 105 roundings
     assert form.velocity[-1].tolist() == [[0.0, 0.0]]
+
+
+def test_body_whose_life_is_over_is_retired_as_by_an_engine() -> None:
+    scene = loads(
+        "[world]\ngravity = [0.0, -10.0]\nduration = 1.0\n[solver]\ndt = 0.01\nhalf_kick = true\n"
+        "[[emitter]]\nname = 'e'\nposition = [0, 0]\ncount = 3\nvelocity_min = [0, 0]\nvelocity_max = [1, 1]\n"
+        "lifetime = 0.305\n"
+    )
+    form, found = solved(scene, scene.solver), run(scene, "pymunk", audit=False)
+    assert form is not None
+    assert form.retired_time.tolist() == found.retired_time.tolist() == [pytest.approx(0.31)] * 3
+    assert form.position[-1] == pytest.approx(found.position[-1], abs=1e-12)  # 31 roundings

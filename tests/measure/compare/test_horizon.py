@@ -31,11 +31,12 @@ def test_scene_in_which_nothing_can_meet_has_no_nudge() -> None:
     assert nudged(loads("[[ball]]\nposition = [0, 0]\nradius = 1\n")) is None
 
 
-def test_generators_are_written_out_as_the_balls_they_make() -> None:
+def test_nudge_moves_a_ball_of_a_generator_and_nothing_else() -> None:
     scene = load(find("gas"))
     other = nudged(scene)
     assert other is not None
     old, new = scene.bodies, other.bodies
+    assert scene.bodies is old  # the scene itself is as it was
     assert new.names == old.names
     assert np.count_nonzero((new.position != old.position).any(axis=1)) == 1
     for key in ("velocity", "angle", "angular_velocity", "radius", "mass", "fixed"):

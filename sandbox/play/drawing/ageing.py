@@ -1,0 +1,65 @@
+"""Ageing: particles that fade from colour to colour over their lives."""
+
+import numpy as np
+
+from sandbox.play.drawing.palette import ColourArray, hex_colour
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.discs import Emitter
+from sandbox.scene.near import FloatArray, IntArray
+
+SHADES = 64
+"""Steps of a life that are told apart: one and the next look alike, and a crowd has few colours at once."""
+
+
+class Ageing:
+    """Those of some bodies that fade, and how; a picture asks once for the shade of each."""
+
+    def __init__(self, bodies: Bodies) -> None:
+        colours = [each.colours if isinstance(each, Emitter) else None for each in bodies.elements]
+        fading = [k for k, each in enumerate(colours) if each is not None]
+        self.shades: ColourArray = np.concatenate(
+            [np.empty((0, 3), np.uint8), *(faded(each) for each in colours if each is not None)]
+        )
+        """(S, 3), SHADES of each element that fades, one element after the other"""
+        order = np.full(len(colours), -1, np.int64)
+        order[fading] = np.arange(len(fading))
+        row = order[bodies.element]
+        numbers = np.flatnonzero(row >= 0)
+        first = int(numbers[0]) if len(numbers) else 0
+        consecutive = len(numbers) == 0 or int(numbers[-1]) == first + len(numbers) - 1
+        self.who: slice | IntArray = slice(first, first + len(numbers)) if consecutive else numbers
+        """(F,) numbers of those that fade"""
+        self._place = np.full(len(bodies), -1, np.int64)
+        self._place[numbers] = np.arange(len(numbers))
+        self._first = row[numbers] * SHADES
+        self._born, self._rate = bodies.born[numbers], SHADES / bodies.lifetime[numbers]
+        self._age: FloatArray = np.empty(len(numbers))
+        self._index: IntArray = np.empty(len(numbers), np.int64)
+
+    def __len__(self) -> int:
+        return len(self._born)
+
+    def at(self, time: float) -> IntArray:
+        """Return which of the shades each of those who fade has at a time, s, (F,); the array is used again."""
+        age = np.subtract(time, self._born, out=self._age)
+        age *= self._rate
+        np.clip(age, 0.0, SHADES - 1.0, out=age)
+        np.copyto(self._index, age, casting="unsafe")
+        self._index += self._first
+        return self._index
+
+    def over(self, colours: ColourArray, numbers: IntArray, shade: IntArray) -> ColourArray:
+        """Return the colours of some bodies (K, 3), by their numbers (K,), those who fade in their shades (F,)."""
+        place = self._place[numbers]
+        fade = place >= 0
+        colours = colours.copy()
+        colours[fade] = self.shades[shade[place[fade]]]
+        return colours
+
+
+def faded(colours: tuple[str, ...]) -> ColourArray:
+    """Return colours from the first to the last in equal steps, (SHADES, 3)."""
+    stops = np.asarray([hex_colour(each) for each in colours], np.float64)
+    along = np.linspace(0.0, len(stops) - 1.0, SHADES)
+    mixed = [np.interp(along, np.arange(len(stops)), stops[:, channel]) for channel in range(3)]
+    return np.rint(np.stack(mixed, 1)).astype(np.uint8)

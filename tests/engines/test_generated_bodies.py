@@ -1,0 +1,88 @@
+"""Stacks, ropes, cloth and ragdolls while they run: what actions find of them, and who meets whom."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sandbox.action import Launch, Remove, SetParameter, Spawn
+from sandbox.engines.registry import start as start_engine
+from sandbox.engines.relay import start
+from sandbox.scene.elements import mover_of
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Ball, Scene
+
+ENGINES = ("pymunk", "reference")
+every_engine = pytest.mark.parametrize("engine", ENGINES)
+
+
+def mixed(**world: Any) -> Scene:
+    """A ball, a small pyramid on a floor, a rope, and a ragdoll in the air."""
+    return from_document(
+        {
+            "world": {"gravity": [0, -9.81], **world},
+            "solver": {"dt": 0.01},
+            "plane": [{"point": [0, 0], "normal": [0, 1], "friction": 0.5}],
+            "ball": [{"name": "own", "position": [-5, 1], "radius": 0.5}],
+            "stack": [{"name": "box", "base": [0, 0], "size": [0.5, 0.5], "columns": 2, "rows": 2, "fewer": 1}],
+            "rope": [{"name": "line", "start": [3, 5], "end": [4, 5], "links": 4, "length": 1.2}],
+            "ragdoll": [{"name": "doll", "position": [8, 2], "friction": 0.5, "restitution": 0.2}],
+        }
+    )
+
+
+@every_engine
+def test_changed_coefficient_reaches_the_bodies_of_its_element_and_spawned_ones_keep_theirs(engine: str) -> None:
+    simulation = start_engine(mixed(), engine, mixed().solver)
+    simulation.apply(Spawn(time=0.0, ball=Ball(position=(-8.0, 3.0), radius=0.3, restitution=0.9)))
+    simulation.apply(SetParameter(time=0.0, path="ragdoll.doll.restitution", value=0.7))
+    simulation.apply(SetParameter(time=0.0, path="stack.box.friction", value=0.4))
+    bodies = simulation.bodies
+    simulation.close()
+    said = [bodies.elements[element] for element in bodies.element.tolist()]
+    assert [each.restitution for each in said[9:24]] == [0.7] * 15
+    assert [each.friction for each in said[1:4]] == [0.4] * 3
+    assert said[-1].restitution == 0.9
+    assert len(bodies) == 25
+
+
+def test_element_leads_back_to_its_mover() -> None:
+    scene = mixed()
+    assert [mover_of(scene, k) for k in range(len(scene.elements))] == [0, 1, 2, *[3] * 15]
+    assert mover_of(scene, len(scene.elements)) == len(scene.movers)
+    plain = from_document({"ball": [{"position": [k, 0], "radius": 0.1} for k in range(3)]})
+    assert [mover_of(plain, k) for k in range(4)] == [0, 1, 2, 3]
+
+
+@every_engine
+@pytest.mark.parametrize("name", ["box", "line", "doll"])
+def test_launch_puts_a_generator_back_whole(engine: str, name: str) -> None:
+    scene = mixed()
+    relay = start(scene, engine)
+    for _ in range(30):
+        relay.step()
+    own = np.asarray([body.startswith(f"{name}-") for body in scene.bodies.names])
+    gone = scene.bodies.names[int(np.flatnonzero(own)[1])]
+    relay.apply(Remove(time=relay.time, body=gone))
+    before = relay.frame()
+    relay.apply(Launch(time=relay.time, generator=name, seed=0))
+    after = relay.frame()
+    assert after.present.all()
+    assert np.array_equal(after.position[own], scene.bodies.position[own])
+    assert np.array_equal(after.angle[own], scene.bodies.angle[own])
+    assert not after.velocity[own].any()
+    assert np.array_equal(after.position[~own], before.position[~own])
+    relay.close()
+
+
+@every_engine
+def test_balls_that_a_rod_joins_pass_through_each_other(engine: str) -> None:
+    balls = [{"name": name, "position": [x, 0], "radius": 1.0} for name, x in (("a", 0), ("b", 1), ("c", 1.5))]
+    joints = [{"kind": "rod", "between": [a, b]} for a, b in (("a", "b"), ("b", "c"), ("a", "c"))]
+    for joined, touches in ((joints, 0), (joints[:2], 1)):
+        scene = from_document({"ball": balls, "joint": joined})
+        simulation = start_engine(scene, engine, scene.solver)
+        simulation.step()
+        contacts = simulation.contacts()
+        simulation.close()
+        assert contacts.pair.tolist() == [[0, 2]] * touches

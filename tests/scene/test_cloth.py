@@ -1,0 +1,143 @@
+"""Cloth: nodes in columns and rows on springs or rods."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sandbox.engines.registry import start
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import dumps, from_document, load, loads
+from sandbox.scene.links import LinkKind
+from sandbox.scene.model import Scene
+from sandbox.scene.shipped import find
+
+CLOTH = {"corner": [1.0, 2.0], "columns": 4, "rows": 3, "spacing": [0.5, 0.25], "stiffness": 100.0, "damping": 0.1}
+
+
+def scene_of(**cloth: Any) -> Scene:
+    return from_document({"cloth": [{key: value for key, value in {**CLOTH, **cloth}.items() if value is not None}]})
+
+
+def test_nodes_are_counted_along_rows_from_the_upper_left() -> None:
+    bodies = scene_of(name="flag").bodies
+    assert bodies.names == tuple(f"flag-{n}" for n in range(1, 13))
+    assert bodies.position[[0, 3, 4, 11]].tolist() == [[1.0, 2.0], [2.5, 2.0], [1.0, 1.75], [2.5, 1.5]]
+    assert bodies.round.all()
+    assert bodies.mass.tolist() == [1.0] * 12
+
+
+def test_springs_join_neighbours_at_rest() -> None:
+    scene = scene_of(pins=[])
+    bodies, links = scene.bodies, scene.links
+    assert links.kind.tolist() == [LinkKind.SPRING] * 17
+    pairs = {tuple(pair) for pair in np.column_stack((links.a, links.b)).tolist()}
+    grid = np.arange(12).reshape(3, 4)
+    across = set(zip(grid[:, :-1].ravel().tolist(), grid[:, 1:].ravel().tolist(), strict=True))
+    down = set(zip(grid[:-1].ravel().tolist(), grid[1:].ravel().tolist(), strict=True))
+    assert pairs == across | down
+    length = np.hypot(*(bodies.position[links.a] - bodies.position[links.b]).T)
+    assert links.figures[:, 0].tolist() == length.tolist()
+    assert links.figures[:, 1:].tolist() == [[100.0, 0.1]] * 17
+
+
+@given(
+    columns=st.integers(1, 9), rows=st.integers(1, 9), shear=st.sampled_from([None, 3.0]),
+    bend=st.sampled_from([None, 5.0]), kind=st.sampled_from(["springs", "rods"]),
+    pins=st.sampled_from(["top", "left", "corners", []]), width=st.floats(0.01, 10.0), height=st.floats(0.01, 10.0),
+)  # fmt: skip
+def test_every_link_is_at_rest_and_counted(
+    columns: int, rows: int, shear: float | None, bend: float | None, kind: str, pins: Any, width: float, height: float
+) -> None:
+    figures = {"stiffness": 100.0, "damping": 0.1} if kind == "springs" else {"stiffness": None, "damping": None}
+    scene = scene_of(
+        columns=columns, rows=rows, shear=shear, bend=bend, kind=kind, pins=pins, spacing=[width, height], **figures
+    )
+    bodies, links = scene.bodies, scene.links
+    length = np.hypot(*(bodies.position[links.a] - bodies.position[links.b]).T)
+    assert links.figures[:, 0] == pytest.approx(length, rel=1e-12)  # rounding of places up to 100 links from the corner
+    assert not (bodies.fixed[links.a] & bodies.fixed[links.b]).any()
+    pinned = {"top": columns, "left": rows, "corners": min(columns, 2)}[pins] if pins else 0
+    assert bodies.fixed.sum() == pinned
+    if not pins:
+        c, r = columns, rows
+        expected = (c - 1) * r + c * (r - 1)
+        expected += 0 if shear is None else 2 * (c - 1) * (r - 1)
+        expected += 0 if bend is None else max(c - 2, 0) * r + c * max(r - 2, 0)
+        assert len(links) == expected
+    assert loads(dumps(scene)) == scene
+
+
+def test_shear_and_bend_have_their_own_stiffness() -> None:
+    links = scene_of(pins=[], kind="rods", stiffness=None, shear=3.0, bend=5.0).links
+    assert np.unique(links.figures[links.kind == LinkKind.ROD, 1]).tolist() == [0.0]
+    springs = links.figures[links.kind == LinkKind.SPRING]
+    diagonal = springs[:, 1] == 3.0
+    assert springs[diagonal, 0] == pytest.approx(math.hypot(0.5, 0.25), rel=1e-15)
+    assert set(springs[~diagonal, 0].tolist()) == {1.0, 0.5}
+    assert set(springs[~diagonal, 1].tolist()) == {5.0}
+
+
+@pytest.mark.parametrize(
+    ("pins", "fixed"),
+    [("top", [0, 1, 2, 3]), ("left", [0, 4, 8]), ("corners", [0, 3]), ([[1, 2], [3, 0]], [3, 9]), ([], [])],
+)
+def test_pinned_nodes_never_move_and_their_links_to_each_other_are_left_out(pins: Any, fixed: list[int]) -> None:
+    scene = scene_of(pins=pins, velocity=[1.0, 2.0])
+    assert np.flatnonzero(scene.bodies.fixed).tolist() == fixed
+    assert {tuple(v) for v in scene.bodies.velocity[fixed].tolist()} <= {(0.0, 0.0)}
+    loose = np.delete(scene.bodies.velocity, fixed, axis=0)
+    assert loose.tolist() == [[1.0, 2.0]] * len(loose)
+    links = scene.links
+    assert not np.isin(links.a, fixed)[np.isin(links.b, fixed)].any()
+
+
+@pytest.mark.parametrize(
+    ("cloth", "key", "message"),
+    [
+        ({"pins": [[0, 0], [4, 0]]}, "pins[1]", "its last node is [3, 2]"),
+        ({"pins": [[0, 3]]}, "pins[0]", "outside the cloth"),
+        ({"pins": "bottom"}, "pins", "'top', 'corners', 'left'"),
+        ({"pins": [[0, -1]]}, "pins", "'top', 'corners', 'left'"),
+        ({"stiffness": None}, "stiffness", "is missing"),
+        ({"kind": "rods", "damping": None}, "stiffness", "kind is 'rods'"),
+        ({"kind": "rods", "stiffness": None}, "damping", "kind is 'rods'"),
+        ({"collides": "all", "radius": 0.2}, "radius", "0.125 m at most"),
+        ({"columns": 1001, "rows": 1000}, "", "at most 1,000,000"),
+        ({"spacing": [0.0, 1.0]}, "spacing[0]", "1e-09 or more"),
+    ],
+)
+def test_wrong_figure_is_a_fault_that_says_what_would_be_right(cloth: dict[str, Any], key: str, message: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        scene_of(**cloth)
+    (fault,) = caught.value.faults
+    assert fault.path == f"cloth[0].{key}".removesuffix(".")
+    assert message in fault.message
+
+
+def test_large_cloth_is_arrays_throughout() -> None:
+    scene = scene_of(columns=64, rows=64, shear=10.0, bend=1.0)
+    assert len(scene.bodies) == 4096
+    assert len(scene.bodies.elements) == 1
+    # 64·63 twice along rows and columns, 63² twice along diagonals, 64·62 twice past a neighbour, less the pinned row's
+    assert len(scene.links) == 2 * 64 * 63 + 2 * 63 * 63 + 2 * 64 * 62 - 63 - 62
+    assert len(set(scene.links.names)) == len(scene.links)
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_cloth_leans_with_the_wind_as_its_scene_tells(engine: str) -> None:
+    scene = load(
+        find("cloth"), ["cloth.sheet.columns=3", "cloth.sheet.rows=8", "world.linear_drag=4.0", "world.wind=[1.0,0.0]"]
+    )
+    simulation = start(scene, engine, scene.solver)
+    for _ in range(round(8.0 / scene.solver.dt)):
+        simulation.step()
+    place = simulation.frame().position.reshape(8, 3, 2)
+    simulation.close()
+    lean = place[-1] - place[0]
+    assert scene.world.wind[0] * scene.world.linear_drag == 4.0
+    # each column hangs by itself along the sum of drag and weight; 8 s of drag leave e^−16 of the swing
+    assert lean[:, 0] / -lean[:, 1] == pytest.approx(4.0 / 9.81, rel=0.01)

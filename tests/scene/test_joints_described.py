@@ -1,0 +1,137 @@
+"""Joints, attractions and thrusts in scene files: which there are, and what is wrong with one."""
+
+import pytest
+
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import loads
+from sandbox.scene.joints import Rod
+
+TWO = '[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n[[ball]]\nname="b"\nposition=[5,0]\nradius=1\n'
+KINDS = "rod, pin, pivot, slide, groove, rotary_limit, motor, gear, spring, rotary_spring"
+FIXED = TWO.replace("radius=1", "radius=1\nfixed=true")
+
+
+def faults(text: str) -> list[str]:
+    with pytest.raises(SceneError) as caught:
+        loads(text, "s.toml")
+    return [str(fault) for fault in caught.value.faults]
+
+
+def test_joint_of_every_kind_is_read() -> None:
+    scene = loads(
+        TWO + "".join(
+            f'[[joint]]\nbetween=["a","b"]\nkind={kind}\n'
+            for kind in (
+                '"rod"', '"pin"\nlength=3', '"pivot"\nat=[1,1]', '"pivot"\nanchors=[[1,0],[-1,0]]', '"slide"\nmost=9',
+                '"groove"\ngroove=[[0,0],[0,1]]', '"rotary_limit"\nleast=-1\nmost=1', '"motor"\nrate=2\nmax_torque=3',
+                '"gear"\nratio=-2', '"spring"\nstiffness=5', '"rotary_spring"\nstiffness=5\ndamping=1',
+            )
+        )
+    )  # fmt: skip
+    assert len(scene.joints) == len(scene.links) == 11
+    assert isinstance(scene.joints[1], Rod)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('between=["a","b"]', [f"s.toml:9: joint[0].kind: is missing; a joint is one of {KINDS}"]),
+        ('kind="spirng"\nbetween=["a","b"]', ['s.toml:10: joint[0].kind: "spirng" is not right here; a joint is one']),
+        ('kind=5\nbetween=["a","b"]', ["s.toml:10: joint[0].kind: "]),
+        ('kind="rod"', ["s.toml:9: joint[0].between: is missing"]),
+        ('kind="rod"\nbetween="a"', ['s.toml:11: joint[0].between: "a" is not right here; it should be the name of']),
+        ('kind="rod"\nbetween=[]', ["s.toml:11: joint[0].between: [] is not right here; it should be the name of one"]),
+        ('kind="rod"\nbetween=["a","b","a"]', ["s.toml:11: joint[0].between: "]),
+        ('kind="rod"\nbetween=["a",5]', ["s.toml:11: joint[0].between[1]: 5 is not right here; it should be text"]),
+        ('kind="rod"\nbetween=["a","q"]', ["s.toml:11: joint[0].between[1]: no body is named 'q'; there are 'a', 'b'"]),
+        ('kind="rod"\nbetween=["a","a"]', ["s.toml:11: joint[0].between: these are one and the same body"]),
+        (
+            'kind="rod"\nbetween=["a","b"]\nlenght=1',
+            ["s.toml:12: joint[0].lenght: unknown key; did you mean 'length'?"],
+        ),
+        ('kind="pin"\nbetween=["a","b"]\nstiffness=1', ["s.toml:12: joint[0].stiffness: unknown key; known here:"]),
+        ('kind="rod"\nbetween=["a","b"]\nlength=0', ["s.toml:12: joint[0].length: a rod of no length"]),
+        ('kind="rod"\nbetween=["a","b"]\nlength=true', ["s.toml:12: joint[0].length: true is not right here"]),
+        ('kind="rod"\nbetween=["a"]', ["s.toml:11: joint[0].between: the two points that it holds start at (0, 0) m"]),
+        ('kind="rod"\nbetween=["a","b"]\nanchors=[[5,0],[0,0]]', ["s.toml:12: joint[0].anchors: the two points"]),
+        ('kind="slide"\nbetween=["a"]', ["s.toml:9: joint[0].most: is missing"]),
+        ('kind="slide"\nbetween=["a"]\nmost=1\nleast=2', ["s.toml:12: joint[0].most: is smaller than `least`"]),
+        ('kind="rotary_limit"\nbetween=["a"]\nmost=1\nleast=2', ["s.toml:12: joint[0].most: is smaller than `least`"]),
+        ('kind="groove"\nbetween=["a"]\ngroove=[[1,1],[1,1]]', ["s.toml:12: joint[0].groove: has no length"]),
+        ('kind="groove"\nbetween=["a"]\ngroove=[[1,1]]', ["s.toml:12: joint[0].groove[1]: is missing"]),
+        (
+            'kind="pivot"\nbetween=["a"]',
+            ["s.toml:9: joint[0].at: state either `at`, a place in the world, or `anchors`"],
+        ),
+        ('kind="pivot"\nbetween=["a"]\nat=[0,0]\nanchors=[[0,0],[1,0]]', ["s.toml:12: joint[0].at: state either `at`"]),
+        ('kind="motor"\nbetween=["a"]\nrate=1\nmax_torque=0', ["s.toml:13: joint[0].max_torque: 0 is not right here"]),
+        ('kind="gear"\nbetween=["a"]\nratio=0', ["s.toml:12: joint[0].ratio: is next to nothing"]),
+        ('kind="gear"\nbetween=["a"]\nratio=-1e-9', ["s.toml:12: joint[0].ratio: is next to nothing"]),
+        (
+            'kind="spring"\nbetween=["a"]\nstiffness=-1\ndamping=inf',
+            ["s.toml:12: joint[0].stiffness: -1 is not", "s.toml:13: joint[0].damping: Infinity is not right here"],
+        ),
+        ('kind="spring"\nbetween=["a"]\nstiffness=1e31', ["s.toml:12: joint[0].stiffness: 1e+31 is not right here"]),
+    ],
+)
+def test_fault_of_a_joint_is_told_with_line_and_path(text: str, told: list[str]) -> None:
+    found = faults(f"{TWO}[[joint]]\n{text}\n")
+    assert len(found) == len(told), found
+    for message, start in zip(found, told, strict=True):
+        assert message.startswith(start)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[[attraction]]\nstrength=1", ["s.toml:9: attraction[0].toward: is missing"]),
+        (
+            "[[attraction]]\nstrength=1\ntoward=[1]",
+            ["s.toml:11: attraction[0].toward: is not right here; it should be a"],
+        ),
+        (
+            "[[attraction]]\nstrength=1\ntoward=5",
+            ["s.toml:11: attraction[0].toward: is not right here; it should be a"],
+        ),
+        ('[[attraction]]\nstrength=1\ntoward="sun"', ["s.toml:11: attraction[0].toward: no body is named 'sun'"]),
+        ("[[attraction]]\nstrength=nan\ntoward=[0,0]", ["s.toml:10: attraction[0].strength: NaN is not right here"]),
+        ('[[thrust]]\nbody="q"\nforce=[1,0]', ["s.toml:10: thrust[0].body: no body is named 'q'"]),
+        (
+            '[[thrust]]\nbody="a"\nforce=[1]\nkey="spc"',
+            ["s.toml:11: thrust[0].force[1]: is missing", 's.toml:12: thrust[0].key: "spc" is not right here'],
+        ),
+        ('[[thrust]]\nbody="a"\nforce=[1,0]\nbegin=3\nend=3', ["s.toml:13: thrust[0].end: is not later than `begin`"]),
+        (
+            '[[thrust]]\nname="t"\nbody="a"\nforce=[1,0]\n[[thrust]]\nname="t"\nbody="b"\nforce=[1,0]',
+            ["s.toml:14: thrust.t.name: a second thrust named 't'"],
+        ),
+        (
+            '[[thrust]]\nname="thrust-2"\nbody="a"\nforce=[1,0]\n[[thrust]]\nbody="b"\nforce=[1,0]',
+            ["s.toml:13: thrust[1].name: a second thrust named 'thrust-2'"],
+        ),
+    ],
+)
+def test_fault_of_a_force_is_told_with_line_and_path(text: str, told: list[str]) -> None:
+    found = faults(f"{TWO}{text}\n")
+    assert len(found) == len(told), found
+    for message, start in zip(found, told, strict=True):
+        assert message.startswith(start)
+
+
+@pytest.mark.parametrize("joint", ["joint=5\n", "joint=[5]\n", "attraction={}\n"])
+def test_tables_that_are_none_are_told(joint: str) -> None:
+    (found,) = faults(joint + TWO)
+    assert found.startswith("s.toml:1: ")
+    assert "a table" in found or "tables, each headed" in found
+
+
+def test_names_of_joints_are_unique() -> None:
+    joint = '[[joint]]\nname="x"\nkind="motor"\nrate=1\nbetween=["a"]\n'
+    (found,) = faults(TWO + joint + joint)
+    assert found.startswith("s.toml:15: joint.x.name: a second joint named 'x'")
+
+
+def test_joint_between_fixed_bodies_is_refused() -> None:
+    found = faults(FIXED + '[[joint]]\nkind="rod"\nbetween=["a","b"]\n[[joint]]\nkind="rod"\nbetween=["b"]\n')
+    assert [each.split(": ")[1] for each in found] == ["joint[0].between", "joint[1].between"]
+    assert all("nothing here can move" in each for each in found)

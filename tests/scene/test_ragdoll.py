@@ -1,0 +1,192 @@
+"""Ragdolls: people's shares of mass and length, joints within their bounds, limbs that pass each other."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sandbox.engines.registry import start
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import dumps, from_document, load, loads
+from sandbox.scene.links import LinkKind
+from sandbox.scene.model import Scene
+from sandbox.scene.ragdoll import segments
+from sandbox.scene.shipped import find
+from sandbox.trajectory import FloatArray
+
+MASSES = {
+    "head": 6.9, "pelvis": 21.75, "chest": 21.75, "upper-arm": 2.7, "forearm": 1.6, "hand": 0.6, "thigh": 14.2,
+    "shank": 4.3, "foot": 1.4,
+}  # fmt: skip
+"""%, of which the trunk has 43.5 in two"""
+
+
+def scene_of(**ragdoll: Any) -> Scene:
+    return from_document({"ragdoll": [{"position": [0.0, 0.0], **ragdoll}]})
+
+
+def parted(scene: Scene, position: FloatArray, angle: FloatArray) -> float:
+    """Return how far the two sides of a pivot are apart at most, m."""
+    pivots = scene.links.of(LinkKind.PIVOT)
+    first, second = pivots.ends(position, angle)
+    return float(np.hypot(*(second - first).T).max())
+
+
+def within(scene: Scene, angle: FloatArray) -> float:
+    """Return how far the angle of a joint is within its bounds at least, rad."""
+    bounds = scene.links.of(LinkKind.ROTARY_LIMIT)
+    turn = angle[bounds.b] - angle[bounds.a]
+    return float(np.minimum(turn - bounds.figures[:, 0], bounds.figures[:, 1] - turn).min())
+
+
+def test_segments_share_the_mass_as_people_do() -> None:
+    bodies = scene_of(name="doll", mass=80.0).bodies
+    assert len(bodies) == 15
+    assert math.fsum(bodies.mass) == pytest.approx(80.0, rel=1e-15)
+    for name, mass in zip(bodies.names, bodies.mass.tolist(), strict=True):
+        limb = name.removeprefix("doll-").removeprefix("left-").removeprefix("right-")
+        assert mass == pytest.approx(0.8 * MASSES[limb], rel=1e-15)
+    assert math.fsum(scene_of().bodies.mass) == pytest.approx(75.0, rel=1e-15)
+
+
+def test_names_tell_the_segments() -> None:
+    names = scene_of(name="doll").bodies.names
+    trunk = {"doll-pelvis", "doll-chest", "doll-head"}
+    sides = {f"doll-{side}-{limb}" for side in ("left", "right") for limb in MASSES if f"doll-{limb}" not in trunk}
+    assert set(names) == trunk | sides
+    assert scene_of().bodies.names[0] == "ragdoll-1-left-upper-arm"
+    assert scene_of(facing="left").bodies.names[0] == "ragdoll-1-right-upper-arm"  # what is behind comes first
+
+
+def test_straight_figure_is_as_tall_as_its_height_and_joined_where_its_segments_meet() -> None:
+    parts = segments(scene_of().ragdolls[0])
+    assert max(part.ends[0][1] + part.radius for part in parts.values()) == 1.0
+    assert min(part.ends[-1][1] - part.radius for name, part in parts.items() if name.endswith("foot")) == 0.0
+    for name, part in parts.items():
+        assert name == "pelvis" or part.parent in parts
+        if name.endswith(("thigh", "shank", "arm")):
+            assert part.joint == part.ends[0]
+            assert not part.parent.endswith(("thigh", "arm")) or parts[part.parent].ends[1] == part.joint
+
+
+figures = {
+    "position": st.tuples(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0)).map(list),
+    "height": st.floats(0.1, 20.0),
+    "mass": st.floats(1e-3, 1e4),
+    "facing": st.sampled_from(["left", "right"]),
+    "angle": st.floats(-7.0, 7.0),
+}
+
+
+@given(st.fixed_dictionaries({}, optional=figures))
+def test_ragdoll_starts_whole_within_its_bounds(ragdoll: dict[str, Any]) -> None:
+    scene = scene_of(**ragdoll)
+    bodies, height = scene.bodies, ragdoll.get("height", 1.75)
+    assert parted(scene, bodies.position, bodies.angle) < 1e-14 * (height + 20.0)  # rounding of places
+    assert within(scene, bodies.angle) >= math.radians(4.9)  # the stiffest bend of the stride is 5° from its bound
+    assert len(scene.links) == 28
+    assert loads(dumps(scene)) == scene
+
+
+@pytest.mark.parametrize("facing", ["left", "right"])
+def test_ragdoll_stands_on_its_position(facing: str) -> None:
+    bodies = scene_of(position=[3.0, 1.0], height=2.0, facing=facing).bodies
+    shapes = bodies.shapes
+    cos, sin = np.cos(bodies.angle), np.sin(bodies.angle)
+    body = np.repeat(shapes.body, shapes.corners)
+    y = bodies.position[body, 1] + sin[body] * shapes.corner[:, 0] + cos[body] * shapes.corner[:, 1]
+    lowest = y - np.repeat(shapes.radius, shapes.corners)
+    assert lowest.min() == pytest.approx(1.0, abs=1e-15)  # rounding
+    assert (y + np.repeat(shapes.radius, shapes.corners)).max() == pytest.approx(3.0, abs=0.02)  # legs are spread
+    toe = bodies.position[bodies.names.index("ragdoll-1-right-foot"), 0]
+    assert (toe > 3.0) == (facing == "right")
+
+
+def test_facing_left_is_the_mirror_image() -> None:
+    right, left = scene_of().bodies, scene_of(facing="left").bodies
+    swapped = [n.replace("left", "x").replace("right", "left").replace("x", "right") for n in right.names]
+    assert swapped != list(right.names)
+    order = [left.names.index(name) for name in right.names]
+    assert left.position[order] * [-1.0, 1.0] == pytest.approx(right.position, abs=1e-15)  # rounding
+
+
+def test_angle_and_spin_turn_all_of_it_about_its_position() -> None:
+    upright, lying = scene_of(position=[1.0, 2.0]).bodies, scene_of(position=[1.0, 2.0], angle=math.pi / 2).bodies
+    offset = upright.position - [1.0, 2.0]
+    across = np.column_stack((-offset[:, 1], offset[:, 0]))
+    assert lying.position == pytest.approx(np.add(across, [1.0, 2.0]), abs=1e-15)
+    assert lying.angle == pytest.approx(upright.angle + math.pi / 2, abs=1e-15)  # rounding, as above
+    spun = scene_of(position=[1.0, 2.0], velocity=[1.0, 0.0], angular_velocity=3.0).bodies
+    assert spun.angular_velocity.tolist() == [3.0] * 15
+    assert spun.velocity == pytest.approx(np.add(3.0 * across, [1.0, 0.0]), abs=1e-14)
+
+
+def test_limbs_of_one_pass_through_each_other_not_through_another() -> None:
+    scene = from_document({
+        "ball": [{"position": [9.0, 9.0], "radius": 1.0}],
+        "ragdoll": [{"position": [0.0, 0.0]}, {"position": [2.0, 0.0]}],
+    })  # fmt: skip
+    assert scene.bodies.group.tolist() == [0] + [1] * 15 + [2] * 15
+    with_more = scene.bodies.joined_by(scene.balls[0], "more")
+    assert with_more.group.tolist() == [*scene.bodies.group.tolist(), 0]
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_only_limbs_of_one_ragdoll_overlap_without_a_contact(engine: str) -> None:
+    doll = {"position": [0.0, 0.0], "restitution": 0.0}
+    for dolls, touches in (([doll], False), ([doll, {**doll, "position": [0.1, 0.0]}], True)):
+        scene = from_document({"solver": {"dt": 0.001}, "ragdoll": dolls})
+        simulation = start(scene, engine, scene.solver)
+        simulation.step()
+        contacts = simulation.contacts()
+        simulation.close()
+        assert (len(contacts) > 0) == touches
+        assert all((a < 15) != (b < 15) for a, b in contacts.pair.tolist())
+
+
+@pytest.mark.parametrize(
+    ("ragdoll", "key", "message"),
+    [
+        ({"density": 2.0}, "density", "share its mass"),
+        ({"height": 0.0}, "height", "0.001 or more"),
+        ({"facing": "up"}, "facing", "'right' or 'left'"),
+        ({"mass": 0.0}, "mass", "1e-09 or more"),
+    ],
+)
+def test_wrong_figure_is_a_fault_that_says_what_would_be_right(ragdoll: dict[str, Any], key: str, message: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        scene_of(**ragdoll)
+    (fault,) = caught.value.faults
+    assert fault.path == f"ragdoll[0].{key}"
+    assert message in fault.message
+
+
+def test_material_and_colour_are_those_of_the_table() -> None:
+    scene = from_document({
+        "material": [{"name": "felt", "friction": 0.5}],
+        "ragdoll": [{"position": [0.0, 0.0], "material": "felt", "restitution": 0.1, "colour": "#123456"}],
+    })  # fmt: skip
+    assert len(scene.elements) == 15
+    for element in scene.elements:
+        assert (element.material, element.restitution, element.colour) == ("felt", 0.1, "#123456")
+    assert len({element.colour for element in scene_of().elements}) == 2
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_ragdoll_holds_together_down_the_stairs(engine: str) -> None:
+    scene = load(find("ragdoll_stairs"))
+    simulation = start(scene, engine, scene.solver)
+    apart, beyond = 0.0, 0.0
+    for _ in range(round(5.0 / scene.solver.dt)):
+        simulation.step()
+        frame = simulation.frame()
+        apart = max(apart, parted(scene, frame.position, frame.angle))
+        beyond = max(beyond, -within(scene, frame.angle))
+    simulation.close()
+    assert frame.position[scene.bodies.names.index("doll-head"), 1] < 1.5  # it has come down from 3.6 m
+    # joints are held by velocities: a blow at some 5 m/s moves what it stops by v·h = 5 mm before it is put right
+    assert apart < 0.02
+    assert beyond < math.radians(8.0)  # likewise, of a hand's 8 cm
