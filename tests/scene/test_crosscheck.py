@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from sandbox.scene.bodies import expand
-from sandbox.scene.crosscheck import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps, height_above
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import from_document, loads
 from sandbox.scene.model import Plane
+from sandbox.scene.starts import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps, height_above
 
 BALL: dict[str, Any] = {"position": [0.0, 0.0], "radius": 1.0}
 GRID: dict[str, Any] = {"origin": [0, 0], "columns": 2, "spacing": [3, 3], "radius": 1}

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.scene.generators import GeneratorError, expand, size
+from sandbox.scene.crosscheck import crosscheck
+from sandbox.scene.generators import GeneratorError, expand, lifetimes, size
 from sandbox.scene.model import Emitter, Grid, Scatter, Scene, World
 
 GRID = Grid(origin=(1.0, 2.0), columns=3, rows=2, spacing=(0.5, -4.0), radius=0.1)
@@ -162,3 +163,47 @@ def test_draws_are_those_of_the_first_release() -> None:
 
 def test_size_counts_balls() -> None:
     assert [size(generator) for generator in (GRID, SCATTER, EMITTER)] == [6, 200, 200]
+
+
+def test_lives_are_uniform_about_the_stated_one_shortest_first() -> None:
+    emitter = EMITTER.model_copy(update={"count": 5000, "lifetime": 3.0, "lifetime_jitter": 0.5})
+    lives = lifetimes(emitter, 1, 0)
+    uniform_mean(lives, 2.5, 3.5)
+    assert (np.diff(lives) >= 0).all()
+    velocity = expand(emitter, 1, 0)[1]
+    assert abs(np.corrcoef(lives, velocity[:, 0])[0, 1]) < 5 / math.sqrt(5000)  # 5 σ, of 5,000 independent pairs
+
+
+def test_lives_are_drawn_after_the_velocities() -> None:
+    emitter = EMITTER.model_copy(update={"lifetime": 3.0, "lifetime_jitter": 0.5})
+    random = np.random.Generator(np.random.PCG64([7, 2, 4]))
+    velocity = random.random((200, 2)) * [2.0, 4.0] + [-1.0, 8.0]
+    assert np.array_equal(expand(emitter, 7, 4)[1], velocity)
+    assert np.array_equal(lifetimes(emitter, 7, 4), np.sort(3.0 + (random.random(200) * 2.0 - 1.0) * 0.5))
+
+
+def test_without_a_lifetime_particles_stay_for_ever() -> None:
+    assert (lifetimes(EMITTER, 1, 0) == np.inf).all()
+
+
+def test_bodies_know_how_long_they_live() -> None:
+    mortal = EMITTER.model_copy(update={"lifetime": 3.0})
+    bodies = Scene(emitters=(EMITTER, mortal), grids=(GRID,)).bodies
+    assert bodies.lifetime.tolist() == [np.inf] * 206 + [3.0] * 200
+    assert not bodies.born.any()
+
+
+@pytest.mark.parametrize(
+    ("stated", "key", "told"),
+    [
+        ({"lifetime_jitter": 0.5}, "lifetime_jitter", "state one"),
+        ({"lifetime": 1.0, "lifetime_jitter": 1.0}, "lifetime_jitter", "less than `lifetime`"),
+        ({"colours": ("#000000", "#ffffff")}, "colours", "fade over a `lifetime`"),
+        ({"lifetime": 1.0, "colour": "#000000", "colours": ("#000000", "#ffffff")}, "colours", "instead of `colour`"),
+    ],
+)
+def test_what_is_said_of_lives_must_agree(stated: dict[str, object], key: str, told: str) -> None:
+    faults = crosscheck(Scene(emitters=(EMITTER, EMITTER.model_copy(update=stated))))
+    ((location, message),) = faults
+    assert location == ("emitter", 1, key)
+    assert told in message

@@ -49,7 +49,17 @@ DEMANDED = {
         Demand.ROTARY_LIMITS,
         Demand.ROTATION,
     },
-    "particles/fireworks_100k": FALLING,
+    "particles/fireworks_100k": {*FALLING, Demand.LIFETIMES},
+    "particles/smoke": {*FALLING, Demand.DRAG, Demand.LIFETIMES},
+    "particles/sparks": {
+        *FALLING,
+        Demand.DRAG,
+        Demand.BALL_PLANE,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.ROTATION,
+        Demand.LIFETIMES,
+    },
     "tutorial/ball": FALLING,
     "tutorial/bounce": {*FALLING, Demand.BALL_PLANE, Demand.RESTITUTION},
     "tutorial/circle_half_plane": {Demand.TRANSLATION, Demand.BALL_PLANE},
@@ -158,15 +168,48 @@ def test_sparks_stay_in_their_box(name: str) -> None:
     (emitter,) = scene.emitters
     (left, slow), (right, fast) = emitter.velocity_min, emitter.velocity_max
     frames, _ = run(scene)
-    for frame in frames[1:]:
+    alive = [frame for frame in frames if frame.present.any()]
+    assert alive[-1].time >= 2.0 - 1e-9  # rounding of 20 sums
+    for frame in alive[1:]:
         t = frame.time
-        x, y = frame.position.T
+        x, y = frame.position[frame.present].T
         fall = -0.5 * G * t**2 + 0.5 * G * scene.solver.dt * t  # explicit Euler's
         tolerance = 1e-9  # rounding of 30 sums of some 100 m
         assert left * t - tolerance <= x.min() < x.max() <= right * t + tolerance
         assert slow * t + fall - tolerance <= y.min() < y.max() <= fast * t + fall + tolerance
     boxes = {"fireworks": (2.0, 4.0), "fireworks_100k": (40.0, 30.0)}
     assert (right - left, fast - slow) == boxes[name]
+
+
+def test_large_firework_burns_out_evenly_between_2_and_3_seconds() -> None:
+    scene = scene_of("fireworks_100k", "solver.dt=0.1")
+    frames, _ = run(scene)
+    left = [int(frame.present.sum()) for frame in frames]
+    assert left[:20] == [100_000] * 20
+    assert left[30] == 0
+    assert left[20:30] == pytest.approx(np.linspace(1e5, 1e4, 10), abs=4 * 159)  # 4 standard deviations of a binomial
+
+
+def test_smoke_ends_up_with_the_wind_at_the_speed_that_its_scene_tells() -> None:
+    frames, _ = run(scene_of("smoke"), until=4.8)
+    last = frames[-1]
+    assert 0 < last.present.sum() < 1000
+    slow = 0.5 * (math.sqrt(5.8) - 1.0)
+    # The rate at which differences die is 1 + |u| > 1.7 /s: of 16 m/s, e^(−1.7·4.8) = 3e-4 is left, 5e-3 m/s.
+    assert last.velocity[last.present] == pytest.approx(np.tile([1.0, slow], (last.present.sum(), 1)), abs=5e-3)
+
+
+def test_sparks_bounce_on_the_floor_and_not_on_each_other() -> None:
+    scene = scene_of("sparks")
+    frames, contacts = run(scene)
+    assert all((each.pair[:, 1] < 0).all() for each in contacts)
+    assert sum(map(len, contacts)) > 1000
+    for frame in frames:
+        x, y = frame.position[frame.present].T
+        # A contact is seen at the end of a step: up to v·dt deep, at 11 m/s less than 6 cm.
+        assert not len(x) or (x.max() <= 5.0 + 0.06 and y.min() >= -0.06)
+    assert frames[0].present.all()
+    assert not frames[-1].present.any()
 
 
 def test_tenths_of_the_large_firework_hold_equally_many() -> None:

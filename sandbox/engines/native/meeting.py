@@ -1,15 +1,14 @@
 """MeetingBodies: the bodies that can touch something, or are joined to something, in a pymunk space."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import pymunk
 
 from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.native.constraints import constraint_of
 from sandbox.engines.native.drag import acceleration
 from sandbox.engines.native.field import Field
+from sandbox.engines.native.member import Member
 from sandbox.engines.native.memory import RememberedImpulses, without
 from sandbox.engines.native.reader import Reader
 from sandbox.engines.native.space import (
@@ -21,9 +20,10 @@ from sandbox.engines.native.space import (
     new_space,
     reach_of,
 )
+from sandbox.engines.native.tethers import Tethers
 from sandbox.engines.touching import NOTHING, Touching
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.links import WORLD, Links
+from sandbox.scene.links import Links
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -31,19 +31,6 @@ from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 MANY = 5_000
 """Shapes from which on they are added shuffled: pymunk's tree takes 30 s for 40,000 in a sorted line."""
-
-
-class Member(NamedTuple):
-    """A body in the space, with its shapes; what can meet nothing has none."""
-
-    body: pymunk.Body
-    shapes: tuple[tuple[int, pymunk.Shape], ...]
-    """each with its number among the pieces of all bodies"""
-
-    @property
-    def moves(self) -> bool:
-        """It is not fixed."""
-        return self.body.body_type == pymunk.Body.DYNAMIC
 
 
 class MeetingBodies:
@@ -59,8 +46,8 @@ class MeetingBodies:
         self._surface_of: IntArray = np.empty(0, np.int64)
         self._moments: FloatArray = np.empty(0)
         self._touches: BoolArray = np.empty(0, np.bool_)
-        self._links: list[tuple[pymunk.Constraint, int, int]] = []
-        self._attached = self._polygons = False
+        self._tethers = Tethers(self._space)
+        self._polygons = False
         self._named: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
         self._remembered: RememberedImpulses | None = None
@@ -170,7 +157,7 @@ class MeetingBodies:
         if not len(numbers):
             return
         for number in numbers.tolist():
-            self._unlink(number)
+            self._tethers.untie(number)
             member = self._members.pop(number)
             self._moving -= member.moves
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
@@ -181,23 +168,9 @@ class MeetingBodies:
 
     def link(self, links: Links) -> None:
         """Join the bodies that are here as a scene says, once; what is joined is always here."""
-        if self._attached or not self._members:
-            return
-        self._attached = True
-        bias = self._settings.bias
-        assert bias is not None
-        for k, (a, b) in enumerate(zip(links.a.tolist(), links.b.tolist(), strict=True)):
-            first = self._space.static_body if a == WORLD else self._members[a].body
-            constraint = constraint_of(links, k, first, self._members[b].body, bias)
-            self._space.add(constraint)
-            self._links.append((constraint, a, b))
-
-    def _unlink(self, number: int) -> None:
-        """Let go of what a body that leaves was joined to."""
-        for constraint, a, b in self._links:
-            if number in (a, b):
-                self._space.remove(constraint)
-        self._links = [each for each in self._links if number not in each[1:]]
+        assert self._settings.bias is not None
+        if self._members:
+            self._tethers.tie(links, lambda number: self._members[number].body, self._settings.bias)
 
     @property
     def joints(self) -> bool:

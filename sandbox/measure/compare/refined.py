@@ -9,7 +9,10 @@ from pydantic import ValidationError
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.horizon import agree_until, nudged
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
+from sandbox.measure.joint_error import HOLDING
 from sandbox.measure.recorder import frame_count
+from sandbox.scene.links import LinkKind
+from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.part import MAX_STEPS
 from sandbox.scene.settings import Settings
@@ -39,6 +42,8 @@ PREFERENCES: tuple[dict[str, object], ...] = (
 """The first that an engine has is taken: exact flight and impacts within a step agree sooner."""
 JOINED: dict[str, object] = {"integrator": "velocity_verlet", "joints": "rattle"}
 """Before all others where bodies are joined: of second order, where impulses alone leave an error of the first."""
+SMOOTH: dict[str, object] = {"integrator": "rk4"}
+"""Before all others where springs, attraction and thrusts are all there is: nothing jumps, and order 4 pays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +76,7 @@ def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | Non
     iterations = max(settings.iterations, ITERATIONS)
     start = Settings(dt=settings.dt, record_every=settings.record_every, iterations=iterations, slop=SLOP * tolerance)
     for name in names:
-        for preference in (JOINED, *PREFERENCES) if len(scene.links) else PREFERENCES:
+        for preference in _preferences(scene):
             wanted = start.replace(**preference)
             if ENGINES[name].missing(scene, wanted):
                 continue
@@ -79,6 +84,14 @@ def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | Non
             if found is not None:
                 return found
     return None
+
+
+def _preferences(scene: Scene) -> tuple[dict[str, object], ...]:
+    if not (len(scene.links) or scene.attractions or scene.thrusts):
+        return PREFERENCES
+    if len(scene.links.of(*HOLDING, LinkKind.MOTOR)):
+        return JOINED, *PREFERENCES
+    return PREFERENCES if meetings(scene).touches.any() else (SMOOTH, *PREFERENCES)
 
 
 def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> Refined | None:

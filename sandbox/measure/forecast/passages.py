@@ -13,12 +13,12 @@ import numpy as np
 
 from sandbox.measure.forecast.held import farthest_fall
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.crosscheck import height_above
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Plane, Post, Scene, Wall
 from sandbox.scene.near import BoolArray, FloatArray
 from sandbox.scene.part import BACKING
 from sandbox.scene.settings import Settings
+from sandbox.scene.starts import height_above
 
 ANOTHER = "another ball"
 ANOTHER_BODY = "another body"

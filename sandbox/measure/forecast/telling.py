@@ -10,10 +10,10 @@ from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, meet_each_o
 from sandbox.measure.forecast.springs import spring_warnings
 from sandbox.measure.forecast.stacks import stack_warnings
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most
-from sandbox.scene.crosscheck import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
+from sandbox.scene.starts import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps
 
 ENOUGH_ITERATIONS = 5
 """With fewer, bouncing groups gain energy: measured on a break shot, 2.4 times after one iteration."""
