@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import drawing
 import peers
 from turning import turns
-from workloads import Timed, command, events, running, scene, staged, stepping
+from workloads import Timed, command, events, flying, running, scene, staged, stepping
 
 from sandbox.measure.versions import machine, versions
 
@@ -73,6 +73,42 @@ BENCHES = (
         "a step of those, not read / copying the bytes that it reads and writes",
         lambda: stepping(scene("particles/fireworks_100k", *SPARKS), 100, record=False, contacts=False),
         lambda: peers.copying(100_000 * 4 * 8, 100),
+    ),
+    *(
+        Bench(
+            f"flight-{name}",
+            f"particle-steps a second of {count:,} particles, stepped and not read / of numpy as one would write it",
+            lambda count=count: flying(count),
+            lambda count=count: peers.naive_flight(count),
+            5e8 if count == 100_000 else None,
+            "steps/s",
+            rate=True,
+        )
+        for name, count in (("1e3", 1_000), ("1e4", 10_000), ("1e5", 100_000), ("1e6", 1_000_000))
+    ),
+    Bench(
+        "flight-substeps",
+        "substeps a second of 100,000 particles, 16 to a frame / of numpy as one would write it",
+        lambda: flying(100_000, substeps=16),
+        lambda: peers.naive_flight(100_000),
+        unit="steps/s",
+        rate=True,
+    ),
+    Bench(
+        "flight-drag",
+        "the same of particles that air slows and wind carries / of numpy as one would write it, without",
+        lambda: flying(100_000, substeps=16, drag=0.3),
+        lambda: peers.naive_flight(100_000),
+        unit="steps/s",
+        rate=True,
+    ),
+    Bench(
+        "flight-copy",
+        "the particle-steps a second of 100,000 particles / how many particles' bytes are copied in a second",
+        lambda: flying(100_000),
+        lambda: peers.copied(100_000),
+        unit="steps/s",
+        rate=True,
     ),
     Bench(
         "omit-space",
@@ -176,9 +212,9 @@ BENCHES = (
     ),
     Bench(
         "draw-particles",
-        "pictures a second of 100,000 particles of 1 px all over it / the same by surfarray, as one would write it",
-        lambda: drawing.particles(scene("particles/fireworks_100k", *SPARKS), 300),
-        lambda: drawing.particles_by_array(scene("particles/fireworks_100k", *SPARKS), 300),
+        "pictures a second of 100,000 particles of 1 px that fade / in one colour by surfarray, as one would write it",
+        lambda: drawing.particles(scene("particles/fireworks_100k", *SPARKS), 150),
+        lambda: drawing.particles_by_array(scene("particles/fireworks_100k", *SPARKS), 150),
         300.0,
         "frames/s",
         rate=True,

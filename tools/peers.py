@@ -134,6 +134,30 @@ def copying(size: int, times: int) -> Callable[[], float]:
     return work
 
 
+def naive_flight(count: int) -> Callable[[], float]:
+    """Return the particle-steps a second of numpy's two lines for free flight."""
+    position, velocity = np.zeros((count, 2)), np.ones((count, 2))
+    gravity, h = np.array([0.0, -9.81]), 0.01
+    steps = max(5, 5_000_000 // count)
+
+    def work() -> float:
+        nonlocal position, velocity
+        began = time.perf_counter()
+        for _ in range(steps):
+            position += velocity * h
+            velocity += gravity * h
+        return count * steps / (time.perf_counter() - began)
+
+    return work
+
+
+def copied(count: int) -> Callable[[], float]:
+    """Return of how many particles positions and velocities are copied in a second: as a step reads and writes them."""
+    times = max(10, 20_000_000 // count)
+    copy = copying(count * 4 * 8, times)
+    return lambda: count * times / copy()
+
+
 def give_moments(simulation: Simulation, scene: Scene) -> None:
     """Give every body of a pymunk simulation the moment that the engine left out as nothing can turn it."""
     half = simulation._population.meeting  # type: ignore[attr-defined]

@@ -12,7 +12,7 @@ from sandbox.engines.reference.stage import Stage
 from sandbox.engines.registry import start
 from sandbox.engines.roster import Roster
 from sandbox.measure.run import run
-from sandbox.scene.file import load
+from sandbox.scene.file import from_document, load
 from sandbox.scene.model import Scene
 from sandbox.scene.shipped import find
 
@@ -61,6 +61,28 @@ def stepping(
                     simulation.frame()
 
         return timed(go)
+
+    return work
+
+
+def flying(count: int, substeps: int = 1, drag: float = 0.0) -> Callable[[], float]:
+    """Return the particle-steps a second of particles that touch nothing, each of a frame's substeps counted."""
+    which = from_document(
+        {
+            "world": {"gravity": [0.0, -9.81], "linear_drag": drag, "wind": [1.0, 0.0], "duration": 1e4},
+            "solver": {"dt": 0.01, "substeps": substeps},
+            "emitter": [
+                {"position": [0, 0], "count": count, "velocity_min": [-20, 10], "velocity_max": [20, 40]},
+            ],
+        }
+    )
+
+    def work() -> float:
+        simulation = start(which, "pymunk")
+        simulation.step()
+        frames = max(10, 20_000_000 // (count * substeps))
+        seconds = timed(lambda: [simulation.step() for _ in range(frames)])
+        return count * substeps * frames / seconds
 
     return work
 

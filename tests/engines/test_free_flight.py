@@ -8,6 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sandbox.action import Force, Remove
+from sandbox.engines.contract import Divergence
+from sandbox.engines.native import free
 from sandbox.engines.registry import start
 from sandbox.scene.file import from_document
 
@@ -150,8 +153,6 @@ def test_drag_is_stable_however_strong(drag):
 
 def test_the_two_halves_obey_one_rule_with_drag_and_force():
     """A ball in the space that never touches anything goes bit for bit as one outside of it."""
-    from sandbox.action import Force
-
     world = {"gravity": [0.3, -9.81], "linear_drag": 0.7, "quadratic_drag": 0.05, "wind": [3, -1]}
     alike = {"velocity": [3.0, 12.0], "radius": 0.1, "mass": 0.37}
     document = {
@@ -172,3 +173,114 @@ def test_the_two_halves_obey_one_rule_with_drag_and_force():
     frame = simulation.frame()
     assert np.array_equal(frame.position[0], frame.position[1])
     assert np.array_equal(frame.velocity[0], frame.velocity[1])
+
+
+SPARKS = {"position": [0.3, 0.7], "velocity_min": [-20, 10], "velocity_max": [20, 40], "radius": 0.05}
+AIRS = {
+    "still": {},
+    "linear": {"linear_drag": 0.3, "wind": [2.0, -1.0]},
+    "quadratic": {"linear_drag": 0.1, "quadratic_drag": 0.02, "wind": [2.0, 0.5]},
+}
+
+
+def crowd(count: int, substeps: int, **more):
+    """Return sparks of two masses, some of which spin, with a hole where a heavy one stands on its own."""
+    world = {"gravity": [0.2, -9.81], "seed": 5, **more}
+    emitters = [
+        {**SPARKS, "count": count, "mass": 0.37},
+        {**SPARKS, "count": count, "mass": 3.3, "angular_velocity": 2.5},
+        {**SPARKS, "count": 1, "radius": 1.0, "collides": "all"},
+        {**SPARKS, "count": 7},
+    ]
+    return from_document({"world": world, "solver": {"dt": 0.01, "substeps": substeps}, "emitter": emitters})
+
+
+def same(a, b):
+    return all(
+        np.array_equal(getattr(a, each), getattr(b, each))
+        for each in ("position", "velocity", "angle", "angular_velocity", "present")
+    )
+
+
+@pytest.mark.parametrize("air", AIRS)
+@pytest.mark.parametrize("substeps", [1, 2, 4, 7, 16])
+def test_a_frame_at_once_is_its_substeps_one_after_the_other(air, substeps):
+    """An observer is told of each substep; without one, all of a frame are done while a body is at hand."""
+    which = crowd(300, substeps, **AIRS[air])
+    at_once, apart, told = start(which), start(which), []
+    apart.watch(lambda time, before, after, pairs: told.append(time))
+    for _ in range(9):
+        at_once.step()
+        apart.step()
+        assert same(at_once.frame(), apart.frame())
+    assert len(told) == 9 * substeps
+
+
+@pytest.mark.parametrize("air", AIRS)
+@pytest.mark.parametrize("substeps", [1, 4, 6])
+@pytest.mark.parametrize("count", [150, 20_000])
+def test_compiled_and_numpy_flight_are_the_same_bit_for_bit(air, substeps, count, monkeypatch):
+    which = crowd(count, substeps, **AIRS[air])
+    compiled, plain = start(which), start(which)
+    for _ in range(4):
+        monkeypatch.setattr(free, "MANY", 200)
+        compiled.step()
+        monkeypatch.setattr(free, "MANY", 10**9)
+        plain.step()
+    assert same(compiled.frame(), plain.frame())
+
+
+@pytest.mark.parametrize("air", AIRS)
+@pytest.mark.parametrize("many", [0, 10**9])
+def test_holes_in_a_crowd_change_no_one_else(air, many, monkeypatch):
+    """Those who are left fly as before, in a few runs or scattered; those who are gone stay where they were."""
+    monkeypatch.setattr(free, "MANY", many)
+    which = crowd(150, 3, **AIRS[air])
+    whole, holed = start(which), start(which)
+    gone: list[int] = []
+    for k, more in enumerate(([0, 1, 40], list(range(100, 200)), list(range(201, 300, 2)), [307], [300])):
+        for number in more:
+            holed.apply(Remove(time=0, body=which.bodies.names[number]))
+        gone += more
+        before = holed.frame().position[gone]
+        for _ in range(k + 1):
+            whole.step()
+            holed.step()
+        a, b = whole.frame(), holed.frame()
+        left = b.present
+        assert np.flatnonzero(~left).tolist() == sorted(gone)
+        assert np.array_equal(a.position[left], b.position[left])
+        assert np.array_equal(a.velocity[left], b.velocity[left])
+        assert np.array_equal(a.angle[left], b.angle[left])
+        assert np.array_equal(before, b.position[gone])
+        assert not b.velocity[gone].any()
+
+
+@pytest.mark.parametrize("many", [0, 10**9])
+def test_a_force_on_one_of_a_crowd_moves_that_one_alone(many, monkeypatch):
+    monkeypatch.setattr(free, "MANY", many)
+    which = crowd(150, 4)
+    calm, pushed = start(which), start(which)
+    pushed.apply(Force(time=0, body=which.bodies.names[7], force=(3.7, 0.0), torque=0.01))
+    for _ in range(10):
+        calm.step()
+        pushed.step()
+    a, b = calm.frame(), pushed.frame()
+    assert b.velocity[7, 0] - a.velocity[7, 0] == pytest.approx(1.0, rel=1e-12)  # 3.7 N · 0.1 s / 0.37 kg, rounding
+    moment = float(which.bodies.moment[7])
+    assert b.angular_velocity[7] == pytest.approx(0.001 / moment, rel=1e-12)  # rounding of 40 sums
+    rest = np.arange(len(a.position)) != 7
+    assert np.array_equal(a.position[rest], b.position[rest])
+    assert np.array_equal(a.angle[rest], b.angle[rest])
+
+
+@pytest.mark.parametrize("many", [0, 10**9])
+def test_what_leaves_all_bounds_in_a_crowd_is_named(many, monkeypatch):
+    monkeypatch.setattr(free, "MANY", many)
+    which = crowd(150, 1, linear_drag=1e-9)
+    simulation = start(which)
+    name = which.bodies.names[123]
+    simulation.apply(Force(time=0, body=name, force=(3e13, 0.0)))
+    with pytest.raises(Divergence, match=name):
+        for _ in range(100):
+            simulation.step()
