@@ -127,7 +127,8 @@ class Trajectory:
     """(M, 2) who should have touched, numbered as in `contact_pair`"""
     info: Mapping[str, Any] = field(default_factory=dict)
     """What was run and how it went: scene (as a document), engine, settings, actions, seed, status, reason, steps,
-    seconds, work, energy_start, energy_end, audited, state_hash (of the end), versions."""
+    seconds, work, energy_start, energy_end, joint_error (the largest, as a part of a length; None without joints),
+    audited, state_hash (of the end), versions."""
 
     @property
     def status(self) -> str:

@@ -55,6 +55,7 @@ class Outcome:
             "realtime_factor": _number(simulated / seconds if seconds else None),
             "energy_start": _number(info["energy_start"]),
             "energy_end": _number(info["energy_end"]),
+            "joint_error": _number(info.get("joint_error")),
             "contacts": len(run.contact_time),
             "missed_contacts": run.missed_contacts,
             "retired": {

@@ -3,6 +3,7 @@
 import math
 import shutil
 import sys
+from collections.abc import Iterator
 from typing import Any
 
 import click
@@ -10,7 +11,7 @@ import click
 from sandbox.cli.reading import fault_rows, paths_of, print_json
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.forecast import at_most, largest_safe_dt, notes, warnings
-from sandbox.scene.demands import Item, bill
+from sandbox.scene.demands import JOINTS, Item, bill
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
@@ -77,9 +78,9 @@ def _checked(name: str, scene: Scene) -> tuple[dict[str, Any], tuple[Item, ...]]
 def _print(name: str, scene: Scene, document: dict[str, Any], items: tuple[Item, ...], quiet: bool) -> None:
     if not quiet:
         click.echo(f"{name}: {scene.title}" if scene.title else name)
-        for item in items:
-            mark = click.style("on ", fg="green", bold=True) if item.on else click.style("off", dim=True)
-            click.echo(f"  {mark}  {item.demand:<12} {item.why}")
+        for on, what, why in _lines(items):
+            mark = click.style("on ", fg="green", bold=True) if on else click.style("off", dim=True)
+            click.echo(f"  {mark}  {what:<14} {why}")
         for engine, verdict in document["engines"].items():
             _tell(f"engine {engine}: {'; '.join(verdict['missing']) or 'models all of it'}")
         safe = document["safe_dt"]
@@ -92,6 +93,18 @@ def _print(name: str, scene: Scene, document: dict[str, Any], items: tuple[Item,
             click.echo(f"{name}: warning: {warning['message']}")
         else:
             _tell(f"warning: {warning['message']}")
+
+
+def _lines(items: tuple[Item, ...]) -> Iterator[tuple[bool, str, str]]:
+    """Yield the bill's lines: of joints only the kinds that there are, or that there are none."""
+    joined = any(item.on for item in items if item.demand in JOINTS)
+    told = False
+    for demand, on, why in items:
+        if on or demand not in JOINTS:
+            yield on, str(demand), why
+        elif not (joined or told):
+            told = True
+            yield False, "joints", "none"
 
 
 def _tell(text: str) -> None:

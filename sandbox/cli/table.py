@@ -33,7 +33,8 @@ def print_runs(rows: Sequence[Row]) -> None:
     for head in ("dt", *swept, *differing, *(["seed"] if seeds else [])):
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("status", no_wrap=True)
-    for head in ("× real", "energy, J", "contacts", "missed"):
+    joined = any(row["joint_error"] is not None for row in rows)
+    for head in ("× real", "energy, J", *(("joints off",) if joined else ()), "contacts", "missed"):
         table.add_column(head, justify="right", no_wrap=True)
 
     for row in rows:
@@ -50,6 +51,7 @@ def print_runs(rows: Sequence[Row]) -> None:
             status,
             _figure(row["realtime_factor"], 3),
             "–" if row["energy_start"] is None else f"{_figure(row['energy_start'])} → {_figure(row['energy_end'])}",
+            *([_share(row["joint_error"])] if joined else []),
             *(("–", "–") if row["status"] == "refused" else (f"{row['contacts']:,}", _missed(row["missed_contacts"]))),
         )
     console = Console(width=None if sys.stdout.isatty() else WIDE)
@@ -71,6 +73,10 @@ def _differs(rows: Sequence[Row], key: str) -> bool:
 
 def _missed(count: int | None) -> str:
     return "?" if count is None else f"{count:,}"
+
+
+def _share(value: float | None) -> str:
+    return "–" if value is None else f"{100.0 * value:.2g} %"
 
 
 def _setting(value: object) -> str:

@@ -20,7 +20,30 @@ G = 9.81
 
 FALLING = {Demand.TRANSLATION, Demand.GRAVITY}
 MEETING = {Demand.TRANSLATION, Demand.BALL_BALL, Demand.RESTITUTION}
+BOX = {*FALLING, Demand.POLYGONS, Demand.FRICTION, Demand.ROTATION}
+PENDULUM = {*FALLING, Demand.RODS}
 DEMANDED = {
+    "benchmark/box_slides": BOX,
+    "benchmark/box_sticks": BOX,
+    "benchmark/double_pendulum": PENDULUM,
+    "benchmark/heavy_on_light": BOX,
+    "benchmark/kepler": {Demand.TRANSLATION, Demand.ATTRACTION},
+    "benchmark/pendulum_170": PENDULUM,
+    "benchmark/pendulum_5": PENDULUM,
+    "benchmark/pendulum_90": PENDULUM,
+    "benchmark/slide_to_roll": {*FALLING, Demand.BALL_PLANE, Demand.FRICTION, Demand.ROTATION},
+    "benchmark/slide_to_stop": BOX,
+    "benchmark/spring": {Demand.TRANSLATION, Demand.SPRINGS},
+    "benchmark/stiff_spring": {Demand.TRANSLATION, Demand.SPRINGS},
+    "tutorial/spaceship": {
+        Demand.TRANSLATION,
+        Demand.ROTATION,
+        Demand.POLYGONS,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.THRUST,
+        Demand.BOUNDS,
+    },
     "benchmark/bullet": {Demand.TRANSLATION, Demand.BALL_SEGMENT, Demand.RESTITUTION},
     "benchmark/gas": {*MEETING, Demand.BALL_PLANE},
     "benchmark/incline": {*FALLING, Demand.BALL_PLANE, Demand.FRICTION, Demand.ROTATION},

@@ -74,10 +74,10 @@ def _overlap(scene: Scene) -> str | None:
     from sandbox.engines.fixtures import fixtures_of
 
     bodies = scene.bodies
-    if not len(bodies):
+    if not bodies.round.any():
         return None
     kinds = np.asarray([element.collides for element in bodies.elements])[bodies.element]
-    to_all, to_fixed = kinds == "all", kinds == "fixed"
+    to_all, to_fixed = (kinds == "all") & bodies.round, (kinds == "fixed") & bodies.round
     pair = overlapping_balls(bodies.position, bodies.radius, to_all, to_fixed, bodies.fixed)
     if pair is not None:
         return told(bodies.names[pair[0]], bodies.names[pair[1]], pair[2])

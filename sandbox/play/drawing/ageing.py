@@ -3,16 +3,17 @@
 import numpy as np
 
 from sandbox.play.drawing.palette import ColourArray, hex_colour
+from sandbox.play.drawing.points import MANY, Packed
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.discs import Emitter
-from sandbox.scene.near import FloatArray, IntArray
+from sandbox.scene.near import IntArray
 
 SHADES = 64
 """Steps of a life that are told apart: one and the next look alike, and a crowd has few colours at once."""
 
 
 class Ageing:
-    """Those of some bodies that fade, and how; a picture asks once for the shade of each."""
+    """Those of some bodies that fade, and how."""
 
     def __init__(self, bodies: Bodies) -> None:
         colours = [each.colours if isinstance(each, Emitter) else None for each in bodies.elements]
@@ -31,30 +32,46 @@ class Ageing:
         """(F,) numbers of those that fade"""
         self._place = np.full(len(bodies), -1, np.int64)
         self._place[numbers] = np.arange(len(numbers))
-        self._first = row[numbers] * SHADES
+        self._first: IntArray = row[numbers] * SHADES
         self._born, self._rate = bodies.born[numbers], SHADES / bodies.lifetime[numbers]
-        self._age: FloatArray = np.empty(len(numbers))
-        self._index: IntArray = np.empty(len(numbers), np.int64)
 
     def __len__(self) -> int:
         return len(self._born)
 
-    def at(self, time: float) -> IntArray:
-        """Return which of the shades each of those who fade has at a time, s, (F,); the array is used again."""
-        age = np.subtract(time, self._born, out=self._age)
-        age *= self._rate
-        np.clip(age, 0.0, SHADES - 1.0, out=age)
-        np.copyto(self._index, age, casting="unsafe")
-        self._index += self._first
-        return self._index
+    def fade(self, tones: Packed, shades: Packed, time: float) -> None:
+        """Give those of all bodies (N,) who fade the tones of their ages.
 
-    def over(self, colours: ColourArray, numbers: IntArray, shade: IntArray) -> ColourArray:
-        """Return the colours of some bodies (K, 3), by their numbers (K,), those who fade in their shades (F,)."""
+        Args:
+            tones: (N,) as a surface holds them, changed in place.
+            shades: (S,) the shades, as the surface holds them.
+            time: s.
+        """
+        if isinstance(self.who, slice) and len(self) >= MANY and self._compiled(tones[self.who], shades, time):
+            return
+        tones[self.who] = shades[self._shade(time, slice(None))]
+
+    def _compiled(self, tones: Packed, shades: Packed, time: float) -> bool:
+        """Fade in one compiled pass; return whether that could be done."""
+        from sandbox.engines.kernel import COMPILED
+
+        if COMPILED:
+            from sandbox.play.drawing.scatter import fade
+
+            fade(tones, shades, time, self._born, self._rate, self._first, SHADES)
+        return COMPILED
+
+    def over(self, colours: ColourArray, numbers: IntArray, time: float) -> ColourArray:
+        """Return the colours of some bodies (K, 3), by their numbers (K,), those who fade as at a time, s."""
         place = self._place[numbers]
         fade = place >= 0
         colours = colours.copy()
-        colours[fade] = self.shades[shade[place[fade]]]
+        colours[fade] = self.shades[self._shade(time, place[fade])]
         return colours
+
+    def _shade(self, time: float, rows: slice | IntArray) -> IntArray:
+        """Return which of the shades some of those who fade have."""
+        age = (time - self._born[rows]) * self._rate[rows]
+        return self._first[rows] + np.clip(age, 0.0, SHADES - 1.0).astype(np.int64)
 
 
 def faded(colours: tuple[str, ...]) -> ColourArray:

@@ -98,12 +98,11 @@ class Picture:
         colours, ageing = self._colours, self._ageing
         if sight.overlapping is not None:
             colours, ageing = _by_contact(sight.overlapping, len(sight.bodies)), None
-        shade = None if ageing is None else ageing.at(sight.frame.time)
         if "shapes" in sight.overlays and sizes.side:
-            self._draw_points(surface, camera, sight, sizes, colours, shade)
+            self._draw_points(surface, camera, sight, sizes, colours, ageing)
 
         shown = _in_sight(camera, sight, None if self._overlays.need_bodies(sight) else sizes.large)
-        tint = colours[shown] if ageing is None or shade is None else ageing.over(colours[shown], shown, shade)
+        tint = colours[shown] if ageing is None else ageing.over(colours[shown], shown, sight.frame.time)
         view = View(
             surface=surface,
             camera=camera,
@@ -150,14 +149,14 @@ class Picture:
         sight: Sight,
         sizes: "Sizes",
         colours: ColourArray,
-        shade: IntArray | None,
+        ageing: Ageing | None,
     ) -> None:
-        """Draw the bodies that are too small for discs, those who fade in their shades."""
+        """Draw the bodies that are too small for discs, those who fade as they do at their ages."""
         form = (surface.get_masks(), surface.get_bytesize())
         if self._tones is None or self._tones[0] is not colours or self._tones[1] != form:
             self._tones = colours, form, packed(colours, surface)
-        if shade is not None and self._ageing is not None:
-            self._tones[2][self._ageing.who] = packed(self._ageing.shades, surface)[shade]
+        if ageing is not None:
+            ageing.fade(self._tones[2], packed(ageing.shades, surface), sight.frame.time)
         frame = sight.frame
         count = min(len(frame.position), len(colours))
         who = None if sizes.all_tiny and frame.present.all() else frame.present[:count] & sizes.tiny[:count]

@@ -1,10 +1,10 @@
-"""Scatter: particles into pixels in one pass, compiled where it can be."""
+"""Scatter: particles into pixels in one pass, and their fading in another, compiled where it can be."""
 
 import numpy as np
 import numpy.typing as npt
 
 from sandbox.engines.kernel import kernel
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 
 @kernel
@@ -53,3 +53,29 @@ def scatter(
             for row in range(max(above, top), min(above + side, bottom)):
                 for column in range(max(first, left), min(first + side, right)):
                     pixels[row * stride + column] = colours[i]
+
+
+@kernel
+def fade(
+    tones: npt.NDArray[np.uint32],
+    shades: npt.NDArray[np.uint32],
+    time: float,
+    born: FloatArray,
+    rate: FloatArray,
+    first: IntArray,
+    steps: int,
+) -> None:
+    """Give particles the tones of their ages.
+
+    Args:
+        tones: (F,) as the surface holds them.
+        shades: (S,) all there are.
+        time: s.
+        born: (F,) s.
+        rate: (F,) shades a second.
+        first: (F,) the shade that each begins with.
+        steps: how many each has.
+    """
+    for i in range(len(tones)):
+        age = (time - born[i]) * rate[i]
+        tones[i] = shades[first[i] + int(min(max(age, 0.0), steps - 1.0))]

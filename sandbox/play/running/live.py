@@ -257,7 +257,7 @@ class Live:
 
     def energy(self) -> tuple[float, float, float]:
         """Return the kinetic, potential and total energy, J."""
-        return energy_of(self.frame, self.bodies, self.session.scene.world.gravity)
+        return energy_of(self.frame, self.bodies, self.session.scene.world.gravity, self.session.scene)
 
     def sight(
         self,

@@ -110,7 +110,7 @@ class Stored:
 
     def energy(self) -> tuple[float, float, float]:
         """Return the kinetic, potential and total energy, J."""
-        return energy_of(self.frame, self.bodies, self.scene.world.gravity)
+        return energy_of(self.frame, self.bodies, self.scene.world.gravity, self.scene)
 
     @property
     def contacts(self) -> Contacts:

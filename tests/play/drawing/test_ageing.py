@@ -1,9 +1,12 @@
 """Particles that fade: the colours of their ages, as points and as discs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn import at, drawn, frame, scene, sight
 
+from sandbox.play.drawing import ageing
 from sandbox.play.drawing.ageing import SHADES, Ageing, faded
 from sandbox.play.drawing.picture import Picture
 from sandbox.scene.bodies import Bodies
@@ -39,15 +42,13 @@ def test_a_particle_has_the_colour_of_its_age(radius):
     which = scene(emitter=[one(0.0, radius)])
     assert seen(which, 0.0) == (255, 0, 0)
     red, green, blue = seen(which, 1.0)
-    assert max(red, blue) <= 9 and green >= 245  # noqa: PT018, half-way is in between two of 64 shades
+    assert max(red, blue) <= 9 and green >= 245  # half-way lies between two of 64 shades
     assert seen(which, 1.999) == (0, 0, 255)
     assert seen(which, 5.0) == (0, 0, 255)  # where a run goes on without its being retired, it stays as it was last
 
 
 @pytest.mark.parametrize("radius", [0.02, 1.0])
 def test_age_counts_from_its_own_birth(radius):
-    from dataclasses import replace
-
     which = scene(emitter=[one(0.0, radius)])
     later = replace(which.bodies, born=np.asarray([7.0]))
     assert seen(which, 7.0, bodies=later) == (255, 0, 0)
@@ -64,9 +65,9 @@ def test_those_who_do_not_fade_keep_their_colours(radius):
             one(3.0, radius, colours=["#000000", "#ffffff"]),
         ]
     )
-    ageing = Ageing(which.bodies)
-    assert len(ageing) == 2
-    assert np.asarray(ageing.who).tolist() == [0, 2]
+    made = Ageing(which.bodies)
+    assert len(made) == 2
+    assert np.asarray(made.who).tolist() == [0, 2]
     for time, first, last in ((0.0, (255, 0, 0), (0, 0, 0)), (1.999, (0, 0, 255), (255, 255, 255))):
         assert seen(which, time, -3.0) == first
         assert seen(which, time, 0.0) == (0x40, 0x50, 0x60)
@@ -84,3 +85,20 @@ def test_one_picture_shows_every_age_in_turn():
     for time in (0.0, 1.999, 0.0):
         what = sight(which, frame=frame(which, time=time))
         assert (drawn(what, picture=picture) == drawn(what)).all()
+
+
+def test_crowds_fade_alike_compiled_and_not(monkeypatch):
+    crowd = {"velocity_max": [1.0, 1.0], "count": 30_000, "lifetime_jitter": 1.5, "position": [0.0, 0.0]}
+    which = scene(emitter=[{**FADING, **crowd}, {**FADING, **crowd, "colours": ["#000000", "#ffffff"]}])
+    bodies = replace(which.bodies, born=np.linspace(-0.5, 0.5, len(which.bodies)))
+    made = Ageing(bodies)
+    shades = np.arange(len(made.shades), dtype=np.uint32)
+    for time in (0.0, 0.7, 3.0):
+        seen = []
+        for many in (1, 10**9):
+            monkeypatch.setattr(ageing, "MANY", many)
+            tones = np.zeros(len(bodies), np.uint32)
+            made.fade(tones, shades, time)
+            seen.append(tones)
+        assert np.array_equal(*seen)
+    assert len(np.unique(seen[0])) > 2
