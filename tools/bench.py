@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+import connected
 import drawing
 import peers
 from turning import turns
@@ -43,6 +44,7 @@ class Bench(NamedTuple):
 
 SPARKS = ("world.duration=1.0", "solver.record_every=1")
 PILE = scene("benchmark/pile")
+TOWER = scene("benchmark/tower")
 SETTLED = scene("benchmark/pile", "world.duration=1.0")
 BOUNCE = scene("tutorial/bounce")
 LOW = scene("tutorial/bounce", "ball.ball.position=[0, 0.55]", "world.duration=0.25")
@@ -173,6 +175,42 @@ BENCHES = (
             lambda: staged(BOUNCE, "step"),
         )
         for name, about in (("move", "forces and advance"), ("look", "detect"), ("resolve", "resolve"))
+    ),
+    Bench(
+        "cloth",
+        "steps a second of a cloth of 64 × 64 nodes on the reference, springs as forces / on pymunk's springs, by hand",
+        lambda: connected.cloth("reference", 200),
+        lambda: connected.springs(100),
+        unit="steps/s",
+        rate=True,
+    ),
+    Bench(
+        "cloth-pymunk",
+        "the same on pymunk through the adapter / on pymunk's springs, by hand",
+        lambda: connected.cloth("pymunk", 100),
+        lambda: connected.springs(100),
+        unit="steps/s",
+        rate=True,
+    ),
+    Bench(
+        "cloth-xpbd",
+        "the same on the reference by XPBD, ten passes / on the reference, springs as forces",
+        lambda: connected.cloth("reference", 100, joints="xpbd"),
+        lambda: connected.cloth("reference", 100),
+        unit="steps/s",
+        rate=True,
+    ),
+    Bench(
+        "tower",
+        "20 boxes stand for 10 s and drift by 5 mm at most: the reference at its cheapest / pymunk at its cheapest",
+        lambda: connected.standing(TOWER, "reference", 0.005, substeps=4, iterations=10),
+        lambda: connected.standing(TOWER, "pymunk", 0.005, substeps=4, iterations=200),
+    ),
+    Bench(
+        "oriented",
+        "a second of a heap of 60 long planks on the reference, looked at by oriented boxes / by discs around them",
+        lambda: connected.planks("oriented"),
+        lambda: connected.planks("circles"),
     ),
     Bench(
         "turn",

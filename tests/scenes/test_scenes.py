@@ -226,11 +226,11 @@ def test_sparks_bounce_on_the_floor_and_not_on_each_other() -> None:
     scene = scene_of("sparks")
     frames, contacts = run(scene)
     assert all((each.pair[:, 1] < 0).all() for each in contacts)
-    assert sum(map(len, contacts)) > 1000
+    assert sum(map(len, contacts)) > 600
     for frame in frames:
         x, y = frame.position[frame.present].T
-        # A contact is seen at the end of a step: up to v·dt deep, at 11 m/s less than 6 cm.
-        assert not len(x) or (x.max() <= 5.0 + 0.06 and y.min() >= -0.06)
+        # A contact is seen at the end of a step: up to v·dt deep, at 11 m/s less than 12 cm.
+        assert not len(x) or (x.max() <= 5.0 + 0.12 and y.min() >= -0.12)
     assert frames[0].present.all()
     assert not frames[-1].present.any()
 
