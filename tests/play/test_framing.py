@@ -63,6 +63,15 @@ def test_flight_behind_a_plane_or_out_of_bounds_does_not_count() -> None:
         assert -6.0 <= low[1] < high[1] <= 6.0
 
 
+def test_frame_ends_below_what_bodies_fall_on() -> None:
+    ground = [{"points": [[-20, -1], [20, -1], [20, 0], [-20, 0]], "fixed": True}]
+    world = {"gravity": [0, -9.81], "duration": 100.0}
+    low, high = framing(scene_of(ball("a", 0, 4), polygon=ground, world=world))
+    assert (low, high) == ((-20.0, -1.0), (20.0, 5.0))
+    low, high = framing(scene_of(ball("a", 0, 4), ball("b", 0, -4), polygon=ground, world={**world, "duration": 1.0}))
+    assert low[1] == pytest.approx(-4 - 9.81 / 2 - 1, rel=1e-12)  # rounding; b starts below the ground
+
+
 ODD: dict[str, dict[str, Any]] = {
     "empty": {"title": "t"},
     "planes": {"plane": [{"point": [1e16, -1e16], "normal": [1e-9, 1]}, {"point": [0, 0], "normal": [0, 1]}]},

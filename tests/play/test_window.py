@@ -453,3 +453,17 @@ def test_no_display_is_told(monkeypatch: pytest.MonkeyPatch, capfd: pytest.Captu
         open_screen(None, "none")
     assert not pygame.display.get_init()
     assert capfd.readouterr().err == ""
+
+
+def test_wait_while_the_picture_is_locked(window: Window) -> None:
+    """A kernel that draws may have to be compiled while it holds the pixels; saying so needs them too."""
+    window.turn(0.0)
+    before = pygame.surfarray.array3d(window.surface)
+    lock = memoryview(window.surface.get_buffer())  # type: ignore[arg-type]  # it is a buffer, which its stub leaves out
+    assert window.surface.get_locked()
+    window.desk.draw_wait(window.surface, "compiling")
+    lock.release()
+    locked = pygame.surfarray.array3d(window.surface)
+    window.desk.draw_wait(window.surface, "compiling")
+    assert (locked != before).any()
+    assert (pygame.surfarray.array3d(window.surface) == locked).all()

@@ -32,6 +32,8 @@ def links_of(*some: dict[str, Any]) -> Links:
         figures=column("figures", (0.0, 0.0, 0.0)).reshape(-1, 3),
         most_force=column("most_force", np.inf),
         collide=column("collide", False, np.bool_),
+        strength=column("strength", np.inf),
+        number=np.arange(len(some)),
         names=tuple(f"link {k}" for k in range(len(some))),
     )
 

@@ -14,7 +14,7 @@ from pieces import ROOT
 
 HERE = Path(__file__).resolve().parent
 
-ANNOUNCEMENT = "compiling the solver's kernels: up to half a minute, this once"
+ANNOUNCEMENT = "compiling: up to half a minute, this once"
 
 HASHES = """
 import json
