@@ -43,6 +43,7 @@ class Finder:
         self._moves: BoolArray = roster.moving
         self._order: IntArray = np.arange(len(roster.position))
         self._apart: IntArray = apart_keys(roster.links)
+        self._own: IntArray = np.arange(len(roster.position))  # each ball is its own body
         self._boxes = SegmentBoxes(roster.fixtures)
         self._planes = len(roster.fixtures.planes) if self.able.any() else 0
         self._plane_tests = self._planes * int(np.count_nonzero(self.able))
@@ -70,7 +71,7 @@ class Finder:
                 ),
             )
             if len(self._apart):
-                balls = balls[: drop(balls, self._order, self._apart, roster.bodies.group)]
+                balls = balls[: drop(balls, self._own, self._apart, roster.bodies.group)]
         if len(boxes):
             self._segment_keys, segments = self._filled(
                 self._segment_keys,

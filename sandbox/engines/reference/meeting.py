@@ -1,7 +1,8 @@
 """Meeting: which pairs may touch at all, and the keys that number pairs."""
 
-from sandbox.engines.kernel import kernel
+from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.roster import ALL, FIXED
+from sandbox.trajectory import IntArray
 
 FIRST = 30
 """Bits below the first number in the key of a pair: a scene holds fewer bodies, and fewer segments, than 2³⁰."""
@@ -17,6 +18,19 @@ Boxes are widened by it, or far from the origin they would lose pairs whose cent
 def pair_key(i: int, j: int) -> int:
     """Return the key of a pair; keys ascend as pairs do."""
     return (i << FIRST) + j
+
+
+@kernel
+def listed(keys: IntArray, key: int) -> bool:
+    """Tell whether a key is among keys (K,) that ascend."""
+    low, high = 0, len(keys)
+    while low < high:
+        middle = (low + high) // 2
+        if keys[middle] < key:
+            low = middle + 1
+        else:
+            high = middle
+    return low < len(keys) and keys[low] == key
 
 
 @kernel

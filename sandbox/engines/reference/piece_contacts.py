@@ -8,7 +8,7 @@ from typing import NamedTuple
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.convex import meet_half_plane, meet_pieces
 from sandbox.engines.reference.manifolds import KIND, Manifolds
-from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key
+from sandbox.engines.reference.meeting import FIRST, SECOND, listed, pair_key
 from sandbox.engines.reference.oriented_boxes import box_of, boxes_apart
 from sandbox.engines.reference.pieces import Hulls
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
@@ -38,18 +38,9 @@ def drop(keys: IntArray, body: IntArray, apart: IntArray, group: IntArray) -> in
         a, b = body[keys[k] >> FIRST], body[keys[k] & SECOND]
         if a == b or (group[a] != 0 and group[a] == group[b]):
             continue
-        key = pair_key(min(a, b), max(a, b))
-        low, high = 0, len(apart)
-        while low < high:
-            middle = (low + high) // 2
-            if apart[middle] < key:
-                low = middle + 1
-            else:
-                high = middle
-        if low < len(apart) and apart[low] == key:
-            continue
-        keys[kept] = keys[k]
-        kept += 1
+        if not listed(apart, pair_key(min(a, b), max(a, b))):
+            keys[kept] = keys[k]
+            kept += 1
     return kept
 
 

@@ -55,6 +55,11 @@ class ReferenceSimulation(Running):
         return self._roster.retired
 
     @property
+    def broken(self) -> Mapping[int, float]:
+        """When each joint broke that did: its number in `scene.links` → s."""
+        return self._roster.broken
+
+    @property
     def work(self) -> Mapping[str, int]:
         """What was done so far: substeps, tests of the broad and narrow phases, contacts found."""
         return {"substeps": self._steps * self._settings.substeps, **self._stage.finder.work}
@@ -70,6 +75,7 @@ class ReferenceSimulation(Running):
             self._check_running()
             for k in range(self._settings.substeps):
                 self._substep(self._steps * self._settings.dt + k * self._settings.h, self._settings.h)
+                self._stage.tear(self._settings.h, self._after(k + 1))
             self._steps += 1
             self._settle()
 
@@ -87,9 +93,12 @@ class ReferenceSimulation(Running):
             begin, h = self._steps * self._settings.dt, self._settings.h
             for k in range(int(whole)):
                 self._substep(begin + k * h, h)
+                self._stage.tear(h, self._after(k + 1))
             if rest > 0.0:
                 self._substep(begin + whole * h, rest * h)
             self._part = part
+            if rest > 0.0:
+                self._stage.tear(rest * h, self.time)
             self._settle()
             self._ended = True
 

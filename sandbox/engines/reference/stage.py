@@ -48,6 +48,8 @@ class Stage:
         self._integrator = INTEGRATORS[settings.integrator]
         self._links = roster.scene.links
         self._joints = self._joint_solver()
+        self._breakable: IntArray = np.flatnonzero(np.isfinite(self._links.strength))
+        self._given: FloatArray = np.zeros((len(self._links), 2))  # N·s or N·m·s by each link, in this substep
         self._field = Field(roster)
         self.finder = self._new_finder()
         self.penalty = Penalty(roster, settings, self.finder) if settings.response == "penalty" else None
@@ -103,6 +105,22 @@ class Stage:
         if self._joints is not None:
             self._joints.use(roster.inverse_mass, roster.inverse_moment, roster.linked())
         self.apply_forces()
+
+    def tear(self, h: float, time: float) -> None:
+        """Break what gave more than its strength, on average over a substep of h, s, that ended at a time, s.
+
+        Over a substep and not over the pieces that impacts cut it into: the shorter one is, the larger its forces.
+        """
+        if not len(self._breakable):
+            return
+        force = np.hypot(*self._given[self._breakable].T) / h
+        self._given[:] = 0.0
+        broken = self._breakable[force > self._links.strength[self._breakable]]
+        if len(broken):
+            self._roster.part(broken, time)
+            self._breakable = np.setdiff1d(self._breakable, broken)
+            self.leave()
+            self.enter()
 
     def leave(self) -> None:
         """Write the state into the roster."""
@@ -241,6 +259,8 @@ class Stage:
     def _done(self, after: State, contacts: Manifolds, impulse: FloatArray, h: float) -> None:
         before, self.x = self.x, after
         start, self.time = self.time, self.time + h
+        if self._joints is not None and len(self._breakable):
+            self._given += h * self._joints.load(after)
         if self.witness is not None:
             self.witness(start, self.time, before, after, contacts, impulse)
 

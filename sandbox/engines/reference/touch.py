@@ -8,7 +8,7 @@ import math
 
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.reference.manifolds import KIND
-from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key
+from sandbox.engines.reference.meeting import FIRST, SECOND, listed, pair_key
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 NEVER = 2.0
@@ -78,18 +78,6 @@ def touch_segment(
 
 
 @kernel
-def _rests(rest: IntArray, key: int) -> bool:
-    low, high = 0, len(rest)
-    while low < high:
-        middle = (low + high) // 2
-        if rest[middle] < key:
-            low = middle + 1
-        else:
-            high = middle
-    return low < len(rest) and rest[low] == key
-
-
-@kernel
 def first_touch(
     start: FloatArray,
     end: FloatArray,
@@ -120,7 +108,7 @@ def first_touch(
         x, y = start[j, 0] - start[i, 0], start[j, 1] - start[i, 1]
         mx, my = end[j, 0] - end[i, 0] - x, end[j, 1] - end[i, 1] - y
         share = touch_circle(x, y, mx, my, radius[i] + radius[j])
-        if share < first and not _rests(rest, balls[k]):
+        if share < first and not listed(rest, balls[k]):
             first, who = share, balls[k]
     for i in range(len(start)):
         if able[i]:
@@ -130,7 +118,7 @@ def first_touch(
                 gap = (start[i, 0] - planes[p, 0]) * nx + (start[i, 1] - planes[p, 1]) * ny - radius[i]
                 share = touch_line(gap, -(mx * nx + my * ny))
                 key = (1 << KIND) + pair_key(i, p)
-                if share < first and not _rests(rest, key):
+                if share < first and not listed(rest, key):
                     first, who = share, key
     for k in range(len(segment_keys)):
         i, s = segment_keys[k] >> FIRST, segment_keys[k] & SECOND
@@ -138,6 +126,6 @@ def first_touch(
         ax, ay, bx, by = segments[s, 0], segments[s, 1], segments[s, 2], segments[s, 3]
         share = touch_segment(x, y, end[i, 0] - x, end[i, 1] - y, ax, ay, bx, by, radius[i] + segments[s, 4])
         key = (2 << KIND) + segment_keys[k]
-        if share < first and not _rests(rest, key):
+        if share < first and not listed(rest, key):
             first, who = share, key
     return first, who

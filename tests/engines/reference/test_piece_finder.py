@@ -142,3 +142,13 @@ def test_a_heap_of_all_shapes_settles_alike(broad_phase):
     assert done.info["state_hash"] == plain.info["state_hash"]
     assert np.abs(done.velocity[-1]).max() < 0.5  # it has come down
     assert done.position[-1, :, 1].min() > 0.1  # and nothing fell through the floor
+
+
+@pytest.mark.parametrize("broad_phase", BROAD[:-1])
+def test_joined_balls_do_not_meet_whatever_the_broad_phase(broad_phase):
+    """Three balls in a row from right to left, so that sorting them changes their order; the outer two are joined."""
+    balls = [{"name": f"{k}", "position": [-0.5 * k, 0.0], "radius": 0.6, "mass": 1.0 + k} for k in range(3)]
+    joint = {"kind": "rod", "between": ["0", "2"]}
+    scene = from_document({"world": {"duration": 0.1}, "ball": balls, "joint": [joint]})
+    done = sandbox.run(scene, "reference", dt=0.01, broad_phase=broad_phase)
+    assert {tuple(pair) for pair in done.contact_pair.tolist()} == {(0, 1), (1, 2)}
