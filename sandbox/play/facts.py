@@ -33,7 +33,7 @@ def facts(bodies: Bodies, frame: Frame, contacts: Contacts, number: int) -> tupl
         ]
     lines.insert(1, f"x {figure(x, 'm')}, {figure(y, 'm')}")
     lines.append(f"m {figure(mass, 'kg')}, {_size(bodies, number)}")
-    if not bodies.fixed[number]:
+    if not (bodies.fixed[number] or bodies.round[number]):  # of a disc it is ½ m r²
         lines.append(f"I {figure(moment, 'kg·m²')}")
     if angle:
         lines.append(f"angle {figure(angle, 'rad')}")
