@@ -54,3 +54,4 @@ if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
     window("gas", 4.0, {"velocities", "energy"}, ghost=True, trust=True, file="window.png")
     film("pile", "pile.gif", "--size", "320x400", "--fps", "15", "--until", "2")
+    film("ragdoll_stairs", "ragdoll.gif", "--size", "640x300", "--fps", "20", "--until", "2.5")

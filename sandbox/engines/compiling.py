@@ -5,7 +5,7 @@ from collections.abc import Callable
 from functools import cache
 from time import perf_counter
 
-ANNOUNCEMENT = "compiling the solver's kernels: up to half a minute, this once"
+ANNOUNCEMENT = "compiling: up to half a minute, this once"
 
 
 @cache

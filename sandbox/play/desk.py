@@ -168,13 +168,23 @@ class Desk:
             self.manual.draw(surface, self.unit, self.claims(stage).told)
 
     def draw_wait(self, surface: pygame.Surface, what: str) -> None:
-        """Say over whatever was drawn what everything waits for."""
+        """Say over whatever was drawn what everything waits for; who was drawing may have locked the surface."""
         size = 15 * self.unit
         width, height = measure(what, size)
-        rect = pygame.Rect(0, 0, round(width + 3 * size), round(height + 2 * size))
-        rect.center = surface.get_rect().center
-        plate(surface, rect, round(0.5 * size))
-        write(surface, what, rect.center, size, INK, "center")
+        note = pygame.Surface((round(width + 3 * size), round(height + 2 * size)), 0, surface)
+        area = note.get_rect()
+        note.fill(BACKGROUND)
+        plate(note, area, round(0.5 * size))
+        write(note, what, area.center, size, INK, "center")
+        place = note.get_rect(center=surface.get_rect().center)
+        if not surface.get_locked():
+            surface.blit(note, place)
+            return
+        # Nothing can be blitted; what locks it writes its pixels directly, and so can this.
+        seen = place.clip(surface.get_rect())
+        area = seen.move(-place.x, -place.y)
+        pixels = pygame.surfarray.array3d(note)[area.left : area.right, area.top : area.bottom]
+        pygame.surfarray.pixels3d(surface)[seen.left : seen.right, seen.top : seen.bottom] = pixels
 
     def _draw_graph(self, surface: pygame.Surface, stage: Stage) -> None:
         show = stage.show

@@ -72,6 +72,28 @@ def test_frame_ends_below_what_bodies_fall_on() -> None:
     assert low[1] == pytest.approx(-4 - 9.81 / 2 - 1, rel=1e-12)  # rounding; b starts below the ground
 
 
+def test_orbit_is_in_sight_and_its_tangent_is_not() -> None:
+    """From the perihelion at 0.5 m of an ellipse whose aphelion is at 1.5 m."""
+    sun = [{"toward": [1, 0], "strength": 1}]
+    planet = ball("a", 1.5, 0, 0.01, velocity=[0, 3**0.5])
+    low, high = framing(scene_of(planet, attraction=sun, world={"duration": 100.0}))
+    assert (*low, *high) == pytest.approx((-0.5, -1.5, 2.5, 1.5), rel=1e-9)  # rounding
+
+
+def test_what_attracts_in_a_body_or_drives_away_has_a_frame() -> None:
+    for strength, toward in ((-1.0, [0, 0]), (1.0, "a"), (1e30, [0, 0])):
+        scene = scene_of(ball("a", 0, 0), ball("b", 3, 0), attraction=[{"toward": toward, "strength": strength}])
+        low, high = framing(scene)
+        assert np.isfinite((*low, *high)).all()
+        assert low[0] <= -1.0 < 4.0 <= high[0]
+
+
+def test_fixed_things_next_to_the_bodies_are_in_sight_whole_and_others_are_not() -> None:
+    walls = [{"points": [[5.1, 0], [9, 2]]}, {"points": [[-6.5, 0], [-9, 2]]}]
+    low, high = framing(scene_of(ball("a", -4, 0), ball("b", 4, 0), wall=walls))
+    assert (*low, *high) == (-5.0, -1.0, 9.0, 2.0)
+
+
 ODD: dict[str, dict[str, Any]] = {
     "empty": {"title": "t"},
     "planes": {"plane": [{"point": [1e16, -1e16], "normal": [1e-9, 1]}, {"point": [0, 0], "normal": [0, 1]}]},

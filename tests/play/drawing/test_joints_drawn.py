@@ -45,6 +45,12 @@ def test_what_carries_the_picture_is_seen_without_the_overlay(kind):
     assert shown(joined(KINDS[kind])).any() == (kind in QUIET)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_broken_is_not_drawn(kind):
+    bare = drawn(sight(scene(balls=TWO), "joints"))
+    assert not changed(bare, drawn(sight(joined(KINDS[kind]), "joints", broken=[0]))).any()
+
+
 @pytest.mark.parametrize("antialias", [True, False])
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_has_its_mark_in_the_overlay(kind, antialias):

@@ -203,6 +203,11 @@ def test_a_ghost_that_agrees_has_no_line():
     assert not effect(ONE, ghost=ghost)[95:105, 55:65].any()
 
 
+def test_what_never_moves_has_no_ghost():
+    which = scene(balls=[ball(0, 0, fixed=True)])
+    assert not effect(which, ghost=frame(which)).any()
+
+
 def test_a_ghost_may_know_fewer_bodies():
     two = scene(balls=[ball(0, 0, velocity=[5.0, 0.0]), ball(4, 0, 0.5)])
     ghost = frame(ONE, position=np.asarray([[0.0, 1.0]]))
