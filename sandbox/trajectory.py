@@ -18,6 +18,9 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
+LATER = frozenset({"broken_time"})
+"""Arrays of a trajectory that those stored by earlier versions lack."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Frame:
@@ -125,10 +128,12 @@ class Trajectory:
     """(M,) s, start of the step in which the engine missed a contact"""
     missed_pair: IntArray
     """(M, 2) who should have touched, numbered as in `contact_pair`"""
+    broken_time: FloatArray = field(default_factory=lambda: np.empty(0))
+    """(J,) s, when a joint broke; nan where it did not. Empty where nothing is known of joints: none broke then"""
     info: Mapping[str, Any] = field(default_factory=dict)
     """What was run and how it went: scene (as a document), engine, settings, actions, seed, status, reason, steps,
     seconds, work, energy_start, energy_end, joint_error (the largest, as a part of a length; None without joints),
-    audited, state_hash (of the end), versions."""
+    broken (how many joints), audited, state_hash (of the end), versions."""
 
     @property
     def status(self) -> str:
@@ -145,6 +150,18 @@ class Trajectory:
     def missed_contacts(self) -> int | None:
         """How many contacts the engine missed; unknown (None) where the run was not audited."""
         return len(self.missed_time) if self.info["audited"] else None
+
+    def breaks(self, joints: int) -> FloatArray:
+        """Return when each of so many joints broke, (J,) s; inf where it never did.
+
+        Raises:
+            ValueError: the run had another number of joints.
+        """
+        if not len(self.broken_time):
+            return np.full(joints, np.inf)
+        if len(self.broken_time) != joints:
+            raise ValueError(f"the run had {len(self.broken_time):,} joints, described are {joints:,}")
+        return np.where(np.isnan(self.broken_time), np.inf, self.broken_time)
 
     def number(self, name: str) -> int:
         """Return a body's number.
@@ -182,10 +199,10 @@ class Trajectory:
         with Path(path).open("rb") as stream:
             try:
                 with np.lib.npyio.NpzFile(stream, allow_pickle=False) as arrays:
-                    missing = {f.name for f in fields(cls)} - set(arrays.files)
+                    missing = {f.name for f in fields(cls)} - set(arrays.files) - LATER
                     if missing:
                         raise ValueError(f"it has no {', '.join(sorted(missing))}")
-                    values = {f.name: arrays[f.name] for f in fields(cls)}
+                    values = {f.name: arrays[f.name] for f in fields(cls) if f.name in arrays.files}
                 return cls(**{**values, "info": json.loads(str(values["info"]))})
             except (ValueError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
                 raise ValueError(f"{path} is no stored run: {error}") from None

@@ -56,6 +56,7 @@ class Outcome:
             "energy_start": _number(info["energy_start"]),
             "energy_end": _number(info["energy_end"]),
             "joint_error": _number(info.get("joint_error")),
+            "broken_joints": info.get("broken", 0),
             "contacts": len(run.contact_time),
             "missed_contacts": run.missed_contacts,
             "retired": {

@@ -87,6 +87,8 @@ def command(
             print_json({"runs": [], "faults": fault_rows(faults)})
         return 2
 
+    if not quiet:
+        _tell_if_nothing_is_random(jobs)
     status = 0
     rows: list[Row] = []
     drawn: Outcome | None = None
@@ -158,6 +160,22 @@ def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) 
             fault("--body", f"no body is named {', '.join(map(repr, unknown))}")
     if faults:
         raise SceneError(faults)
+
+
+def _tell_if_nothing_is_random(jobs: list[Job]) -> None:
+    """Say so where runs of several seeds will all be the same."""
+    for label in dict.fromkeys(job.label for job in jobs):
+        # Seeds change fastest: the first two that differ in it have every other value in common.
+        first, *others = (job.scene for job in jobs if job.label == label)
+        other = next((scene for scene in others if scene.world.seed != first.world.seed), first)
+        if other is first:
+            continue
+        same = (
+            getattr(first.bodies, key).tobytes() == getattr(other.bodies, key).tobytes()
+            for key in ("position", "velocity", "lifetime")
+        )
+        if all(same):
+            click.echo(f"{label}: nothing in it is random: all seeds are the same run", err=True)
 
 
 def _check_memory(jobs: list[Job]) -> None:

@@ -90,6 +90,7 @@ def _check(run: Trajectory) -> None:
     shapes |= dict.fromkeys(("position", "velocity"), (frames, bodies, 2))
     shapes |= dict.fromkeys(("angle", "angular_velocity"), (frames, bodies))
     shapes |= dict.fromkeys(("contact_pair", "contact_point", "contact_normal", "contact_impulse"), (contacts, 2))
+    shapes |= {"broken_time": (np.size(run.broken_time),)}
     shapes |= {"missed_time": np.shape(run.missed_time)[:1], "missed_pair": (*np.shape(run.missed_time)[:1], 2)}
     for name, shape in shapes.items():
         array = getattr(run, name)

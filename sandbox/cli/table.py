@@ -34,7 +34,9 @@ def print_runs(rows: Sequence[Row]) -> None:
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("status", no_wrap=True)
     joined = any(row["joint_error"] is not None for row in rows)
-    for head in ("× real", "energy, J", *(("joints off",) if joined else ()), "contacts", "missed"):
+    torn = any(row["broken_joints"] for row in rows)
+    joints = *(("joints off",) if joined else ()), *(("broken",) if torn else ())
+    for head in ("× real", "energy, J", *joints, "contacts", "missed"):
         table.add_column(head, justify="right", no_wrap=True)
 
     for row in rows:
@@ -52,6 +54,7 @@ def print_runs(rows: Sequence[Row]) -> None:
             _figure(row["realtime_factor"], 3),
             "–" if row["energy_start"] is None else f"{_figure(row['energy_start'])} → {_figure(row['energy_end'])}",
             *([_share(row["joint_error"])] if joined else []),
+            *([f"{row['broken_joints']:,}"] if torn else []),
             *(("–", "–") if row["status"] == "refused" else (f"{row['contacts']:,}", _missed(row["missed_contacts"]))),
         )
     console = Console(width=None if sys.stdout.isatty() else WIDE)

@@ -1,6 +1,7 @@
 """Acting: what each action does to the bodies of a running scene. Everything is checked before anything changes."""
 
 import math
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -234,6 +235,17 @@ def alone_in(scene: Scene, single: Single) -> Scene:
     return Scene.model_validate(surroundings).model_copy(update={kinds[type(single)]: (single,)})
 
 
+def _going_on(scene: Scene, running: Scene) -> Scene:
+    """Return a scene with the bodies and joints of a running one that differs in air, gravity or coefficients alone.
+
+    Laid out anew they would be those of the file: with who is gone, with what is broken, and hanging along the new
+    gravity.
+    """
+    joined = running.bodies.elements[len(running.elements) :]  # spawned before the present engine took over
+    bodies = replace(running.bodies, elements=(*scene.elements, *joined))
+    return scene.holding(bodies, running.links, running.began)
+
+
 def _set(action: SetParameter, cast: Cast) -> None:
     if not is_settable(action.path):
         raise ActionError(f"{action.path!r} cannot be changed while a scene runs; what can: {SETTABLE}")
@@ -249,4 +261,4 @@ def _set(action: SetParameter, cast: Cast) -> None:
         raise ActionError(str(error)) from None
     except SceneError as error:
         raise ActionError("; ".join(f"{f.path}: {f.message}" for f in error.faults)) from None
-    cast.change(scene)
+    cast.change(_going_on(scene, cast.scene))

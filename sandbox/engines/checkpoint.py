@@ -26,6 +26,7 @@ class Checkpoint:
     steps: float
     """since then"""
     retired: Mapping[int, float]
+    broken: Mapping[int, float]
     forces: Mapping[str, Force]
     throttles: Mapping[str, Throttle]
     pulls: Mapping[str, Pull]

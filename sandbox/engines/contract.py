@@ -77,6 +77,10 @@ class Simulation(Protocol):
         """When each body that was removed, left world.bounds or had lived its time was gone: number → s."""
 
     @property
+    def broken(self) -> Mapping[int, float]:
+        """When each joint broke that did: its number in `scene.links` → s."""
+
+    @property
     def work(self) -> Mapping[str, int]:
         """What was done so far, counted and not timed: the same on every machine. What is counted is the engine's."""
 

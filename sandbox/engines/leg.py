@@ -1,7 +1,7 @@
 """Leg: one simulation of a relay, and how its numbers and times read in the whole."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -33,6 +33,29 @@ class Leg:
     """when its steps begin to count, s"""
     steps: float = 0.0
     """that it has made since then; where a leg is taken up again, also those made before"""
+    whole: Scene | None = None
+    """what runs, with the bodies and joints of the whole; none for the first leg, which has them itself"""
+    _told: tuple[Scene, Scene] | None = field(default=None, init=False)  # the simulation's, and as the whole has it
+
+    @property
+    def scene(self) -> Scene:
+        """What runs, with all that was set since; with all bodies of the whole, as the leg began, and all joints."""
+        own = self.simulation.scene
+        if self.whole is None:
+            return own
+        if self._told is None or self._told[0] is not own:
+            bodies = replace(self.whole.bodies, elements=own.bodies.elements)
+            self._told = own, own.holding(bodies, self.whole.links, self.whole.began)
+        return self._told[1]
+
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """When each joint broke that did in this leg: its number in the whole → s."""
+        own = self.simulation.broken
+        if self.before is None:
+            return own
+        number = self.simulation.scene.links.number
+        return {int(number[k]): self._began + time for k, time in own.items()}
 
     @property
     def time(self) -> float:
@@ -115,23 +138,30 @@ class Leg:
 
 
 def begun(
-    scene: Scene, engine: str, wanted: Settings, bodies: Bodies, frame: Frame, lasting: Iterable[Force | Throttle]
+    scene: Scene,
+    engine: str,
+    wanted: Settings,
+    bodies: Bodies,
+    frame: Frame,
+    lasting: Iterable[Force | Throttle],
+    broken: Collection[int] = (),
 ) -> Leg:
     """Start a leg from a state.
 
     Args:
-        scene: what runs.
+        scene: what runs, with the bodies and joints of the whole.
         engine: its name.
         wanted: settings.
         bodies: all, by the numbers of the whole.
         frame: the state.
         lasting: what acts from earlier on: steady forces, thrusts that were opened or closed.
+        broken: numbers of the joints that hold no more.
 
     Raises:
         Refusal: the engine lacks something.
         ActionError: it cannot take over a steady force.
     """
-    simulation = start_engine(scene.placed(cast(bodies, frame), frame.time), engine, wanted)
+    simulation = start_engine(scene.placed(cast(bodies, frame), frame.time, broken), engine, wanted)
     for each in lasting:
         try:
             simulation.apply(each)
@@ -140,4 +170,7 @@ def begun(
             what = f"the steady force on {each.body!r}" if isinstance(each, Force) else f"the thrust {each.thrust!r}"
             raise ActionError(f"{engine} cannot go on with {what}: {error}") from None
     numbers = None if frame.present.all() else np.flatnonzero(frame.present)
-    return Leg(simulation, bodies, frame, numbers, frame.time)
+    columns = ("position", "velocity", "angle", "angular_velocity")
+    everyone = replace(bodies, **{column: getattr(frame, column) for column in columns})
+    whole = scene.holding(everyone, scene.links, frame.time)
+    return Leg(simulation, bodies, frame, numbers, frame.time, whole=whole)

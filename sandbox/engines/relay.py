@@ -47,6 +47,7 @@ class Relay:
         """the settings as they were asked for; what they leave open is the engine's choice"""
         self._leg = Leg(start_engine(scene, engine, self.wanted), scene.bodies)
         self._retired: dict[int, float] = {}
+        self._broken: dict[int, float] = {}
         self._work: Counter[str] = Counter()
         self._pulls = Pulls()
         self._forces: dict[str, Force] = {}
@@ -65,6 +66,7 @@ class Relay:
             origin=self._leg.origin,
             steps=self._leg.steps,
             retired=dict(self.retired),
+            broken=dict(self.broken),
             forces=self._acting(),
             throttles=dict(self._throttles),
             pulls=self._pulls.pulls,
@@ -84,9 +86,9 @@ class Relay:
         relay = cls.__new__(cls)
         relay.engine, relay.wanted = point.engine, point.wanted
         lasting: list[Force | Throttle] = [*point.forces.values(), *point.throttles.values()]
-        relay._leg = begun(point.scene, point.engine, point.wanted, point.bodies, point.frame, lasting)
+        relay._leg = begun(point.scene, point.engine, point.wanted, point.bodies, point.frame, lasting, point.broken)
         relay._leg.origin, relay._leg.steps = point.origin, point.steps
-        relay._retired, relay._work = dict(point.retired), Counter()
+        relay._retired, relay._broken, relay._work = dict(point.retired), dict(point.broken), Counter()
         relay._forces, relay._pulls = dict(point.forces), Pulls(point.pulls)
         relay._throttles = dict(point.throttles)
         relay._kept, relay._observer = None, None
@@ -109,7 +111,7 @@ class Relay:
     @property
     def scene(self) -> Scene:
         """What runs, with all that was set since."""
-        return self._leg.simulation.scene
+        return self._leg.scene
 
     @property
     def settings(self) -> Settings:
@@ -125,6 +127,11 @@ class Relay:
     def retired(self) -> Mapping[int, float]:
         """When each body that was removed, left world.bounds or had lived its time was gone: number → s."""
         return MappingProxyType({**self._retired, **self._leg.retired})
+
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """When each joint broke that did: its number in `scene.links` → s."""
+        return MappingProxyType({**self._broken, **self._leg.broken}) if self._broken else self._leg.broken
 
     @property
     def pulls(self) -> Mapping[str, Pull]:
@@ -234,7 +241,8 @@ class Relay:
         """
         try:
             lasting: list[Force | Throttle] = [*self._acting().values(), *self._throttles.values()]
-            leg = begun(self.scene, engine, wanted, bodies, frame, lasting)
+            broken = dict(self.broken)
+            leg = begun(self.scene, engine, wanted, bodies, frame, lasting, broken)
         except (Refusal, UnknownEngineError) as refusal:
             raise ActionError(str(refusal)) from None
         old = self._leg
@@ -245,7 +253,7 @@ class Relay:
             self._kept.append(old.contacts())
             leg.simulation.contacts()
         self._work.update(old.simulation.work)
-        self._retired = retired
+        self._retired, self._broken = retired, broken
         self.engine, self.wanted = engine, wanted
         old.simulation.close()
         self._leg = leg

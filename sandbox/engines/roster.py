@@ -43,6 +43,7 @@ class Roster:
         self.throttles: FloatArray = np.asarray([0.0 if t.key else 1.0 for t in scene.thrusts], dtype=np.float64)
         """how far each thrust of the scene is open, 0 to 1"""
         self._retired: dict[int, float] = {}
+        self._broken: dict[int, float] = {}
         self._expiry = Expiry(bodies, scene.began, h)
         self._twisted: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
         self._assume(scene, bodies, meetings(scene, bodies))
@@ -67,13 +68,15 @@ class Roster:
 
     @property
     def links(self) -> Links:
-        """The joints whose bodies are all there."""
+        """The joints that hold: whole, and their bodies all there."""
         return self.scene.links.some(self.linked())
 
     def linked(self) -> IntArray:
-        """Return the numbers of the scene's joints whose bodies are all there."""
+        """Return the numbers of the scene's joints that hold."""
         links, there = self.scene.links, np.append(self.present, True)  # the world, −1, finds the last
-        return np.flatnonzero(there[links.a] & there[links.b])
+        holds = there[links.a] & there[links.b]
+        holds[list(self._broken)] = False
+        return np.flatnonzero(holds)
 
     def throttle(self, number: int, level: float) -> None:
         """Open the scene's thrust of that number to a share of its force."""
@@ -88,6 +91,15 @@ class Roster:
     def retired(self) -> Mapping[int, float]:
         """When each body that is no longer there was gone: number → s."""
         return MappingProxyType(self._retired)
+
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """When each joint broke that did: its number in `scene.links` → s."""
+        return MappingProxyType(self._broken)
+
+    def part(self, links: IntArray, time: float) -> None:
+        """Let joints, by their numbers, hold no more from a time on, s."""
+        self._broken |= dict.fromkeys(links.tolist(), time)
 
     def motion(self, number: int) -> tuple[FloatArray, float]:
         """Return a body's velocity (2,), m/s, and angular velocity, rad/s."""

@@ -1,6 +1,7 @@
 """Running: what every simulation here has of its own accord: a clock, a lock, an end, and a fingerprint."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import NoReturn
 
 from sandbox.engines.turn import Turn
@@ -33,9 +34,18 @@ class Running(ABC):
         """The settings, with every choice filled in."""
         return self._settings
 
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """When each joint broke that did: its number in `scene.links` → s."""
+        return {}
+
     @abstractmethod
     def frame(self) -> Frame:
         """Return the present state."""
+
+    def _after(self, substeps: int) -> float:
+        """Return the time after so many substeps of the present step, s; after all of them, the next frame's."""
+        return (self._steps + substeps / self._settings.substeps) * self._settings.dt
 
     def state_hash(self) -> str:
         """Return a SHA-256 of time and every body's state."""

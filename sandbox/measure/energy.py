@@ -30,8 +30,8 @@ def energies(
     """Return the energy of all bodies that move, or of one.
 
     A body counts from its first frame until it is retired; a fixed one counts nothing. Gravity, springs and
-    attraction are the scene's; a spring counts as long as both its bodies do, and of one body half of what it shares
-    with another (`potential.Potential`). Where a run diverged, energy may be infinite or nan.
+    attraction are the scene's; a spring counts until it breaks, as long as both its bodies do, and of one body half of
+    what it shares with another (`potential.Potential`). Where a run diverged, energy may be infinite or nan.
 
     Args:
         trajectory: the run.
@@ -56,7 +56,7 @@ def energies(
     mass = np.where(bodies.fixed, 0.0, bodies.mass)[columns]
     moment = np.where(bodies.fixed, 0.0, bodies.moment)[columns]
     gravity = np.asarray(scene.world.gravity)
-    stored = Potential(scene, bodies, body)
+    stored = Potential(scene, bodies, body, trajectory.breaks(len(scene.links)))
     looked = slice(None) if stored else columns  # who is there, of whom one may be joined to
     own = columns if stored else slice(None)
     gone = np.where(np.isnan(trajectory.retired_time), np.inf, trajectory.retired_time)[looked]
@@ -79,7 +79,8 @@ def energies(
             kinetic[rows] = 0.5 * (_sum(squared, counts, mass) + turning)
             potential[rows] = -_sum(position @ gravity, counts, mass)
             if stored:
-                potential[rows] += stored.at(trajectory.position[rows], trajectory.angle[rows], present)
+                state = trajectory.position[rows], trajectory.angle[rows], present
+                potential[rows] += stored.at(trajectory.time[rows], *state)
     with np.errstate(invalid="ignore"):
         return Energies(kinetic, potential, kinetic + potential)
 
@@ -96,7 +97,11 @@ def _sum(values: FloatArray, counts: BoolArray, weights: FloatArray) -> FloatArr
 
 
 def energy_of(
-    frame: Frame, bodies: Bodies, gravity: tuple[float, float], scene: Scene | None = None
+    frame: Frame,
+    bodies: Bodies,
+    gravity: tuple[float, float],
+    scene: Scene | None = None,
+    breaks: FloatArray | None = None,
 ) -> tuple[float, float, float]:
     """Return the kinetic, potential and total energy of one state, J; of those who are there and move.
 
@@ -105,6 +110,7 @@ def energy_of(
         bodies: at least those of the frame, numbered alike.
         gravity: m/s².
         scene: whose springs and attractions count too; without, none do.
+        breaks: (J,) s, when each of the scene's joints broke; inf where it never did, without, none did.
     """
     count = len(frame.position)
     counts = frame.present & ~bodies.fixed[:count]
@@ -114,7 +120,9 @@ def energy_of(
         kinetic = 0.5 * float(mass @ squared + moment @ np.square(frame.angular_velocity[counts]))
         potential = -float(mass @ (frame.position[counts] @ np.asarray(gravity)))
         if scene is not None:
-            stored = Potential(scene, bodies if count == len(bodies) else bodies.some(np.arange(count)))
+            known = bodies if count == len(bodies) else bodies.some(np.arange(count))
+            stored = Potential(scene, known, breaks=breaks)
             if stored:
-                potential += float(stored.at(frame.position[None], frame.angle[None], frame.present[None])[0])
+                state = frame.position[None], frame.angle[None], frame.present[None]
+                potential += float(stored.at(np.asarray([frame.time]), *state)[0])
         return kinetic, potential, kinetic + potential

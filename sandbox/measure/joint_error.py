@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sandbox.measure.potential import both_there, ends_over_time, turned_by
+from sandbox.measure.potential import both_there, ends_over_time, parted, turned_by
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import LinkKind, Links
 from sandbox.scene.model import Scene
@@ -25,7 +25,7 @@ HOLDING = (
 
 
 def joint_errors(trajectory: Trajectory, scene: Scene) -> FloatArray:
-    """Return how far each joint is off in each frame, (T, J); nan where a body is gone, and of springs and motors.
+    """Return how far each joint is off in each frame, (T, J); nan once it broke or lost a body, of springs, of motors.
 
     Of a rod |l − length|, of a pivot the distance of its two points, of a slide how far the distance is beyond its
     bounds, of a groove how far the point is from the groove, in m. Of a rotary limit how far the angle is beyond its
@@ -38,10 +38,11 @@ def joint_errors(trajectory: Trajectory, scene: Scene) -> FloatArray:
     links = scene.links
     found = np.full((len(trajectory.time), len(links)), np.nan)
     gone = np.where(np.isnan(trajectory.retired_time), np.inf, trajectory.retired_time)
+    breaks = trajectory.breaks(len(links))
     step = max(1, CHUNK // max(1, len(links)))
     for begin in range(0, len(found), step):
         rows = slice(begin, begin + step)
-        there = both_there(links, trajectory.time[rows, None] < gone)
+        there = both_there(links, trajectory.time[rows, None] < gone) & ~parted(breaks, trajectory.time[rows])
         found[rows] = _errors(links, trajectory.position[rows], trajectory.angle[rows], there)
     return found
 

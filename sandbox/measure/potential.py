@@ -8,6 +8,9 @@ from sandbox.scene.links import LinkKind, Links
 from sandbox.scene.model import Scene
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
+ROUNDING = 1e-12
+"""Share of a time."""
+
 
 class Potential:
     """What springs and attraction store, frame by frame.
@@ -17,16 +20,19 @@ class Potential:
     moving bodies store belongs half to each, what one stores against the world or a fixed body is all its own.
     """
 
-    def __init__(self, scene: Scene, bodies: Bodies, body: int | None = None) -> None:
+    def __init__(self, scene: Scene, bodies: Bodies, body: int | None = None, breaks: FloatArray | None = None) -> None:
         """Take what a scene has of them.
 
         Args:
             scene: its springs hold by the numbers of its own bodies.
             bodies: those and any that were spawned since: they are attracted too.
             body: the only one whose share counts; else all.
+            breaks: (J,) s, when each of the scene's joints broke; inf where it never did, without, none did.
         """
-        self._springs = scene.links.of(LinkKind.SPRING)
-        self._rotary = scene.links.of(LinkKind.ROTARY_SPRING)
+        links = scene.links
+        breaks = np.full(len(links), np.inf) if breaks is None else breaks
+        kinds = (LinkKind.SPRING, _stretch), (LinkKind.ROTARY_SPRING, _turn)
+        self._springs = [(links.of(kind), breaks[links.kind == kind], strain) for kind, strain in kinds]
         number = {name: k for k, name in enumerate(bodies.names)} if scene.attractions else {}
         self._attractions = [
             (each, number.get(each.toward) if isinstance(each.toward, str) else None)
@@ -39,21 +45,23 @@ class Potential:
 
     def __bool__(self) -> bool:
         """Tell whether there is anything of it."""
-        return bool(len(self._springs) or len(self._rotary) or self._attractions)
+        return bool(self._attractions) or any(len(links) for links, _, _ in self._springs)
 
-    def at(self, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
+    def at(self, time: FloatArray, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
         """Return what is stored in each of T frames, (T,) J.
 
         Args:
+            time: (T,) s; what has broken by then stores nothing.
             position: (T, N, 2) m.
             angle: (T, N) rad.
             there: (T, N) who is; what held or attracted the others is no more.
         """
         stored = np.zeros(len(position))
-        for links, strain in ((self._springs, _stretch), (self._rotary, _turn)):
+        for links, breaks, strain in self._springs:
             if len(links):
                 energy = 0.5 * links.figures[:, 1] * np.square(strain(links, position, angle) - links.figures[:, 0])
-                stored += np.where(both_there(links, there), energy, 0.0) @ self._share(links.a, links.b)
+                holds = both_there(links, there) & ~parted(breaks, time)
+                stored += np.where(holds, energy, 0.0) @ self._share(links.a, links.b)
         for attraction, toward in self._attractions:
             stored += self._attracted(attraction, toward, position, there)
         return stored
@@ -89,6 +97,16 @@ class Potential:
 def both_there(links: Links, there: BoolArray) -> BoolArray:
     """Tell which links still have both their bodies, (T, J), from who is there, (T, N)."""
     return np.asarray(there[:, links.b] & (there[:, links.a] | (links.a < 0)))
+
+
+def parted(breaks: FloatArray, time: FloatArray) -> BoolArray:
+    """Tell which joints have broken by each of some times, (T, J).
+
+    Args:
+        breaks: (J,) s, inf for what never does.
+        time: (T,) s. Times of frames are sums that round: what breaks within rounding of one has broken by then.
+    """
+    return np.asarray(breaks * (1.0 - ROUNDING) <= time[:, None])
 
 
 def ends_over_time(links: Links, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -86,11 +86,13 @@ def run(
     retired = np.full(len(bodies), np.nan)
     for number, time in simulation.retired.items():
         retired[number] = time
+    broken = np.full(len(scene.links), np.nan)
+    broken[list(simulation.broken)] = list(simulation.broken.values())
     missed = auditor.missed if auditor else _no_misses()
     outcome = {"status": status, "reason": reason, "steps": steps, "seconds": seconds, "work": work, "audited": audit}
-    outcome["state_hash"] = state_hash
+    outcome |= {"state_hash": state_hash, "broken": len(simulation.broken)}
     info = _info(scene, engine, resolved, actions, **outcome)
-    trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, missed, info)
+    trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, broken, missed, info)
     total = energies(trajectory.at([0, -1]), scene, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     info["joint_error"] = joint_error(trajectory, scene)
@@ -113,11 +115,12 @@ def _refused(scene: Scene, engine: str, settings: Settings, actions: tuple[Actio
     """Return a trajectory without frames, which says why."""
     count = len(scene.bodies)
     outcome = {"status": "refused", "reason": reason, "steps": 0, "seconds": 0.0, "work": {}, "audited": False}
-    outcome["state_hash"] = None
+    outcome |= {"state_hash": None, "broken": 0}
     info = _info(scene, engine, settings, actions, **outcome, energy_start=None, energy_end=None, joint_error=None)
     shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
     frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}
-    return _trajectory(frames, scene.bodies, Contacts.none(), np.full(count, np.nan), _no_misses(), info)
+    whole = np.full(len(scene.links), np.nan)
+    return _trajectory(frames, scene.bodies, Contacts.none(), np.full(count, np.nan), whole, _no_misses(), info)
 
 
 def _trajectory(
@@ -125,6 +128,7 @@ def _trajectory(
     bodies: Bodies,
     contacts: Contacts,
     retired_time: FloatArray,
+    broken_time: FloatArray,
     missed: tuple[FloatArray, IntArray],
     info: dict[str, Any],
 ) -> Trajectory:
@@ -143,6 +147,7 @@ def _trajectory(
         retired_time=retired_time,
         missed_time=missed[0],
         missed_pair=missed[1],
+        broken_time=broken_time,
         info=info,
     )
 

@@ -17,6 +17,8 @@ ANCHORED = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkK
 """Joints that hold in a point."""
 LARGEST = 1e15
 """m: what lies beyond does not count"""
+NEAR = 0.1
+"""Fixed things count so near to where bodies are or fly, as a share of its size."""
 FAR = 20.0
 """Fixed things, and where bodies fly, count up to so many times the size of what is there at the start."""
 
@@ -25,13 +27,17 @@ def framing(scene: Scene) -> Box:
     """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there."""
     bodies = scene.bodies
     things = [corners for corners in _things(scene) if (np.abs(corners) < LARGEST).all()]
-    start = around(bodies.position, bodies.radius)
-    if start is None:
-        start = _union([(corners.min(axis=0), corners.max(axis=0)) for corners in things] or [(-ONE, ONE)])
+    discs = bodies.round | ~bodies.fixed  # what turns is anywhere within its circle; what stands is where it is
+    seen = around(bodies.position[discs], bodies.radius[discs])
+    stands = [(corners.min(axis=0), corners.max(axis=0)) for corners in _solids(bodies)]
+    if seen is None and not stands:
+        stands = [(corners.min(axis=0), corners.max(axis=0)) for corners in things] or [(-ONE, ONE)]
+    start = _union([*stands, *([] if seen is None else [seen])])
     start = _union([start, *_swings(scene, bodies, start)])
-    flown = _union([start, *_flight(scene, bodies)])
+    flown = _union([start, *(_orbits(scene, bodies, start) if scene.attractions else _flight(scene, bodies))])
     met = [(corners.min(axis=0), corners.max(axis=0)) for corners in things]
-    met = [each for each in met if (each[0] <= flown[1]).all() and (each[1] >= flown[0]).all()]
+    near = NEAR * float((flown[1] - flown[0]).max())
+    met = [each for each in met if (each[0] <= flown[1] + near).all() and (each[1] >= flown[0] - near).all()]
     low, high = _union([start, *met]) if met else flown
     if scene.play.arrows is not None:  # room to move it
         low, high = low - 2.0 * scene.play.arrow_step, high + 2.0 * scene.play.arrow_step
@@ -85,10 +91,61 @@ def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
             counts &= (place - np.asarray(plane.point)) @ normal >= -radius
         if world.bounds is not None:
             counts &= ((place >= world.bounds[0]) & (place <= world.bounds[1])).all(axis=2)
+        counts &= ~_falls(scene, bodies, place)
     # Once stopped, it does not come out on the far side.
     counts = np.logical_and.accumulate(counts, axis=0)
     found = around(place[counts], radius[counts])
     return [] if found is None else [found]
+
+
+def _orbits(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
+    """Return the boxes around what attracts, as far out as the bodies can come that are bound to it alone."""
+    found, size = [], float((start[1] - start[0]).max())
+    for each in scene.attractions:
+        if isinstance(each.toward, str):
+            body = bodies.names.index(each.toward)
+            centre, drift = bodies.position[body], bodies.velocity[body]
+        else:
+            centre, drift = np.asarray(each.toward), np.zeros(2)
+        offset, motion = bodies.position - centre, bodies.velocity - drift
+        with np.errstate(all="ignore"):
+            away = np.hypot(*offset.T)
+            size = max(size, float(away.max(initial=0.0)))
+            bound = each.strength / away - 0.5 * (motion * motion).sum(axis=1)  # J/kg short of escaping
+            spin = offset[:, 0] * motion[:, 1] - offset[:, 1] * motion[:, 0]
+            oval = np.maximum(1.0 - 2.0 * bound * (spin / each.strength) ** 2, 0.0)  # eccentricity squared
+            farthest = np.where(bound > 0.0, 0.5 * each.strength / bound * (1.0 + np.sqrt(oval)), np.nan)
+        farthest = farthest[~bodies.fixed & (farthest <= FAR * size)]
+        if len(farthest):
+            reach = float(farthest.max())
+            found.append((centre - reach, centre + reach))
+    return found
+
+
+def _falls(scene: Scene, bodies: Bodies, place: FloatArray) -> BoolArray:
+    """Return which places (T, M, 2) are past everything fixed that the bodies could have fallen on, (T, M)."""
+    gravity = np.asarray(scene.world.gravity)
+    fixed = [*_things(scene), *_solids(bodies)]
+    if not fixed or not gravity.any():
+        return np.zeros(place.shape[:2], np.bool_)
+    down = gravity / np.hypot(*gravity)
+    ground = max(float((corners @ down).max()) for corners in fixed)
+    with np.errstate(all="ignore"):
+        depth = place @ down
+    return np.asarray((depth > ground) & (depth[0] <= ground))  # one that starts below it does not fall on it
+
+
+def _solids(bodies: Bodies) -> list[FloatArray]:
+    """Return the corners (P, 2), m, of each fixed body that is no ball, as it stands."""
+    shapes, found = bodies.shapes, []
+    for piece in np.flatnonzero((bodies.fixed & ~bodies.round)[shapes.body]).tolist():
+        body, radius = int(shapes.body[piece]), float(shapes.radius[piece])
+        x, y = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]].T
+        cos, sin = np.cos(bodies.angle[body]), np.sin(bodies.angle[body])
+        corners = bodies.position[body] + np.column_stack((cos * x - sin * y, sin * x + cos * y))
+        if (np.abs(corners) < LARGEST).all():
+            found.append(np.concatenate((corners - radius, corners + radius)))
+    return found
 
 
 def _tethered(scene: Scene, bodies: Bodies) -> BoolArray:

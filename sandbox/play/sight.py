@@ -1,8 +1,11 @@
 """Sight: what the window draws of one moment, as plain values; no engine, no pygame."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from sandbox.scene.bodies import Bodies
+from sandbox.scene.links import Links
 from sandbox.scene.model import Scene
 from sandbox.trajectory import BoolArray, Contacts, FloatArray, Frame
 
@@ -56,6 +59,13 @@ class Sight:
     """number of the body whose figures are shown"""
     pull: tuple[tuple[float, float], tuple[float, float]] | None = None
     """where a body is held, and the hand that pulls it, m"""
+    broken: Collection[int] = ()
+    """numbers of the scene's joints that have broken by then"""
+
+    @cached_property
+    def links(self) -> Links:
+        """The joints that are whole."""
+        return self.scene.links.without(self.broken)
 
 
 @dataclass(frozen=True)

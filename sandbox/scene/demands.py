@@ -155,3 +155,12 @@ def _joints(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
 
 def _count(n: int, one: str, many: str, none: str) -> str:
     return none if n == 0 else f"{n:,} {one if n == 1 else many}"
+
+
+def unmodelled(scene: Scene, capabilities: frozenset[Demand]) -> list[str]:
+    """Return in words what a scene demands beyond what an engine can do: one reason, or none."""
+    *others, last = "", *sorted(map(str, demands(scene) - capabilities))
+    listed = ", ".join(others[1:])
+    if listed:
+        last = f"{listed} or {last}"
+    return [f"it does not model {last}"] if last else []

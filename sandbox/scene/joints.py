@@ -25,6 +25,8 @@ class Joined(Part):
     """one body, held by the world, or two"""
     collide: bool = False
     """Let the two meet, other than by the joint."""
+    strength: Force | None = None
+    """N, or N·m of what holds an angle: the joint breaks once it has given more; without, it never does"""
 
 
 class Anchored(Joined):

@@ -39,7 +39,7 @@ KINDS: dict[type, LinkKind] = {
 
 def links_of(scene: Scene) -> Links:
     """Lay out the joints of a scene, whose names must be those of its bodies: those of the file, then of generators."""
-    return _stated(scene, scene.bodies).joined(seams_of(scene, scene.bodies))
+    return _stated(scene, scene.bodies).joined(seams_of(scene, scene.bodies)).counted()
 
 
 def _stated(scene: Scene, bodies: Bodies) -> Links:
@@ -50,6 +50,7 @@ def _stated(scene: Scene, bodies: Bodies) -> Links:
     rows = [_row(joint, bodies, number) for joint in scene.joints]
     a, b, anchor_a, anchor_b, figures = (list(column) for column in zip(*rows, strict=True))
     motors = [joint.max_torque if isinstance(joint, Motor) else None for joint in scene.joints]
+    strengths = [joint.strength for joint in scene.joints]
     return Links(
         kind=np.asarray([KINDS[type(joint)] for joint in scene.joints], dtype=np.int64),
         a=np.asarray(a, dtype=np.int64),
@@ -59,6 +60,8 @@ def _stated(scene: Scene, bodies: Bodies) -> Links:
         figures=np.asarray(figures, dtype=np.float64).reshape(-1, 3),
         most_force=np.asarray([math.inf if most is None else most for most in motors]),
         collide=np.asarray([joint.collide for joint in scene.joints], dtype=np.bool_),
+        strength=np.asarray([math.inf if most is None else most for most in strengths]),
+        number=np.arange(len(scene.joints)),
         names=tuple(joint.name or default_name("joint", k) for k, joint in enumerate(scene.joints)),
     )
 

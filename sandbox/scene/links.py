@@ -1,6 +1,6 @@
 """Links: the joints of a scene as arrays, J of them, by the numbers of bodies; for whoever computes or draws them."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Self
@@ -64,6 +64,10 @@ class Links:
     """(J,) N or N·m, inf where there is no bound"""
     collide: BoolArray
     """(J,) the two may also meet"""
+    strength: FloatArray
+    """(J,) N or N·m beyond which each breaks, inf where it never does"""
+    number: IntArray
+    """(J,) of each among the joints of its whole scene, which are 0 to J − 1; of fewer it tells which they are"""
     names: tuple[str, ...]
     """(J,)"""
 
@@ -82,6 +86,8 @@ class Links:
             figures=np.empty((0, 3)),
             most_force=np.empty(0),
             collide=np.empty(0, np.bool_),
+            strength=np.empty(0),
+            number=np.empty(0, np.int64),
             names=(),
         )
 
@@ -95,7 +101,7 @@ class Links:
         anchor_b: npt.ArrayLike = (0.0, 0.0),
         figures: npt.ArrayLike = (0.0, 0.0, 0.0),
     ) -> Self:
-        """Return J nameless links of one kind, whose bodies never meet; what is given once holds for all."""
+        """Return J nameless links of one kind, unbreakable, for bodies that never meet; one figure may do for all."""
         first, second = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
         count = len(first)
         return cls(
@@ -107,6 +113,8 @@ class Links:
             figures=np.broadcast_to(np.asarray(figures, dtype=np.float64), (count, 3)).copy(),
             most_force=np.full(count, np.inf),
             collide=np.zeros(count, np.bool_),
+            strength=np.full(count, np.inf),
+            number=np.arange(count),
             names=("",) * count,
         )
 
@@ -124,6 +132,14 @@ class Links:
             if f.name != "names"
         }
         return replace(self, names=(*self.names, *more.names), **columns)
+
+    def counted(self) -> Self:
+        """Return them numbered as those of a whole scene."""
+        return replace(self, number=np.arange(len(self)))
+
+    def without(self, broken: Collection[int]) -> Self:
+        """Return those whose numbers in the whole scene are not among some."""
+        return self.some(~np.isin(self.number, list(broken))) if broken else self
 
     def of(self, *kinds: LinkKind) -> Self:
         """Return those of some kinds."""

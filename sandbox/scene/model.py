@@ -4,6 +4,7 @@ The model holds the file as it was written: generators are not expanded, mixing 
 `bodies.py` numbers what moves, `demands.py` derives the physics that is needed.
 """
 
+from collections.abc import Collection
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -187,14 +188,19 @@ class Scene(Part):
         """The time at which this state of the scene begins, s: 0, but of one that goes on (`placed`)."""
         return 0.0
 
-    def placed(self, bodies: "Bodies", time: float = 0.0) -> "Scene":
+    def placed(self, bodies: "Bodies", time: float = 0.0, broken: Collection[int] = ()) -> "Scene":
         """Return this scene with its bodies as they have come to be by a time, s: elsewhere, fewer, or more.
 
-        Only `bodies`, `links` and `began` differ: the file that it would be written to is the same.
+        Joints go with their bodies, and those that are broken, by their numbers, are left out. Only `bodies`, `links`
+        and `began` differ: the file that it would be written to is the same.
         """
-        links = self.links.among(bodies.names, self.bodies.names)
+        links = self.links.without(broken).among(bodies.names, self.bodies.names)
+        return self.holding(bodies, links, time)
+
+    def holding(self, bodies: "Bodies", links: "Links", began: float = 0.0) -> "Scene":
+        """Return this scene with bodies, and joints between them, that it does not lay out itself."""
         scene = self.model_copy()
-        scene.__dict__.update(bodies=bodies, links=links, began=time)  # where cached_property looks first
+        scene.__dict__.update(bodies=bodies, links=links, began=began)  # where cached_property looks first
         return scene
 
     @property

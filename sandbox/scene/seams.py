@@ -14,7 +14,7 @@ from sandbox.scene.near import FloatArray
 from sandbox.scene.part import Point
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.surfaced import Mover
-from sandbox.scene.weaves import ENDS, Cloth, Rope
+from sandbox.scene.weaves import ENDS, Cloth, Rope, Woven
 from sandbox.scene.weaving import ENDS_AT, STARTS_AT, cloth_links, rope_links
 
 
@@ -32,6 +32,8 @@ def seams_of(scene: Scene, bodies: Bodies) -> Links:
             own = _own(mover, first, bodies)
             first += count_of(mover)
             own = own.some(~(still[own.a] & still[own.b]))
+            if isinstance(mover, Woven) and mover.strength is not None:
+                own = replace(own, strength=np.full(len(own), mover.strength))
             stem = mover.name or default_name(kind, k)
             links = links.joined(replace(own, names=tuple(f"{stem}-joint-{n}" for n in range(1, len(own) + 1))))
     return links

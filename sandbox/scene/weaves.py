@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from sandbox.scene.discs import Count
-from sandbox.scene.joints import Damping, Stiffness
+from sandbox.scene.joints import Damping, Force, Stiffness
 from sandbox.scene.part import MAX_BODIES, Name, Part, Point, Radius, Velocity
 from sandbox.scene.solids import Length
 from sandbox.scene.surfaced import Collides, Mover
@@ -41,6 +41,8 @@ class Woven(Mover):
     """of each spring, N/m"""
     damping: Damping = 0.0
     """of each spring, N·s/m"""
+    strength: Force | None = None
+    """of each joint, N: it breaks once it has given more; without, it never does"""
 
 
 class Rope(Woven):

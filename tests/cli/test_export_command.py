@@ -313,6 +313,7 @@ def test_empty_folder_and_impossible_names_are_told(tmp_path: Path, capfd: pytes
         ({"angle": np.zeros((51, 1), np.int64)}, "angle is 51 x 1 of int64"),
         ({"names": np.asarray(["a", "b"])}, "retired_time is 1 of float64, not 2"),
         ({"time": np.linspace(1.0, 0.0, 51)}, "its times do not rise"),
+        ({"broken_time": np.zeros((2, 2))}, "broken_time is 2 x 2 of float64, not 4"),
         ({"info": {"scene": {}}}, "does not say `engine`"),
         ({"contact_pair": np.asarray([[0, -9]])}, "contact_pair: names a thing that the scene does not have"),
     ],

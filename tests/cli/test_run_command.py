@@ -110,6 +110,26 @@ def test_several_scenes_sweeps_and_seeds_multiply(tmp_path: Path, capfd: pytest.
     assert len({r["id"] for r in document["runs"]}) == 8  # the two files say the same, so they are the same runs
 
 
+SPARKS = """
+[[emitter]]
+position = [0.0, 3.0]
+count = 3
+velocity_min = [-1.0, -1.0]
+velocity_max = [1.0, 1.0]
+"""
+
+
+def test_seeds_of_a_scene_without_chance_are_told_to_be_one_run(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene = written(tmp_path)
+    told = f"{scene}: nothing in it is random: all seeds are the same run"
+    assert lines_of(capfd, "run", scene, "--seeds", "2", "--sweep", "solver.dt=0.01,0.02")[2] == [told]
+    assert lines_of(capfd, "run", scene, "--seeds", "1")[2] == []
+    random = written(tmp_path, DROP + SPARKS, "sparks.toml")
+    assert lines_of(capfd, "run", random, "--seeds", "2")[2] == []
+
+
 def test_engines_may_be_listed_and_count_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     status, document, _ = json_of(capfd, "run", written(tmp_path), "--engines", "pymunk, pymunk")
     assert (status, [row["engine"] for row in document["runs"]]) == (0, ["pymunk"])
@@ -244,6 +264,15 @@ def test_table_has_columns_for_what_differs(tmp_path: Path, capfd: pytest.Captur
     assert out[1].split("  ")[0] == "engine"
     assert " ".join(out[1].split()) == "engine dt iterations status × real energy, J contacts missed"
     assert [line.split()[2] for line in out[2:]] == ["5", "10"]
+
+
+def test_table_tells_how_many_joints_broke_where_some_did(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    rope = '[[rope]]\nname = "r"\nstart = [0, 5]\nend = [1, 5]\nlinks = 2\nmass = 1.0\nstrength = {}\n'
+    for strength, column in (("1.0", "broken "), ("1e9", "")):
+        path = tmp_path / f"{strength}.toml"
+        path.write_text(f"world.gravity = [0, -9.81]\nworld.duration = 0.1\n{rope.format(strength)}", encoding="utf-8")
+        _, out, _ = lines_of(capfd, "run", str(path))
+        assert " ".join(out[1].split()) == f"engine dt status × real energy, J joints off {column}contacts missed"
 
 
 def test_table_of_several_scenes_names_each(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -173,7 +173,7 @@ def test_kepler_orbit(way):
     # The band of a first order scheme is h·|d/dt(v·a)|/2 or so, 3 h at perihelion; of a second order one some 20 h².
     assert np.abs(energy + 0.5).max() <= (30 * h * h if second else 6 * h)
     back = float(np.hypot(*(x[4000] - x[0])))
-    # After a period it is back: the scheme's own orbit has another period, by O(h²); a first order start is off by O(h).
+    # After a period it is back: its orbit's period is off by O(h²), a first order start by O(h).
     assert back <= (300 * h * h if second else 12 * h)
 
 

@@ -6,7 +6,7 @@ import pytest
 import strategies
 from hypothesis import given, settings
 
-from sandbox.scene.demands import Demand, Item, bill, demands
+from sandbox.scene.demands import Demand, Item, bill, demands, unmodelled
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
 
@@ -134,3 +134,12 @@ def test_fireworks_demand_nothing_but_flight() -> None:
     emitter = {"position": [0, 0], "count": 100, "velocity_min": [-1, 8], "velocity_max": [1, 12]}
     scene = from_document({"world": {"gravity": [0, -9.81]}, "emitter": [emitter]})
     assert demands(scene) == {Demand.TRANSLATION, Demand.GRAVITY}
+
+
+def test_unmodelled_is_one_reason_that_lists_all() -> None:
+    falls = from_document({"world": {"gravity": [0, -9.81], "linear_drag": 0.1}, "ball": [BALL]})
+    wanted = demands(falls)
+    assert unmodelled(falls, wanted) == []
+    assert unmodelled(falls, wanted - {Demand.DRAG}) == ["it does not model drag"]
+    three = wanted - {Demand.DRAG, Demand.GRAVITY, Demand.TRANSLATION}
+    assert unmodelled(falls, three) == ["it does not model drag, gravity or translation"]

@@ -135,3 +135,9 @@ def test_joint_between_fixed_bodies_is_refused() -> None:
     found = faults(FIXED + '[[joint]]\nkind="rod"\nbetween=["a","b"]\n[[joint]]\nkind="rod"\nbetween=["b"]\n')
     assert [each.split(": ")[1] for each in found] == ["joint[0].between", "joint[1].between"]
     assert all("nothing here can move" in each for each in found)
+
+
+@pytest.mark.parametrize("strength", ["0", "-1.0", "inf", "true"])
+def test_strength_is_a_force_above_none(strength: str) -> None:
+    (found,) = faults(f'{TWO}[[joint]]\nkind="rod"\nstrength={strength}\nbetween=["a"]\n')
+    assert found.startswith("s.toml:11: joint[0].strength: ")

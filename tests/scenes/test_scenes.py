@@ -72,6 +72,7 @@ DEMANDED = {
         Demand.ROTARY_LIMITS,
         Demand.ROTATION,
     },
+    "joints/tearing_cloth": {*FALLING, Demand.BALL_BALL, Demand.BALL_SEGMENT, Demand.SPRINGS},
     "particles/fireworks_100k": {*FALLING, Demand.LIFETIMES},
     "particles/smoke": {*FALLING, Demand.DRAG, Demand.LIFETIMES},
     "particles/sparks": {
@@ -259,6 +260,20 @@ def test_fast_ball_is_carried_deep_into_the_plane() -> None:
     assert frames[1].position[0, 1] - ball.radius == pytest.approx(-5.5, abs=1e-12)  # rounding
     assert len(contacts[1]) == 1
     assert frames[-1].velocity[0, 1] == pytest.approx(100.0, rel=1e-12)  # e = 1, to rounding
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_stone_tears_the_cloth_but_not_the_strong_one(engine: str) -> None:
+    broken = []
+    for overrides in ((), ("cloth.sheet.strength=20",)):
+        scene = scene_of("tearing_cloth", *overrides)
+        simulation = start(scene, engine, scene.solver)
+        for _ in range(72):  # 0.6 s: the stone is deep in it
+            simulation.step()
+        broken.append(len(simulation.broken))
+        simulation.close()
+    assert broken[0] > 20  # about a column of threads for each that it has come through
+    assert broken[1] == 0
 
 
 def test_two_balls_part_at_half_the_speed_of_approach() -> None:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sandbox.scene.demands import BALLS, Demand, demands
+from sandbox.scene.demands import BALLS, Demand, unmodelled
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -37,7 +37,7 @@ class ExactEngine:
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that it lacks."""
-        lacks = [f"it does not model {demand}" for demand in sorted(demands(scene) - self.capabilities)]
+        lacks = unmodelled(scene, self.capabilities)
         for key in STEPS + OVERLAP + SPRINGS:
             stated = getattr(settings, key)
             if stated is not None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.overlap import BIAS, slop_of
-from sandbox.scene.demands import BALLS, JOINTS, Demand, demands
+from sandbox.scene.demands import BALLS, JOINTS, Demand, unmodelled
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -33,7 +33,7 @@ class PymunkEngine:
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that pymunk lacks."""
-        lacks = [f"it does not model {demand}" for demand in sorted(demands(scene) - self.capabilities)]
+        lacks = unmodelled(scene, self.capabilities)
         for key, word in PYMUNK_WORDS.items():
             stated = getattr(settings, key)
             if stated not in (None, word):

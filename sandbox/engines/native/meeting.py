@@ -173,6 +173,20 @@ class MeetingBodies:
             self._tethers.tie(links, lambda number: self._members[number].body, self._settings.bias)
 
     @property
+    def breakable(self) -> bool:
+        """Whether some joint may break."""
+        return self._tethers.breakable
+
+    def torn(
+        self, position: FloatArray, velocity: FloatArray, angle: FloatArray, angular_velocity: FloatArray
+    ) -> IntArray:
+        """Let go of joints that gave more than their strength in the last substep; return their numbers.
+
+        Of arrays in scene order: the present state.
+        """
+        return self._tethers.torn(position, velocity, angle, angular_velocity, self._settings.h)
+
+    @property
     def joints(self) -> bool:
         """Whether two can touch in several places at once."""
         several = any(len(shapes) > 1 for _, shapes in self._fixed)

@@ -83,6 +83,11 @@ class Population:
         self._fresh = True
         self.meeting.write(self.position, self.velocity, self.angle, self.angular_velocity)
 
+    def torn(self) -> IntArray:
+        """Let go of joints that gave more than their strength in the last substep; return their numbers."""
+        self.refresh()
+        return self.meeting.torn(self.position, self.velocity, self.angle, self.angular_velocity)
+
     def _place(self, numbers: IntArray) -> None:
         """Give each body to the half that it belongs to, and its surface, as things now stand."""
         meet, bodies = self._meet, self.bodies

@@ -35,6 +35,7 @@ class NativeSimulation(Running):
         self._ledger: ContactLedger | None = None
         self._observer: Observer | None = None
         self._retired: dict[int, float] = {}
+        self._broken: dict[int, float] = {}
         self._expiry = Expiry(scene.bodies, scene.began, settings.h)
         self._still: tuple[FloatArray, FloatArray] | None = None  # angles and spins, which frames share if they can
 
@@ -52,6 +53,11 @@ class NativeSimulation(Running):
     def retired(self) -> Mapping[int, float]:
         """When each body that is no longer there was gone: number → s."""
         return MappingProxyType(self._retired)
+
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """When each joint broke that did: its number in `scene.links` → s."""
+        return MappingProxyType(self._broken)
 
     @property
     def work(self) -> Mapping[str, int]:
@@ -172,6 +178,8 @@ class NativeSimulation(Running):
             population.free.step()
         population.meeting.step(start)
         population.changed()
+        if population.meeting.breakable and look:
+            self._broken |= dict.fromkeys(population.torn().tolist(), self._after(k + 1))
         if self._ledger is not None and look:
             self._record(start + h)
             if self._observer is not None and before is not None:

@@ -1,20 +1,24 @@
-"""Tethers: the links of a scene between the bodies of a space, for as long as both are there."""
+"""Tethers: the links of a scene between the bodies of a space, for as long as both are there and the link is whole."""
 
 from collections.abc import Callable
 
+import numpy as np
 import pymunk
 
 from sandbox.engines.native.constraints import constraint_of
-from sandbox.scene.links import WORLD, Links
+from sandbox.engines.native.tension import tension, torsion
+from sandbox.scene.links import WORLD, LinkKind, Links
+from sandbox.trajectory import FloatArray, IntArray
 
 
 class Tethers:
-    """The constraints in a space, by the numbers of the bodies that they hold."""
+    """The constraints in a space, by the numbers of their links."""
 
     def __init__(self, space: pymunk.Space) -> None:
         self._space = space
-        self._tied = False
-        self._constraints: list[tuple[pymunk.Constraint, int, int]] = []
+        self._links: Links | None = None
+        self._constraints: dict[int, pymunk.Constraint] = {}
+        self._watch(Links.none())
 
     def tie(self, links: Links, body: Callable[[int], pymunk.Body], bias: float) -> None:
         """Join bodies as a scene says, once.
@@ -24,20 +28,66 @@ class Tethers:
             body: gives a body by its number.
             bias: the share of a joint's error that still remains one second later.
         """
-        if self._tied:
+        if self._links is not None:
             return
-        self._tied = True
+        self._links = links
         for k, (a, b) in enumerate(zip(links.a.tolist(), links.b.tolist(), strict=True)):
             first = self._space.static_body if a == WORLD else body(a)
             constraint = constraint_of(links, k, first, body(b), bias)
             self._space.add(constraint)
-            self._constraints.append((constraint, a, b))
+            self._constraints[k] = constraint
+        self._watch(links.counted())
 
     def untie(self, number: int) -> None:
         """Let go of what a body that leaves was joined to."""
-        if not any(number in each[1:] for each in self._constraints):
+        if self._links is None:
             return
-        for constraint, a, b in self._constraints:
-            if number in (a, b):
-                self._space.remove(constraint)
-        self._constraints = [each for each in self._constraints if number not in each[1:]]
+        those = np.flatnonzero((self._links.a == number) | (self._links.b == number))
+        self._release([k for k in those.tolist() if k in self._constraints])
+
+    @property
+    def breakable(self) -> bool:
+        """Whether some link that is there may break."""
+        return self._strong > 0
+
+    def torn(
+        self, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray, h: float
+    ) -> IntArray:
+        """Let go of what gave more than its strength in the last substep; return the numbers of those links.
+
+        pymunk tells the impulse of one constraint at a time, 1 µs each. Of springs it is the force in the state that
+        the substep ended in, but for rounding and a part of the damper's, so theirs is worked out for all at once.
+
+        Args:
+            position: (N, 2) m, of all bodies.
+            velocity: (N, 2) m/s.
+            angle: (N,) rad.
+            spin: (N,) rad/s.
+            h: the substep, s.
+        """
+        held, springs, rotary = self._held, self._springs, self._rotary
+        given = np.asarray([self._constraints[k].impulse for k in held.number.tolist()]) / h
+        gone = [held.number[given > held.strength]]
+        if len(springs):
+            gone.append(springs.number[tension(springs, position, velocity, angle, spin) > springs.strength])
+        if len(rotary):
+            gone.append(rotary.number[torsion(rotary, angle, spin) > rotary.strength])
+        numbers = np.sort(np.concatenate(gone))
+        if len(numbers):
+            self._release(numbers.tolist())
+        return numbers
+
+    def _release(self, numbers: list[int]) -> None:
+        if not numbers:
+            return
+        for k in numbers:
+            self._space.remove(self._constraints.pop(k))
+        assert self._links is not None
+        self._watch(self._links.counted().some(np.asarray(sorted(self._constraints), dtype=np.int64)))
+
+    def _watch(self, links: Links) -> None:
+        """Sort out which of the links that are there may break."""
+        some = links.some(np.isfinite(links.strength))
+        kinds = LinkKind.SPRING, LinkKind.ROTARY_SPRING
+        self._springs, self._rotary = some.of(kinds[0]), some.of(kinds[1])
+        self._held, self._strong = some.some(~np.isin(some.kind, kinds)), len(some)

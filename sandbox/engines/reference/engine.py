@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.overlap import BIAS, slop_of
-from sandbox.scene.demands import BALLS, Demand, demands
+from sandbox.scene.demands import BALLS, Demand, demands, unmodelled
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -53,7 +53,7 @@ class ReferenceEngine:
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that the reference lacks."""
         wanted = demands(scene)
-        lacks = [f"it does not model {demand}" for demand in sorted(wanted - self.capabilities)]
+        lacks = unmodelled(scene, self.capabilities)
         lacks += self._detection_lacks(wanted, settings)
         if settings.broad_phase == "oriented" and Demand.POLYGONS not in wanted:
             lacks.append("broad_phase 'oriented' is for polygons, of which the scene has none; 'grid' or 'sweep' do")

@@ -187,7 +187,7 @@ def _motors(view: View, motors: Held) -> None:
 def _dials(view: View, joints: Held) -> list[Dial]:
     """Return where joints that turn are drawn: where a pivot holds the same two, else in the second body's middle."""
     frame, bodies, links = view.sight.frame, view.sight.bodies, joints.links
-    every, pivots = view.sight.scene.links, {}
+    every, pivots = view.sight.links, {}
     for k in np.flatnonzero(every.kind == LinkKind.PIVOT).tolist():
         pivots[int(every.a[k]), int(every.b[k])] = k
     _, hinge = every.ends(frame.position, frame.angle)

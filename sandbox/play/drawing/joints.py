@@ -61,8 +61,8 @@ class Held:
 
 
 def held(view: View) -> Held:
-    """Return the joints whose bodies are present, those about the picture."""
-    links, frame = view.sight.scene.links, view.sight.frame
+    """Return the joints that are whole and whose bodies are present, those about the picture."""
+    links, frame = view.sight.links, view.sight.frame
     count = min(len(frame.position), len(view.sight.bodies))
     if not len(links):
         return Held(links, np.empty((0, 4)))

@@ -46,7 +46,7 @@ class Overlays:
         """Draw what bodies cover."""
         if "trails" in view.sight.overlays:
             draw_trails(view, self._points)
-        if "shapes" in view.sight.overlays and len(view.sight.scene.links):
+        if "shapes" in view.sight.overlays and len(view.sight.links):
             draw_joints(view, held(view), self._discs)
 
     def above(self, view: View) -> None:
@@ -56,7 +56,7 @@ class Overlays:
             self._ghost(view)
         if "bounds" in overlays:
             draw_boxes(view, self._polygons)
-        if "joints" in overlays and len(view.sight.scene.links):
+        if "joints" in overlays and len(view.sight.links):
             draw_fittings(view, held(view), self._discs)
         if "centres" in overlays:
             draw_centres(view)
@@ -81,7 +81,8 @@ class Overlays:
         count = min(len(ghost.position), len(frame.position), len(view.sight.bodies))
         place, radius = ghost.position[:count], view.sight.bodies.radius[:count]
         with np.errstate(invalid="ignore", over="ignore"):
-            seen = np.flatnonzero(camera.in_sight(place, radius) & ghost.present[:count])
+            there = camera.in_sight(place, radius) & ghost.present[:count]
+        seen = np.flatnonzero(there & ~view.sight.bodies.fixed[:count])  # what never moves never differs
         if len(seen) > MOST_GHOSTS:
             seen = seen[np.linspace(0, len(seen) - 1, MOST_GHOSTS).astype(np.intp)]
         if not len(seen):

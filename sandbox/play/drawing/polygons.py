@@ -143,7 +143,7 @@ def _in_one_pass(
         surface.get_pitch() // 4,
         edges,
         anatomy.pieces,
-        np.empty((len(anatomy.pieces.corner), 7)),
+        np.empty((len(anatomy.pieces.corner), 9)),
         who,
         pose,
         line,

@@ -51,3 +51,20 @@ def inner_span(
         elif bound > 0.0:
             to_x = left - 1.0
     return from_x, to_x
+
+
+@bare_kernel
+def outer_span(
+    y: float, room: FloatArray, first: int, last: int, radius: float, left: float, right: float
+) -> tuple[float, float]:
+    """Return from where to where a row may lie within a piece whose radius is this: beyond, it surely does not."""
+    low_x, high_x, low_y, high_y = math.inf, -math.inf, math.inf, -math.inf
+    for k in range(first, last):
+        low_x, high_x = min(low_x, room[k, 0]), max(high_x, room[k, 0])
+        low_y, high_y = min(low_y, room[k, 1]), max(high_y, room[k, 1])
+    if y < low_y - radius or y > high_y + radius:
+        return left, left - 1.0
+    from_x, to_x = max(left, low_x - radius), min(right, high_x + radius)
+    if last - first == 1:
+        return from_x, to_x
+    return span(y, room, first, last, radius, from_x, to_x)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from sandbox.engines.kernel import bare_kernel
 from sandbox.play.drawing.anatomy import SEAM, Pieces
 from sandbox.play.drawing.blend import FULL, blended
-from sandbox.play.drawing.spans import inner_span, span
+from sandbox.play.drawing.spans import inner_span, outer_span, span
 from sandbox.scene.near import IntArray
 from sandbox.trajectory import FloatArray
 
@@ -61,11 +61,13 @@ def _piece_distance(x: float, y: float, room: FloatArray, first: int, last: int,
 
 
 @bare_kernel
-def _outline_distance(x: float, y: float, edge: FloatArray, first: int, last: int) -> float:
-    """Return the distance from an outline, in its own units."""
+def _outline_distance(x: float, y: float, edge: FloatArray, first: int, last: int, far: float) -> float:
+    """Return the distance from an outline, in its own units; some greater one where it is farther than `far`."""
     best = np.inf
     for k in range(first, last):
         if edge[k, 0] == 0.0:
+            if x < min(edge[k, 1], edge[k, 3]) - far or x > max(edge[k, 1], edge[k, 3]) + far:
+                continue  # most of a long outline
             away2 = _side_distance2(x, y, edge[k, 1], edge[k, 2], edge[k, 3], edge[k, 4])
             best = min(best, away2)
         else:
@@ -80,11 +82,13 @@ def _outline_distance(x: float, y: float, edge: FloatArray, first: int, last: in
 def _body_distance(
     x: float, y: float, body: int, pieces: Pieces, room: FloatArray, pose: Pose, edges: tuple[int, int], deep: float
 ) -> float:
-    """Return the signed distance from a body, px; only whether it is deeper than its rim, where it is."""
+    """Return the signed distance from a body, px: `deep` where it is deeper than its rim, inf where it is not near."""
     begin, end = pieces.piece[body], pieces.piece[body + 1]
     away = np.inf
     for piece in range(begin, end):
         first, last = pieces.first[piece], pieces.first[piece + 1]
+        if x < room[first, 7] or x > room[first, 8]:
+            continue
         away = min(away, _piece_distance(x, y, room, first, last, pieces.radius[piece] * pose.scale))
         if away <= deep:
             return deep
@@ -93,7 +97,8 @@ def _body_distance(
             return deep if away <= SEAM else away
         px, py = (x - pose.x) / pose.scale, (pose.y - y) / pose.scale
         along, across = pose.cos * px + pose.sin * py, pose.cos * py - pose.sin * px
-        near = pose.scale * _outline_distance(along, across, pieces.edge, edges[0], edges[1])
+        far = (1.0 - deep) / pose.scale
+        near = pose.scale * _outline_distance(along, across, pieces.edge, edges[0], edges[1], far)
         return -near if away <= SEAM else near
     return away
 
@@ -194,7 +199,7 @@ def stencil(
         stride: of a row, px.
         area: left, top, right and bottom of what may be drawn on, px.
         pieces: what they consist of.
-        room: (V, 7) to work in.
+        room: (V, 9) to work in.
         who: (K,) their numbers.
         pose: (K, 5) as in `Pose`.
         line: (K,) widths of their rims, px.
@@ -225,13 +230,19 @@ def stencil(
             for piece in range(begin, end):
                 first, last, wide = pieces.first[piece], pieces.first[piece + 1], pieces.radius[piece] * here.scale
                 room[first, 5], room[first, 6] = inner_span(y, room, first, last, wide + deep, left, right)
+                room[first, 7], room[first, 8] = outer_span(y, room, first, last, wide + 0.5, left, right)
             column, stop = int(left), math.ceil(right)
             while column < stop:
-                x, beyond = column + 0.5, column
+                x, beyond, empty = column + 0.5, column, stop
                 for piece in range(begin, end):
                     first = pieces.first[piece]
                     if room[first, 5] <= x <= room[first, 6]:
                         beyond = max(beyond, min(int(room[first, 6] - 0.5) + 1, stop))
+                    if x <= room[first, 8]:
+                        empty = min(empty, int(max(room[first, 7] - 0.5, float(column))))
+                if empty > column:  # none of them is there
+                    column = empty
+                    continue
                 if beyond > column:
                     if not hollow:
                         pixels[start + column : start + beyond] = inner

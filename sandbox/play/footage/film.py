@@ -9,6 +9,7 @@ import numpy as np
 import pygame
 
 from sandbox.action import ActionError, Spawn, actions_from_json, in_order
+from sandbox.measure.potential import parted
 from sandbox.play.camera import Box, Camera
 from sandbox.play.drawing.palette import FAINT, INK
 from sandbox.play.drawing.picture import Picture
@@ -50,6 +51,10 @@ class Film:
         self.bodies = bodies_of(trajectory, self.scene, name)
         self._picture = Picture()
         self._last: Frame | None = None  # one picture asks for the same time again and again
+        try:
+            self.breaks: FloatArray = trajectory.breaks(len(self.scene.links))
+        except ValueError as error:
+            raise SceneError([Fault(name, None, "broken_time", str(error))]) from None
         self._graph = RunGraph(trajectory, self.scene, self.bodies)
 
     @property
@@ -119,6 +124,7 @@ class Film:
             trails=self._trails(frame, TRAIL * speed) if "trails" in overlays else (),
             overlapping=overlapping(self.scene, self.bodies, frame) if by_contact else None,
             flashes=tuple(self._flashes(time, FLASH * speed, speed)),
+            broken=np.flatnonzero(parted(self.breaks, np.asarray([time]))[0]).tolist(),
         )
 
     def contacts(self, time: float, speed: float = 1.0) -> Contacts:

@@ -3,9 +3,12 @@
 from collections.abc import Iterator
 from time import perf_counter
 
+import numpy as np
+
 from sandbox.action import Action, ActionError, Launch
 from sandbox.engines.compiling import COMPILING
 from sandbox.measure.energy import energy_of
+from sandbox.measure.potential import parted
 from sandbox.play.footage.film import Film
 from sandbox.play.picking import overlapping
 from sandbox.play.running.between import between
@@ -24,6 +27,8 @@ LEAST, MOST = 0.012, 0.03
 scene is slower than asked."""
 SLICE = 0.04
 """s of each picture that the way to another step may take"""
+TELL_EVERY = 1.0
+"""s of the scene between two notes on broken joints"""
 
 
 class Live:
@@ -46,6 +51,7 @@ class Live:
         self._contacts, self._since = session.contacts(), session.settings.dt
         self._seed = session.scene.world.seed
         self._told_end = False
+        self._told_breaks, self._told_at = 0, 0.0
         self._until = until
         self.wants_pause = False
         """It has come to the end of what was recorded; whoever pauses it takes this back."""
@@ -137,10 +143,21 @@ class Live:
         if made:
             self._contacts, self._since = self.session.contacts(), self.session.time - before
             self.company.advance(self.session.redone())
+            self._tell_breaks()
         if self.session.ended is not None and not self._told_end:
             self._told_end = True
             self.company.notes.append(("error", self.session.ended))
         return made
+
+    def _tell_breaks(self) -> None:
+        """Say how many joints broke, the first at once, then once a second: a cloth tears on and on."""
+        broken, now = len(self.session.relay.broken), self.session.time
+        if broken < self._told_breaks or now < self._told_at:  # it has gone back
+            self._told_breaks, self._told_at = broken, now
+        more = broken - self._told_breaks
+        if more and (self._told_breaks == 0 or now >= self._told_at + TELL_EVERY):
+            self.company.notes.append(("info", "a joint broke" if more == 1 else f"{more:,} joints broke"))
+            self._told_breaks, self._told_at = broken, now
 
     def act(self, action: Action) -> None:
         """Do something now.
@@ -257,7 +274,8 @@ class Live:
 
     def energy(self) -> tuple[float, float, float]:
         """Return the kinetic, potential and total energy, J."""
-        return energy_of(self.frame, self.bodies, self.session.scene.world.gravity, self.session.scene)
+        session = self.session
+        return energy_of(self.frame, self.bodies, session.scene.world.gravity, session.scene, session.breaks)
 
     def sight(
         self,
@@ -288,7 +306,13 @@ class Live:
             flashes=self.company.flashes,
             picked=picked,
             pull=pull,
+            broken=self._broken(frame.time),
         )
+
+    def _broken(self, time: float) -> list[int]:
+        """Return the numbers of the joints that have broken by a time, s."""
+        breaks = self.session.breaks
+        return np.flatnonzero(parted(breaks, np.asarray([time]))[0]).tolist() if len(breaks) else []
 
     def close(self) -> None:
         """Release all engines."""

@@ -12,6 +12,8 @@ up part of the session, as a switch that changes nothing: who replays the sessio
 from collections.abc import Iterator
 from time import perf_counter
 
+import numpy as np
+
 from sandbox.action import Action, ActionError
 from sandbox.engines.relay import joined
 from sandbox.play.running.course import Course
@@ -19,7 +21,7 @@ from sandbox.play.running.history import History, Mark
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
-from sandbox.trajectory import Contacts, Frame
+from sandbox.trajectory import Contacts, FloatArray, Frame
 
 CALM = 8
 """Substeps without contact before a checkpoint is made; engines remember parted contacts for 3 by default."""
@@ -55,6 +57,7 @@ class Session(Course):
         self._astray = False
         self._contacts: list[Contacts] = []
         self._everyone = self.bodies
+        self._breaks = np.full(len(self.scene.links), np.inf)
         self.history = History()
         self._previous = self._frame = self.relay.frame()
         self.history.keep(0, self._frame)
@@ -62,6 +65,11 @@ class Session(Course):
     def bodies_in(self, frame: Frame) -> Bodies:
         """Return the bodies by number, with those of a state that was seen; it may lie ahead and have more."""
         return self._everyone if len(frame.position) > len(self.bodies) else self.bodies
+
+    @property
+    def breaks(self) -> FloatArray:
+        """When each of the scene's joints broke, (J,) s, inf where it never did; also in states that lie ahead."""
+        return self._breaks
 
     @property
     def time(self) -> float:
@@ -113,6 +121,7 @@ class Session(Course):
         self._frame = self.relay.frame()
         if len(self.bodies) >= len(self._everyone):
             self._everyone = self.bodies
+        self._note_breaks()
         self._contacts.append(self.relay.contacts())
         del self._contacts[:-64]  # nobody asks
         if len(self._contacts[-1]):
@@ -126,6 +135,14 @@ class Session(Course):
         calm = self._calm >= max(CALM, 2 * (self.relay.settings.persistence or 1))
         if calm and self.ended is None and self.history.wants_mark(self._step):
             self.history.mark(Mark(self._step, self._script.done, self.relay.checkpoint()))
+
+    def _note_breaks(self) -> None:
+        """Learn when joints broke. Those that broke later than now are kept: the same way leads there again."""
+        broken = self.relay.broken
+        if len(broken) and not np.isfinite(self._breaks[list(broken)]).all():
+            breaks = self._breaks.copy()
+            breaks[list(broken)] = list(broken.values())
+            self._breaks = breaks
 
     def _check(self, frame: Frame | None) -> None:
         """Hold the present state against what was seen before."""
@@ -162,6 +179,8 @@ class Session(Course):
         self._script.add(timed, self.relay)
         self.history.cut(self._step - 1)
         self._everyone = self.bodies
+        self._breaks = np.full(len(self._breaks), np.inf)
+        self._note_breaks()
         self._frame = self._previous = self.relay.frame()
         self.history.keep(self._step, self._frame)
         self._calm = 0

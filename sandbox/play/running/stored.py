@@ -110,7 +110,7 @@ class Stored:
 
     def energy(self) -> tuple[float, float, float]:
         """Return the kinetic, potential and total energy, J."""
-        return energy_of(self.frame, self.bodies, self.scene.world.gravity, self.scene)
+        return energy_of(self.frame, self.bodies, self.scene.world.gravity, self.scene, self.film.breaks)
 
     @property
     def contacts(self) -> Contacts:
