@@ -14,7 +14,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from hashlib import blake2b
 from pathlib import Path
@@ -78,7 +78,7 @@ def cache_folder() -> Path | None:
     # Installations may share the user's folder, and Pythons the sources: each has folders of its own.
     place = blake2b(f"{here} {sys.version} {numba.__version__}".encode(), digest_size=4).hexdigest()
     stamp = blake2b(digest_size=8)
-    for file in sorted(here.rglob("*.py")):
+    for file in sorted(_sources(here)):
         status = file.stat()
         stamp.update(f"{file.name} {status.st_mtime_ns} {status.st_size}".encode())
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -95,6 +95,13 @@ def cache_folder() -> Path | None:
                 shutil.rmtree(old, ignore_errors=True)  # another process may be removing it too
         return folder
     return None
+
+
+def _sources(folder: Path) -> Iterator[Path]:
+    """Yield the sources below a folder; what is compiled lies there too, and another process may be removing it."""
+    for place, folders, files in os.walk(folder):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        yield from (Path(place, name) for name in files if name.endswith(".py"))
 
 
 def _unused(folder: Path) -> bool:

@@ -102,7 +102,7 @@ def test_figures_of_springs_are_refused_to_impulses(key):
 @pytest.mark.parametrize(
     ("choice", "reason"),
     [
-        ({"broad_phase": "oriented"}, "needs polygons"),
+        ({"broad_phase": "oriented"}, "is for polygons, of which the scene has none"),
         ({"half_kick": True}, "a remedy for pymunk's scheme"),
         ({"persistence": 3}, "it remembers contacts for 1 substep"),
     ],
