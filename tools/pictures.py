@@ -55,3 +55,4 @@ if __name__ == "__main__":
     window("gas", 4.0, {"velocities", "energy"}, ghost=True, trust=True, file="window.png")
     film("pile", "pile.gif", "--size", "320x400", "--fps", "15", "--until", "2")
     film("ragdoll_stairs", "ragdoll.gif", "--size", "640x300", "--fps", "20", "--until", "2.5")
+    film("tearing_cloth", "tearing.gif", "--size", "640x340", "--fps", "20", "--until", "1.6")
