@@ -4,7 +4,7 @@ import hashlib
 import json
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -86,6 +86,12 @@ class Contacts:
     def none(cls) -> Self:
         """Return no contacts."""
         return cls(np.empty(0), np.empty((0, 2), np.int64), *(np.empty((0, 2)) for _ in range(3)))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return contacts one after the other."""
+        columns = ("time", "pair", "point", "normal", "impulse")
+        return cls(*(np.concatenate([getattr(part, column) for part in parts]) for column in columns))
 
     def __len__(self) -> int:
         return len(self.time)

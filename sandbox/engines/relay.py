@@ -10,7 +10,6 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Self
 
-import numpy as np
 from pydantic import ValidationError
 
 from sandbox.action import Action, ActionError, Force, Launch, Pull, Remove, SetParameter, Spawn, Switch, Throttle
@@ -278,7 +277,7 @@ class Relay:
         """
         kept, self._kept = self._kept or [], []
         found = self._leg.contacts()
-        return joined([*kept, found]) if kept else found
+        return Contacts.joined([*kept, found]) if kept else found
 
     def watch(self, observer: Observer) -> None:
         """Have an observer called after every substep."""
@@ -293,9 +292,3 @@ class Relay:
     def close(self) -> None:
         """Release what the engine holds."""
         self._leg.simulation.close()
-
-
-def joined(parts: list[Contacts]) -> Contacts:
-    """Return contacts one after the other."""
-    columns = ("time", "pair", "point", "normal", "impulse")
-    return Contacts(*(np.concatenate([getattr(part, column) for part in parts]) for column in columns))

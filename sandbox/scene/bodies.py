@@ -86,11 +86,6 @@ class Bodies:
         return Bodies(names=names, element=self.element[which], elements=self.elements, **columns)
 
 
-def mass_of(element: Mover) -> float:
-    """Return the mass of one body of an element in kg: stated, or from its density, or 1."""
-    return form_of(element).mass
-
-
 def expand(scene: Scene) -> Bodies:
     """Number the bodies of a scene and lay out their starting state.
 

@@ -92,6 +92,3 @@ class Compound(Single):
     def parts(self) -> tuple[AnyPart, ...]:
         """Its parts, by kind, each in the order of the file."""
         return self.balls + self.boxes + self.capsules + self.polygons
-
-
-Solid = Box | Capsule | Polygon | Compound

@@ -6,10 +6,10 @@ import numpy as np
 import strategies
 from hypothesis import given, settings
 
-from sandbox.scene.bodies import mass_of
 from sandbox.scene.file import loads
 from sandbox.scene.generators import size
 from sandbox.scene.model import Ball, Emitter, Grid, Scatter, Scene
+from sandbox.scene.shapes import form_of
 
 SCENE = """
 [[emitter]]
@@ -63,9 +63,9 @@ def test_bodies_are_numbered_balls_grids_scatters_emitters() -> None:
 
 def test_mass_is_stated_or_from_the_density_or_one() -> None:
     at = {"position": (0.0, 0.0), "radius": 3.0}
-    assert mass_of(Ball(**at, mass=2.5)) == 2.5
-    assert mass_of(Ball(**at, density=2.0)) == 2.0 * math.pi * 9.0
-    assert mass_of(Ball(**at)) == 1.0
+    assert form_of(Ball(**at, mass=2.5)).mass == 2.5
+    assert form_of(Ball(**at, density=2.0)).mass == 2.0 * math.pi * 9.0
+    assert form_of(Ball(**at)).mass == 1.0
 
 
 def test_moment_is_that_of_a_disc() -> None:

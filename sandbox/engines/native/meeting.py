@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pymunk
 
-from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
+from sandbox.engines.limits import BEYOND, FARTHEST
 from sandbox.engines.native.drag import acceleration
 from sandbox.engines.native.field import Field
+from sandbox.engines.native.ground import Ground, shuffled
 from sandbox.engines.native.member import Member
 from sandbox.engines.native.memory import RememberedImpulses, without
 from sandbox.engines.native.reader import Reader
@@ -15,10 +16,8 @@ from sandbox.engines.native.space import (
     SurfaceSetter,
     body_shapes,
     category,
-    fixed_shapes,
     gravity_of,
     new_space,
-    reach_of,
 )
 from sandbox.engines.native.tethers import Tethers
 from sandbox.engines.touching import NOTHING, Touching
@@ -28,9 +27,6 @@ from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
-
-MANY = 5_000
-"""Shapes from which on they are added shuffled: pymunk's tree takes 30 s for 40,000 in a sorted line."""
 
 
 class MeetingBodies:
@@ -42,7 +38,7 @@ class MeetingBodies:
         self._reader = Reader(self._space)
         self._setter = SurfaceSetter(self._space)
         self._members: dict[int, Member] = {}
-        self._fixed: list[tuple[pymunk.Body, list[pymunk.Shape]]] = []
+        self._ground = Ground(self._space, self._setter)
         self._surface_of: IntArray = np.empty(0, np.int64)
         self._moments: FloatArray = np.empty(0)
         self._touches: BoolArray = np.empty(0, np.bool_)
@@ -55,9 +51,7 @@ class MeetingBodies:
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self._steady: dict[int, tuple[FloatArray, float]] = {}
         self._moving = 0
-        self._reach = math.inf
         self._state: tuple[IntArray, FloatArray] | None = None
-        self._middle, self._limit = np.zeros(6), np.full(6, math.inf)
 
     def __len__(self) -> int:
         return self._moving
@@ -75,11 +69,10 @@ class MeetingBodies:
         """Add bodies, (M,) numbers with their present state."""
         if not len(numbers):
             return
-        if not self._fixed:
-            self._add_fixed(bodies)
+        self._ground.lay(self._scene, bodies, self._surface_of_fixed)
         self._moments = bodies.moment
         self._polygons = self._polygons or not bodies.round.all()
-        order = np.asarray(_order(len(numbers)))
+        order = np.asarray(shuffled(len(numbers)))
         states = np.column_stack((position, angle, velocity, angular_velocity, bodies.mass[numbers], moment))
         for number, state in zip(numbers[order].tolist(), states[order].tolist(), strict=True):
             self._add(number, bodies, state)
@@ -124,32 +117,10 @@ class MeetingBodies:
             if not member.shapes and self._touches[number]:
                 self._give_shapes(number, bodies)
 
-    def _add_fixed(self, bodies: Bodies) -> None:
-        """Add the fixed things, once there is something to meet them."""
-        starts, speeds = bodies.position[~bodies.fixed], np.hypot(*bodies.velocity[~bodies.fixed].T)
-        centre, reach = reach_of(self._scene, starts, speeds)
-        if self._scene.planes:
-            self._middle[0:2], self._reach = centre, reach
-        every: list[pymunk.Shape] = []
-        for thing, surface in zip(self._scene.fixed, self._surface_of_fixed.tolist(), strict=True):
-            body = pymunk.Body(body_type=pymunk.Body.STATIC)
-            shapes = list(fixed_shapes(thing, body, centre, reach))
-            for shape in shapes:
-                shape.filter = category(True, "all")
-                self._setter.dress(shape, surface)
-            self._space.add(body)
-            self._fixed.append((body, shapes))
-            every += shapes
-        for k in _order(len(every)):
-            self._space.add(every[k])
-        where = min(self._reach, FARTHEST)
-        self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
-
     def _register(self) -> None:
         moving = {m.body.id: number for number, m in self._members.items() if m.moves}
         still = {m.body.id: number for number, m in self._members.items() if not m.moves}
-        things = {body.id: -1 - k for k, (body, _) in enumerate(self._fixed)}
-        self._reader.assign(moving, still | things)
+        self._reader.assign(moving, still | self._ground.ids)
         self._state = None
 
     def leave(self, numbers: IntArray) -> None:
@@ -189,8 +160,7 @@ class MeetingBodies:
     @property
     def joints(self) -> bool:
         """Whether two can touch in several places at once."""
-        several = any(len(shapes) > 1 for _, shapes in self._fixed)
-        return several or any(len(member.shapes) > 1 for member in self._members.values())
+        return self._ground.several or any(len(member.shapes) > 1 for member in self._members.values())
 
     def renew(self, scene: Scene, meet: Meetings) -> None:
         """Go on with a scene's changed air, gravity or coefficients, or with more surfaces."""
@@ -204,9 +174,7 @@ class MeetingBodies:
                 self._setter.dress(shape, int(self._surface_of[piece]))
             if meet.turnable[number] and math.isinf(body.moment):
                 body.moment = float(self._moments[number])
-        for (_, shapes), surface in zip(self._fixed, self._surface_of_fixed.tolist(), strict=False):
-            for shape in shapes:
-                self._setter.dress(shape, surface)
+        self._ground.dress(self._surface_of_fixed)
 
     def step(self, time: float) -> None:
         """Advance by one substep, from a time, s."""
@@ -266,13 +234,13 @@ class MeetingBodies:
         if not self._moving:
             return None
         numbers, state = self._read()
-        within = np.abs(state - self._middle) <= self._limit
+        within = self._ground.within(state)
         if within.all():
             return None
         worst = int(np.argmin(np.all(within, axis=1)))
-        if not np.isfinite(state[worst]).all() or self._reach > FARTHEST:
+        if not np.isfinite(state[worst]).all() or self._ground.reach > FARTHEST:
             return int(numbers[worst]), BEYOND
-        return int(numbers[worst]), f"is more than {self._reach:g} m out, where pymunk's half-planes end"
+        return int(numbers[worst]), f"is more than {self._ground.reach:g} m out, where pymunk's half-planes end"
 
     def holds(self, number: int) -> bool:
         """Tell whether a body is in the space."""
@@ -284,7 +252,7 @@ class MeetingBodies:
 
     def reaches(self, place: FloatArray) -> bool:
         """Tell whether planes are planes at a place; so they are until there are some."""
-        return bool((np.abs(place - self._middle[0:2]) <= self._reach).all())
+        return self._ground.reaches(place)
 
     def moment(self, number: int) -> float:
         """Return a body's moment of inertia, kg·m²; infinite where nothing in the scene can turn it."""
@@ -317,10 +285,3 @@ class MeetingBodies:
         """Give a body an angular velocity, rad/s."""
         self._members[number].body.angular_velocity = spin
         self._state = None
-
-
-def _order(count: int) -> list[int]:
-    """Return the order in which to add so many shapes to a space."""
-    if count <= MANY:
-        return list(range(count))
-    return list(map(int, np.random.Generator(np.random.PCG64(0)).permutation(count)))

@@ -18,6 +18,8 @@ WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "i
 SUITED = {"relaxation": "semi_implicit_euler", "xpbd": "semi_implicit_euler", "rattle": "velocity_verlet"}
 """What goes with ways to hold joints by their positions: kicks come before positions are put right."""
 
+BALLS_ALONE = "detection 'swept' knows times of impact of balls alone, not of polygons; 'bisect' does"
+
 HELD = {Demand.RODS, Demand.PIVOTS, Demand.SLIDES, Demand.ROTARY_LIMITS}
 """Joints that hold, other than springs, which are forces."""
 
@@ -77,7 +79,7 @@ class ReferenceEngine:
         """Say what a detection of impacts in time cannot do."""
         lacks = []
         if settings.detection == "swept" and Demand.POLYGONS in wanted:
-            lacks.append("detection 'swept' knows times of impact of balls alone, not of polygons; 'bisect' does")
+            lacks.append(BALLS_ALONE)
         if settings.detection in ("bisect", "swept") and wanted & HELD:
             lacks.append(
                 f"detection {settings.detection!r} resolves impacts one by one, apart from joints; 'shrink' does not"

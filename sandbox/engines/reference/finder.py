@@ -1,5 +1,6 @@
 """Finder: broad phase, then narrow phase; from positions to manifolds."""
 
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,26 +8,23 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.engines.reference.broad_phase import BROAD_PHASES
-from sandbox.engines.reference.manifolds import KIND, Manifolds, meet_balls, meet_planes, meet_segments
-from sandbox.engines.reference.piece_contacts import drop
-from sandbox.engines.reference.pieces import apart_keys
-from sandbox.engines.reference.segments import SegmentBoxes, near_segments
-from sandbox.engines.reference.touch import first_touch
+from sandbox.engines.reference.manifolds import Manifolds
+from sandbox.engines.reference.segments import SegmentBoxes
 from sandbox.engines.roster import NOTHING, Roster
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 
 class Candidates(NamedTuple):
-    """The pairs that the broad phases handed on, by ascending key. Every ball is a candidate for every plane."""
+    """The pairs that the broad phases handed on, by ascending key. Every body is a candidate for every plane."""
 
     balls: IntArray
-    """(B,) keys of two balls"""
+    """(B,) keys of two balls, or two pieces"""
     segments: IntArray
-    """(S,) keys of a ball and a segment"""
+    """(S,) keys of a ball, or a piece, and a segment"""
 
 
-class Finder:
-    """Finds contacts, in the order of their keys, whichever broad phase; counts the work."""
+class Finder(ABC):
+    """Finds contacts, in the order of their keys, whichever broad phase; counts the work. Of what, its kinds say."""
 
     def __init__(self, roster: Roster, broad_phase: str) -> None:
         self._roster, self._broad_phase = roster, BROAD_PHASES[broad_phase]
@@ -42,8 +40,6 @@ class Finder:
         self.able: BoolArray = roster.moving & (roster.meets > NOTHING)
         self._moves: BoolArray = roster.moving
         self._order: IntArray = np.arange(len(roster.position))
-        self._apart: IntArray = apart_keys(roster.links)
-        self._own: IntArray = np.arange(len(roster.position))  # each ball is its own body
         self._boxes = SegmentBoxes(roster.fixtures)
         self._planes = len(roster.fixtures.planes) if self.able.any() else 0
         self._plane_tests = self._planes * int(np.count_nonzero(self.able))
@@ -59,27 +55,9 @@ class Finder:
         """Enter figures of one's own (S, S) into the manifolds, in the place of restitution."""
         self._tables = restitution, self._roster.friction
 
+    @abstractmethod
     def candidates(self, position: FloatArray, margin: float = 0.0) -> Candidates:
-        """Return the pairs worth a look at (N, ≥ 2) positions, m: none nearer than the margin, m, is left out."""
-        roster, boxes = self._roster, self._boxes
-        none = self._ball_keys[:0]
-        if roster.meet.ball_ball:
-            self._ball_keys, balls = self._filled(
-                self._ball_keys,
-                lambda room: self._broad_phase(
-                    self._order, position, roster.radius, roster.meets, self._moves, margin, room
-                ),
-            )
-            if len(self._apart):
-                balls = balls[: drop(balls, self._own, self._apart, roster.bodies.group)]
-        if len(boxes):
-            self._segment_keys, segments = self._filled(
-                self._segment_keys,
-                lambda room: near_segments(
-                    position, roster.radius, self.able, boxes.box, boxes.index, boxes.widest, margin, room
-                ),
-            )
-        return Candidates(balls if roster.meet.ball_ball else none, segments if len(boxes) else none)
+        """Return the pairs worth a look at (N, ≥ 2) poses, m: none nearer than the margin, m, is left out."""
 
     def _filled(self, room: IntArray, search: Callable[[IntArray], tuple[int, int]]) -> tuple[IntArray, IntArray]:
         """Return what a search finds, sorted, and the room that it took: more where there was too little."""
@@ -103,47 +81,13 @@ class Finder:
         self.work["contacts"] += size
         return self._out.of(slice(0, size)) if size else self._none
 
+    @abstractmethod
     def _looked(self, position: FloatArray, near: Candidates, reach: float) -> int:
         """Write the contacts as far as there is room; return how many there are."""
-        roster, fixtures, size = self._roster, self._roster.fixtures, 0
-        radius, surface, other = roster.radius, roster.surface, roster.fixed_surface
-        if len(near.balls):
-            size = meet_balls(near.balls, position, radius, surface, *self._tables, reach, self._out, size)
-        if self._planes:
-            things = fixtures.planes, fixtures.plane_thing, other
-            size = meet_planes(position, radius, self.able, surface, *things, *self._tables, reach, self._out, size)
-        if len(near.segments):
-            walls = fixtures.segments, fixtures.segment_thing, other
-            size = meet_segments(
-                near.segments, position, radius, surface, *walls, *self._tables, reach, self._out, size
-            )
-        return size
 
+    @abstractmethod
     def farthest(self, start: FloatArray, end: FloatArray) -> float:
-        """Return the longest way, m, between two sets of (N, ≥ 2) centres, of those that can touch anything."""
-        way = (end - start)[self.able, :2]
-        return float(np.sqrt((way * way).sum(axis=1)).max(initial=0.0))
-
-    def first_touch(self, start: FloatArray, end: FloatArray, rest: IntArray) -> tuple[float, int]:
-        """Return the share of straight ways at which a pair first touches, and its key; −1 for none.
-
-        Pairs whose keys are in `rest`, ascending, are left out.
-        """
-        roster = self._roster
-        near = self.candidates(start, 2.0 * self.farthest(start, end))
-        self.work["narrow_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
-        planes, segments = roster.fixtures.planes, roster.fixtures.segments
-        share, key = first_touch(
-            start, end, roster.radius, self.able, near.balls, planes, near.segments, segments, rest
-        )  # fmt: skip
-        return float(share), int(key)
-
-    def only(self, position: FloatArray, key: int) -> Manifolds:
-        """Return the manifold of one pair, whether it overlaps or not."""
-        balls = np.array([key] if key >> KIND == 0 else [], np.int64)
-        segments = np.array([key - (2 << KIND)] if key >> KIND == 2 else [], np.int64)
-        contacts = self.manifolds(position, Candidates(balls, segments), np.inf)
-        return contacts.of(contacts.key == key)
+        """Return the longest way, m, of any point of those that can touch anything, between two sets of poses."""
 
     def overlaps(self, position: FloatArray) -> Manifolds:
         """Return all contacts at (N, ≥ 2) positions, m. They are good until the next look."""

@@ -64,28 +64,13 @@ def drop_apart(keys: IntArray, offset: int, box: FloatArray, margin: float) -> i
 
 
 @kernel
-def meet_bodies(
-    keys: IntArray,
-    hulls: Hulls,
-    position: FloatArray,
-    look: Look,
-    out: Manifolds,
-    at: int,
-) -> int:
+def meet_bodies(keys: IntArray, hulls: Hulls, position: FloatArray, look: Look, out: Manifolds, at: int) -> int:
     """Write the pairs of pieces that are near from row `at` on; return the next free row."""
-    body, surface, scratch = hulls.body, hulls.surface, look.scratch
     for k in range(len(keys)):
         p, q = keys[k] >> FIRST, keys[k] & SECOND
-        count = meet_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, scratch)
-        for n in range(count):
-            if at < len(out.key):
-                i, j = body[p], body[q]
-                out.key[at] = 2 * keys[k] + int(scratch[n, 5])
-                out.first[at], out.second[at] = i, j
-                _place(out, at, scratch, n, position[i, 0], position[i, 1], position[j, 0], position[j, 1])
-                out.coefficient[at, 0] = look.restitution[surface[p], surface[q]]
-                out.coefficient[at, 1] = look.friction[surface[p], surface[q]]
-            at += 1
+        j = hulls.body[q]
+        count = meet_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, look.scratch)
+        at = _write(hulls, look, count, 2 * keys[k], p, j, hulls.surface[q], position, out, at)
     return at
 
 
@@ -102,23 +87,16 @@ def meet_half_planes(
     at: int,
 ) -> int:
     """Write the pieces near half-planes from row `at` on; return the next free row."""
-    body, surface, scratch = hulls.body, hulls.surface, look.scratch
-    for p in range(len(body)):
+    for p in range(len(hulls.body)):
         if not able[p]:
             continue
-        i = body[p]
         for s in range(len(planes)):
             px, py, nx, ny = planes[s, 0], planes[s, 1], planes[s, 2], planes[s, 3]
-            count = meet_half_plane(hulls.corner, hulls.first, hulls.radius, p, px, py, nx, ny, look.reach, scratch)
-            for n in range(count):
-                if at < len(out.key):
-                    other = thing_surface[thing[s]]
-                    out.key[at] = (1 << KIND) + 2 * pair_key(p, s) + int(scratch[n, 5])
-                    out.first[at], out.second[at] = i, -1 - thing[s]
-                    _place(out, at, scratch, n, position[i, 0], position[i, 1], px, py)
-                    out.coefficient[at, 0] = look.restitution[surface[p], other]
-                    out.coefficient[at, 1] = look.friction[surface[p], other]
-                at += 1
+            count = meet_half_plane(
+                hulls.corner, hulls.first, hulls.radius, p, px, py, nx, ny, look.reach, look.scratch
+            )
+            key, other = (1 << KIND) + 2 * pair_key(p, s), thing_surface[thing[s]]
+            at = _write(hulls, look, count, key, p, -1 - thing[s], other, position, out, at)
     return at
 
 
@@ -134,31 +112,62 @@ def meet_fixed_segments(
     at: int,
 ) -> int:
     """Write the pieces near segments from row `at` on; return the next free row."""
-    body, surface, scratch = hulls.body, hulls.surface, look.scratch
     for k in range(len(keys)):
         p, s = keys[k] >> FIRST, keys[k] & SECOND
-        count = meet_pieces(hulls.corner, hulls.first, hulls.radius, p, len(body) + s, look.reach, scratch)
-        for n in range(count):
-            if at < len(out.key):
-                i, other = body[p], thing_surface[thing[s]]
-                out.key[at] = (2 << KIND) + 2 * keys[k] + int(scratch[n, 5])
-                out.first[at], out.second[at] = i, -1 - thing[s]
-                _place(out, at, scratch, n, position[i, 0], position[i, 1], scratch[n, 3], scratch[n, 4])
-                out.coefficient[at, 0] = look.restitution[surface[p], other]
-                out.coefficient[at, 1] = look.friction[surface[p], other]
-            at += 1
+        q = len(hulls.body) + s
+        count = meet_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, look.scratch)
+        key, other = (2 << KIND) + 2 * keys[k], thing_surface[thing[s]]
+        at = _write(hulls, look, count, key, p, -1 - thing[s], other, position, out, at)
     return at
 
 
 @kernel
-def _place(out: Manifolds, at: int, scratch: FloatArray, n: int, ax: float, ay: float, bx: float, by: float) -> None:
-    """Write a point as two centres see it: the lever of each ends on its own surface."""
-    nx, ny, separation, x, y = scratch[n, 0], scratch[n, 1], scratch[n, 2], scratch[n, 3], scratch[n, 4]
-    out.normal[at, 0], out.normal[at, 1] = nx, ny
-    out.separation[at] = separation
-    out.point[at, 0], out.point[at, 1] = x, y
-    half = 0.5 * separation
-    out.arm[at, 0] = (x - ax) * nx + (y - ay) * ny - half
-    out.arm[at, 1] = (bx - x) * nx + (by - y) * ny - half
-    out.offset[at, 0] = (y - ay) * nx - (x - ax) * ny
-    out.offset[at, 1] = (y - by) * nx - (x - bx) * ny
+def _write(
+    hulls: Hulls,
+    look: Look,
+    count: int,
+    key: int,
+    p: int,
+    second: int,
+    other: int,
+    position: FloatArray,
+    out: Manifolds,
+    at: int,
+) -> int:
+    """Write the points found in `look.scratch` from row `at` on, as far as there is room; return the next free row.
+
+    Args:
+        hulls: the pieces.
+        look: with the points of two of them.
+        count: how many points.
+        key: of the pair, its lowest bit left for the point.
+        p: the first piece.
+        second: number of the second body, or −1 − k.
+        other: surface of the second.
+        position: (N, ≥ 2) m, of bodies.
+        out: where to.
+        at: from where on.
+    """
+    i, surface = hulls.body[p], hulls.surface[p]
+    ax, ay = position[i, 0], position[i, 1]
+    for n in range(count):
+        if at < len(out.key):
+            nx, ny, separation = look.scratch[n, 0], look.scratch[n, 1], look.scratch[n, 2]
+            x, y, half = look.scratch[n, 3], look.scratch[n, 4], 0.5 * separation
+            bx, by = x, y  # what is fixed has no centre to turn about
+            if second >= 0:
+                bx, by = position[second, 0], position[second, 1]
+            out.key[at] = key + int(look.scratch[n, 5])
+            out.first[at], out.second[at] = i, second
+            out.normal[at, 0], out.normal[at, 1] = nx, ny
+            out.separation[at] = separation
+            out.point[at, 0], out.point[at, 1] = x, y
+            # The lever of each ends on its own surface.
+            out.arm[at, 0] = (x - ax) * nx + (y - ay) * ny - half
+            out.arm[at, 1] = (bx - x) * nx + (by - y) * ny - half
+            out.offset[at, 0] = (y - ay) * nx - (x - ax) * ny
+            out.offset[at, 1] = (y - by) * nx - (x - bx) * ny
+            out.coefficient[at, 0] = look.restitution[surface, other]
+            out.coefficient[at, 1] = look.friction[surface, other]
+        at += 1
+    return at

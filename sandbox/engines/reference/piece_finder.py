@@ -7,7 +7,6 @@ long, as a disc around them holds mostly nothing.
 import numpy as np
 
 from sandbox.engines.reference.finder import Candidates, Finder
-from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.piece_contacts import (
     Look,
     drop,
@@ -98,19 +97,3 @@ class PieceFinder(Finder):
         if way.shape[1] == 3:
             length += np.abs(way[:, 2]) * self._roster.radius[self.able]
         return float(length.max(initial=0.0))
-
-    def first_touch(self, start: FloatArray, end: FloatArray, rest: IntArray) -> tuple[float, int]:
-        """Not known for polygons.
-
-        Raises:
-            NotImplementedError: always; the engine refuses what would ask for it.
-        """
-        raise NotImplementedError("a time of impact in closed form is known for balls alone")
-
-    def only(self, position: FloatArray, key: int) -> Manifolds:
-        """Not asked for without a first touch.
-
-        Raises:
-            NotImplementedError: always.
-        """
-        raise NotImplementedError("a time of impact in closed form is known for balls alone")

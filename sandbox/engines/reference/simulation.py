@@ -4,13 +4,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sandbox.action import Action
+from sandbox.action import Action, ActionError, Spawn
 from sandbox.engines.acting import perform
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.kernel import tell_if_slow
 from sandbox.engines.ledger import ContactLedger
 from sandbox.engines.limits import BEYOND
 from sandbox.engines.reference.detection import DETECTIONS
+from sandbox.engines.reference.engine import BALLS_ALONE
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.motion import State
 from sandbox.engines.reference.stage import Stage
@@ -18,7 +19,7 @@ from sandbox.engines.roster import Roster
 from sandbox.engines.running import Running
 from sandbox.engines.touching import NOTHING, Touching
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
+from sandbox.scene.model import Disc, Scene, Single
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
 
@@ -137,10 +138,21 @@ class ReferenceSimulation(Running):
         """
         with self._turn:
             self._check_running()
+            if isinstance(action, Spawn):
+                self._check_shape(action.single)
             leaving = perform(action, self._roster)
             if leaving is not None:
                 self._take_out(np.asarray([leaving]))
             self._stage.enter()
+
+    def _check_shape(self, single: Single) -> None:
+        """Refuse a body that the chosen detection knows nothing of.
+
+        Raises:
+            ActionError: it does not.
+        """
+        if self._settings.detection == "swept" and single.collides != "none" and not isinstance(single, Disc):
+            raise ActionError(BALLS_ALONE)
 
     def frame(self) -> Frame:
         """Return the present state."""

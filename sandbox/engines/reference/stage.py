@@ -13,6 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
+from sandbox.engines.reference.ball_finder import BallFinder
 from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.impulses import approach, remembered, solve_overlaps, solve_velocities
 from sandbox.engines.reference.integrators import INTEGRATORS
@@ -62,7 +63,7 @@ class Stage:
 
     def _new_finder(self) -> Finder:
         assert self._settings.broad_phase
-        kind = PieceFinder if self._roster.meet.solids else Finder
+        kind = PieceFinder if self._roster.meet.solids else BallFinder
         return kind(self._roster, self._settings.broad_phase)
 
     def _joint_solver(self) -> JointSolver | None:

@@ -9,7 +9,7 @@ import numpy as np
 import pygame
 
 from sandbox.action import ActionError, Spawn, actions_from_json, in_order
-from sandbox.measure.potential import parted
+from sandbox.play.breaks import broken_by
 from sandbox.play.camera import Box, Camera
 from sandbox.play.drawing.palette import FAINT, INK
 from sandbox.play.drawing.picture import Picture
@@ -124,7 +124,7 @@ class Film:
             trails=self._trails(frame, TRAIL * speed) if "trails" in overlays else (),
             overlapping=overlapping(self.scene, self.bodies, frame) if by_contact else None,
             flashes=tuple(self._flashes(time, FLASH * speed, speed)),
-            broken=np.flatnonzero(parted(self.breaks, np.asarray([time]))[0]).tolist(),
+            broken=broken_by(self.breaks, time),
         )
 
     def contacts(self, time: float, speed: float = 1.0) -> Contacts:

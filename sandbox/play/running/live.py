@@ -3,12 +3,10 @@
 from collections.abc import Iterator
 from time import perf_counter
 
-import numpy as np
-
 from sandbox.action import Action, ActionError, Launch
 from sandbox.engines.compiling import COMPILING
 from sandbox.measure.energy import energy_of
-from sandbox.measure.potential import parted
+from sandbox.play.breaks import BreakNotes, broken_by
 from sandbox.play.footage.film import Film
 from sandbox.play.picking import overlapping
 from sandbox.play.running.between import between
@@ -27,8 +25,6 @@ LEAST, MOST = 0.012, 0.03
 scene is slower than asked."""
 SLICE = 0.04
 """s of each picture that the way to another step may take"""
-TELL_EVERY = 1.0
-"""s of the scene between two notes on broken joints"""
 
 
 class Live:
@@ -46,12 +42,11 @@ class Live:
         self.pace = Pace()
         self.company = Company(session, ghost)
         self._seeking: Iterator[float] | None = None
-        self._share_done, self._target = 0.0, 0
-        self._worked = 0.0
+        self._share_done, self._target, self._worked = 0.0, 0, 0.0
         self._contacts, self._since = session.contacts(), session.settings.dt
         self._seed = session.scene.world.seed
         self._told_end = False
-        self._told_breaks, self._told_at = 0, 0.0
+        self._breaks = BreakNotes()
         self._until = until
         self.wants_pause = False
         """It has come to the end of what was recorded; whoever pauses it takes this back."""
@@ -143,21 +138,11 @@ class Live:
         if made:
             self._contacts, self._since = self.session.contacts(), self.session.time - before
             self.company.advance(self.session.redone())
-            self._tell_breaks()
+            self.company.notes += self._breaks.told(len(self.session.relay.broken), self.session.time)
         if self.session.ended is not None and not self._told_end:
             self._told_end = True
             self.company.notes.append(("error", self.session.ended))
         return made
-
-    def _tell_breaks(self) -> None:
-        """Say how many joints broke, the first at once, then once a second: a cloth tears on and on."""
-        broken, now = len(self.session.relay.broken), self.session.time
-        if broken < self._told_breaks or now < self._told_at:  # it has gone back
-            self._told_breaks, self._told_at = broken, now
-        more = broken - self._told_breaks
-        if more and (self._told_breaks == 0 or now >= self._told_at + TELL_EVERY):
-            self.company.notes.append(("info", "a joint broke" if more == 1 else f"{more:,} joints broke"))
-            self._told_breaks, self._told_at = broken, now
 
     def act(self, action: Action) -> None:
         """Do something now.
@@ -165,8 +150,7 @@ class Live:
         Raises:
             ActionError: it cannot be done. Nothing has changed then.
         """
-        if self._seeking is not None:
-            raise ActionError("wait until the way back is done")
+        self._check_there()
         done = self.session.act(action)
         self.company.did(done)
         self._contacts = self.session.contacts()
@@ -187,11 +171,14 @@ class Live:
         Raises:
             ActionError: it cannot go on from here.
         """
-        if self._seeking is not None:
-            raise ActionError("wait until the way back is done")
+        self._check_there()
         told = switch(self.session, engine)
         self._begin(anew=True)
         return told
+
+    def _check_there(self) -> None:
+        if self._seeking is not None:
+            raise ActionError("wait until the way back is done")
 
     def seek(self, step: int) -> None:
         """Set out for another step. It is reached in parts, one a picture; meanwhile what is known nearest is seen."""
@@ -274,8 +261,7 @@ class Live:
 
     def energy(self) -> tuple[float, float, float]:
         """Return the kinetic, potential and total energy, J."""
-        session = self.session
-        return energy_of(self.frame, self.bodies, session.scene.world.gravity, session.scene, session.breaks)
+        return energy_of(self.frame, self.bodies, self.scene.world.gravity, self.scene, self.session.breaks)
 
     def sight(
         self,
@@ -292,7 +278,6 @@ class Live:
         """
         session, present = self.session, self._peek is None
         frame = between(session.previous, session.frame, self.between_steps) if present else self.frame
-        shows = session.scene.play.show == "overlap"
         return Sight(
             scene=session.scene,
             bodies=self.bodies,
@@ -302,17 +287,14 @@ class Live:
             seconds=self._since,
             ghost=self.company.ghost_frame if present else None,
             trails=self.company.trails.pieces() if "trails" in overlays and present else (),
-            overlapping=overlapping(session.scene, self.bodies, frame) if shows else None,
+            overlapping=overlapping(session.scene, self.bodies, frame)
+            if session.scene.play.show == "overlap"
+            else None,
             flashes=self.company.flashes,
             picked=picked,
             pull=pull,
-            broken=self._broken(frame.time),
+            broken=broken_by(session.breaks, frame.time),
         )
-
-    def _broken(self, time: float) -> list[int]:
-        """Return the numbers of the joints that have broken by a time, s."""
-        breaks = self.session.breaks
-        return np.flatnonzero(parted(breaks, np.asarray([time]))[0]).tolist() if len(breaks) else []
 
     def close(self) -> None:
         """Release all engines."""

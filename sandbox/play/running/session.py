@@ -15,7 +15,6 @@ from time import perf_counter
 import numpy as np
 
 from sandbox.action import Action, ActionError
-from sandbox.engines.relay import joined
 from sandbox.play.running.course import Course
 from sandbox.play.running.history import History, Mark
 from sandbox.scene.bodies import Bodies
@@ -160,7 +159,7 @@ class Session(Course):
     def contacts(self) -> Contacts:
         """Return the contacts that were open since the last call."""
         parts, self._contacts = self._contacts, []
-        return joined(parts) if parts else Contacts.none()
+        return Contacts.joined(parts) if parts else Contacts.none()
 
     def act(self, action: Action) -> Action:
         """Do something now, whatever its time says, and remember it; what came later is forgotten.

@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pieces import EARTH, FLOOR, ball, running, scene_of, shipped, stepped
 
+from sandbox.action import ActionError, Spawn
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.reference.detection import DETECTIONS
 from sandbox.engines.reference.detection.resting import MOST_IMPACTS
+from sandbox.scene.model import Box
 
 UNSEEING, SEEING = ["discrete", "bisect"], ["swept", "shrink"]
 
@@ -313,3 +315,12 @@ def test_a_resting_ball_carries_its_weight_through_anothers_impacts(detection):
     contacts = simulation.contacts()
     (alone,) = contacts.impulse[(contacts.pair == (3, -1)).all(axis=1)]
     assert alone == pytest.approx([0.0, -9.81 * 5.0], rel=1e-9, abs=1e-9)  # 1 kg for 5 s, to how still it is
+
+
+def test_swept_takes_in_no_polygon_while_it_runs_but_what_meets_nothing():
+    simulation = running(scene_of(ball(0, 0, velocity=[1.0, 0.0])), detection="swept")
+    box = {"position": (1.0, 0.0), "size": (0.5, 0.5)}
+    with pytest.raises(ActionError, match="'swept' knows times of impact of balls alone"):
+        simulation.apply(Spawn(time=0.0, box=Box(**box)))
+    simulation.apply(Spawn(time=0.0, box=Box(**box, collides="none")))
+    assert stepped(simulation, 100).frame().velocity[0].tolist() == [1.0, 0.0]

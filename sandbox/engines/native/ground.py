@@ -1,0 +1,82 @@
+"""Ground: the planes, walls and posts of a scene in a pymunk space, and how far out planes are planes."""
+
+import math
+
+import numpy as np
+import pymunk
+
+from sandbox.engines.limits import FARTHEST, FASTEST
+from sandbox.engines.native.space import SurfaceSetter, category, fixed_shapes, reach_of
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+MANY = 5_000
+"""Shapes from which on they are added shuffled: pymunk's tree takes 30 s for 40,000 in a sorted line."""
+
+
+class Ground:
+    """What never moves, from the moment on that there is something to meet it."""
+
+    def __init__(self, space: pymunk.Space, setter: SurfaceSetter) -> None:
+        self._space, self._setter = space, setter
+        self._things: list[tuple[pymunk.Body, list[pymunk.Shape]]] = []
+        self.reach = math.inf
+        """m, how far from the middle of the scene planes are planes"""
+        self._middle, self._limit = np.zeros(6), np.full(6, math.inf)
+        self._laid = False
+
+    def lay(self, scene: Scene, bodies: Bodies, surface: IntArray) -> None:
+        """Add the fixed things of a scene, once; `surface` (F,) are theirs."""
+        if self._laid:
+            return
+        self._laid = True
+        starts, speeds = bodies.position[~bodies.fixed], np.hypot(*bodies.velocity[~bodies.fixed].T)
+        centre, reach = reach_of(scene, starts, speeds)
+        if scene.planes:
+            self._middle[0:2], self.reach = centre, reach
+        every: list[pymunk.Shape] = []
+        for thing, number in zip(scene.fixed, surface.tolist(), strict=True):
+            body = pymunk.Body(body_type=pymunk.Body.STATIC)
+            shapes = list(fixed_shapes(thing, body, centre, reach))
+            for shape in shapes:
+                shape.filter = category(True, "all")
+                self._setter.dress(shape, number)
+            self._space.add(body)
+            self._things.append((body, shapes))
+            every += shapes
+        for k in shuffled(len(every)):
+            self._space.add(every[k])
+        where = min(self.reach, FARTHEST)
+        self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
+
+    def dress(self, surface: IntArray) -> None:
+        """Give the fixed things their surfaces (F,) anew."""
+        for (_, shapes), number in zip(self._things, surface.tolist(), strict=False):
+            for shape in shapes:
+                self._setter.dress(shape, number)
+
+    @property
+    def ids(self) -> dict[int, int]:
+        """What each one's body id stands for: −1 − k."""
+        return {body.id: -1 - k for k, (body, _) in enumerate(self._things)}
+
+    @property
+    def several(self) -> bool:
+        """Whether one of them has several shapes, so that a body can touch it in several places at once."""
+        return any(len(shapes) > 1 for _, shapes in self._things)
+
+    def within(self, state: FloatArray) -> BoolArray:
+        """Tell which figures of states (R, 6), x, y, angle, vx, vy, ω, are within bounds; no nan is."""
+        return np.asarray(np.abs(state - self._middle) <= self._limit)
+
+    def reaches(self, place: FloatArray) -> bool:
+        """Tell whether planes are planes at a place; so they are until there are some."""
+        return bool((np.abs(place - self._middle[0:2]) <= self.reach).all())
+
+
+def shuffled(count: int) -> list[int]:
+    """Return the order in which to add so many shapes to a space."""
+    if count <= MANY:
+        return list(range(count))
+    return list(map(int, np.random.Generator(np.random.PCG64(0)).permutation(count)))
