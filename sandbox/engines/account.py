@@ -1,0 +1,60 @@
+"""Account: where the energy of a running scene went, by cause.
+
+    start + sum over all causes = end + residual
+
+A simulation keeps an account from the first time that it is asked for one; who never asks pays nothing. Each cause's
+entry is the energy that it has brought since, J, negative where it took some. Entries are computed from what each cause
+did (impulses times velocities, forces along ways), never as what is left over, so that the residual is a true check;
+only INTEGRATOR is a remainder, of free motion alone: what its energy changed by, less the work of the forces that act.
+"""
+
+from collections.abc import Mapping
+from enum import StrEnum
+
+
+class Cause(StrEnum):
+    """What can change the energy of a scene."""
+
+    RESTITUTION = "restitution"
+    """Impulses along the normals of contacts, as far as they take"""
+    FRICTION = "friction"
+    """Impulses along the surfaces of contacts, as far as they take"""
+    DRAG = "drag"
+    """Air, and wind, which may bring some"""
+    DAMPING = "damping"
+    """Dampers of springs"""
+    JOINTS = "joints"
+    """What holds joints, as far as it takes: ideally nothing"""
+    DRIVES = "drives"
+    """Thrusts, motors, steady forces, hands"""
+    CORRECTION = "position correction"
+    """Positions that are shifted to undo overlaps, or to follow velocities that contacts have changed"""
+    INTEGRATOR = "integrator"
+    """Free motion: what the energy changed by, less the work of drag, dampers and drives"""
+    PHANTOM = "phantom"
+    """Energy given by what can only take: contacts and joints"""
+    PARTED = "parted"
+    """Stored in springs that broke"""
+    ACTIONS = "actions"
+    """Bodies added, moved or kicked, knobs turned, while the scene ran"""
+    RETIRED = "retired"
+    """Bodies that were removed, left the bounds, or had lived their time, with all they had"""
+
+
+TAKES = frozenset({Cause.RESTITUTION, Cause.FRICTION, Cause.JOINTS})
+"""Causes that can only take; whatever one of them gives at once is phantom energy."""
+
+
+class Account:
+    """Energy by cause since the account was opened, J."""
+
+    def __init__(self) -> None:
+        self._entries = dict.fromkeys(Cause, 0.0)
+
+    def enter(self, cause: Cause, energy: float) -> None:
+        """Book what a cause brought at once: one substep's sum, or one impact's."""
+        self._entries[Cause.PHANTOM if energy > 0.0 and cause in TAKES else cause] += energy
+
+    def entries(self) -> Mapping[Cause, float]:
+        """Return what each cause has brought so far, J, in the order of `Cause`."""
+        return dict(self._entries)

@@ -1,0 +1,37 @@
+"""Point: one setting of one engine, with its error and its cost."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sandbox.scene.settings import Settings
+
+
+@dataclass(frozen=True)
+class Point:
+    """What one setting costs, and what it buys. What is unknown is None."""
+
+    engine: str
+    settings: Settings
+    """as the engine filled them in"""
+    changes: Mapping[str, Any]
+    """what differs from the scene's own `[solver]`"""
+    status: str
+    """`ok`, `diverged`, `failed`, `refused`, or `stopped` where it took too long"""
+    reason: str | None
+    """why it is not `ok`"""
+    metrics: Mapping[str, float | None]
+    """every metric by name, in its unit; over several seeds the worst"""
+    error: float | None
+    """of the metric that was asked for; None where the run gives none"""
+    cost: float | None
+    """ms per simulated second: the least of separate repeats, nothing recorded"""
+    cost_median: float | None
+    repeats: int
+    work: Mapping[str, int]
+    """deterministic counters: substeps, pair tests, contact iterations, events"""
+
+    @property
+    def usable(self) -> bool:
+        """Whether it has both figures, so that it can be weighed."""
+        return self.status == "ok" and self.error is not None and self.cost is not None
