@@ -1,23 +1,24 @@
 """`sandbox tradeoff`: error against cost over engines and settings, and the setting to take."""
 
-import json
 from pathlib import Path
 
 import click
 
-from sandbox.cli.folder import make_folder
+from sandbox.batch.plan import USUAL
+from sandbox.cli.folder import make_folder, require_folder, write_json
 from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
 from sandbox.cli.telling import telling
 from sandbox.cli.tradeoff_table import print_tradeoff
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.tradeoff.aim import UnknownMetricError, metric_named
+from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.weighed import Tradeoff
 from sandbox.measure.tradeoff.weighing import PATIENCE, POINTS, REPEATS, tradeoff
 from sandbox.scene.faults import Fault
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
-from sandbox.whole import whole
+from sandbox.scene.rewrite import write_solver
 
 POSITIVE = click.FloatRange(min=0.0, min_open=True)
 
@@ -26,7 +27,7 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True)
 @click.argument("scene")
 @click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="which engine(s); by default all")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
-@click.option("--metric", metavar="NAME", help="what the error is counted in; `--metric help` lists them")
+@click.option("--metric", metavar="NAME", help=f"what the error is counted in: {', '.join(METRICS)}")
 @click.option("--tolerance", type=click.FloatRange(min=0.0), metavar="X", help="error that is allowed, in its unit")
 @click.option("--budget", type=POSITIVE, metavar="MS", help="milliseconds a frame that may be spent")
 @click.option("--fps", type=POSITIVE, default=60.0, metavar="N", help="frames a second of the budget; by default 60")
@@ -74,6 +75,10 @@ def command(
         path = paths_of([scene])[0][1]
         require_scene(scene, path)
         read = load(path, overrides)
+    if write and overrides:
+        faults.append(Fault("--write", None, "", "the file lacks what --set changes; leave one of the two out"))
+    with gathering(faults):
+        require_folder(out)
     if out is not None and not faults:
         with gathering(faults):
             make_folder(out)
@@ -98,7 +103,7 @@ def command(
         for fault in faults:
             click.echo(str(fault), err=True)
         if as_json:
-            empty = {"truth": None, "metric": metric, "points": [], "pareto": []}
+            empty: dict[str, object] = {"truth": None, "metric": metric, "points": [], "pareto": []}
             nothing = {"within_tolerance": None, "within_budget": None, "faults": fault_rows(faults)}
             print_json({"scene": scene, **empty, **nothing})
         return 2
@@ -120,16 +125,31 @@ def _kept(
     plot: Path | None,
     silent: bool,
 ) -> int:
-    """Write what was asked for; return 2 where something cannot be written."""
-    status = 0
+    """Write what was asked for, and say so; return 2 where something cannot be written."""
+    faults: list[Fault] = []
+    if write and found.within_tolerance is not None:
+        with gathering(faults):
+            changed = write_solver(path, found.within_tolerance.point.changes)
+            _say(f"written: {path}" if changed else f"{path}: has the recommended [solver] already", silent)
+            engine = found.within_tolerance.point.engine
+            if engine != USUAL:
+                _say(f"run it with --engine {engine}", silent)
     try:
+        if plot is not None:
+            from sandbox.report.work_precision import plot_tradeoff
+
+            plot_tradeoff(document, plot)
+            _say(f"written: {plot}", silent)
         if out is not None:
-            with whole(out / "tradeoff.json") as temporary:
-                text = json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1)
-                temporary.write_text(text, encoding="utf-8")
-            if not silent:
-                click.echo(f"written: {out}")
+            write_json(document, out / "tradeoff.json")
+            _say(f"written: {out}", silent)
     except OSError as error:
-        click.echo(f"{error.filename or out}: {error.strerror or error}", err=True)
-        status = 2
-    return status
+        faults.append(Fault("--out" if plot is None else "--plot", None, "", f"{error.filename}: {error.strerror}"))
+    for fault in faults:
+        click.echo(str(fault), err=True)
+    return 2 if faults else 0
+
+
+def _say(text: str, silent: bool) -> None:
+    if not silent:
+        click.echo(text)

@@ -7,6 +7,7 @@ the time step's and the model's parts; the whole is at most their sum, and may b
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from time import perf_counter
 from typing import Any
 
 from pydantic import ValidationError
@@ -20,7 +21,7 @@ from sandbox.trajectory import Trajectory
 
 MANY_ITERATIONS = 16
 """How many times the iterations stand for infinitely many."""
-FINEST = 64
+FINEST = 16
 """How many times the substeps stand for a step of 0, if there is the time; else as many as there is time for."""
 
 
@@ -58,11 +59,11 @@ def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split 
         judge: gives scene and truth.
         engine: its name.
         asked: settings, choices left to the engine still open.
-        patience: s that one run may take.
+        patience: s that all runs together may take.
     """
     if judge.truth is None:
         return None
-    runs = _Runs(judge, engine, patience)
+    runs = _Runs(judge, engine, perf_counter() + patience)
     own = runs.of(asked)
     if own is None:
         return None
@@ -91,12 +92,16 @@ def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split 
 class _Runs:
     judge: Judge
     engine: str
-    patience: float
+    end: float
+    """of the patience, s, by the clock"""
 
     def of(self, settings: Settings) -> Trajectory | None:
         """Return a run that got to its end, or None."""
+        left = self.end - perf_counter()
+        if left <= 0.0:
+            return None
         try:
-            found = patient_run(self.judge.scene, self.engine, settings, self.patience)
+            found = patient_run(self.judge.scene, self.engine, settings, left)
         except TookTooLongError:
             return None
         return found if found.status == "ok" else None
