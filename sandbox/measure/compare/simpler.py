@@ -78,7 +78,7 @@ def shorter(document: Document, parting: float) -> Iterator[Document]:
     world = document.get("world", {})
     now = world.get("duration", 10.0)
     for digits in (1, 2):
-        for spare in (1.05, 1.5):
+        for spare in (1.0, 1.05, 1.5):
             end = _up(parting * spare, digits)
             if 0.0 < end < WORTH * now:
                 yield {**document, "world": {**world, "duration": end}}
