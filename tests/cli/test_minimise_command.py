@@ -95,6 +95,7 @@ def test_where_nobody_disagrees_it_says_so(engines: str, tmp_path: Path, capfd: 
 
 def test_an_engine_that_refuses_disagrees_with_nobody(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     box = "[world]\nduration = 0.02\n[[box]]\nposition = [0.0, 9.0]\nsize = [1.0, 1.0]\n"
+    box += "[[plane]]\npoint = [0.0, 0.0]\nnormal = [0.0, 1.0]\n"
     scene = written(tmp_path, box, "box.toml")
     status, _, err = lines_of(capfd, "compare", scene, *CHOICE)
     assert status == 1

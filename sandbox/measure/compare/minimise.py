@@ -30,6 +30,9 @@ MOST_RUNS = 1000
 PATIENCE = 300.0
 """s that it all may take; what is found by then counts."""
 
+SOONEST = 0.8
+"""The share of the time at which the scene given parts, before which a smaller one parts for another reason."""
+
 Told = Callable[[str], None]
 """Called with what is being done now."""
 
@@ -61,9 +64,10 @@ def minimise(
 ) -> Minimised:
     """Make a scene smaller for as long as a disagreement stays.
 
-    The tolerance stays what it was, whatever is left out. What is left need not part for the reason that the whole
-    scene did: a larger tolerance asks for a larger disagreement. Ctrl-C ends the search, as a bound does; before the
-    scene given has been tried, it passes through.
+    The tolerance stays what it was, whatever is left out. A scene that parts sooner than the one given has another
+    disagreement, as when a support is left out and a body falls; it does not count. Even so, what is left need not
+    part for the reason that the whole scene did: a larger tolerance asks for a larger disagreement. Ctrl-C ends the
+    search, as a bound does; before the scene given has been tried, it passes through.
 
     Args:
         scene: what to make smaller.
@@ -101,24 +105,30 @@ class Search:
     ) -> None:
         self.scene, self.parting, self.runs = scene, parting, 1
         self._asked, self._most_runs, self._end, self._told = disagreement, most_runs, end, told
+        self._given = scene, parting
+        self._soonest = SOONEST * parting.time
         self._known: dict[str, tuple[Scene, Parting] | None] = {}
         self._now: Spelled = spelled(scene, whole=True)
 
     def go(self) -> str | None:
         """Search; return why it ended before it was done, or None."""
+        ended: str | None = None
         try:
-            for whole in (False, True):
-                if self._take(spelled(self.scene, whole)):
-                    break
-            self._take_first(shorter(self._now.document, self.parting.time))  # all that follows is quicker then
-            self._prune()
-            self._simplify()
-            self._confirm()
-        except _EnoughError as error:
-            return str(error)
+            try:
+                self._smaller()
+            except _EnoughError as error:
+                ended = str(error)
+            return ended if self._is_confirmed() else "an engine's answer hangs on chance, so nothing was left out"
         except KeyboardInterrupt:
             return "interrupted"
-        return None
+
+    def _smaller(self) -> None:
+        for whole in (False, True):
+            if self._take(spelled(self.scene, whole)):
+                break
+        self._take_first(shorter(self._now.document, self.parting.time))  # all that follows is quicker then
+        self._prune()
+        self._simplify()
 
     def _take(self, candidate: Spelled) -> bool:
         """Try a scene; where it shows the disagreement, go on with it."""
@@ -151,7 +161,7 @@ class Search:
             raise _EnoughError("its time is over") from None
         except TooLargeError:
             return None
-        return None if parting is None else (scene, parting)
+        return None if parting is None or parting.time < self._soonest else (scene, parting)
 
     def _take_first(self, candidates: Iterable[Document]) -> bool:
         """Go on with the first that shows the disagreement."""
@@ -176,7 +186,7 @@ class Search:
         start, keys = self._now, optional(self._now.document)
         gone = frozenset(keys)
         least(keys, lambda kept: self._take(start.with_document(without_keys(start.document, gone - frozenset(kept)))))
-        self._take(self._now.without(unused(self._now.document)))
+        self._prune()  # without gravity nothing needs a floor
         for k, wall in enumerate(self._now.document.get("wall", ())):
             self._cut_corners(k, wall["points"])
         for kind, k in self._now.movers:
@@ -186,6 +196,7 @@ class Search:
         self._take_first(rounded(self._now.document, None))
         for kind, k in (*self._now.movers, *self._now.places(FIXED)):
             self._take_first(rounded(self._now.document, (kind, k)))
+        self._take_first(shorter(self._now.document, self.parting.time))
 
     def _cut_corners(self, k: int, points: Sequence[Any]) -> None:
         start = self._now.document
@@ -195,17 +206,12 @@ class Search:
     def _take_corners(self, document: Document, k: int, points: list[Any]) -> bool:
         return len(points) >= 2 and self._take(self._now.with_document(_with(document, "wall", k, "points", points)))
 
-    def _confirm(self) -> None:
-        """Read what will be written, and try once more.
-
-        Raises:
-            RuntimeError: it does not show what it did: an engine's answer hangs on chance.
-        """
+    def _is_confirmed(self) -> bool:
+        """Read what will be written, and try once more; where it does not part again, go back to the scene given."""
         scene = loads(dumps(self.scene))
         parting = self._asked.of(scene)
-        if parting is None:
-            raise RuntimeError("the smallest scene parted once, and not again: an engine's answer hangs on chance")
-        self.scene, self.parting = scene, parting
+        self.scene, self.parting = self._given if parting is None else (scene, parting)
+        return parting is not None
 
 
 def _with(document: Document, kind: str, k: int, key: str, value: Any) -> Document:

@@ -1,11 +1,12 @@
 """Minimising: what is left shows the disagreement, and nothing in it is idle."""
 
+import math
 from functools import cache
 
 import pytest
 
 from sandbox.measure.compare import disagreement as module
-from sandbox.measure.compare.disagreement import Disagreement
+from sandbox.measure.compare.disagreement import Disagreement, Parting
 from sandbox.measure.compare.minimise import Minimised, minimise
 from sandbox.measure.compare.spelled import spelled
 from sandbox.scene.bodies import COLUMNS
@@ -100,6 +101,28 @@ force = [0.0, 0.0]
 """
 """A spring lets a bob go, the rod and its two balls stay at rest."""
 
+ROLLING = """
+[world]
+gravity = [0.0, -10.0]
+duration = 1.0
+[[plane]]
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+[[wall]]
+name = "thin"
+points = [[5.0, -1.0], [5.0, 3.0]]
+[[ball]]
+name = "resting"
+position = [-9.0, 0.5]
+radius = 0.5
+[[ball]]
+name = "rolling"
+position = [-1.05, 0.01]
+velocity = [20.0, 0.0]
+radius = 0.01
+"""
+"""A ball rolls over a floor, 20 cm a step, and is through a wall at 0.31 s."""
+
 BOTH = Disagreement(["pymunk", "exact"], 1e-4)
 
 
@@ -189,6 +212,30 @@ def test_it_ends_at_its_bounds_with_what_it_has() -> None:
     found = least_of(TUNNEL, most_runs=5)
     assert (found.ended, found.runs) == ("5 scenes have been tried", 5)
     assert shows(found.scene)
+
+
+def test_an_answer_that_is_not_found_again_leaves_the_scene_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = Disagreement(BOTH.engines, BOTH.tolerance)
+    honest = asked.of
+
+    def fickle(scene: Scene, patience: float = math.inf) -> Parting | None:
+        return None if patience == math.inf else honest(scene, patience)  # only the last try has all the time
+
+    monkeypatch.setattr(asked, "of", fickle)
+    found = minimise(loads(TUNNEL), asked, most_runs=5)
+    assert (found.scene, found.bodies) == (loads(TUNNEL), (13, 13))
+    assert found.ended == "an engine's answer hangs on chance, so nothing was left out"
+
+
+def test_a_scene_that_parts_sooner_parts_for_another_reason() -> None:
+    # Without its floor the ball would fall, and in 0.1 s Euler's fall is g·h·T/2 = 5 mm behind.
+    asked = Disagreement(["pymunk", "exact"], 0.005)
+    found = least_of(ROLLING, asked)
+    assert (found.scene.bodies.names, found.scene.fixed_names) == (("rolling",), ("thin",))
+    assert found.scene.world.gravity == (0.0, 0.0)  # so the floor could go after all
+    assert found.parting is not None
+    assert found.parting.time >= 0.8 * 0.31
+    assert shows(found.scene, asked)
 
 
 def test_three_engines_are_no_disagreement() -> None:
