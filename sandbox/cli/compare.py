@@ -6,7 +6,8 @@ import click
 
 from sandbox.cli.comparison_table import print_comparison
 from sandbox.cli.folder import make_folder, require_folder, write_json
-from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json
+from sandbox.cli.minimising import faults_of, minimised
+from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
 from sandbox.cli.telling import telling
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.compare import Comparison, compare
@@ -28,6 +29,15 @@ from sandbox.scene.model import Scene
 )
 @click.option("--why", is_flag=True, help="rerun with one knob changed at a time, and say which one matters")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write plots and comparison.json")
+@click.option(
+    "--minimise",
+    is_flag=False,
+    flag_value="",
+    metavar="[FILE]",
+    help="leave out bodies while two engines, or one and the truth, still part, and write the smallest scene; "
+    "by default SCENE.min.toml here",
+)
+@click.option("--force", is_flag=True, help="let --minimise replace a file that exists")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 @click.option("--quiet", is_flag=True, help="no table, no progress")
 def command(
@@ -37,6 +47,8 @@ def command(
     tolerance: float | None,
     why: bool,
     out: Path | None,
+    minimise: str | None,
+    force: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -47,13 +59,22 @@ def command(
         with gathering(faults, "--engine", (UnknownEngineError,)):
             engine_named(name)
     read: Scene | None = None
+    path = ""
     with gathering(faults):
-        read = load(paths_of([scene])[0][1], overrides)
+        path = paths_of([scene])[0][1]
+        require_scene(scene, path)
+        read = load(path, overrides)
     with gathering(faults, "--tolerance", (ValueError,)):
         if tolerance == float("inf") or tolerance != tolerance:
             raise ValueError(f"{tolerance} m; a tolerance is finite")
     with gathering(faults):
         require_folder(out)
+
+    smallest = None if minimise is None else Path(minimise or f"{Path(path or scene).stem}.min.toml")
+    if smallest is not None:
+        faults += faults_of(smallest, path, force)
+    elif force:
+        faults.append(Fault("--force", None, "", "is of --minimise; there is nothing else to replace"))
 
     if out is not None and not faults:
         with gathering(faults):
@@ -76,10 +97,19 @@ def command(
             what = row.reason if row.status == "refused" else f"{row.engine} {row.status}: {row.reason}"
             click.echo(f"{scene}: {what}", err=True)
     document = comparison.document(scene)
+    if not as_json and not quiet:
+        print_comparison(scene, comparison, why, refusals=names is None)
+    if smallest is not None:
+        with telling(quiet or as_json) as told:
+            answer = minimised(scene, comparison, names, smallest, told)
+        document["minimised"] = answer.document
+        status = answer.status or status
+        if answer.status:
+            click.echo(answer.sentence, err=True)
+        elif not as_json and not quiet:
+            click.echo(answer.sentence)
     if as_json:
         print_json(document)
-    elif not quiet:
-        print_comparison(scene, comparison, why, refusals=names is None)
     if out is not None:
         try:
             _write(comparison, document, out)

@@ -46,9 +46,10 @@ off it; the starts of the second and of the instant in which events are being co
 NONE, SLIP_ENDS, EDGE, FLAT, KNOB, BALL = range(6)
 """Kinds of event, in the order in which those of one ball at one instant happen."""
 
-RECORDING, ROWS, EVENTS, IN_SECOND, AT_INSTANT, WHO, WHAT, WITH, BUDGET = range(9)
+RECORDING, ROWS, EVENTS, IN_SECOND, AT_INSTANT, WHO, WHAT, WITH, BUDGET, PREDICTIONS, PAIR_TESTS = range(11)
 """Places of `count`: whether contacts are logged, how many rows there are; events so far, in the present second and
-instant; the last event's ball, kind and partner; how many events a second may have."""
+instant; the last event's ball, kind and partner; how many events a second may have; how often a ball looked ahead,
+and at how many others, flats and knobs."""
 
 HOP_TIME, HOP_MOST = 5e-5, 5e-4
 """s and m/s: what would rest on a ball or on anything round hops instead, with g·HOP_TIME or HOP_MOST if that is less:
@@ -84,7 +85,7 @@ class Arena(NamedTuple):
     world: FloatArray
     """(7,)"""
     counts: IntArray
-    """(9,)"""
+    """(11,)"""
     log: FloatArray
     """(C, 7) time, point, normal, impulse"""
     log_pair: IntArray
@@ -115,7 +116,7 @@ def arena_of(roster: Roster) -> Arena:
         knobs=knobs,
         knob_tags=np.column_stack((knob_thing, knob_thing)),
         world=np.zeros(7),
-        counts=np.zeros(9, np.int64),
+        counts=np.zeros(11, np.int64),
         log=np.empty((0, 7)),
         log_pair=np.empty((0, 2), np.int64),
     )

@@ -28,6 +28,8 @@ from sandbox.engines.exact.arena import (
     LIGHTNESS,
     NOW,
     NOW_LATE,
+    PAIR_TESTS,
+    PREDICTIONS,
     RECORDING,
     ROWS,
     SINCE,
@@ -108,8 +110,13 @@ class ExactSimulation(Running):
 
     @property
     def work(self) -> Mapping[str, int]:
-        """What was done so far: events."""
-        return {"events": self.events}
+        """What was done so far: events, predictions, and at how many others, flats and knobs these looked."""
+        counts = self._arena.counts
+        return {
+            "events": self.events,
+            "predictions": int(counts[PREDICTIONS]),
+            "pair_tests": int(counts[PAIR_TESTS]),
+        }
 
     def step(self) -> None:
         """Advance by one dt.

@@ -144,6 +144,11 @@ class MeetingBodies:
             self._tethers.tie(links, lambda number: self._members[number].body, self._settings.bias)
 
     @property
+    def joined(self) -> int:
+        """How many joints there are that pymunk solves."""
+        return len(self._tethers) if self._moving else 0
+
+    @property
     def breakable(self) -> bool:
         """Whether some joint may break."""
         return self._tethers.breakable

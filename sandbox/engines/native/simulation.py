@@ -36,6 +36,7 @@ class NativeSimulation(Running):
         self._observer: Observer | None = None
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
+        self._work = {"contacts": 0, "contact_iterations": 0, "joint_iterations": 0}
         self._expiry = Expiry(scene.bodies, scene.began, settings.h)
         self._still: tuple[FloatArray, FloatArray] | None = None  # angles and spins, which frames share if they can
 
@@ -61,8 +62,12 @@ class NativeSimulation(Running):
 
     @property
     def work(self) -> Mapping[str, int]:
-        """What was done so far: substeps; pymunk does not tell how much it looks at."""
-        return {"substeps": self._steps * self._settings.substeps}
+        """What was done so far; pymunk does not tell how many pairs it looks at.
+
+        Its contacts, and with them `contact_iterations`, count only from the first call of `contacts` or `watch` on:
+        until then nobody asks pymunk for them.
+        """
+        return {"substeps": self.substeps, **self._work}
 
     @property
     def flying(self) -> int:
@@ -177,6 +182,7 @@ class NativeSimulation(Running):
         if fly:
             population.free.step()
         population.meeting.step(start)
+        self._work["joint_iterations"] += population.meeting.joined * self._settings.iterations
         population.changed()
         if population.meeting.breakable and look:
             self._broken |= dict.fromkeys(population.torn().tolist(), self._after(k + 1))
@@ -187,7 +193,10 @@ class NativeSimulation(Running):
 
     def _record(self, time: float) -> None:
         if self._ledger is not None:
-            self._ledger.record(time, self._population.meeting.touching())
+            now = self._population.meeting.touching()
+            self._work["contacts"] += len(now.a)
+            self._work["contact_iterations"] += len(now.a) * self._settings.iterations
+            self._ledger.record(time, now)
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the present arrays in scene order; they belong to the population."""

@@ -20,6 +20,9 @@ class Tethers:
         self._constraints: dict[int, pymunk.Constraint] = {}
         self._watch(Links.none())
 
+    def __len__(self) -> int:
+        return len(self._constraints)
+
     def tie(self, links: Links, body: Callable[[int], pymunk.Body], bias: float) -> None:
         """Join bodies as a scene says, once.
 
