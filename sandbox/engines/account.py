@@ -31,7 +31,7 @@ class Cause(StrEnum):
     DRIVES = "drives"
     """Thrusts, motors, steady forces, hands"""
     CORRECTION = "position correction"
-    """Positions that are shifted to undo overlaps"""
+    """Positions that are shifted to undo overlaps, or what is off in joints"""
     INTEGRATOR = "integrator"
     """Motion in steps: what the energy changed by, less the work of drag, dampers and drives; with how positions follow
     what contacts and joints do to velocities within a step"""

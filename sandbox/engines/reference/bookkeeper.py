@@ -7,8 +7,10 @@ give before it can answer. So its impulse J is booked with the mean of the veloc
 
 which is ½μ(1 − e²)u² for an impact, μ m g s for a slide, and nothing at all for what rests. The rest of what it did to
 the kinetic energy, J·(kick)/2, it took back from the integrator, and so did positions that follow velocities: both are
-the integrator's. An impact at a moment of its own is booked with the velocities just before and after it. What acts
-from afar, in the air or by design is booked with its work along the way that each body really went.
+the integrator's. Joints that are held by positions are booked likewise, by the velocities that they give; where they
+shift positions beyond what follows from those, that is position correction. An impact at a moment of its own is booked
+with the velocities just before and after it. What acts from afar, in the air or by design is booked with its work along
+the way that each body really went.
 """
 
 import math
@@ -91,6 +93,8 @@ class Bookkeeper(Idle):
         breaks[list(roster.broken)] = -np.inf
         self._potential = Potential(roster.scene, roster.bodies, breaks=breaks)
         self._no_spin: FloatArray = np.zeros(len(moving))
+        steady = bool(roster.force.any() or roster.torque.any())
+        self._worked = u.dragged or u.rubbing or steady or self._field.thrusting or penalty is not None
         self._compliant = joints is not None and joints.how == "xpbd"
 
     @contextmanager
@@ -168,7 +172,7 @@ class Bookkeeper(Idle):
     def _work(self, time: float, start: State, end: State, h: float) -> dict[Cause, float]:
         """Return the work, J, of what takes or gives along the way of a step, a parabola between its ends."""
         work = dict.fromkeys(Cause, 0.0)
-        if h <= 0.0:
+        if h <= 0.0 or not self._worked:
             return work
         off = end[0] - start[0] - (0.5 * h) * (start[1] + end[1])  # where the scheme leaves the parabola of its kick
         for share, weight in GAUSS:
