@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 if TYPE_CHECKING:  # a contract is for reading; engines that only refuse should not pay for its nouns
     from sandbox.action import Action
+    from sandbox.engines.account import Cause
     from sandbox.scene.bodies import Bodies
     from sandbox.scene.demands import Demand
     from sandbox.scene.model import Scene
@@ -127,6 +128,14 @@ class Simulation(Protocol):
 
         One that lasts keeps the time of its first touch, so a caller knows it again. Recording starts with
         the first call, which returns those that touch now: who never asks pays nothing.
+        """
+
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy, J, that each cause has brought since the first call; negative where it took some.
+
+        The first call opens the account, which is empty then: who never asks pays nothing. It changes no state. The
+        causes' sum is what the energy of `engines.energy.energy_of` changed by, but for a residual that is rounding
+        in the engines written by hand.
         """
 
     def watch(self, observer: Observer) -> None:
