@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 if TYPE_CHECKING:  # a contract is for reading; engines that only refuse should not pay for its nouns
     from sandbox.action import Action
+    from sandbox.engines.account import Cause
     from sandbox.scene.bodies import Bodies
     from sandbox.scene.demands import Demand
     from sandbox.scene.model import Scene
@@ -117,6 +118,13 @@ class Simulation(Protocol):
 
         One that lasts keeps the time of its first touch, so a caller knows it again. Recording starts with
         the first call, which returns those that touch now: who never asks pays nothing.
+        """
+
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy that each cause has brought since the first call, J.
+
+        The first call starts the accounting: who never asks pays nothing. The state stays bit-identical with and
+        without.
         """
 
     def watch(self, observer: Observer) -> None:
