@@ -18,7 +18,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
-LATER = frozenset({"broken_time"})
+LATER = frozenset({"broken_time", "energy", "account"})
 """Arrays of a trajectory that those stored by earlier versions lack."""
 
 
@@ -136,10 +136,15 @@ class Trajectory:
     """(M, 2) who should have touched, numbered as in `contact_pair`"""
     broken_time: FloatArray = field(default_factory=lambda: np.empty(0))
     """(J,) s, when a joint broke; nan where it did not. Empty where nothing is known of joints: none broke then"""
+    energy: FloatArray = field(default_factory=lambda: np.empty(0))
+    """(T,) J, of all bodies, under the gravity of each time; empty where no account was kept"""
+    account: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    """(T, K) J, what each cause, as in info's `causes`, has brought by then; empty where no account was kept"""
     info: Mapping[str, Any] = field(default_factory=dict)
     """What was run and how it went: scene (as a document), engine, settings, actions, seed, status, reason, steps,
     seconds, work, energy_start, energy_end, joint_error (the largest, as a part of a length; None without joints),
-    broken (how many joints), audited, state_hash (of the end), versions."""
+    broken (how many joints), audited, state_hash (of the end), versions; causes (names, where an account was
+    kept)."""
 
     @property
     def status(self) -> str:
@@ -182,7 +187,9 @@ class Trajectory:
 
     def at(self, frames: list[int]) -> Self:
         """Return the trajectory with only some of its frames, by their numbers."""
-        keys = ("time", "position", "velocity", "angle", "angular_velocity")
+        keys = ["time", "position", "velocity", "angle", "angular_velocity"]
+        if len(self.energy):
+            keys += ["energy", "account"]
         return replace(self, **{key: getattr(self, key)[frames] for key in keys})
 
     def save(self, path: str | Path) -> Path:

@@ -55,6 +55,10 @@ class Account:
         """Book what a cause brought at once: one substep's sum, or one impact's."""
         self._entries[Cause.PHANTOM if energy > 0.0 and cause in TAKES else cause] += energy
 
+    def add(self, cause: Cause, energy: float) -> None:
+        """Book without asking who may give: the sum of another account, or what a cause has lent or gets back."""
+        self._entries[cause] += energy
+
     def entries(self) -> Mapping[Cause, float]:
         """Return what each cause has brought so far, J, in the order of `Cause`."""
         return dict(self._entries)

@@ -121,10 +121,11 @@ class Simulation(Protocol):
         """
 
     def account(self) -> Mapping[Cause, float]:
-        """Return the energy that each cause has brought since the first call, J.
+        """Return the energy, J, that each cause has brought since the first call; negative where it took some.
 
-        The first call starts the accounting: who never asks pays nothing. The state stays bit-identical with and
-        without.
+        The first call opens the account, which is empty then: who never asks pays nothing. It changes no state. The
+        causes' sum is what the energy of `engines.energy.energy_of` changed by, but for a residual that is rounding
+        in the engines written by hand.
         """
 
     def watch(self, observer: Observer) -> None:

@@ -6,6 +6,7 @@ and time goes on. What engines remember beyond that state, such as the impulses 
 
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Self
@@ -13,6 +14,7 @@ from typing import Self
 from pydantic import ValidationError
 
 from sandbox.action import Action, ActionError, Force, Launch, Pull, Remove, SetParameter, Spawn, Switch, Throttle
+from sandbox.engines.account import Cause
 from sandbox.engines.checkpoint import Checkpoint
 from sandbox.engines.contract import Divergence, Exhaustion, Observer, Refusal
 from sandbox.engines.launch import launched
@@ -20,6 +22,7 @@ from sandbox.engines.leg import Leg, begun
 from sandbox.engines.pull import Pulls
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import start as start_engine
+from sandbox.engines.succession import Succession, total_energy
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene, default_name
 from sandbox.scene.settings import Settings
@@ -53,6 +56,7 @@ class Relay:
         self._throttles: dict[str, Throttle] = {}
         self._kept: list[Contacts] | None = None  # of earlier legs, since the last call; none before the first
         self._observer: Observer | None = None
+        self._account: Succession | None = None  # none before it is asked for
 
     def checkpoint(self) -> Checkpoint:
         """Return what `resumed` goes on from."""
@@ -90,7 +94,7 @@ class Relay:
         relay._retired, relay._broken, relay._work = dict(point.retired), dict(point.broken), Counter()
         relay._forces, relay._pulls = dict(point.forces), Pulls(point.pulls)
         relay._throttles = dict(point.throttles)
-        relay._kept, relay._observer = None, None
+        relay._kept, relay._observer, relay._account = None, None, None
         return relay
 
     @property
@@ -149,7 +153,7 @@ class Relay:
             Divergence: the state is not finite, or beyond all bounds.
             Exhaustion: the step asks for more than can be had.
         """
-        self._pulls.act(self._leg.simulation, self.settings.dt)
+        self._pull(self.settings.dt)
         self._leg.steps += 1
         try:
             self._leg.simulation.step()
@@ -166,7 +170,7 @@ class Relay:
             Divergence: as `step`.
             ValueError: there is no such part.
         """
-        self._pulls.act(self._leg.simulation, self.settings.dt * part)
+        self._pull(self.settings.dt * part)
         self._leg.steps += part
         try:
             self._leg.simulation.finish(part)
@@ -175,6 +179,11 @@ class Relay:
         except Exhaustion:
             self._leg.steps -= part
             raise
+
+    def _pull(self, h: float) -> None:
+        """Let hands draw bodies for a step of h, s."""
+        with self._account.hands() if self._account is not None else nullcontext():
+            self._pulls.act(self._leg.simulation, h)
 
     def _later(self, divergence: Divergence) -> Divergence:
         return Divergence(self.time, divergence.body, divergence.what)
@@ -244,7 +253,7 @@ class Relay:
             leg = begun(self.scene, engine, wanted, bodies, frame, lasting, broken)
         except (Refusal, UnknownEngineError) as refusal:
             raise ActionError(str(refusal)) from None
-        old = self._leg
+        old, before = self._leg, 0.0 if self._account is None else total_energy(self)
         if leg.simulation.settings.dt == old.simulation.settings.dt:  # so that frames go on to lie at k·dt
             leg.origin, leg.steps = old.origin, old.steps
         leg.simulation.patience = old.simulation.patience
@@ -258,6 +267,8 @@ class Relay:
         self._leg = leg
         if self._observer is not None:
             self._leg.watched_by(self._observer)
+        if self._account is not None:
+            self._account.pass_on(leg.simulation, total_energy(self) - before)
 
     def _acting(self) -> dict[str, Force]:
         """Return the steady forces on bodies that are there; on who has left they have ended."""
@@ -278,6 +289,12 @@ class Relay:
         kept, self._kept = self._kept or [], []
         found = self._leg.contacts()
         return Contacts.joined([*kept, found]) if kept else found
+
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy, J, that each cause has brought since the first call, over all engines that took part."""
+        if self._account is None:
+            self._account = Succession(self._leg.simulation)
+        return self._account.entries()
 
     def watch(self, observer: Observer) -> None:
         """Have an observer called after every substep."""

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import NoReturn
 
+from sandbox.engines.account import Cause
 from sandbox.engines.turn import Turn
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Frame
@@ -42,6 +43,10 @@ class Running(ABC):
     @abstractmethod
     def frame(self) -> Frame:
         """Return the present state."""
+
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy, J, that each cause has brought since the first call."""
+        raise NotImplementedError(f"{type(self).__name__} keeps no account of energy")
 
     def _after(self, substeps: int) -> float:
         """Return the time after so many substeps of the present step, s; after all of them, the next frame's."""

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.measure.potential import Potential
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray, FloatArray, Frame, Trajectory
+from sandbox.scene.potential import Potential
+from sandbox.trajectory import BoolArray, FloatArray, Trajectory
 
 CHUNK = 10_000_000
 """Frames × bodies worked on at once: a few arrays of 80 MB."""
@@ -31,7 +31,7 @@ def energies(
 
     A body counts from its first frame until it is retired; a fixed one counts nothing. Gravity, springs and
     attraction are the scene's; a spring counts until it breaks, as long as both its bodies do, and of one body half of
-    what it shares with another (`potential.Potential`). Where a run diverged, energy may be infinite or nan.
+    what it shares with another (`scene.potential.Potential`). Where a run diverged, energy may be infinite or nan.
 
     Args:
         trajectory: the run.
@@ -94,35 +94,3 @@ def _there(position: FloatArray, seen: BoolArray) -> BoolArray:
 
 def _sum(values: FloatArray, counts: BoolArray, weights: FloatArray) -> FloatArray:
     return np.asarray(np.where(counts, values, 0.0) @ weights)
-
-
-def energy_of(
-    frame: Frame,
-    bodies: Bodies,
-    gravity: tuple[float, float],
-    scene: Scene | None = None,
-    breaks: FloatArray | None = None,
-) -> tuple[float, float, float]:
-    """Return the kinetic, potential and total energy of one state, J; of those who are there and move.
-
-    Args:
-        frame: the state.
-        bodies: at least those of the frame, numbered alike.
-        gravity: m/s².
-        scene: whose springs and attractions count too; without, none do.
-        breaks: (J,) s, when each of the scene's joints broke; inf where it never did, without, none did.
-    """
-    count = len(frame.position)
-    counts = frame.present & ~bodies.fixed[:count]
-    mass, moment = bodies.mass[:count][counts], bodies.moment[:count][counts]
-    with np.errstate(over="ignore", invalid="ignore"):  # as above
-        squared = np.einsum("nk,nk->n", frame.velocity[counts], frame.velocity[counts])
-        kinetic = 0.5 * float(mass @ squared + moment @ np.square(frame.angular_velocity[counts]))
-        potential = -float(mass @ (frame.position[counts] @ np.asarray(gravity)))
-        if scene is not None:
-            known = bodies if count == len(bodies) else bodies.some(np.arange(count))
-            stored = Potential(scene, known, breaks=breaks)
-            if stored:
-                state = frame.position[None], frame.angle[None], frame.present[None]
-                potential += float(stored.at(np.asarray([frame.time]), *state)[0])
-        return kinetic, potential, kinetic + potential

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from sandbox.measure.potential import both_there, ends_over_time, parted, turned_by
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import LinkKind, Links
 from sandbox.scene.model import Scene
+from sandbox.scene.potential import both_there, ends_over_time, parted, turned_by
 from sandbox.trajectory import BoolArray, FloatArray, Trajectory
 
 CHUNK = 2_000_000

@@ -1,7 +1,7 @@
 """Recorder: arrays for the frames of a run, sized before it starts."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -16,6 +16,10 @@ BYTES_PER_BODY = 6 * 8
 
 SHARE = 0.6
 """of the free memory that the frames of a run may take"""
+
+
+Books = Callable[[], tuple[float, Sequence[float]]]
+"""Tells the present energy, J, and what each of K causes has brought by then."""
 
 
 class TooLargeError(ValueError):
@@ -72,8 +76,24 @@ def require_memory(scene: Scene, settings: Settings, bodies: int, actions: Seque
 class Recorder:
     """The kept frames of a run: every n-th, and the last."""
 
-    def __init__(self, scene: Scene, settings: Settings, bodies: int, actions: Sequence[Action] = ()) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings,
+        bodies: int,
+        actions: Sequence[Action] = (),
+        books: Books | None = None,
+        causes: int = 0,
+    ) -> None:
         """Allocate.
+
+        Args:
+            scene: what runs.
+            settings: with every choice filled in.
+            bodies: how many there will be.
+            actions: what happens on the way.
+            books: asked at every frame that is kept; none where no account is.
+            causes: K.
 
         Raises:
             TooLargeError: the frames would not fit.
@@ -85,6 +105,9 @@ class Recorder:
         # A body that is not there yet is nan.
         self.position, self.velocity = (np.full((kept, bodies, 2), np.nan) for _ in range(2))
         self.angle, self.angular_velocity = (np.full((kept, bodies), np.nan) for _ in range(2))
+        self._books = books
+        self._energy: FloatArray = np.empty(kept if books else 0)
+        self._account: FloatArray = np.empty((kept, causes) if books else (0, 0))
 
     def wants(self, step: int, last: bool) -> bool:
         """Tell whether the frame after so many steps is kept."""
@@ -106,10 +129,13 @@ class Recorder:
         self.time[k] = time
         self.position[k, :n], self.velocity[k, :n] = frame.position, frame.velocity
         self.angle[k, :n], self.angular_velocity[k, :n] = frame.angle, frame.angular_velocity
+        if self._books is not None:
+            self._energy[k], self._account[k] = self._books()
         self._count += 1
 
     def arrays(self, bodies: int) -> dict[str, FloatArray]:
         """Return what was kept of the first so many bodies."""
         names = ("position", "velocity", "angle", "angular_velocity")
         kept = {name: getattr(self, name)[: self._count, :bodies] for name in names}
-        return {"time": self.time[: self._count], **kept}
+        books = {"energy": self._energy[: self._count], "account": self._account[: self._count]}
+        return {"time": self.time[: self._count], **kept, **books}

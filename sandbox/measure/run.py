@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 
 from sandbox.action import Action, ActionError, Spawn, actions_to_json, in_order
+from sandbox.engines.account import Cause
 from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
 from sandbox.engines.registry import engine_named
 from sandbox.engines.relay import start
+from sandbox.engines.succession import total_energy
 from sandbox.measure.audit import Audit
 from sandbox.measure.energy import energies
 from sandbox.measure.joint_error import joint_error
-from sandbox.measure.recorder import Recorder, TooLargeError
+from sandbox.measure.recorder import Books, Recorder, TooLargeError
 from sandbox.measure.schedule import ROUNDING, Stretch, schedule
 from sandbox.measure.versions import versions
 from sandbox.scene.bodies import Bodies
@@ -36,6 +38,7 @@ def run(
     *,
     actions: Sequence[Action] = (),
     audit: bool = True,
+    account: bool = False,
     progress: Progress | None = None,
     **settings: Any,
 ) -> Trajectory:
@@ -47,6 +50,7 @@ def run(
         actions: what happens on the way; each takes effect before the first step that starts at its time or later,
             those of the very end after the last step.
         audit: count the contacts that the engine misses.
+        account: keep the account of energy at every frame, which `measure.ledger` reads.
         progress: who is told how far it is.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
@@ -73,7 +77,8 @@ def run(
         return _refused(scene, engine, wanted, actions, str(refusal))
     resolved = chosen.resolve(scene, wanted)
     spawned = sum(isinstance(action, Spawn) for action in actions)
-    recorder = Recorder(scene, resolved, len(scene.bodies) + spawned, actions)
+    books = _books(simulation) if account else None
+    recorder = Recorder(scene, resolved, len(scene.bodies) + spawned, actions, books, len(Cause))
     auditor = Auditor(scene, simulation) if audit else None
 
     began, compiled = perf_counter(), COMPILING.seconds
@@ -92,11 +97,22 @@ def run(
     outcome = {"status": status, "reason": reason, "steps": steps, "seconds": seconds, "work": work, "audited": audit}
     outcome |= {"state_hash": state_hash, "broken": len(simulation.broken)}
     info = _info(scene, engine, resolved, actions, **outcome)
+    if account:
+        info["causes"] = [cause.value for cause in Cause]
     trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, broken, missed, info)
     total = energies(trajectory.at([0, -1]), scene, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     info["joint_error"] = joint_error(trajectory, scene)
     return trajectory
+
+
+def _books(simulation: Simulation) -> Books:
+    """Return what tells the present energy of a simulation, J, and the entries of its account, in their order."""
+
+    def books() -> tuple[float, list[float]]:
+        return total_energy(simulation), list(simulation.account().values())
+
+    return books
 
 
 def _info(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, ...], **outcome: Any) -> dict[str, Any]:
@@ -118,7 +134,9 @@ def _refused(scene: Scene, engine: str, settings: Settings, actions: tuple[Actio
     outcome |= {"state_hash": None, "broken": 0}
     info = _info(scene, engine, settings, actions, **outcome, energy_start=None, energy_end=None, joint_error=None)
     shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
-    frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}
+    frames = {"time": np.empty(0), "energy": np.empty(0), "account": np.empty((0, 0))} | {
+        name: np.empty(shape) for name, shape in shapes.items()
+    }
     whole = np.full(len(scene.links), np.nan)
     return _trajectory(frames, scene.bodies, Contacts.none(), np.full(count, np.nan), whole, _no_misses(), info)
 
@@ -148,6 +166,8 @@ def _trajectory(
         missed_time=missed[0],
         missed_pair=missed[1],
         broken_time=broken_time,
+        energy=frames["energy"],
+        account=frames["account"],
         info=info,
     )
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sandbox.measure.potential import parted
+from sandbox.scene.potential import parted
 from sandbox.trajectory import FloatArray
 
 TELL_EVERY = 1.0

@@ -7,7 +7,8 @@ import pytest
 
 from sandbox.batch.outcome import execute
 from sandbox.batch.plan import Job
-from sandbox.measure.energy import energies, energy_of
+from sandbox.engines.energy import energy_of
+from sandbox.measure.energy import energies
 from sandbox.measure.joint_error import joint_error, joint_errors
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from test_energy import still
 
-from sandbox.measure.energy import energies, energy_of
+from sandbox.engines.energy import energy_of
+from sandbox.measure.energy import energies
 from sandbox.measure.run import run
 from sandbox.scene.file import loads
 from sandbox.trajectory import Frame

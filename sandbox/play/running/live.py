@@ -5,7 +5,7 @@ from time import perf_counter
 
 from sandbox.action import Action, ActionError, Launch
 from sandbox.engines.compiling import COMPILING
-from sandbox.measure.energy import energy_of
+from sandbox.engines.energy import energy_of
 from sandbox.play.breaks import BreakNotes, broken_by
 from sandbox.play.footage.film import Film
 from sandbox.play.picking import overlapping

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sandbox.measure.energy import energy_of
+from sandbox.engines.energy import energy_of
 from sandbox.play.footage.film import Film
 from sandbox.play.picking import overlapping
 from sandbox.play.running.pace import Pace

@@ -6,7 +6,7 @@ from sandbox.scene.bodies import Bodies
 from sandbox.scene.forces import Attraction
 from sandbox.scene.links import LinkKind, Links
 from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray, FloatArray, IntArray
+from sandbox.scene.near import BoolArray, FloatArray, IntArray
 
 ROUNDING = 1e-12
 """Share of a time."""
