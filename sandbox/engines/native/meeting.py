@@ -1,6 +1,7 @@
 """MeetingBodies: the bodies that can touch something, or are joined to something, in a pymunk space."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import pymunk
@@ -11,6 +12,7 @@ from sandbox.engines.native.field import Field
 from sandbox.engines.native.ground import Ground, shuffled
 from sandbox.engines.native.member import Member
 from sandbox.engines.native.memory import RememberedImpulses, without
+from sandbox.engines.native.points import PointReader, Points
 from sandbox.engines.native.reader import Reader
 from sandbox.engines.native.space import (
     SurfaceSetter,
@@ -47,6 +49,7 @@ class MeetingBodies:
         self._named: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
         self._remembered: RememberedImpulses | None = None
+        self._points: PointReader | None = None
         self.field = Field(scene)
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self._steady: dict[int, tuple[FloatArray, float]] = {}
@@ -223,11 +226,31 @@ class MeetingBodies:
         if not self._moving:
             return NOTHING
         found = self._reader.touching(self._polygons)
+        remembered = self._remember()
+        remembered.pairs = True
+        ids, impulses = remembered.take()
+        return without(found, self._reader.numbers(ids), impulses) if len(ids) else found
+
+    def _remember(self) -> RememberedImpulses:
         if self._remembered is None:
             self._remembered = RememberedImpulses(self._space)
-            return found
-        ids, impulses = self._remembered.take()
-        return without(found, self._reader.numbers(ids), impulses) if len(ids) else found
+        return self._remembered
+
+    def points(self) -> Points:
+        """Return the contact points of the last substep; from the first call on, their impulses add up."""
+        if self._points is None:
+            self._points = PointReader(self._space, self._remember())
+        return self._points.read({m.body._body: number for number, m in self._members.items() if m.moves})
+
+    @property
+    def tethers(self) -> Tethers:
+        """The joints that hold."""
+        return self._tethers
+
+    @property
+    def steady(self) -> Mapping[int, tuple[FloatArray, float]]:
+        """Steady forces, N, and torques, N·m, by the number of the body."""
+        return self._steady
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a body that is not finite or beyond all bounds, and what is the matter; else None."""

@@ -1,24 +1,17 @@
-"""Points: the impulses of a substep, contact point by contact point.
+"""Points: the impulses of a substep, contact point by contact point."""
 
-pymunk's public calls tell the impulse of a pair of shapes, which does not say what turned polygons that touch in two
-points. Munk2D's own record of a contact, which pymunk reads to pickle a space, does: its accumulated impulses, and
-the arms that they acted on.
-"""
-
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pymunk
-from pymunk.arbiter import Arbiter, ffi
 
+from sandbox.engines.native.hauls import Hauls
 from sandbox.engines.native.memory import RememberedImpulses
+from sandbox.engines.native.record import ARMS, IMPULSES, WIDTH, address_of, points_of
 from sandbox.trajectory import FloatArray, IntArray
 
 APART = 2
 """cpArbiterState from which on shapes do not touch: ignored, cached, invalidated."""
-
-WIDTH = 12
-"""Words of `cpContact`: two arms, two masses, bounce, impulses along the normal and to its left, three more, hash."""
 
 
 class Points(NamedTuple):
@@ -39,24 +32,39 @@ class Points(NamedTuple):
     across: FloatArray
     """(P,) impulse on b to the normal's left, N·s"""
 
+    def times(self, share: float) -> Self:
+        """Return a share of the impulses."""
+        return self._replace(along=self.along * share, across=self.across * share)
+
+    @property
+    def hauls(self) -> Hauls:
+        """The impulses as those of links."""
+        nx, ny = self.normal.T
+        impulse = np.column_stack((nx * self.along - ny * self.across, ny * self.along + nx * self.across))
+        return Hauls(self.a, self.b, self.arm_a, self.arm_b, impulse, np.zeros(len(self.a)))
+
+    def work(self, velocity: FloatArray, spin: FloatArray) -> tuple[float, float]:
+        """Return the work of impulses along normals and along surfaces, J, at mean velocities, as of `Hauls`."""
+        parting = self.hauls.parting(velocity, spin)
+        nx, ny = self.normal.T
+        out, left = nx * parting[:, 0] + ny * parting[:, 1], nx * parting[:, 1] - ny * parting[:, 0]
+        return float(self.along @ out), float(self.across @ left)
+
 
 class PointReader:
     """Reads the contact points of one space after each substep."""
 
     def __init__(self, space: pymunk.Space, remembered: RememberedImpulses) -> None:
-        self._space = space
-        self._remembered = remembered
-        self._number: dict[Any, int] = {}
+        self._space, self._remembered = space, remembered
         remembered.points = {}
 
-    def assign(self, moving: dict[int, pymunk.Body]) -> None:
-        """Say which number each moving body has; all others never move."""
-        self._number = {body._body: number for number, body in moving.items()}
+    def read(self, number: dict[Any, int]) -> Points:
+        """Return the points of the last substep, with the impulses that were applied in it.
 
-    def read(self) -> Points:
-        """Return the points of the last substep, with the impulses that were applied in it."""
-        begun, number = self._remembered.points, self._number
-        assert begun is not None
+        Args:
+            number: of each `cpBody` that moves; all others never do.
+        """
+        begun = self._remembered.points
         first: list[int] = []
         second: list[int] = []
         normal: list[tuple[float, float]] = []
@@ -64,9 +72,11 @@ class PointReader:
         for arbiter in self._space._get_arbiters():
             if arbiter.state >= APART:
                 continue
-            record = _record(arbiter)
-            if begun and int(ffi.cast("uintptr_t", arbiter)) in begun:
-                record[:, 7:9] -= begun[int(ffi.cast("uintptr_t", arbiter))]  # applied before they parted
+            record = points_of(arbiter)
+            if begun:
+                old = begun.get(address_of(arbiter))
+                if old is not None:
+                    record[:, IMPULSES] -= old  # applied before they parted
             records.append(record)
             a, b = number.get(arbiter.body_a, -1), number.get(arbiter.body_b, -1)
             n = arbiter.n.x, arbiter.n.y
@@ -74,25 +84,10 @@ class PointReader:
                 first.append(a)
                 second.append(b)
                 normal.append(n)
-        begun.clear()
+        if begun:
+            begun.clear()
         table = np.concatenate(records) if records else np.empty((0, WIDTH))
-        return Points(
-            np.asarray(first, np.int64),
-            np.asarray(second, np.int64),
-            table[:, 0:2],
-            table[:, 2:4],
-            np.asarray(normal).reshape(-1, 2),
-            table[:, 7],
-            table[:, 8],
-        )
-
-
-def impulses_of(arbiter: Arbiter) -> tuple[int, FloatArray]:
-    """Return where an arbiter lies, and the impulses (C, 2) that its contacts now have, N·s."""
-    pointer = arbiter._arbiter
-    return int(ffi.cast("uintptr_t", pointer)), _record(pointer)[:, 7:9]
-
-
-def _record(pointer: Any) -> FloatArray:
-    size = 8 * WIDTH * pointer.count
-    return np.frombuffer(ffi.buffer(pointer.contacts, size)[:]).reshape(-1, WIDTH).copy()
+        arms, impulses = table[:, ARMS], table[:, IMPULSES]
+        numbers = np.asarray(first, np.int64), np.asarray(second, np.int64)
+        normals = np.asarray(normal, np.float64).reshape(-1, 2)
+        return Points(*numbers, arms[:, :2], arms[:, 2:], normals, impulses[:, 0], impulses[:, 1])

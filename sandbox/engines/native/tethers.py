@@ -77,6 +77,18 @@ class Tethers:
             self._release(numbers.tolist())
         return numbers
 
+    @property
+    def held(self) -> Links:
+        """The links that are there, in order."""
+        return self._there
+
+    def impulses(self, links: Links) -> FloatArray:
+        """Return what pymunk tells of each of some links' impulses in the last substep, (K,) N·s or N·m·s.
+
+        Of joints it is the size, of springs what along them pushes apart.
+        """
+        return np.asarray([self._constraints[k].impulse for k in links.number.tolist()], dtype=np.float64)
+
     def _release(self, numbers: list[int]) -> None:
         if not numbers:
             return
@@ -87,6 +99,7 @@ class Tethers:
 
     def _watch(self, links: Links) -> None:
         """Sort out which of the links that are there may break."""
+        self._there = links
         some = links.some(np.isfinite(links.strength))
         kinds = LinkKind.SPRING, LinkKind.ROTARY_SPRING
         self._springs, self._rotary = some.of(kinds[0]), some.of(kinds[1])
