@@ -43,9 +43,19 @@ class Potential:
         self._fixed = bodies.fixed
         self._body = body
 
+    @property
+    def springs(self) -> bool:
+        """There are springs."""
+        return any(len(links) for links, _, _ in self._springs)
+
+    @property
+    def attracts(self) -> bool:
+        """There is attraction."""
+        return bool(self._attractions)
+
     def __bool__(self) -> bool:
         """Tell whether there is anything of it."""
-        return bool(self._attractions) or any(len(links) for links, _, _ in self._springs)
+        return self.attracts or self.springs
 
     def at(self, time: FloatArray, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
         """Return what is stored in each of T frames, (T,) J.
@@ -56,12 +66,21 @@ class Potential:
             angle: (T, N) rad.
             there: (T, N) who is; what held or attracted the others is no more.
         """
+        return self.of_springs(time, position, angle, there) + self.of_attraction(position, there)
+
+    def of_springs(self, time: FloatArray, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
+        """Return what springs store in each of T frames, (T,) J; the arguments are those of `at`."""
         stored = np.zeros(len(position))
         for links, breaks, strain in self._springs:
             if len(links):
                 energy = 0.5 * links.figures[:, 1] * np.square(strain(links, position, angle) - links.figures[:, 0])
                 holds = both_there(links, there) & ~parted(breaks, time)
                 stored += np.where(holds, energy, 0.0) @ self._share(links.a, links.b)
+        return stored
+
+    def of_attraction(self, position: FloatArray, there: BoolArray) -> FloatArray:
+        """Return what attraction stores in each of T frames, (T,) J; the arguments are those of `at`."""
+        stored = np.zeros(len(position))
         for attraction, toward in self._attractions:
             stored += self._attracted(attraction, toward, position, there)
         return stored

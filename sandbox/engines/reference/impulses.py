@@ -143,6 +143,32 @@ def _push(
 
 
 @kernel
+def contact_work(now: Manifolds, impulse: FloatArray, velocity: FloatArray, spin: FloatArray) -> tuple[float, float]:
+    """Return the work of impulses (K, 2), J, along the normals and across them.
+
+    Args:
+        now: K contacts.
+        impulse: (K, 2) N·s along the normal and along the normal turned left.
+        velocity: (N, ≥ 2) m/s, the mean of those before and after the impulses.
+        spin: (N,) rad/s, likewise.
+    """
+    along, across = 0.0, 0.0
+    for k in range(len(now.key)):
+        i, j = now.first[k], now.second[k]
+        nx, ny = now.normal[k, 0], now.normal[k, 1]
+        vx, vy = -velocity[i, 0], -velocity[i, 1]
+        rub, turn = -spin[i] * now.arm[k, 0], spin[i] * now.offset[k, 0]
+        if j >= 0:
+            vx += velocity[j, 0]
+            vy += velocity[j, 1]
+            rub -= spin[j] * now.arm[k, 1]
+            turn -= spin[j] * now.offset[k, 1]
+        along += impulse[k, 0] * (vx * nx + vy * ny + turn)
+        across += impulse[k, 1] * (vy * nx - vx * ny + rub)
+    return along, across
+
+
+@kernel
 def solve_overlaps(
     now: Manifolds,
     target: FloatArray,

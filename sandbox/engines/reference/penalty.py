@@ -6,7 +6,7 @@ from sandbox.engines.reference.finder import Candidates, Finder
 from sandbox.engines.reference.integrators import Step
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.motion import Inputs, State, transition
-from sandbox.engines.reference.springs import LEAST_RESTITUTION, damping_of, penalty_forces
+from sandbox.engines.reference.springs import LEAST_RESTITUTION, damping_of, penalty_forces, penalty_losses
 from sandbox.engines.roster import Roster
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
@@ -78,6 +78,17 @@ class Penalty:
         penalty_forces(
             contacts, row, rates, spin, roster.inverse_mass, roster.inverse_moment, self._stiffness, acceleration, turn
         )
+
+    def stored(self, pose: FloatArray) -> float:
+        """Return what the springs of all contacts at (N, ≥ 2) poses store, ½ k overlap² each, J."""
+        return 0.5 * self._stiffness * float(np.square(self._finder.overlaps(pose).separation).sum())
+
+    def losses(self, x: State) -> tuple[float, float]:
+        """Return the power, W, of all contacts in a state, along normals and across, less that of their springs."""
+        contacts, roster = self._finder.overlaps(x[0]), self._roster
+        spin = x[1, :, 2] if x.shape[2] == 3 else np.zeros((x.shape[1], 3))[:, 2]
+        inverse = roster.inverse_mass, roster.inverse_moment
+        return penalty_losses(contacts, x[1], spin, *inverse, self._stiffness)
 
     def _note(self, position: FloatArray, impulse: FloatArray, near: Candidates, reach: float) -> None:
         """Keep what was exchanged (K, 2) for whoever asks, also by those that have parted since."""

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from sandbox.action import Action, ActionError, Spawn
+from sandbox.engines.account import Cause
 from sandbox.engines.acting import perform
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.kernel import tell_if_slow
@@ -127,8 +128,9 @@ class ReferenceSimulation(Running):
             self._take_out(going)
 
     def _take_out(self, numbers: IntArray) -> None:
-        self._roster.take_out(numbers, self.time)
-        self._stage.enter()
+        with self._stage.books.doing(Cause.RETIRED):
+            self._roster.take_out(numbers, self.time)
+            self._stage.enter()
 
     def apply(self, action: Action) -> None:
         """Do what an action says, now.
@@ -140,10 +142,11 @@ class ReferenceSimulation(Running):
             self._check_running()
             if isinstance(action, Spawn):
                 self._check_shape(action.single)
-            leaving = perform(action, self._roster)
+            with self._stage.books.doing(Cause.ACTIONS):
+                leaving = perform(action, self._roster)
+                self._stage.enter()
             if leaving is not None:
                 self._take_out(np.asarray([leaving]))
-            self._stage.enter()
 
     def _check_shape(self, single: Single) -> None:
         """Refuse a body that the chosen detection knows nothing of.
@@ -168,6 +171,10 @@ class ReferenceSimulation(Running):
             now = self._stage.overlaps(self._stage.x)
             self._ledger.record(self.time, _touching(now, np.zeros((now.size, 2))))
         return self._ledger.take()
+
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy, J, that each cause has brought since the first call."""
+        return self._stage.open_account().entries()
 
     def watch(self, observer: Observer) -> None:
         """Have an observer called after every substep, and at every impact within one; this records contacts too."""

@@ -42,6 +42,64 @@ def damping_of(restitution: float) -> float:
 
 
 @kernel
+def _forces(
+    now: Manifolds,
+    k: int,
+    rates: FloatArray,
+    spin: FloatArray,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    stiffness: float,
+) -> tuple[float, float, float, float]:
+    """Return contact k's force along its normal and across, N, and how fast it parts and slips, m/s."""
+    i, j = now.first[k], now.second[k]
+    nx, ny = now.normal[k, 0], now.normal[k, 1]
+    a, b = now.arm[k, 0], now.arm[k, 1]
+    a_off, b_off = now.offset[k, 0], now.offset[k, 1]
+    mass = inverse_mass[i] + inverse_moment[i] * a_off * a_off
+    turning = inverse_moment[i] * (a * a - a_off * a_off)
+    vx, vy, rub = -rates[i, 0], -rates[i, 1], -spin[i] * a
+    roll = spin[i] * a_off
+    if j >= 0:
+        mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
+        turning += inverse_moment[j] * (b * b - b_off * b_off)
+        vx += rates[j, 0]
+        vy += rates[j, 1]
+        rub -= spin[j] * b
+        roll -= spin[j] * b_off
+    if mass == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    damper = 2.0 * now.coefficient[k, 0] * math.sqrt(stiffness / mass)
+    parting, slip = vx * nx + vy * ny + roll, vy * nx - vx * ny + rub
+    normal = max(-stiffness * now.separation[k] - damper * parting, 0.0)
+    most = now.coefficient[k, 1] * normal
+    # A viscous slope that damps slip as fast as the spring swings, so that it asks for no smaller step.
+    tangent = min(max(-math.sqrt(stiffness * mass) / (mass + turning) * slip, -most), most)
+    return normal, tangent, parting, slip
+
+
+@kernel
+def penalty_losses(
+    now: Manifolds,
+    rates: FloatArray,
+    spin: FloatArray,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    stiffness: float,
+) -> tuple[float, float]:
+    """Return the power, W, of dampers, and of forces that were cut short, along normals and across; never above 0.
+
+    Arguments as in `penalty_forces`.
+    """
+    along, across = 0.0, 0.0
+    for k in range(len(now.key)):
+        normal, tangent, parting, slip = _forces(now, k, rates, spin, inverse_mass, inverse_moment, stiffness)
+        along += (normal + stiffness * now.separation[k]) * parting
+        across += tangent * slip
+    return along, across
+
+
+@kernel
 def penalty_forces(
     now: Manifolds,
     row: IntArray,
@@ -71,25 +129,7 @@ def penalty_forces(
         nx, ny = now.normal[k, 0], now.normal[k, 1]
         a, b = now.arm[k, 0], now.arm[k, 1]
         a_off, b_off = now.offset[k, 0], now.offset[k, 1]
-        mass = inverse_mass[i] + inverse_moment[i] * a_off * a_off
-        turning = inverse_moment[i] * (a * a - a_off * a_off)
-        vx, vy, rub = -rates[i, 0], -rates[i, 1], -spin[i] * a
-        roll = spin[i] * a_off
-        if j >= 0:
-            mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
-            turning += inverse_moment[j] * (b * b - b_off * b_off)
-            vx += rates[j, 0]
-            vy += rates[j, 1]
-            rub -= spin[j] * b
-            roll -= spin[j] * b_off
-        if mass == 0.0:
-            continue
-        damper = 2.0 * now.coefficient[k, 0] * math.sqrt(stiffness / mass)
-        normal = max(-stiffness * now.separation[k] - damper * (vx * nx + vy * ny + roll), 0.0)
-        slip = vy * nx - vx * ny + rub
-        most = now.coefficient[k, 1] * normal
-        # A viscous slope that damps slip as fast as the spring swings, so that it asks for no smaller step.
-        tangent = min(max(-math.sqrt(stiffness * mass) / (mass + turning) * slip, -most), most)
+        normal, tangent, _, _ = _forces(now, k, rates, spin, inverse_mass, inverse_moment, stiffness)
         x, y = nx * normal - ny * tangent, nx * tangent + ny * normal
         acceleration[i, 0] -= inverse_mass[i] * x
         acceleration[i, 1] -= inverse_mass[i] * y

@@ -13,7 +13,9 @@ from typing import Protocol
 
 import numpy as np
 
+from sandbox.engines.account import Account, Cause
 from sandbox.engines.reference.ball_finder import BallFinder
+from sandbox.engines.reference.bookkeeper import Bookkeeper, Idle
 from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.impulses import approach, remembered, solve_overlaps, solve_velocities
 from sandbox.engines.reference.integrators import INTEGRATORS
@@ -45,6 +47,7 @@ class Stage:
     def __init__(self, roster: Roster, settings: Settings) -> None:
         assert settings.integrator and settings.broad_phase and settings.slop is not None and settings.bias is not None
         self._roster, self._settings = roster, settings
+        self.books = Idle()
         self._slop, self._bias = settings.slop, settings.bias
         self._integrator = INTEGRATORS[settings.integrator]
         self._links = roster.scene.links
@@ -60,6 +63,18 @@ class Stage:
         self.push: FloatArray = np.zeros((0, 3))
         """(N, 3) m/s and rad/s, by which overlap is undone in the next substep"""
         self.enter()
+
+    def open_account(self) -> Account:
+        """Return the account of energy, opened by the first call."""
+        if not isinstance(self.books, Bookkeeper):
+            self.books = Bookkeeper(self._roster, self._field)
+            self._tell_books()
+        return self.books.account
+
+    def _tell_books(self) -> None:
+        """Let the books know who is there. What looks for contacts on their behalf is no work of the stage's."""
+        own = None if self.penalty is None else Penalty(self._roster, self._settings, self._new_finder())
+        self.books.population_changed(self.u, self._joints, own)
 
     def _new_finder(self) -> Finder:
         assert self._settings.broad_phase
@@ -118,10 +133,11 @@ class Stage:
         self._given[:] = 0.0
         broken = self._breakable[force > self._links.strength[self._breakable]]
         if len(broken):
-            self._roster.part(broken, time)
             self._breakable = np.setdiff1d(self._breakable, broken)
             self.leave()
-            self.enter()
+            with self.books.doing(Cause.PARTED):
+                self._roster.part(broken, time)
+                self.enter()
 
     def leave(self) -> None:
         """Write the state into the roster."""
@@ -152,6 +168,8 @@ class Stage:
             forces=tuple(forces),
             rubbing=bool(springs.figures[:, 2].any()),
         )
+        if isinstance(self.books, Bookkeeper):
+            self._tell_books()
 
     def moved(self, h: float) -> State:
         """Return the state a time h, s, ahead, as if nothing were hit on the way. Nothing is changed."""
@@ -159,8 +177,10 @@ class Stage:
             moved = self.penalty.moved(self._integrator.step, self.time, self.x, self.u, h)
         else:
             moved = self._integrator.step(transition, self.time, self.x, self.u, h)
-        if self._pushes:
-            moved[0] += h * self.push[:, : moved.shape[2]]
+        shift = h * self.push[:, : moved.shape[2]] if self._pushes else None
+        self.books.flown(self.x, moved, shift)
+        if shift is not None:
+            moved[0] += shift
         if self._joints is not None and self._joints.how != "impulses":
             self._joints.project(self.x, moved, h)
         return moved
@@ -202,6 +222,7 @@ class Stage:
         struck = np.zeros((clash.size, 2))
         bounce = self._approach(clash, moved[1]) * clash.coefficient[:, 0]
         self._solve(clash, bounce, moved[1], struck)
+        self.books.struck(moved, clash, struck)
         self._done(moved, lasting.joined(clash), np.concatenate((held, struck)), h)
 
     def _held(self, moved: State, contacts: Manifolds, h: float) -> FloatArray:
@@ -209,6 +230,7 @@ class Stage:
 
         Both the state and the separations are brought up to date.
         """
+        self.books.met(moved)
         impulse = np.zeros((contacts.size, 2))
         joined = self._joints is not None and self._joints.how == "impulses"
         if not (contacts.size or joined):
@@ -223,6 +245,7 @@ class Stage:
         impulse *= min(h / old_h, 1.0)
         kicked = moved[1].copy()
         self._solve(contacts, bounce, moved[1], impulse, joined)
+        self.books.held(moved, contacts, impulse)
         if share:
             change = moved[1] - kicked
             moved[0] += (share * h) * change
@@ -260,6 +283,7 @@ class Stage:
     def _done(self, after: State, contacts: Manifolds, impulse: FloatArray, h: float) -> None:
         before, self.x = self.x, after
         start, self.time = self.time, self.time + h
+        self.books.done(start, after, h)
         if self._joints is not None and len(self._breakable):
             self._given += h * self._joints.load(after)
         if self.witness is not None:

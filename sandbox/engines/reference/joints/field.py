@@ -47,9 +47,24 @@ class Field:
             there = (self._target == WORLD) | roster.present[self._target]
             some = self._target[there], self._place[there], self._strength[there], self._softening[there]
             attract(x[0], *some, roster.inverse_mass, out[: len(roster.inverse_mass)])
-        if len(self._body):
-            now = self._began + time
+        self._drive(time, x, out)
+        return out
+
+    @property
+    def thrusting(self) -> bool:
+        """There are thrusts."""
+        return len(self._body) > 0
+
+    def thrusts(self, time: float, x: State) -> FloatArray:
+        """Return the accelerations (N, D) by thrusts alone, as all of them are returned when called."""
+        out: FloatArray = np.zeros_like(x[1])
+        self._drive(time, x, out)
+        return out
+
+    def _drive(self, time: float, x: State, out: FloatArray) -> None:
+        """Add the accelerations by thrusts."""
+        if self.thrusting:
+            roster, now = self._roster, self._began + time
             level = roster.throttles * ((self._begin <= now) & (now < self._end))
             inverse = roster.inverse_mass, roster.inverse_moment
             thrust(x[0], self._body, self._point, self._force, level, *inverse, out)
-        return out

@@ -74,6 +74,30 @@ def torsion(ties: Ties, k: int, pose: FloatArray, rates: FloatArray) -> float:
 
 
 @bare_kernel
+def damper_power(ties: Ties, pose: FloatArray, rates: FloatArray) -> float:
+    """Return the power, W, of the dampers of springs: −c l̇² and −c φ̇²; never more than 0.
+
+    Args:
+        ties: of them, the springs and rotary springs.
+        pose: (N, 3) m and rad.
+        rates: (N, 3) m/s and rad/s.
+    """
+    power = 0.0
+    for k in range(len(ties.kind)):
+        i, j = ties.first[k], ties.second[k]
+        if ties.kind[k] == SPRING:
+            arms, dx, dy = reach(ties, k, pose)
+            vx, vy = parting(i, j, arms, rates)
+            length, nx, ny = line(dx, dy)
+            if length == 0.0:
+                _, nx, ny = line(vx, vy)
+            power -= ties.figures[k, 2] * (vx * nx + vy * ny) ** 2
+        elif ties.kind[k] == ROTARY_SPRING:
+            power -= ties.figures[k, 2] * turning(i, j, rates) ** 2
+    return power
+
+
+@bare_kernel
 def spring_loads(ties: Ties, pose: FloatArray, rates: FloatArray, load: FloatArray) -> None:
     """Write what each spring gives its second body into its link's row: force, N, or torque, N·m, and 0.
 

@@ -54,6 +54,23 @@ def one_pass(rows: Rows, velocity: FloatArray, inverse_mass: FloatArray, inverse
 
 
 @bare_kernel
+def row_work(rows: Rows, velocity: FloatArray) -> float:
+    """Return the work, J, of all rows' impulses: times how fast their bodies part, where velocities are (N, 3)."""
+    work = 0.0
+    for k in range(len(rows.holds)):
+        i, j, x, y = rows.first[k], rows.second[k], rows.impulse[k, 0], rows.impulse[k, 1]
+        if rows.holds[k] == TURN:
+            work += x * turning(i, j, velocity)
+            continue
+        if rows.holds[k] != BOTH:
+            x, y = x * rows.normal[k, 0], x * rows.normal[k, 1]
+        arms = rows.arm[k, 0], rows.arm[k, 1], rows.arm[k, 2], rows.arm[k, 3]
+        vx, vy = parting(i, j, arms, velocity)
+        work += x * vx + y * vy
+    return work
+
+
+@bare_kernel
 def _give(
     rows: Rows,
     k: int,

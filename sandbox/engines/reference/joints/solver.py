@@ -21,8 +21,8 @@ import math
 
 import numpy as np
 
-from sandbox.engines.reference.joints.forces import spring_forces, spring_loads
-from sandbox.engines.reference.joints.impulses import one_pass, warm_start
+from sandbox.engines.reference.joints.forces import damper_power, spring_forces, spring_loads
+from sandbox.engines.reference.joints.impulses import one_pass, row_work, warm_start
 from sandbox.engines.reference.joints.positions import project
 from sandbox.engines.reference.joints.rows import Rows, impulses_of, prepare, rows_of
 from sandbox.engines.reference.joints.stretch import CAP, cap_stretch
@@ -164,6 +164,14 @@ class JointSolver:
         self.rows.impulse[:], self.rows.target[:] = given, 0.0  # given already: what counts is the sum
         for _ in range(self._iterations):
             self.one_pass(moved[1])
+
+    def work(self, velocity: FloatArray) -> float:
+        """Return the work of the rows' impulses, J, at velocities (N, 3): their mean over what the impulses did."""
+        return row_work(self.rows, velocity)
+
+    def damper_power(self, x: State) -> float:
+        """Return the power of the dampers of springs in a state, W."""
+        return damper_power(self._springs, x[0], x[1])
 
     def impulse(self) -> FloatArray:
         """Return what each link gave its second body in the last step (J, 2): x and y, N·s, or N·m·s and 0.

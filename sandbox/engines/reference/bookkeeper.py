@@ -1,0 +1,230 @@
+"""Bookkeeper: books what each verb of a stage does to the energy, by cause.
+
+A contact, or a joint, acts through the whole of a step, and is not to be blamed for the kick that the step's forces
+give before it can answer. So its impulse J is booked with the mean of the velocities u at the step's two ends,
+
+    work = J·(u_start + u_end)/2,
+
+which is ½μ(1 − e²)u² for an impact, μ m g s for a slide, and nothing at all for what rests. The rest of what it did to
+the kinetic energy, J·(kick)/2, it took back from the integrator, and so did positions that follow velocities: both are
+the integrator's. An impact at a moment of its own is booked with the velocities just before and after it. What acts
+from afar, in the air or by design is booked with its work along the way that each body really went.
+"""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from sandbox.engines.account import Account, Cause
+from sandbox.engines.reference.impulses import contact_work
+from sandbox.engines.reference.joints.field import Field
+from sandbox.engines.reference.joints.solver import JointSolver
+from sandbox.engines.reference.manifolds import Manifolds
+from sandbox.engines.reference.motion import Inputs, State
+from sandbox.engines.reference.penalty import Penalty
+from sandbox.engines.roster import Roster
+from sandbox.scene.potential import Potential
+from sandbox.trajectory import FloatArray
+
+GAUSS = tuple((0.5 + 0.5 * node * math.sqrt(0.6), weight / 18.0) for node, weight in ((-1, 5), (0, 8), (1, 5)))
+"""Places in a step, as shares of it, and their weights: exact for polynomials up to degree 5."""
+
+
+class Idle:
+    """Who keeps no books, and takes no notice."""
+
+    def population_changed(self, u: Inputs, joints: JointSolver | None, penalty: Penalty | None) -> None:
+        """Take note of who is there, and what acts on them."""
+
+    def flown(self, start: State, free: State, shift: FloatArray | None) -> None:
+        """Take note of free motion; it is booked if a stage goes on from there.
+
+        Args:
+            start: (2, N, D) from where.
+            free: (2, N, D) to where, before positions are put right.
+            shift: (N, D) m and rad, by which overlap is undone; none where there is none.
+        """
+
+    def met(self, moved: State) -> None:
+        """Take note of the state in which contacts and joints are resolved: joints held by positions are done."""
+
+    def held(self, moved: State, contacts: Manifolds, impulse: FloatArray) -> None:
+        """Book what impulses (K, 2), N·s, of contacts through the step, and of joints, did to velocities."""
+
+    def struck(self, moved: State, contacts: Manifolds, impulse: FloatArray) -> None:
+        """Book what impulses (K, 2), N·s, of impacts at the end of a step did to velocities."""
+
+    def done(self, time: float, after: State, h: float) -> None:
+        """Book the rest of a step of h, s, that began at a time, s, and led to a state."""
+
+    @contextmanager
+    def doing(self, cause: Cause) -> Iterator[None]:
+        """Book all that is done to the roster meanwhile to one cause."""
+        del cause
+        yield
+
+
+class Bookkeeper(Idle):
+    """Keeps an account of a running stage."""
+
+    def __init__(self, roster: Roster, field: Field) -> None:
+        self.account = Account()
+        self._roster, self._field = roster, field
+
+    def population_changed(self, u: Inputs, joints: JointSolver | None, penalty: Penalty | None) -> None:
+        """Take note of who is there, and what acts on them; `penalty` is one of the books' own."""
+        roster = self._roster
+        self._u, self._joints, self._penalty = u, joints, penalty
+        moving = roster.moving
+        self._inertia: FloatArray = np.where(moving, (roster.bodies.mass,) * 2 + (roster.bodies.moment,), 0.0).T
+        self._weight: FloatArray = self._inertia[:, :1] * roster.scene.world.gravity
+        breaks = np.full(len(roster.scene.links), np.inf)
+        breaks[list(roster.broken)] = -np.inf
+        self._potential = Potential(roster.scene, roster.bodies, breaks=breaks)
+        self._no_spin: FloatArray = np.zeros(len(moving))
+        self._compliant = joints is not None and joints.how == "xpbd"
+
+    @contextmanager
+    def doing(self, cause: Cause) -> Iterator[None]:
+        """Book all that is done to the roster meanwhile to one cause."""
+        before = self._total()
+        yield
+        self.account.enter(cause, self._total() - before)
+
+    def flown(self, start: State, free: State, shift: FloatArray | None) -> None:
+        """Take note of free motion."""
+        self._start, self._free, self._shift = start, free.copy(), shift
+
+    def met(self, moved: State) -> None:
+        """Take note of the state in which contacts and joints are resolved."""
+        self._met = moved.copy()
+        self._end = self._met[1]  # the velocities at the end of what acts through the step
+
+    def held(self, moved: State, contacts: Manifolds, impulse: FloatArray) -> None:
+        """Book contacts through the step, and joints held by impulses."""
+        self._end = moved[1].copy()
+        mean = 0.5 * (self._start[1] + self._end)
+        self._touch(contacts, impulse, mean)
+        if self._joints is not None and self._joints.how == "impulses":
+            self.account.enter(Cause.JOINTS, self._joints.work(mean))
+
+    def struck(self, moved: State, contacts: Manifolds, impulse: FloatArray) -> None:
+        """Book impacts."""
+        self._touch(contacts, impulse, 0.5 * (self._end + moved[1]))
+
+    def _touch(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray) -> None:
+        if contacts.size:
+            spin = mean[:, 2] if mean.shape[1] == 3 else self._no_spin
+            normal, tangential = contact_work(contacts, impulse, mean, spin)
+            self.account.enter(Cause.RESTITUTION, normal)
+            self.account.enter(Cause.FRICTION, tangential)
+
+    def done(self, time: float, after: State, h: float) -> None:
+        """Book the rest of a step: joints held by positions, forces, positions put right, the integrator."""
+        start, free, met, end = self._start, self._free, self._met, self._end
+        pushed = free[0] if self._shift is None else free[0] + self._shift
+        goal = after[0] if self._shift is None else after[0] - self._shift
+        correction = self._lift(free[0], pushed) + self._strain(free[0], pushed)
+        self.account.enter(Cause.CORRECTION, correction)
+
+        work, forces = self._work(time, start, np.stack((goal, end)), h), 0.0
+        for cause in (Cause.DRAG, Cause.DAMPING, Cause.DRIVES):
+            self.account.enter(cause, work[cause])
+            forces += work[cause]
+        forces += self._spring_contacts(work, start[0], after[0])
+
+        drift = self._kinetic(start[1], free[1]) + self._lift(start[0], free[0]) + self._lift(pushed, after[0])
+        strain = self._strain(start[0], free[0]) + self._strain(pushed, after[0])
+        # What contacts and joints took back of the kick that they were not given time to withstand.
+        put = met[1] - free[1]
+        drift += 0.5 * self._product(put, free[1] - start[1] + met[1] - end)
+        drift += 0.5 * self._product(end - met[1], met[1] - start[1])
+        if self._compliant or put.any():
+            taken = 0.5 * self._product(put, start[1] + end)
+            if self._compliant:  # springs are held as joints are: what they store is theirs
+                taken += strain - work[Cause.DAMPING]
+            self.account.enter(Cause.JOINTS, taken)
+        if self._compliant:
+            strain, forces = 0.0, forces - work[Cause.DAMPING]
+        self.account.enter(Cause.INTEGRATOR, drift + strain - forces)
+
+    def _spring_contacts(self, work: dict[Cause, float], start: FloatArray, end: FloatArray) -> float:
+        """Book contacts that are springs; return their work, J. What they store is restitution's until given back."""
+        if self._penalty is None:
+            return 0.0
+        given_back = self._penalty.stored(start) - self._penalty.stored(end)
+        self.account.add(Cause.RESTITUTION, given_back)
+        self.account.enter(Cause.RESTITUTION, work[Cause.RESTITUTION])
+        self.account.enter(Cause.FRICTION, work[Cause.FRICTION])
+        return given_back + work[Cause.RESTITUTION] + work[Cause.FRICTION]
+
+    def _work(self, time: float, start: State, end: State, h: float) -> dict[Cause, float]:
+        """Return the work, J, of what takes or gives along the way of a step, a parabola between its ends."""
+        work = dict.fromkeys(Cause, 0.0)
+        if h <= 0.0:
+            return work
+        off = end[0] - start[0] - (0.5 * h) * (start[1] + end[1])  # where the scheme leaves the parabola of its kick
+        for share, weight in GAUSS:
+            rate = start[1] + share * (end[1] - start[1]) + off / h
+            pose = start[0] + (share * h) * (start[1] + (0.5 * share) * (end[1] - start[1])) + share * off
+            for cause, power in self._powers(time + share * h, np.stack((pose, rate))):
+                work[cause] += weight * h * power
+        return work
+
+    def _powers(self, time: float, x: State) -> Iterator[tuple[Cause, float]]:
+        """Yield the power, W, of each cause in a state."""
+        u, roster, rate = self._u, self._roster, x[1]
+        if u.dragged:
+            wind = rate[:, :2] - u.wind
+            share = u.linear_drag + u.quadratic_drag * np.hypot(wind[:, :1], wind[:, 1:])
+            yield Cause.DRAG, -float((self._inertia[:, :1] * share * wind * rate[:, :2]).sum())
+        if u.rubbing and self._joints is not None:
+            yield Cause.DAMPING, self._joints.damper_power(x)
+        if roster.force.any() or roster.torque.any():
+            yield Cause.DRIVES, float((roster.force * rate[:, :2]).sum())
+            yield Cause.DRIVES, float(roster.torque @ rate[:, 2]) if rate.shape[1] == 3 else 0.0
+        if self._field.thrusting:
+            yield Cause.DRIVES, self._product(self._field.thrusts(time, x), rate)
+        if self._penalty is not None:
+            normal, tangential = self._penalty.losses(x)
+            yield Cause.RESTITUTION, normal
+            yield Cause.FRICTION, tangential
+
+    def _product(self, change: FloatArray, rate: FloatArray) -> float:
+        """Return m Δv·w + I Δω w, J, summed over all bodies."""
+        return float((self._inertia[:, : rate.shape[1]] * change * rate).sum())
+
+    def _kinetic(self, before: FloatArray, after: FloatArray) -> float:
+        """Return the change of kinetic energy, J, between two sets of rates."""
+        return 0.5 * self._product(after - before, after + before)
+
+    def _lift(self, before: FloatArray, after: FloatArray) -> float:
+        """Return the change, J, of what gravity and attraction store, between two sets of poses."""
+        change = -float((self._weight * (after[:, :2] - before[:, :2])).sum())
+        if self._potential.attracts:
+            change += self._attracted(after) - self._attracted(before)
+        return change
+
+    def _strain(self, before: FloatArray, after: FloatArray) -> float:
+        """Return the change, J, of what springs store, between two sets of poses."""
+        return self._strained(after) - self._strained(before) if self._potential.springs else 0.0
+
+    def _attracted(self, pose: FloatArray) -> float:
+        return float(self._potential.of_attraction(pose[None, :, :2], self._roster.present[None])[0])
+
+    def _strained(self, pose: FloatArray) -> float:
+        angle = pose[:, 2] if pose.shape[1] == 3 else self._roster.angle
+        here = pose[None, :, :2], angle[None], self._roster.present[None]
+        return float(self._potential.of_springs(np.zeros(1), *here)[0])
+
+    def _total(self) -> float:
+        """Return the energy of the roster, J."""
+        roster = self._roster
+        pose = np.column_stack((roster.position, roster.angle))
+        rate = np.column_stack((roster.velocity, roster.angular_velocity))
+        total = self._kinetic(np.zeros_like(rate), rate) - float((self._weight * roster.position).sum())
+        if self._potential.attracts:
+            total += self._attracted(pose)
+        return total + self._strained(pose) if self._potential.springs else total
