@@ -6,6 +6,9 @@ A simulation keeps an account from the first time that it is asked for one; who 
 entry is the energy that it has brought since, J, negative where it took some. Entries are computed from what each cause
 did (impulses times velocities, forces along ways), never as what is left over, so that the residual is a true check;
 only INTEGRATOR is a remainder, of free motion alone: what its energy changed by, less the work of the forces that act.
+
+All that acts within a substep acts at once. An impulse's work is the impulse times the mean of the velocities at the
+substep's two ends, so that what rests has no entries, though each substep kicks it down and its support kicks it back.
 """
 
 from collections.abc import Mapping
@@ -28,11 +31,12 @@ class Cause(StrEnum):
     DRIVES = "drives"
     """Thrusts, motors, steady forces, hands"""
     CORRECTION = "position correction"
-    """Positions that are shifted to undo overlaps, or to follow velocities that contacts have changed"""
+    """Positions that are shifted to undo overlaps, or what is off in joints"""
     INTEGRATOR = "integrator"
-    """Free motion: what the energy changed by, less the work of drag, dampers and drives"""
+    """Motion in steps: what the energy changed by, less the work of drag, dampers and drives; with how positions follow
+    what contacts and joints do to velocities within a step"""
     PHANTOM = "phantom"
-    """Energy given by what can only take: contacts and joints"""
+    """Energy given at once by what can only take: contacts, all together, or joints"""
     PARTED = "parted"
     """Stored in springs that broke"""
     ACTIONS = "actions"
@@ -54,6 +58,21 @@ class Account:
     def enter(self, cause: Cause, energy: float) -> None:
         """Book what a cause brought at once: one substep's sum, or one impact's."""
         self._entries[Cause.PHANTOM if energy > 0.0 and cause in TAKES else cause] += energy
+
+    def touch(self, along: float, across: float) -> None:
+        """Book what contacts brought at once, along their normals and along their surfaces.
+
+        Only both together can be said to take: an impulse along the normal of a corner changes how fast it slides.
+        Where one of the two gives, that is set against what the other takes; phantom is what they give together.
+        """
+        both = along + across
+        if both > 0.0:
+            self.enter(Cause.PHANTOM, both)
+        elif along > 0.0 or across > 0.0:
+            self.enter(Cause.FRICTION if along > 0.0 else Cause.RESTITUTION, both)
+        else:
+            self.enter(Cause.RESTITUTION, along)
+            self.enter(Cause.FRICTION, across)
 
     def add(self, cause: Cause, energy: float) -> None:
         """Book without asking who may give: the sum of another account, or what a cause has lent or gets back."""

@@ -36,11 +36,26 @@ from sandbox.trajectory import FloatArray
 
 @kernel
 def enter(world: FloatArray, place: int, energy: float) -> None:
-    """Book what one impact or slide took under its place; what it gave is phantom."""
+    """Book what one slide took under its place; what it gave is phantom."""
     if energy > 0.0:
         world[BY_PHANTOM] += energy
     else:
         world[place] += energy
+
+
+@kernel
+def touch(world: FloatArray, along: float, across: float) -> None:
+    """Book what a contact brought along its normal and along its surface, as `Account.touch` does."""
+    both = along + across
+    if both > 0.0:
+        world[BY_PHANTOM] += both
+    elif along > 0.0:
+        world[BY_RUBBING] += both
+    elif across > 0.0:
+        world[BY_NORMAL] += both
+    else:
+        world[BY_NORMAL] += along
+        world[BY_RUBBING] += across
 
 
 @kernel
@@ -74,11 +89,12 @@ def book_hit(arena: Arena, i: int, j: int, jx: float, jy: float, nx: float, ny: 
     normal, rub = jx * nx + jy * ny, jy * nx - jx * ny
     vx, vy = state[j, VX] - state[i, VX], state[j, VY] - state[i, VY]
     parting = vx * nx + vy * ny
-    enter(world, BY_NORMAL, normal * (parting - 0.5 * normal * (state[i, LIGHTNESS] + state[j, LIGHTNESS])))
-    if arena.surfaces[FRICTION, arena.tags[i, SURFACE], arena.tags[j, SURFACE]] == 0.0:
-        return  # what rounding leaves of no impulse is no friction
-    slip = vy * nx - vx * ny - (rim(state, i) + rim(state, j))
-    enter(world, BY_RUBBING, rub * (slip - 0.5 * rub * (readiness(state, i) + readiness(state, j))))
+    along = normal * (parting - 0.5 * normal * (state[i, LIGHTNESS] + state[j, LIGHTNESS]))
+    across = 0.0  # what rounding leaves of no impulse is no friction
+    if arena.surfaces[FRICTION, arena.tags[i, SURFACE], arena.tags[j, SURFACE]] > 0.0:
+        slip = vy * nx - vx * ny - (rim(state, i) + rim(state, j))
+        across = rub * (slip - 0.5 * rub * (readiness(state, i) + readiness(state, j)))
+    touch(world, along, across)
 
 
 @kernel
@@ -95,9 +111,9 @@ def book_strike(arena: Arena, i: int, nx: float, ny: float, normal: float, acros
     """
     state, world = arena.state, arena.world
     out = state[i, VX] * nx + state[i, VY] * ny
-    enter(world, BY_NORMAL, normal * (out - 0.5 * normal * state[i, LIGHTNESS]))
     slip = state[i, VY] * nx - state[i, VX] * ny - rim(state, i)
-    enter(world, BY_RUBBING, across * (slip - 0.5 * across * readiness(state, i)))
+    took = across * (slip - 0.5 * across * readiness(state, i))
+    touch(world, normal * (out - 0.5 * normal * state[i, LIGHTNESS]), took)
 
 
 @kernel

@@ -8,7 +8,9 @@ from sandbox.engines.account import Account, Cause
 from sandbox.engines.native.hauls import Hauls, Momenta, motors, springs
 from sandbox.engines.native.kicks import Kicks, kicks_of
 from sandbox.engines.native.population import Population
+from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import LinkKind
+from sandbox.scene.model import Scene
 from sandbox.scene.potential import Potential
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
@@ -50,6 +52,7 @@ class Books:
         self.account = Account()
         self._population = population
         self._breaks = np.full(len(population.scene.links), np.inf)
+        self._potential: tuple[tuple[Scene, Bodies], Potential] | None = None
         population.meeting.field.told = {}
         population.meeting.points()  # from now on what contacts begin with is remembered
 
@@ -83,9 +86,7 @@ class Books:
         account.enter(Cause.DRAG, float(np.sum(kicks.dragged * velocity[:-1])))
         account.enter(Cause.DRIVES, float(np.sum(kicks.driven * velocity[:-1]) + kicks.twisted @ spin[:-1]))
         account.enter(Cause.DAMPING, sum(each.work(velocity, spin) for each in damped))
-        along, across = points.work(velocity, spin)
-        account.enter(Cause.RESTITUTION, along)
-        account.enter(Cause.FRICTION, across)
+        account.touch(*points.work(velocity, spin))
 
         if self._rigid:
             given = self._given(before, now, counts, kicks)
@@ -97,7 +98,7 @@ class Books:
         """Book that joints, by their numbers, have come apart."""
         now = self.state()
         before = self._stored(now)
-        self._breaks[numbers] = -np.inf
+        self._breaks[numbers], self._potential = -np.inf, None
         self.account.enter(Cause.PARTED, float(self._stored(now)[0] - before[0]))
 
     def _fallen(self, share: float) -> float:
@@ -140,7 +141,10 @@ class Books:
     def _stored(self, *states: State) -> FloatArray:
         """Return what springs and attraction store in some states, (S,) J."""
         p = self._population
-        potential = Potential(p.scene, p.bodies, breaks=self._breaks)
+        key = p.scene, p.bodies
+        if self._potential is None or any(a is not b for a, b in zip(key, self._potential[0], strict=True)):
+            self._potential = key, Potential(p.scene, p.bodies, breaks=self._breaks)
+        potential = self._potential[1]
         if not potential:
             return np.zeros(len(states))
         there = np.broadcast_to(p.present, (len(states), len(p.present)))
