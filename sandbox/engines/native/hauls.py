@@ -94,8 +94,7 @@ def springs(tethers: Tethers, position: FloatArray, angle: FloatArray, h: float)
     rotary = tethers.held.of(LinkKind.ROTARY_SPRING)
     turned = angle[rotary.b] - np.where(rotary.a >= 0, angle[rotary.a], 0.0)
     wound = rotary.figures[:, 1] * (rotary.figures[:, 0] - turned) * h
-    # Munk2D adds up what a rotary spring gives to the second and what its damper gives to the first.
-    slowed = wound - tethers.impulses(rotary)
+    slowed = tethers.impulses(rotary) - wound
     still = np.zeros((len(rotary), 2))
     axles = rotary.a, rotary.b, still, still, still
     stiffness = Hauls(*ends, along * stiff[:, None], nothing), Hauls(*axles, wound)
