@@ -40,6 +40,7 @@ from sandbox.engines.exact.arena import (
     VX,
     VY,
     Arena,
+    T,
     X,
     Y,
     arena_of,
@@ -249,7 +250,9 @@ class ExactSimulation(Running):
         for i in troupe.moved:
             freed(arena, i)
         if troupe.renewed:
+            known = len(arena.state)
             self._arena = arena = renewed(arena, troupe)
+            arena.state[known:, T] = now  # who has just been spawned has not moved before
             self._allow()
             renew(arena, now)
             return
