@@ -10,6 +10,7 @@ from sandbox.batch.interrupt import uninterrupted
 from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError, run_id
 from sandbox.engines.registry import engine_named
+from sandbox.measure.ledger import ledger_of
 from sandbox.measure.run import Progress, run
 from sandbox.measure.versions import versions
 from sandbox.trajectory import Trajectory
@@ -33,8 +34,13 @@ class Outcome:
         wanted, found = self.job.state_hash, self.trajectory.info.get("state_hash")
         return None if wanted is None or found is None else bool(wanted == found)
 
-    def row(self, final: bool = True) -> dict[str, Any]:
-        """Return the run as one JSON object, with or without the final state; figures that are not finite are null."""
+    def row(self, final: bool = True, ledger: bool = False) -> dict[str, Any]:
+        """Return the run as one JSON object; figures that are not finite are null.
+
+        Args:
+            final: with the final state.
+            ledger: with where energy went, null where no account was kept.
+        """
         run, info = self.trajectory, self.trajectory.info
         seconds, steps = info["seconds"], info["steps"]
         simulated = float(run.time[-1]) if len(run.time) else 0.0
@@ -64,10 +70,14 @@ class Outcome:
             },
             "state_hash": info.get("state_hash"),
             **({"replayed": self.replayed} if self.job.recorded else {}),
+            **({"ledger": self._ledger()} if ledger else {}),
             **({"final": self._final()} if final else {}),
             "path": None if self.path is None else str(self.path),
             "repeated": self.repeated,
         }
+
+    def _ledger(self) -> dict[str, Any] | None:
+        return ledger_of(self.trajectory, self.job.scene).document() if len(self.trajectory.energy) else None
 
     def _final(self) -> dict[str, Any]:
         run = self.trajectory
@@ -101,6 +111,7 @@ def execute(
     store: Store | None = None,
     progress: Progress | None = None,
     audit: bool = True,
+    account: bool = False,
     done: Callable[[Outcome], None] | None = None,
 ) -> Outcome:
     """Make a run, and store it where there is a store; one that is stored already is read, not repeated.
@@ -110,6 +121,7 @@ def execute(
         store: where to look it up and put it.
         progress: who is told how far it is.
         audit: count the contacts that the engine misses.
+        account: keep the account of energy; a run that was stored without one is made again, and put in its place.
         done: who is told of the outcome, with no interrupt between storing and telling.
 
     Raises:
@@ -128,12 +140,15 @@ def execute(
             outcome = Outcome(job, number, Trajectory.load(file), file, repeated=True)
         except (ValueError, OSError) as error:
             raise StoreError(f"{error}; remove the file, and the run is made again") from None
-        if done is not None:
-            done(outcome)
-        return outcome
-    trajectory = run(job.scene, job.engine, actions=job.actions, audit=audit, progress=progress)
+        if len(outcome.trajectory.energy) or not account or outcome.trajectory.status == "refused":
+            if done is not None:
+                done(outcome)
+            return outcome
+    trajectory = run(job.scene, job.engine, actions=job.actions, audit=audit, account=account, progress=progress)
     with uninterrupted():
         path = store.file(store.add(trajectory, number)) if store is not None else None
+        if found is not None and path is not None:
+            trajectory.save(path)
         outcome = Outcome(job, number, trajectory, path, repeated=False)
         if done is not None:
             done(outcome)

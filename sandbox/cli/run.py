@@ -11,6 +11,7 @@ from sandbox.action import Spawn
 from sandbox.batch.outcome import Outcome, execute
 from sandbox.batch.plan import Job, parse_sweep, plan
 from sandbox.batch.store import Store, StoreError
+from sandbox.cli.ledger_table import print_ledgers
 from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json
 from sandbox.cli.table import Row, print_runs
 from sandbox.engines.registry import UnknownEngineError, engine_named
@@ -36,6 +37,7 @@ from sandbox.scene.faults import Fault, SceneError
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw the run: .png, .svg or .pdf")
 @click.option("--body", "bodies", multiple=True, metavar="NAME", help="which bodies to draw")
 @click.option("--audit/--no-audit", default=True, help="count the contacts that the engine misses")
+@click.option("--ledger", "ledger", is_flag=True, help="tell where energy went, by cause")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 @click.option("--quiet", is_flag=True, help="no table, no progress")
 def command(
@@ -48,6 +50,7 @@ def command(
     plot: Path | None,
     bodies: tuple[str, ...],
     audit: bool,
+    ledger: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -95,7 +98,9 @@ def command(
     try:
         with _progress(jobs, quiet or as_json) as told:
             for job, progress in zip(jobs, told, strict=True):
-                outcome = execute(job, store, progress, audit, lambda made: rows.append(made.row(final=as_json)))
+                outcome = execute(
+                    job, store, progress, audit, ledger, lambda made: rows.append(made.row(as_json, ledger))
+                )
                 drawn = outcome if plot is not None else None  # else its arrays are let go
     except KeyboardInterrupt:
         status = 130
@@ -119,6 +124,8 @@ def command(
         print_json({"runs": rows})
     elif not quiet and rows:
         print_runs(rows)
+        if ledger:
+            print_ledgers(rows)
         if out is not None:
             click.echo(f"stored: {out}")
     if plot is not None and drawn is not None and len(drawn.trajectory.time):

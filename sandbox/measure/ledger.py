@@ -17,6 +17,9 @@ from sandbox.measure.run import run
 from sandbox.scene.model import Scene
 from sandbox.trajectory import FloatArray, Trajectory
 
+HARDLY = 1e-6
+"""The least scale, as a part of the energy itself: where hardly anything moves, its rounding is all there is."""
+
 
 @dataclass(frozen=True, eq=False)
 class Ledger:
@@ -31,7 +34,7 @@ class Ledger:
     entries: FloatArray
     """(T, K) J, negative where a cause took some"""
     scale: float
-    """J, what figures are compared with: the most energy that was in motion, or turned over by one cause"""
+    """J, what figures are compared with: the most energy that was in motion, or that one cause brought or took"""
 
     @property
     def residual(self) -> FloatArray:
@@ -95,8 +98,9 @@ def ledger_of(trajectory: Trajectory, scene: Scene) -> Ledger:
     known = len(scene.bodies) == len(trajectory.names)
     motion = float(energies(trajectory, scene).kinetic.max()) if known else 0.0
     turnover = float(np.abs(trajectory.account).max(initial=0.0))
+    scale = max(motion, turnover, HARDLY * float(np.abs(trajectory.energy).max()))
     causes = tuple(str(name) for name in trajectory.info["causes"])
-    return Ledger(trajectory.time, trajectory.energy, causes, trajectory.account, max(motion, turnover))
+    return Ledger(trajectory.time, trajectory.energy, causes, trajectory.account, scale)
 
 
 def _number(value: float) -> float | None:

@@ -7,8 +7,10 @@ give before it can answer. So its impulse J is booked with the mean of the veloc
 
 which is ½μ(1 − e²)u² for an impact, μ m g s for a slide, and nothing at all for what rests. The rest of what it did to
 the kinetic energy, J·(kick)/2, it took back from the integrator, and so did positions that follow velocities: both are
-the integrator's. An impact at a moment of its own is booked with the velocities just before and after it. What acts
-from afar, in the air or by design is booked with its work along the way that each body really went.
+the integrator's. Joints that are held by positions are booked likewise, by the velocities that they give; where they
+shift positions beyond what follows from those, that is position correction. An impact at a moment of its own is booked
+with the velocities just before and after it. What acts from afar, in the air or by design is booked with its work along
+the way that each body really went.
 """
 
 import math
@@ -69,9 +71,16 @@ class Idle:
 class Bookkeeper(Idle):
     """Keeps an account of a running stage."""
 
-    def __init__(self, roster: Roster, field: Field) -> None:
+    def __init__(self, roster: Roster, field: Field, share: float) -> None:
+        """Open an account.
+
+        Args:
+            roster: the bodies.
+            field: what acts on them from afar and from within.
+            share: of the stage's integrator, `Integrator.share`.
+        """
         self.account = Account()
-        self._roster, self._field = roster, field
+        self._roster, self._field, self._share = roster, field, share
 
     def population_changed(self, u: Inputs, joints: JointSolver | None, penalty: Penalty | None) -> None:
         """Take note of who is there, and what acts on them; `penalty` is one of the books' own."""
@@ -84,6 +93,8 @@ class Bookkeeper(Idle):
         breaks[list(roster.broken)] = -np.inf
         self._potential = Potential(roster.scene, roster.bodies, breaks=breaks)
         self._no_spin: FloatArray = np.zeros(len(moving))
+        steady = bool(roster.force.any() or roster.torque.any())
+        self._worked = u.dragged or u.rubbing or steady or self._field.thrusting or penalty is not None
         self._compliant = joints is not None and joints.how == "xpbd"
 
     @contextmanager
@@ -117,38 +128,37 @@ class Bookkeeper(Idle):
     def _touch(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray) -> None:
         if contacts.size:
             spin = mean[:, 2] if mean.shape[1] == 3 else self._no_spin
-            normal, tangential = contact_work(contacts, impulse, mean, spin)
-            self.account.enter(Cause.RESTITUTION, normal)
-            self.account.enter(Cause.FRICTION, tangential)
+            self.account.touch(*contact_work(contacts, impulse, mean, spin))
 
     def done(self, time: float, after: State, h: float) -> None:
-        """Book the rest of a step: joints held by positions, forces, positions put right, the integrator."""
+        """Book the rest of a step: forces, joints held by positions, positions put right, the integrator."""
         start, free, met, end = self._start, self._free, self._met, self._end
-        pushed = free[0] if self._shift is None else free[0] + self._shift
-        goal = after[0] if self._shift is None else after[0] - self._shift
-        correction = self._lift(free[0], pushed) + self._strain(free[0], pushed)
-        self.account.enter(Cause.CORRECTION, correction)
-
-        work, forces = self._work(time, start, np.stack((goal, end)), h), 0.0
+        shift = 0.0 if self._shift is None else self._shift
+        work = self._work(time, start, np.stack((after[0] - shift, end)), h)
         for cause in (Cause.DRAG, Cause.DAMPING, Cause.DRIVES):
             self.account.enter(cause, work[cause])
-            forces += work[cause]
-        forces += self._spring_contacts(work, start[0], after[0])
+        forces = work[Cause.DRAG] + work[Cause.DRIVES] + self._spring_contacts(work, start[0], after[0])
 
-        drift = self._kinetic(start[1], free[1]) + self._lift(start[0], free[0]) + self._lift(pushed, after[0])
-        strain = self._strain(start[0], free[0]) + self._strain(pushed, after[0])
+        put = met[1] - free[1]  # by joints that are held by positions
+        placed = bool(put.any())
+        pushed = free[0] if self._shift is None else free[0] + shift
+        followed = pushed + (self._share * h) * (end - free[1]) if placed else after[0]
+        drift = self._kinetic(start[1], free[1]) + self._lift(start[0], free[0]) + self._lift(pushed, followed)
         # What contacts and joints took back of the kick that they were not given time to withstand.
-        put = met[1] - free[1]
         drift += 0.5 * self._product(put, free[1] - start[1] + met[1] - end)
         drift += 0.5 * self._product(end - met[1], met[1] - start[1])
-        if self._compliant or put.any():
-            taken = 0.5 * self._product(put, start[1] + end)
-            if self._compliant:  # springs are held as joints are: what they store is theirs
-                taken += strain - work[Cause.DAMPING]
-            self.account.enter(Cause.JOINTS, taken)
-        if self._compliant:
-            strain, forces = 0.0, forces - work[Cause.DAMPING]
-        self.account.enter(Cause.INTEGRATOR, drift + strain - forces)
+        correction = self._lift(free[0], pushed) + self._strain(free[0], pushed) + self._lift(followed, after[0])
+        strain, strain_after = self._strain(start[0], free[0]) + self._strain(pushed, followed), 0.0
+        if placed:
+            strain_after = self._strain(followed, after[0])
+        joints = 0.5 * self._product(put, start[1] + end)
+        if self._compliant:  # springs are held as joints are: what they store is theirs, but for what dampers take
+            joints += strain + strain_after - work[Cause.DAMPING]
+        else:
+            drift, correction, forces = drift + strain, correction + strain_after, forces + work[Cause.DAMPING]
+        self.account.enter(Cause.JOINTS, joints)
+        self.account.enter(Cause.CORRECTION, correction)
+        self.account.enter(Cause.INTEGRATOR, drift - forces)
 
     def _spring_contacts(self, work: dict[Cause, float], start: FloatArray, end: FloatArray) -> float:
         """Book contacts that are springs; return their work, J. What they store is restitution's until given back."""
@@ -156,14 +166,13 @@ class Bookkeeper(Idle):
             return 0.0
         given_back = self._penalty.stored(start) - self._penalty.stored(end)
         self.account.add(Cause.RESTITUTION, given_back)
-        self.account.enter(Cause.RESTITUTION, work[Cause.RESTITUTION])
-        self.account.enter(Cause.FRICTION, work[Cause.FRICTION])
+        self.account.touch(work[Cause.RESTITUTION], work[Cause.FRICTION])
         return given_back + work[Cause.RESTITUTION] + work[Cause.FRICTION]
 
     def _work(self, time: float, start: State, end: State, h: float) -> dict[Cause, float]:
         """Return the work, J, of what takes or gives along the way of a step, a parabola between its ends."""
         work = dict.fromkeys(Cause, 0.0)
-        if h <= 0.0:
+        if h <= 0.0 or not self._worked:
             return work
         off = end[0] - start[0] - (0.5 * h) * (start[1] + end[1])  # where the scheme leaves the parabola of its kick
         for share, weight in GAUSS:
@@ -202,6 +211,8 @@ class Bookkeeper(Idle):
 
     def _lift(self, before: FloatArray, after: FloatArray) -> float:
         """Return the change, J, of what gravity and attraction store, between two sets of poses."""
+        if before is after:
+            return 0.0
         change = -float((self._weight * (after[:, :2] - before[:, :2])).sum())
         if self._potential.attracts:
             change += self._attracted(after) - self._attracted(before)
@@ -209,7 +220,9 @@ class Bookkeeper(Idle):
 
     def _strain(self, before: FloatArray, after: FloatArray) -> float:
         """Return the change, J, of what springs store, between two sets of poses."""
-        return self._strained(after) - self._strained(before) if self._potential.springs else 0.0
+        if before is after or not self._potential.springs:
+            return 0.0
+        return self._strained(after) - self._strained(before)
 
     def _attracted(self, pose: FloatArray) -> float:
         return float(self._potential.of_attraction(pose[None, :, :2], self._roster.present[None])[0])

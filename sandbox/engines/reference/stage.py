@@ -67,7 +67,7 @@ class Stage:
     def open_account(self) -> Account:
         """Return the account of energy, opened by the first call."""
         if not isinstance(self.books, Bookkeeper):
-            self.books = Bookkeeper(self._roster, self._field)
+            self.books = Bookkeeper(self._roster, self._field, self._integrator.share)
             self._tell_books()
         return self.books.account
 
