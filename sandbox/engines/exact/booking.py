@@ -62,14 +62,14 @@ def touch(world: FloatArray, along: float, across: float) -> None:
 def rim(state: FloatArray, i: int) -> float:
     """Return how fast a ball's rim turns, m/s; of one that nothing can turn no impulse finds any of it."""
     if state[i, READINESS] > 0.0:
-        return state[i, SPIN] * state[i, RADIUS]
+        return float(state[i, SPIN] * state[i, RADIUS])
     return 0.0
 
 
 @kernel
 def readiness(state: FloatArray, i: int) -> float:
     """Return how readily an impulse along a ball's rim sets that in motion, 1/kg."""
-    return state[i, LIGHTNESS] + state[i, RADIUS] * state[i, RADIUS] * state[i, READINESS]
+    return float(state[i, LIGHTNESS] + state[i, RADIUS] * state[i, RADIUS] * state[i, READINESS])
 
 
 @kernel

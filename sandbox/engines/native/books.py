@@ -9,7 +9,6 @@ from sandbox.engines.native.hauls import Hauls, Momenta, motors, springs
 from sandbox.engines.native.kicks import Kicks, kicks_of
 from sandbox.engines.native.population import Population
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.links import LinkKind
 from sandbox.scene.model import Scene
 from sandbox.scene.potential import Potential
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
@@ -56,28 +55,34 @@ class Books:
         population.meeting.field.told = {}
         population.meeting.points()  # from now on what contacts begin with is remembered
 
-    def state(self) -> State:
-        """Return the present state; a substep is booked from one to the next."""
+    def opening(self) -> State | None:
+        """Return the state that a substep is booked from; none while gravity alone acts on all that moves."""
+        p = self._population
+        return None if p.free.even and not len(p.meeting) else self._state()
+
+    def _state(self) -> State:
         p = self._population
         p.refresh()
         return State(p.position.copy(), p.angle.copy(), p.velocity.copy(), p.angular_velocity.copy())
 
-    def substep(self, before: State, share: float = 1.0) -> None:
+    def substep(self, before: State | None, share: float = 1.0) -> None:
         """Book the substep that has just been made or, where it is cut, a first share of it."""
         p, account = self._population, self.account
-        counts = p.moving
         if p.free.even:
             account.enter(Cause.INTEGRATOR, self._fallen(share))
-            counts[p.free.numbers] = False
-        if not counts.any():
+        if before is None:
             return
-        whole = self.state()
+        counts = p.moving
+        if p.free.even:
+            counts[p.free.numbers] = False
+        whole = self._state()
         now = before.towards(whole, share)
         velocity, spin = self._mean(before, now, counts)
         kicks = kicks_of(p, before.velocity, counts, p.h * share)
         kicks.twisted[~self._turnable()] = 0.0
-        hauls = springs(p.meeting.tethers, whole.position, whole.angle, p.h)
-        stiff, damped = (tuple(each.times(share) for each in pair) for pair in hauls)
+        held = p.meeting.tethers.held
+        hauls = springs(p.meeting.tethers, whole.position, whole.angle, p.h) if held else ((), ())
+        stiff, damped = (tuple(each.times(share) for each in some) for some in hauls)
         points = p.meeting.points().times(share)
 
         self._move(before, now, counts, share, kicks, (velocity, spin))
@@ -88,7 +93,7 @@ class Books:
         account.enter(Cause.DAMPING, sum(each.work(velocity, spin) for each in damped))
         account.touch(*points.work(velocity, spin))
 
-        if self._rigid:
+        if len(held.rigid):
             given = self._given(before, now, counts, kicks)
             for haul in (*stiff, *damped, points.hauls):
                 given.less(haul)
@@ -96,7 +101,7 @@ class Books:
 
     def parted(self, numbers: IntArray) -> None:
         """Book that joints, by their numbers, have come apart."""
-        now = self.state()
+        now = self._state()
         before = self._stored(now)
         self._breaks[numbers], self._potential = -np.inf, None
         self.account.enter(Cause.PARTED, float(self._stored(now)[0] - before[0]))
@@ -151,11 +156,6 @@ class Books:
         places, angles = np.stack([s.position for s in states]), np.stack([s.angle for s in states])
         return potential.at(np.zeros(len(states)), places, angles, there)
 
-    @property
-    def _rigid(self) -> bool:
-        kind = self._population.meeting.tethers.held.kind
-        return bool(((kind != LinkKind.SPRING) & (kind != LinkKind.ROTARY_SPRING)).any())
-
     def _turnable(self) -> BoolArray:
         """Tell which bodies a torque turns, (N,): in the space those that something can turn have moments."""
         p = self._population
@@ -170,8 +170,7 @@ class Books:
         mass, moment = np.where(counts, p.bodies.mass, 0.0), np.where(counts, p.bodies.moment, 0.0)
         gained = mass[:, None] * (now.velocity - before.velocity) - kicks.weight - kicks.driven - kicks.dragged
         twisted = moment * (now.spin - before.spin) - kicks.twisted
-        held = p.meeting.tethers.held
-        rigid = held.some(np.flatnonzero((held.kind != LinkKind.SPRING) & (held.kind != LinkKind.ROTARY_SPRING)))
+        rigid = p.meeting.tethers.held.rigid
         return Momenta(np.vstack((gained, np.zeros((1, 2)))), np.append(twisted, 0.0), np.union1d(rigid.a, rigid.b))
 
     def _joints(self, given: Momenta, whole: State, share: float, velocity: FloatArray, spin: FloatArray) -> None:

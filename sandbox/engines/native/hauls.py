@@ -80,7 +80,7 @@ def springs(tethers: Tethers, position: FloatArray, angle: FloatArray, h: float)
         angle: (N,) rad.
         h: the substep, s.
     """
-    links = tethers.held.of(LinkKind.SPRING)
+    links = tethers.held.springs
     arm_a, place_a = _end(links.a, links.anchor_a, position, angle)
     arm_b, place_b = _end(links.b, links.anchor_b, position, angle)
     way = place_b - place_a
@@ -91,7 +91,7 @@ def springs(tethers: Tethers, position: FloatArray, angle: FloatArray, h: float)
     nothing = np.zeros(len(links))
     ends = links.a, links.b, arm_a, arm_b
 
-    rotary = tethers.held.of(LinkKind.ROTARY_SPRING)
+    rotary = tethers.held.rotary
     turned = angle[rotary.b] - np.where(rotary.a >= 0, angle[rotary.a], 0.0)
     wound = rotary.figures[:, 1] * (rotary.figures[:, 0] - turned) * h
     slowed = tethers.impulses(rotary) - wound
@@ -111,9 +111,7 @@ def motors(tethers: Tethers, position: FloatArray, angle: FloatArray, given: Mom
         angle: (N,) rad.
         given: what all joints but springs gave together.
     """
-    held = tethers.held
-    rigid = held.some(np.flatnonzero((held.kind != LinkKind.SPRING) & (held.kind != LinkKind.ROTARY_SPRING)))
-    chosen = held.of(LinkKind.MOTOR)
+    rigid, chosen = tethers.held.rigid, tethers.held.motors
     still = np.zeros((len(chosen), 2))
     if not len(chosen):
         return Hauls(chosen.a, chosen.b, still, still, still, np.zeros(0))

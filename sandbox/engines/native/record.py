@@ -7,7 +7,8 @@ points.
 from typing import Any
 
 import numpy as np
-from pymunk.arbiter import Arbiter, ffi
+from pymunk import Arbiter
+from pymunk._chipmunk_cffi import ffi
 
 from sandbox.trajectory import FloatArray
 

@@ -194,21 +194,21 @@ class NativeSimulation(Running):
         population, h = self._population, self._settings.h
         start = self.time + k * h
         before = self._state()[0].copy() if self._observer is not None else None
-        opening = self._books.state() if self._books is not None else None
+        opening = self._books.opening() if self._books is not None else None
         if fly:
             population.free.step()
         population.meeting.step(start)
         population.changed()
-        if self._books is not None and opening is not None:
+        if self._books is not None:
             self._books.substep(opening, share)
         if population.meeting.breakable and look:
-            self._part(population.torn(), self._after(k + 1))
+            self._come_apart(population.torn(), self._after(k + 1))
         if self._ledger is not None and look:
             self._record(start + h)
             if self._observer is not None and before is not None:
                 self._observer(start, before, self._state()[0], self._ledger.pairs())
 
-    def _part(self, numbers: IntArray, time: float) -> None:
+    def _come_apart(self, numbers: IntArray, time: float) -> None:
         """Note that joints, by their numbers, have come apart."""
         self._broken |= dict.fromkeys(numbers.tolist(), time)
         if self._books is not None and len(numbers):
