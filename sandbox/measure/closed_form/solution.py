@@ -43,7 +43,7 @@ class Solution:
         if self.together is not None:
             return self.together.name
         names = dict.fromkeys([FLIGHT] * bool(len(self.flying)) + [form.name for form in self.alone.values()])
-        XX
+        return ", ".join(names) or "nothing moves"
 
     def at(self, time: FloatArray) -> Motion:
         """Return the motion of all N bodies at T times."""
