@@ -5,8 +5,8 @@
 
 from sandbox.measure.closed_form.bouncing import bounces
 from sandbox.measure.closed_form.flight import free_flight, why_not
+from sandbox.measure.closed_form.forms import Solution, solution
 from sandbox.measure.closed_form.recorded import ClosedForm, closed_form, valid_until
-from sandbox.measure.closed_form.solution import Solution, solution
 
 __all__ = [
     "ClosedForm",

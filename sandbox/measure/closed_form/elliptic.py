@@ -12,8 +12,8 @@ import numpy as np
 
 from sandbox.trajectory import FloatArray
 
-CONVERGED = 1e-16
-"""Means are taken until their difference no longer changes them; it shrinks quadratically."""
+CONVERGED = 1e-9
+"""As a share of the mean, a difference that vanishes beside it once it is squared, as each next one is."""
 SMALL = 2e-3
 """Carlson's series is cut at the sixth order in this: 64e-18."""
 
@@ -39,7 +39,7 @@ def quarter_period(m1: float) -> float:
     a, b = 1.0, math.sqrt(m1)
     while a - b > CONVERGED * a:
         mean = 0.5 * (a + b)
-        a, b = mean, min(math.sqrt(a * b), mean)
+        a, b = mean, math.sqrt(a * b)
     return math.pi / (a + b)
 
 
@@ -56,9 +56,11 @@ def jacobi(u: FloatArray, m: float, m1: float) -> Jacobi:
             flat = 1.0 / np.cosh(u)
         return Jacobi(2.0 * np.arctan(np.tanh(0.5 * u)), np.tanh(u), flat, flat)
     a, b, c = [1.0], math.sqrt(m1), [math.sqrt(m)]
-    while c[-1] > CONVERGED * a[-1]:
-        mean, half = 0.5 * (a[-1] + b), 0.5 * (a[-1] - b)
-        b = min(math.sqrt(a[-1] * b), mean)
+    while c[-1] > CONVERGED * CONVERGED * a[-1]:
+        mean = 0.5 * (a[-1] + b)
+        # Half the difference, without its cancellation.
+        half = 0.25 * c[-1] * c[-1] / mean
+        b = math.sqrt(a[-1] * b)
         a.append(mean)
         c.append(half)
     half_turns = np.round(u * (a[-1] / math.pi))  # in half periods of sn, 2 K

@@ -59,7 +59,7 @@ def damped(time: FloatArray, squared: float, damping: float) -> tuple[FloatArray
     difference = (omega - damping) * (omega + damping)
     if difference >= 0.0:
         nu, fade = math.sqrt(difference), np.exp(-damping * time)
-        return fade * np.cos(nu * time), fade * time * np.sinc(nu * time / math.pi)
+        return fade * np.cos(nu * time), fade * (np.sin(nu * time) / nu if nu > 0.0 else time)
     # Both exponentials shrink: the slower at ω²/(γ + ν), which is γ − ν without its cancellation.
     nu = math.sqrt(-difference)
     slow, gone = np.exp(-squared / (damping + nu) * time), np.expm1(-2.0 * nu * time)
