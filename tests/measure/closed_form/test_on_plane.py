@@ -152,7 +152,7 @@ def test_reference_converges_to_it(scene: Scene) -> None:
         found = run(scene, "reference", audit=False, dt=dt, integrator="velocity_verlet", slop=0.0)
         assert truth is not None
         errors.append(float(np.hypot(*(found.position[-1, 0] - truth.position[-1, 0]))))
-    assert errors[1] < 0.5 * errors[0] < 0.01  # first order, of a way of some 5 m: a contact is felt a step late
+    assert errors[1] < 0.5 * errors[0] < 0.02  # first order, of a way of some 5 m: a contact is felt a step late
 
 
 @pytest.mark.parametrize(
