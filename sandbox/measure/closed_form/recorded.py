@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.measure.closed_form.bouncing import bouncing
+from sandbox.measure.closed_form.bouncing import Bouncing, bouncing
 from sandbox.measure.closed_form.flight import free_flight, why_not
+from sandbox.measure.closed_form.forms import solution
 from sandbox.measure.closed_form.given import TOUCH, Given, normal_of, thrust_on
 from sandbox.measure.lying import gap_above
 from sandbox.scene.bodies import Bodies
@@ -22,7 +23,9 @@ class ClosedForm(NamedTuple):
     velocity: FloatArray
     """(T, 2) m/s; at the instant of a bounce, that after it"""
     valid: BoolArray
-    """(T,) whether the formula holds at that time; elsewhere the other two mean nothing"""
+    """(T,) whether the formula holds at that time; elsewhere the others mean nothing"""
+    spin: FloatArray | None = None
+    """(T,) rad/s; None where nothing turns the body"""
 
 
 def valid_until(trajectory: Trajectory, number: int) -> float:
@@ -37,21 +40,38 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
     friction is 0, or the ball neither spins nor moves along the plane. It holds until the ball meets anything
     else. Otherwise free flight up to the first contact, by what the run recorded or because the formula itself
     reaches a plane. Contacts that the engine missed count where the run was audited; a missed bounce does not
-    end the bouncing, which is right then.
+    end the bouncing, which is right then. Before either, what a formula of the whole scene says of a body that does
+    more than fly and bounce: that holds to its end.
 
-    A run that actions interfered with has none, nor has a body that is joined to something, attracted or thrust. Only
-    a ball bounces by formula; other shapes have theirs up to the first contact.
+    A run that actions interfered with has none. Only a ball bounces by formula; other shapes have their flight up to
+    the first contact.
     """
     bodies = scene.bodies
     if trajectory.info.get("actions") or trajectory.names.tolist() != list(bodies.names) or bodies.fixed[number]:
         return None
-    form = _bouncing(trajectory, scene, number) or _flying(trajectory, scene, bodies, number)
+    form = _solved(trajectory, scene, number) or _bouncing(trajectory, scene, number)
+    form = form or _flying(trajectory, scene, bodies, number)
     return form if form is not None and np.count_nonzero(form.valid) > 1 else None
 
 
 def _driven(scene: Scene, bodies: Bodies) -> BoolArray:
     """Return which bodies are joined to something or carry a thrust, (N,): no formula here is theirs."""
     return np.asarray(scene.links.held(len(bodies)) | thrust_on(scene, bodies))
+
+
+def _solved(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm | None:
+    """Return a body's part in the solution of its scene, where it neither flies free nor bounces."""
+    found = solution(scene)
+    if found is None:
+        return None
+    form = found.alone.get(number)
+    if found.together is not None:
+        position, velocity, _, spin = (each[:, number] for each in found.together.at(trajectory.time))
+    elif form is not None and not isinstance(form, Bouncing):
+        position, velocity, _, spin = form.at(trajectory.time)
+    else:
+        return None
+    return ClosedForm(position, velocity, trajectory.time < _retired(trajectory, number), spin)
 
 
 def _flying(trajectory: Trajectory, scene: Scene, bodies: Bodies, number: int) -> ClosedForm | None:
