@@ -124,9 +124,11 @@ class Search:
 
     def _smaller(self) -> None:
         for whole in (False, True):
-            if self._take(spelled(self.scene, whole)):
+            laid = spelled(self.scene, whole)
+            # Shorter first: all that follows is quicker then.
+            tries = (*shorter(laid.document, self.parting.time), laid.document)
+            if any(self._take(laid.with_document(each)) for each in tries):
                 break
-        self._take_first(shorter(self._now.document, self.parting.time))  # all that follows is quicker then
         self._prune()
         self._simplify()
 
