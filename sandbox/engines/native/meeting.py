@@ -151,7 +151,7 @@ class MeetingBodies:
     @property
     def joined(self) -> int:
         """How many joints there are that pymunk solves."""
-        return len(self._tethers) if self._moving else 0
+        return len(self.tethers) if self._moving else 0
 
     @property
     def breakable(self) -> bool:
