@@ -1,0 +1,68 @@
+"""`sandbox run --ledger`: where energy went, on the terminal and in JSON."""
+
+from pathlib import Path
+
+import pytest
+from calling import json_of, lines_of, written
+
+from sandbox.engines.account import Cause
+from sandbox.trajectory import Trajectory
+
+RUN = ("--engine", "reference", "--ledger")
+
+
+def test_ledger_is_printed_by_cause(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, lines, err = lines_of(capfd, "run", written(tmp_path), *RUN)
+    assert (status, err) == (0, [])
+    head = next(k for k, line in enumerate(lines) if line.startswith("energy of"))
+    words = [line.split()[0] for line in lines[head + 1 :]]
+    assert words == ["start", "restitution", "position", "integrator", "phantom", "sum", "end", "residual", "%:"]
+    rows = {line.split()[0]: line.split()[1:] for line in lines[head + 1 :]}
+    assert rows["start"] == ["10"]  # m·g·y, y = 1 m
+    assert float(rows["restitution"][0]) == pytest.approx(-3.75, rel=0.1)  # (1 − e²) of 5 J, where steps meet
+    assert rows["phantom"] == ["0"]
+    assert float(rows["start"][0]) + float(rows["sum"][0]) == pytest.approx(float(rows["end"][0]), abs=1e-3)  # 5 digits
+
+
+def test_runs_of_one_scene_stand_side_by_side(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    sweep = ("--sweep", "solver.integrator='explicit_euler','velocity_verlet'")
+    _, lines, _ = lines_of(capfd, "run", written(tmp_path), *RUN, *sweep)
+    heads = [line for line in lines if line.startswith("energy of")]
+    assert len(heads) == 1
+    assert "integrator=explicit_euler" in heads[0]
+    assert "integrator=velocity_verlet" in heads[0]
+    integrator = next(line.split() for line in lines if line.split()[:1] == ["integrator"])
+    assert integrator[-1] == "0"  # velocity Verlet is exact under gravity
+
+
+def test_json_has_the_ledger_only_where_it_is_asked_for(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    _, document, _ = json_of(capfd, "run", written(tmp_path), *RUN)
+    told = document["runs"][0]["ledger"]
+    assert list(told) == ["start", "causes", "end", "residual", "scale", "closes_to"]
+    assert list(told["causes"]) == list(Cause)
+    assert told["closes_to"] < 1e-9  # the promise for engines written by hand
+    assert told["end"] == document["runs"][0]["energy_end"]
+    _, document, _ = json_of(capfd, "run", written(tmp_path), "--engine", "reference")
+    assert "ledger" not in document["runs"][0]
+
+
+def test_a_refused_run_has_none(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, _ = json_of(capfd, "run", written(tmp_path), *RUN, "--set", "solver.half_kick=true")
+    assert (status, document["runs"][0]["status"], document["runs"][0]["ledger"]) == (1, "refused", None)
+    status, lines, _ = lines_of(capfd, "run", written(tmp_path), *RUN, "--set", "solver.half_kick=true")
+    assert not any(line.startswith(("energy of", "%:")) for line in lines)
+
+
+def test_a_run_stored_without_one_is_made_again(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    store = ("--out", str(tmp_path / "runs"))
+    scene = written(tmp_path)
+    _, document, _ = json_of(capfd, "run", scene, "--engine", "reference", *store)
+    first = document["runs"][0]
+    assert not len(Trajectory.load(first["path"]).account)
+    _, document, _ = json_of(capfd, "run", scene, *RUN, *store)
+    second = document["runs"][0]
+    assert (second["id"], second["path"], second["repeated"]) == (first["id"], first["path"], False)
+    assert second["state_hash"] == first["state_hash"]
+    _, document, _ = json_of(capfd, "run", scene, *RUN, *store)
+    third = document["runs"][0]
+    assert (third["repeated"], third["ledger"]) == (True, second["ledger"])
