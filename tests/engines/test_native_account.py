@@ -97,7 +97,15 @@ def test_account_of_a_shipped_scene_closes(name: str, steps: int) -> None:
         [{"kind": "rotary_limit", "least": -0.2, "most": 0.2}],
         [{"kind": "gear", "ratio": 2.0}],
         [{"kind": "pivot", "at": [0.5, 0]}, {"kind": "motor", "rate": 5.0, "max_torque": 3.0}],
-        [{"kind": "spring", "anchors": [[0.3, 0.1], [-0.3, 0]], "stiffness": 300.0, "damping": 5.0, "rest_length": 0.2}],
+        [
+            {
+                "kind": "spring",
+                "anchors": [[0.3, 0.1], [-0.3, 0]],
+                "stiffness": 300.0,
+                "damping": 5.0,
+                "rest_length": 0.2,
+            }
+        ],
         [{"kind": "rotary_spring", "stiffness": 30.0, "damping": 0.7, "rest_angle": 0.5}],
     ],
     ids=lambda joints: str(joints[-1]["kind"]),
@@ -200,7 +208,13 @@ def test_spring_that_breaks_parts_with_what_it_stored() -> None:
 
 def test_contacts_that_part_and_meet_again_are_booked_once() -> None:
     boxes = [
-        {"name": f"b{k}", "position": [0.3 * (k % 3), 0.5 + 0.35 * k], "size": [0.3, 0.3], "mass": 1.0, "angle": 0.3 * k}
+        {
+            "name": f"b{k}",
+            "position": [0.3 * (k % 3), 0.5 + 0.35 * k],
+            "size": [0.3, 0.3],
+            "mass": 1.0,
+            "angle": 0.3 * k,
+        }
         for k in range(9)
     ]
     kept(document(box=boxes, plane=[FLOOR], solver={"persistence": 8}), 120)

@@ -42,8 +42,12 @@ class Books:
     ½ μ (1 − e²) v² of an impact, but for a part of the kick that comes on top. What the time step does is the
     integrator's: positions move by the old velocity, so that gravity's work and the height lost do not agree.
 
-    Of contacts, springs and motors the impulses are pymunk's own figures. Of the other joints pymunk tells only how
-    large they are: theirs are what changed the bodies' momenta besides. The residual is rounding.
+    Of contacts, springs and motors the impulses are pymunk's own figures. Of other joints pymunk tells only how large
+    they are: theirs are what changed their bodies' momenta besides, so that in scenes with joints the residual tells
+    less. pymunk mends a joint by velocities, which gives energy: that is phantom, not position correction.
+
+    The residual is rounding, of pymunk's sums and of those here: below 1e-11 of the energy in motion over 0.3 s of every
+    shipped scene, the most in towers at rest (4e-12), where next to nothing moves, and below 1e-13 in what does.
     """
 
     def __init__(self, population: Population) -> None:
