@@ -217,4 +217,5 @@ def test_contacts_that_part_and_meet_again_are_booked_once() -> None:
         }
         for k in range(9)
     ]
+    # Munk2D starts a point that it still knows at its old impulse, and reports that once more.
     kept(document(box=boxes, plane=[FLOOR], solver={"persistence": 8}), 120)

@@ -42,8 +42,13 @@ class Books:
     ½ μ (1 − e²) v² of an impact, but for a part of the kick that comes on top. What the time step does is the
     integrator's: positions move by the old velocity, so that gravity's work and the height lost do not agree.
 
-    Of contacts, springs and motors the impulses are pymunk's own figures. Of the other joints pymunk tells only how
-    large they are: theirs are what changed the bodies' momenta besides. The residual is rounding.
+    Of contacts, springs and motors the impulses are pymunk's own figures. Of other joints pymunk tells only how large
+    they are: theirs are what changed their bodies' momenta besides, so that in scenes with joints the residual tells
+    less. pymunk mends a joint by velocities, which gives energy: that is phantom, not position correction.
+
+    The residual is rounding, of pymunk's sums and of those here. Over the first 0.1 to 1 s of the shipped scenes it was
+    6e-13 at most of the most energy that was in motion or turned over by one cause: in the pyramid, whose height holds
+    2,000 times as much. Where things move it was below 1e-13.
     """
 
     def __init__(self, population: Population) -> None:

@@ -44,7 +44,6 @@ class MeetingBodies:
         self._moments: FloatArray = np.empty(0)
         self._touches: BoolArray = np.empty(0, np.bool_)
         self.tethers = Tethers(self._space)
-        """the joints that hold"""
         self._polygons = False
         self._named: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
@@ -52,8 +51,7 @@ class MeetingBodies:
         self._points: PointReader | None = None
         self.field = Field(scene)
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
-        self.steady: dict[int, tuple[FloatArray, float]] = {}
-        """steady forces, N, and torques, N·m, by the number of the body"""
+        self.steady: dict[int, tuple[FloatArray, float]] = {}  # N and N·m, by the number of the body
         self._moving = 0
         self._state: tuple[IntArray, FloatArray] | None = None
 
