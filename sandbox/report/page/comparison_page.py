@@ -135,7 +135,11 @@ def milliseconds(comparison: Comparison, row: Row) -> float | None:
 
 def remarks(comparison: Comparison) -> Markup | None:
     """Return why engines refused or failed, and what the energy is held against."""
-    found: list[Child] = [joined(engine_name(row.engine), f": {row.reason}") for row in comparison.rows if row.reason]
+    found: list[Child] = [
+        row.reason if row.status == "refused" else joined(engine_name(row.engine), f": {row.reason}")
+        for row in comparison.rows
+        if row.reason
+    ]
     if any(row.energy_against == "start" and row.energy_drift for row in comparison.rows):
         found.append(
             "Energy is the change from the start, losses that are right included: the truth ends before the run."

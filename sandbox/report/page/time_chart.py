@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sandbox.report.page.axes import Axes
-from sandbox.report.page.markup import Markup, joined, tag
+from sandbox.report.page.markup import Markup, tag
 from sandbox.report.page.scales import Linear, Log
 from sandbox.report.page.wording import number, power_of
 from sandbox.trajectory import FloatArray
@@ -143,7 +143,7 @@ def _chart(
     )
 
 
-def _line(axes: Axes, curve: Curve, stretches: int) -> Markup | None:
+def _line(axes: Axes, curve: Curve, stretches: int) -> Markup:
     """Return a curve as a path that breaks where there is no value."""
     time, values = _thinned(curve.time, curve.values, stretches)
     words, drawing = [], False
@@ -153,7 +153,7 @@ def _line(axes: Axes, curve: Curve, stretches: int) -> Markup | None:
             continue
         words.append(f"{'L' if drawing else 'M'}{axes.across(t):.1f} {min(max(axes.up(value), -1e4), 1e4):.1f}")
         drawing = True
-    return tag("path", d="".join(words), class_=f"line {curve.look}") if words else None
+    return tag("path", d="".join(words), class_=f"line {curve.look}")
 
 
 def _thinned(time: FloatArray, values: FloatArray, stretches: int) -> tuple[FloatArray, FloatArray]:
@@ -171,7 +171,7 @@ def _thinned(time: FloatArray, values: FloatArray, stretches: int) -> tuple[Floa
 
 
 def _range(curves: Sequence[Curve]) -> tuple[float, float]:
-    """Return the lowest and highest energy to show: the truth's, and others' as far as they are not out of all reach."""
+    """Return the lowest and highest energy to show: the truth's, and others' where they are not out of all reach."""
     finite = {each.name: each.values[np.abs(each.values) < BEYOND] for each in curves}
     known = {name: values for name, values in finite.items() if len(values)}
     if not known:
