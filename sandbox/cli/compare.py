@@ -1,23 +1,19 @@
 """`sandbox compare`: one scene on several engines, scored against the best known truth."""
 
-import json
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import click
 
 from sandbox.cli.comparison_table import print_comparison
+from sandbox.cli.folder import make_folder, require_folder, write_json
 from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json
+from sandbox.cli.telling import telling
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.compare import Comparison, compare
-from sandbox.measure.compare.comparing import Told
 from sandbox.measure.recorder import TooLargeError
-from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.faults import Fault
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
-from sandbox.whole import whole
 
 
 @click.command(name="compare")
@@ -56,15 +52,15 @@ def command(
     with gathering(faults, "--tolerance", (ValueError,)):
         if tolerance == float("inf") or tolerance != tolerance:
             raise ValueError(f"{tolerance} m; a tolerance is finite")
-    if out is not None and out.exists() and not out.is_dir():
-        faults.append(Fault("--out", None, "", f"{out}: is no folder"))
+    with gathering(faults):
+        require_folder(out)
 
     if out is not None and not faults:
         with gathering(faults):
-            _make_folder(out)
+            make_folder(out)
     comparison: Comparison | None = None
     if read is not None and not faults:
-        with gathering(faults, scene, (TooLargeError,)), _telling(quiet or as_json) as told:
+        with gathering(faults, scene, (TooLargeError,)), telling(quiet or as_json) as told:
             comparison = compare(read, names, tolerance=tolerance, why=why, told=told)
     if comparison is None:
         for fault in faults:
@@ -95,31 +91,9 @@ def command(
     return status
 
 
-def _make_folder(out: Path) -> None:
-    """Make the folder before the runs, so that what could not be written is refused first."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SceneError([Fault("--out", None, "", f"{out}: {error.strerror or error}")]) from None
-
-
 def _write(comparison: Comparison, document: dict[str, object], out: Path) -> None:
     """Write the plots and the document into a folder, each to a temporary name first."""
     from sandbox.report.comparison import plot_comparison
 
     plot_comparison(comparison, out)
-    with whole(out / "comparison.json") as temporary:
-        temporary.write_text(json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1), encoding="utf-8")
-
-
-@contextmanager
-def _telling(silent: bool) -> Iterator[Told | None]:
-    """Yield who says what is being done: a line that comes and goes on a terminal, nobody elsewhere."""
-    if silent or not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.text import Text
-
-    with Console(stderr=True).status("") as line:
-        yield lambda what: line.update(Text(what))
+    write_json(document, out / "comparison.json")
