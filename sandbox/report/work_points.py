@@ -10,6 +10,8 @@ Document = Mapping[str, Any]
 
 CHOICES = ("integrator", "detection", "response", "joints", "iterations", "broad_phase", "half_kick")
 """Settings by which methods differ; along one method's curve dt and substeps change."""
+SPLIT = "max_position"
+"""The metric that floors are of."""
 SMALLEST = 1e-16
 """Errors below it, such as 0, are drawn there."""
 
@@ -22,7 +24,7 @@ class WorkPoint:
     """its place in the document"""
     engine: str
     method: str
-    """what it has chosen besides its step, in a few words; empty where the engine has no choice"""
+    """what it chooses otherwise than the first of its engine, besides the step; empty where nothing"""
     step: float
     """dt / substeps, s"""
     settings: Mapping[str, Any]
@@ -38,16 +40,20 @@ class WorkPoint:
         """Whether it has a place among the axes."""
         return self.status == "ok" and self.error is not None and self.cost is not None and self.cost > 0.0
 
+    @property
+    def place(self) -> tuple[float, float]:
+        """Cost and error as axes show them, of one that is whole."""
+        assert self.cost is not None
+        assert self.error is not None
+        return self.cost, shown_error(self.error)
+
 
 def work_points(document: Document) -> list[WorkPoint]:
-    """Return the points of a document, each with its method: the choices in which its engine's points differ."""
-    rows: Sequence[Document] = document["points"]
-    told: dict[str, list[str]] = {}
-    for row in rows:
-        mine = [each["settings"] for each in rows if each["engine"] == row["engine"]]
-        if row["engine"] not in told:
-            told[row["engine"]] = [key for key in CHOICES if len({repr(each.get(key)) for each in mine}) > 1]
-    return [_point(k, row, told[row["engine"]]) for k, row in enumerate(rows)]
+    """Return the points of a document, each with its method: the choices that differ from its engine's first point."""
+    first: dict[str, Document] = {}
+    for row in document["points"]:
+        first.setdefault(row["engine"], row["settings"])
+    return [_point(k, row, first[row["engine"]]) for k, row in enumerate(document["points"])]
 
 
 def methods(points: Sequence[WorkPoint]) -> dict[tuple[str, str], list[WorkPoint]]:
@@ -56,7 +62,7 @@ def methods(points: Sequence[WorkPoint]) -> dict[tuple[str, str], list[WorkPoint
     for point in points:
         if point.whole:
             found.setdefault((point.engine, point.method), []).append(point)
-    return {key: sorted(each, key=lambda point: -point.step) for key, each in found.items()}
+    return {key: sorted(found[key], key=lambda point: -point.step) for key in sorted(found, key=lambda each: each[0])}
 
 
 def pareto_of(document: Document, points: Sequence[WorkPoint]) -> list[WorkPoint]:
@@ -80,15 +86,28 @@ def shown_error(error: float) -> float:
 def errors_of(document: Document, points: Sequence[WorkPoint]) -> list[float]:
     """Return every positive error that a plot holds: of points, floors and the tolerance."""
     values = [point.error for point in points if point.whole]
-    values += list((document.get("floors") or {}).values())
+    values += list(floors_of(document).values())
     values.append(document.get("tolerance"))
     return [shown_error(value) for value in values if value is not None and math.isfinite(value)]
 
 
 def costs_of(document: Document, points: Sequence[WorkPoint]) -> list[float]:
     """Return every positive cost that a plot holds: of points and the budget."""
-    values = [*(point.cost for point in points), document.get("budget")]
+    values = [*(point.cost for point in points), budget_of(document)]
     return [value for value in values if value is not None and 0.0 < value < math.inf]
+
+
+def floors_of(document: Document) -> dict[str, float]:
+    """Return the error of each engine that no step removes; they are of positions, and drawn where these are."""
+    if document["metric"] != SPLIT:
+        return {}
+    return {engine: float(floor) for engine, floor in (document.get("floors") or {}).items() if floor is not None}
+
+
+def budget_of(document: Document) -> float | None:
+    """Return the budget, ms per simulated second; a document has it a frame."""
+    budget = document.get("budget")
+    return None if budget is None else float(budget) * float(document.get("fps") or 1.0)
 
 
 def told(point: WorkPoint, metric: str, unit: str) -> Iterator[str]:
@@ -103,12 +122,12 @@ def told(point: WorkPoint, metric: str, unit: str) -> Iterator[str]:
         yield f"{point.status}: {point.reason or 'no reason given'}"
 
 
-def _point(number: int, row: Document, choices: Sequence[str]) -> WorkPoint:
+def _point(number: int, row: Document, plain: Document) -> WorkPoint:
     settings = row["settings"]
     words = []
-    for key in choices:
+    for key in CHOICES:
         value = settings.get(key)
-        if value is None or value is False:
+        if value is None or value is False or value == plain.get(key):
             continue
         words.append(f"{value} iterations" if key == "iterations" else key if value is True else str(value))
     return WorkPoint(

@@ -12,8 +12,10 @@ from sandbox.report.panels import FAINT, INK, add_legend, literal, shortened
 from sandbox.report.work_points import (
     Document,
     WorkPoint,
+    budget_of,
     costs_of,
     errors_of,
+    floors_of,
     methods,
     pareto_of,
     shown_error,
@@ -57,34 +59,33 @@ def draw_tradeoff(document: Document) -> Figure:
         mark = MARKS[marks.setdefault(engine, 0) % len(MARKS)]
         marks[engine] += 1
         colour = colour_of(engine)
-        where = [point.cost for point in mine], [shown_error(point.error or 0.0) for point in mine]
-        panel.plot(*where, color=colour, lw=0.9, alpha=0.45)
-        panel.plot(*where, color=colour, lw=0, marker=mark, ms=6.5, mec="white", mew=0.6, zorder=3)
+        x, y = zip(*(point.place for point in mine), strict=True)
+        panel.plot(x, y, color=colour, lw=0.9, alpha=0.45)
+        panel.plot(x, y, color=colour, lw=0, marker=mark, ms=6.5, mec="white", mew=0.6, zorder=3)
         label = f"{engine}: {method}" if method else engine
         entries.append((label, Line2D([], [], color=colour, marker=mark, lw=0.9, ms=6.5)))
     front = pareto_of(document, points)
     if front:
-        panel.plot([p.cost for p in front], [shown_error(p.error or 0.0) for p in front], **FRONT)
+        panel.plot(*zip(*(point.place for point in front), strict=True), **FRONT)
         entries.append(("Pareto front", Line2D([], [], **FRONT)))
-    for engine, floor in (document.get("floors") or {}).items():
-        if floor is not None:
-            panel.axhline(shown_error(floor), color=colour_of(engine), **FLOOR)
-            entries.append(
-                (f"{engine}: no step is small enough for less", Line2D([], [], color=colour_of(engine), **FLOOR))
-            )
-    for value, draw_line, what in (
-        (document.get("tolerance"), panel.axhline, f"tolerance {document.get('tolerance') or 0:.3g} {unit}"),
-        (document.get("budget"), panel.axvline, f"budget {document.get('budget') or 0:.3g} ms per s"),
-    ):
-        if value is not None:
-            draw_line(value, **BOUND)
-            entries.append((what, Line2D([], [], **BOUND)))
+    for engine, floor in floors_of(document).items():
+        panel.axhline(shown_error(floor), color=colour_of(engine), **FLOOR)
+        entries.append(
+            (f"{engine}: no step is small enough for less", Line2D([], [], color=colour_of(engine), **FLOOR))
+        )
+    tolerance, budget = document.get("tolerance"), budget_of(document)
+    if tolerance:
+        panel.axhline(tolerance, **BOUND)
+        entries.append((f"tolerance {tolerance:.3g} {unit}", Line2D([], [], **BOUND)))
+    if budget:
+        panel.axvline(budget, **BOUND)
+        entries.append((f"budget {budget:.3g} ms per s", Line2D([], [], **BOUND)))
     _draw_failures(figure, document, points, entries)
     panel.grid(color="#e4e4e4", lw=0.6)
     panel.set_axisbelow(True)
     panel.spines[["top", "right"]].set_visible(False)
-    title = figure.suptitle(shortened(document.get("title") or "untitled scene", 60), x=0.01, ha="left", fontsize=16, weight="bold", color=INK)  # fmt: skip
-    literal(title)
+    heading = shortened(document.get("title") or "untitled scene", 60)
+    literal(figure.suptitle(heading, x=0.01, ha="left", fontsize=16, weight="bold", color=INK))
     if entries:
         add_legend(figure, entries, loc="outside lower center", ncols=2)
     return figure

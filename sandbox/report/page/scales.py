@@ -5,10 +5,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from sandbox.report.page.wording import MINUS, power_of
+from sandbox.report.page.wording import MINUS, number, power_of
 
 STILL = 1e-6
 """An axis spans at least this share of its values: rounding is not blown up to full height."""
+
+
+STEPS = (1, 2, 5)
+"""What ticks are multiples of, times a power of ten."""
 
 
 class Tick(NamedTuple):
@@ -92,6 +96,13 @@ class Log:
             first, last = first - 1, max(last, first + 1)
         return cls(10.0**first, 10.0**last)
 
+    @classmethod
+    def snug(cls, low: float, high: float) -> "Log":
+        """Return a scale from 1, 2 or 5 times a power of ten to another, with some room beside the values."""
+        low, high = low / 1.1, high * 1.1
+        down, up = 10.0 ** math.floor(math.log10(low)), 10.0 ** math.floor(math.log10(high))
+        return cls(max(k * down for k in STEPS if k * down <= low), min(k * up for k in (*STEPS, 10) if k * up >= high))
+
     def share(self, value: float) -> float:
         """Return how far along the axis a value lies."""
         if value <= self.low:
@@ -99,8 +110,11 @@ class Log:
         return math.log10(value / self.low) / math.log10(self.high / self.low)
 
     def ticks(self, most: int) -> Sequence[Tick]:
-        """Return ticks at powers of ten, every so many that they do not crowd."""
-        first, last = round(math.log10(self.low)), round(math.log10(self.high))
+        """Return ticks at powers of ten, every so many that they do not crowd; of few, also at 2 and 5 times them."""
+        first, last = math.ceil(math.log10(self.low) - 1e-9), math.floor(math.log10(self.high) + 1e-9)
+        if 3 * (last - first + 1) <= most and last - first < 3:
+            every = [k * 10.0**power for power in range(first - 1, last + 1) for k in STEPS]
+            return [Tick(v, number(v)) for v in every if self.low * (1 - 1e-9) <= v <= self.high * (1 + 1e-9)]
         step = max(1, math.ceil((last - first) / max(most, 1)))
         return [Tick(10.0**k, _power(k)) for k in range(math.ceil(first / step) * step, last + 1, step)]
 

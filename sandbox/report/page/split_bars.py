@@ -1,4 +1,4 @@
-"""Bars of what an error consists of: model, time step, solver."""
+"""Bars of what an error consists of: model, time step, solver, and what is left at the finest step that was tried."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from sandbox.report.page.verdicts import engine_name
 from sandbox.report.page.wording import number
 from sandbox.report.work_points import Document
 
-PARTS = (("model", "model"), ("time_step", "time step"), ("solver", "solver"))
+PARTS = (("model", "model"), ("time_step", "time step"), ("solver", "solver"), ("left", "left at the finest step"))
 WIDTH, HEIGHT = 320.0, 14.0
 
 
@@ -16,7 +16,7 @@ def split_bars(rows: Sequence[Document], unit: str) -> Markup:
     """Return a bar an engine, as long for a small error as for a large one: the shares are what it shows.
 
     Args:
-        rows: each with `engine`, `total`, `model`, `time_step` and `solver`; unknown parts are None.
+        rows: each with `engine`, `total`, `model`, `time_step`, `solver` and `left`; unknown parts are None.
         unit: of the errors.
     """
     ending = f", {unit}" if unit else ""

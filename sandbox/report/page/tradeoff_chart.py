@@ -11,8 +11,10 @@ from sandbox.report.page.wording import number
 from sandbox.report.work_points import (
     Document,
     WorkPoint,
+    budget_of,
     costs_of,
     errors_of,
+    floors_of,
     methods,
     pareto_of,
     same,
@@ -27,8 +29,9 @@ REACH = 9.0
 """Radius within which a point is hit."""
 STRIP = 26.0
 """Width of the edges where failures are, right and above."""
-SHAPES = ("disc", "square", "diamond", "up", "down", "ring", "frame")
+SHAPES = ("disc", "square", "diamond", "up", "down", "ring", "frame", "gem", "left", "right")
 """A mark a method of an engine."""
+HOLLOW = ("ring", "frame", "gem")
 
 
 def tradeoff_chart(document: Document, name: str) -> Markup:
@@ -41,7 +44,7 @@ def tradeoff_chart(document: Document, name: str) -> Markup:
     points = work_points(document)
     costs, errors = costs_of(document, points) or [1.0], errors_of(document, points) or [1.0]
     axes = Axes(
-        Log.around(min(costs), max(costs), room=0.05),
+        Log.snug(min(costs), max(costs)),
         Log.around(min(errors), max(errors), room=0.05),
         width=760.0,
         height=470.0,
@@ -98,9 +101,10 @@ def chart_keys(document: Document) -> Markup:
 
     if document["pareto"]:
         entries.append(line("front", "Pareto front: no other setting is both cheaper and closer"))
-    for engine, floor in (document.get("floors") or {}).items():
-        if floor is not None:
-            entries.append(line(f"floor {look_of(engine)}", f"{engine}: no step is small enough for less"))
+    entries += [
+        line(f"floor {look_of(engine)}", f"{engine}: no step is small enough for less")
+        for engine in floors_of(document)
+    ]
     if any(not point.whole for point in points):
         cross = tag("svg", _shape("cross", 0.0, 0.0), viewBox="-7 -7 14 14", class_="truth points")
         entries.append(tag("li", cross, "failed: at the top what ran into nonsense, at the right what has no cost"))
@@ -111,20 +115,23 @@ def _bounds(axes: Axes, document: Document) -> Markup:
     """Return the floors, the tolerance and the budget."""
     parts = []
     end, base = axes.width - axes.right, axes.height - axes.bottom
-    for engine, floor in (document.get("floors") or {}).items():
-        if floor is not None:
-            y = axes.up(shown_error(floor))
-            parts.append(tag("line", x1=axes.left, x2=end, y1=y, y2=y, class_=f"floor {look_of(engine)}"))
-    tolerance, budget = document.get("tolerance"), document.get("budget")
+    for engine, floor in floors_of(document).items():
+        y = axes.up(shown_error(floor))
+        parts.append(tag("line", x1=axes.left, x2=end, y1=y, y2=y, class_=f"floor {look_of(engine)}"))
+    tolerance, budget = document.get("tolerance"), budget_of(document)
     if tolerance:
         y = axes.up(tolerance)
         text = f"tolerance {number(tolerance, 2)} {document.get('unit') or ''}"
         parts.append(tag("line", x1=axes.left, x2=end, y1=y, y2=y, class_="bound"))
-        parts.append(tag("text", text, x=end - 4.0, y=y - 5.0, class_="note end"))
+        parts.append(tag("text", text, x=axes.left + 5.0, y=y - 5.0, class_="note"))
     if budget:
         x = axes.across(budget)
         parts.append(tag("line", x1=x, x2=x, y1=axes.top, y2=base, class_="bound"))
-        parts.append(tag("text", f"budget {number(budget, 2)} ms", x=x + 5.0, y=base - 7.0, class_="note"))
+        parts.append(
+            tag(
+                "text", f"budget {number(document.get('budget'), 2)} ms a frame", x=x + 5.0, y=base - 7.0, class_="note"
+            )
+        )
     return joined(*parts)
 
 
@@ -169,6 +176,9 @@ def _shape(shape: str, x: float, y: float) -> Markup:
         "square": ((-0.85, -0.85), (0.85, -0.85), (0.85, 0.85), (-0.85, 0.85)),
         "frame": ((-0.8, -0.8), (0.8, -0.8), (0.8, 0.8), (-0.8, 0.8)),
         "diamond": ((0.0, -1.15), (1.15, 0.0), (0.0, 1.15), (-1.15, 0.0)),
+        "gem": ((0.0, -1.1), (1.1, 0.0), (0.0, 1.1), (-1.1, 0.0)),
+        "left": ((-1.1, 0.0), (0.8, -1.05), (0.8, 1.05)),
+        "right": ((1.1, 0.0), (-0.8, -1.05), (-0.8, 1.05)),
         "up": ((0.0, -1.1), (1.05, 0.8), (-1.05, 0.8)),
         "down": ((0.0, 1.1), (1.05, -0.8), (-1.05, -0.8)),
     }
@@ -177,5 +187,5 @@ def _shape(shape: str, x: float, y: float) -> Markup:
         return tag("path", d=f"{b}l{2 * a:.1f} {2 * a:.1f}m0 {-2 * a:.1f}l{-2 * a:.1f} {2 * a:.1f}", class_="cross")
     if shape in corners:
         path = "L".join(f"{x + s * a:.1f} {y + s * b:.1f}" for a, b in corners[shape])
-        return tag("path", d=f"M{path}Z", class_="hollow" if shape == "frame" else "mark")
+        return tag("path", d=f"M{path}Z", class_="hollow" if shape in HOLLOW else "mark")
     return tag("circle", cx=x, cy=y, r=s, class_="hollow" if shape == "ring" else "mark")

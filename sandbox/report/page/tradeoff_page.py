@@ -47,7 +47,9 @@ POINTS = "Every point is a setting. Click one for its [solver] table, to be copi
 def answers(document: Document) -> Markup | None:
     """Return the sentences that people came for."""
     told_ = document.get("answers") or []
-    return tag("ul", *(tag("li", text) for text in told_), class_="answers") if told_ else None
+    return (
+        tag("ul", *(tag("li", f"{text[:1].upper()}{text[1:]}") for text in told_), class_="answers") if told_ else None
+    )
 
 
 def truth_of(document: Document) -> str:
@@ -108,7 +110,7 @@ def details(document: Document) -> list[Section]:
     front = pareto_of(document, points)
     if front:
         lead = "From the cheapest to the closest; no other setting that was tried is both cheaper and closer."
-        found.append(Section("The Pareto front", _points_table(front, document, "The Pareto front"), lead=lead))
+        found.append(Section("The Pareto front", _front_table(front, document), lead=lead))
     if document.get("split"):
         lead = (
             "What would be left with no time step at all is the model's; what more iterations would take away "
@@ -121,6 +123,31 @@ def details(document: Document) -> list[Section]:
     summary = tag("summary", f"{plural(len(points), 'point')}, with metrics and work counters")
     found.append(Section("All that was tried", tag("details", summary, others)))
     return found
+
+
+def _front_table(points: Sequence[WorkPoint], document: Document) -> Markup:
+    """Return a row a point of the front."""
+    unit = document.get("unit") or ""
+    columns = (
+        Column("engine"),
+        Column("changes"),
+        Column(f"{document['metric'].replace('_', ' ')}{', ' if unit else ''}{unit}", True),
+        Column("ms per s", True, "milliseconds per simulated second, the least of the repeats"),
+        Column("median", True),
+        Column("repeats", True),
+    )
+    rows = [
+        [
+            engine_name(point.engine),
+            _changes(point),
+            number(point.error),
+            number(point.cost),
+            number(point.document.get("cost_median_ms_per_second")),
+            str(point.document.get("repeats", NONE)),
+        ]
+        for point in points
+    ]
+    return table(columns, rows, "The Pareto front")
 
 
 def _points_table(points: Sequence[WorkPoint], document: Document, caption: str) -> Markup:
