@@ -40,7 +40,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Compare many scenes and write one page that needs no network. SCENES are files or shipped; else the benchmarks."""
+    """Compare many scenes and write one page that needs no network. SCENES: files or shipped; else all benchmarks."""
     faults: list[Fault] = []
     names = None if engines is None else list(dict.fromkeys(name.strip() for name in engines.split(",")))
     for name in names or ():

@@ -13,6 +13,7 @@ class Painter {
   /* The ground: paper, a grid, what is solid, and a bar that says how long a metre is. */
   drawScenery(scenery) {
     const { context, camera, colours } = this;
+    context.lineCap = context.lineJoin = "round";
     context.fillStyle = colours.sheet;
     context.fillRect(0, 0, camera.width, camera.height);
     const step = this.gridStep();

@@ -17,7 +17,9 @@ class Column(NamedTuple):
 
 
 def table(columns: Sequence[Column], rows: Sequence[Sequence[Child]], caption: str, wide: bool = False) -> Markup:
-    """Return a table whose first column names its rows; where it is wider than the page, it scrolls by itself.
+    """Return a table whose first column names its rows, an empty one those below the last name.
+
+    Where it is wider than the page, it scrolls by itself.
 
     Args:
         columns: its columns.
@@ -38,7 +40,7 @@ def table(columns: Sequence[Column], rows: Sequence[Sequence[Child]], caption: s
             tag("td" if k else "th", cell, scope=None if k else "row", class_="figure" if column.numeric else None)
             for k, (column, cell) in enumerate(zip(columns, row, strict=True))
         ]
-        body.append(tag("tr", *cells))
+        body.append(tag("tr", *cells, class_=None if row[0] else "more"))
     whole = tag(
         "table",
         tag("caption", caption, class_="unseen"),

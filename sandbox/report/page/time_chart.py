@@ -92,11 +92,11 @@ def sparkline(curves: Sequence[Curve], duration: float, tolerance: float, label:
     least = min((float(values.min()) for values in positive if len(values)), default=tolerance)
     most = max((float(values.max()) for values in positive if len(values)), default=tolerance)
     scale = Log.around(max(FLOOR, min(least, tolerance)), max(most, tolerance), room=0.0)
-    axes = Axes(Linear(0.0, duration), scale, width=150.0, height=34.0, left=1.0, right=1.0, top=2.0, bottom=2.0)
+    axes = Axes(Linear(0.0, duration), scale, width=150.0, height=23.0, left=1.0, right=1.0, top=2.0, bottom=2.0)
     y = axes.up(tolerance)
     lines = [tag("line", x1=1.0, x2=149.0, y1=y, y2=y, class_="tolerance")]
     lines += [_line(axes, each, 40) for each in curves]
-    return tag("svg", *lines, viewBox="0 0 150 34", class_="spark", role="img", aria_label=label)
+    return tag("svg", *lines, viewBox="0 0 150 23", class_="spark", role="img", aria_label=label)
 
 
 def _chart(

@@ -1,5 +1,6 @@
 """Verdicts: how an engine did, in a word and a badge."""
 
+import math
 from typing import Literal
 
 from sandbox.measure.compare import Row
@@ -40,7 +41,8 @@ def verdict_of(row: Row, tolerance: float) -> tuple[str, Shade]:
         return row.status, "bad"
     if error is None:
         return "not judged", "none"
-    if missed:
+    first = min((event.when for event in row.events or () if event.kind == "missed"), default=math.inf)
+    if missed and (row.first_divergence is None or first <= row.first_divergence):
         return f"misses {missed:,}", "bad"
     if row.first_divergence is not None:
         return f"off from {number(row.first_divergence)} s", "bad" if error > 10.0 * tolerance else "fair"
@@ -58,7 +60,7 @@ KEY = (
     ("right", "good", "off by no more than a millionth of the tolerance"),
     ("within", "good", "within the tolerance for as long as the truth is trusted"),
     ("off from", "fair", "further off than the tolerance from that time on; red beyond ten times"),
-    ("misses", "bad", "so many contacts of the truth never happened"),
+    ("misses", "bad", "so many contacts of the truth never happened, the first before all else went wrong"),
     ("refuses", "none", "cannot model the scene, and says so"),
 )
 """What the words mean."""

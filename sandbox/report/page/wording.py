@@ -26,7 +26,12 @@ def number(value: float | None, digits: int = 3) -> str:
     elif 3 <= power < 6:
         text = f"{float(f'{value:.{digits - 1}e}'):,.0f}"
     else:
-        text = f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}×10{power_of(power)}"
+        short = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+        text = (
+            f"{short}×10{power_of(power)}".replace("1×10", "10")
+            if short in {"1", "-1"}
+            else f"{short}×10{power_of(power)}"
+        )
     return text.replace("-", MINUS)
 
 
