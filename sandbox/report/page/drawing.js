@@ -212,6 +212,7 @@ class Painter {
     const dense = bodies > 60;
     if (truth) {
       context.setLineDash(dense ? [3, 3] : [6, 5]);
+      context.globalAlpha = dense ? 0.6 : 1;
       context.lineWidth = dense ? 1 : 1.6;
     } else {
       context.globalAlpha = 0.16;
@@ -249,7 +250,7 @@ class Painter {
     context.stroke();
     context.setLineDash([]);
     context.beginPath();
-    for (const [x, y] of nails) {
+    for (const [x, y] of truth ? [] : nails) {
       context.moveTo(x + 2.5, y);
       context.arc(x, y, 2.5, 0, TURN);
     }
