@@ -123,7 +123,7 @@ def _chart(
         x = axes.across(trusted_until)
         late = x > axes.left + 0.6 * axes.inner_width
         text, look = ("trusted until here", "note end") if late else ("truth no longer trusted", "note")
-        parts.append(tag("text", text, x=x - 5.0 if late else x + 5.0, y=axes.top + 12.0, class_=look))
+        parts.append(tag("text", text, x=x - 5.0 if late else x + 5.0, y=base - 7.0, class_=look))
         parts.append(tag("line", x1=x, x2=x, y1=axes.top, y2=base, class_="limit"))
     if words is not None:
         parts.append(words)
