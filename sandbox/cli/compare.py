@@ -28,7 +28,6 @@ from sandbox.scene.model import Scene
     help="position error that is too much, m; by default 1 % of the smallest ball's radius",
 )
 @click.option("--why", is_flag=True, help="rerun with one knob changed at a time, and say which one matters")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write plots and comparison.json")
 @click.option(
     "--minimise",
     is_flag=False,
@@ -38,6 +37,9 @@ from sandbox.scene.model import Scene
     "by default SCENE.min.toml here",
 )
 @click.option("--force", is_flag=True, help="let --minimise replace a file that exists")
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR", help="write report.html, plots and comparison.json"
+)
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 @click.option("--quiet", is_flag=True, help="no table, no progress")
 def command(
@@ -124,6 +126,8 @@ def command(
 def _write(comparison: Comparison, document: dict[str, object], out: Path) -> None:
     """Write the plots and the document into a folder, each to a temporary name first."""
     from sandbox.report.comparison import plot_comparison
+    from sandbox.report.page.comparison_page import write_comparison
 
     plot_comparison(comparison, out)
+    write_comparison(comparison, out / "report.html")
     write_json(document, out / "comparison.json")

@@ -141,7 +141,10 @@ def _kept(
             plot_tradeoff(document, plot)
             _say(f"written: {plot}", silent)
         if out is not None:
+            from sandbox.report.page.tradeoff_page import write_tradeoff
+
             write_json(document, out / "tradeoff.json")
+            write_tradeoff(document, out / "report.html")
             _say(f"written: {out}", silent)
     except OSError as error:
         faults.append(Fault("--out" if plot is None else "--plot", None, "", f"{error.filename}: {error.strerror}"))

@@ -4,6 +4,7 @@ import os
 import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 
 @cache
@@ -18,6 +19,22 @@ def versions() -> dict[str, str]:
     return found
 
 
+@cache
 def machine() -> dict[str, str | int]:
     """Return what is worth knowing of the machine."""
-    return {"system": platform.platform(), "machine": platform.machine(), "cores": os.cpu_count() or 1}
+    return {
+        "cpu": _processor(),
+        "cores": os.cpu_count() or 1,
+        "machine": platform.machine(),
+        "system": platform.platform(),
+    }
+
+
+def _processor() -> str:
+    """Return the processor's model: Linux tells it in a file, other systems tell Python; else the architecture."""
+    try:
+        with Path("/proc/cpuinfo").open(encoding="utf-8", errors="replace") as lines:
+            named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    except OSError:
+        named = []
+    return named[0] if named and named[0] else platform.processor() or platform.machine()

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from itertools import chain, cycle, repeat
+from itertools import chain, repeat
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -16,6 +16,7 @@ from sandbox.measure.compare import Comparison
 from sandbox.measure.compare.errors import Errors, errors
 from sandbox.measure.compare.runs import common_frames
 from sandbox.measure.energy import energies
+from sandbox.report.colours import colour_of
 from sandbox.report.figure_file import write_figure
 from sandbox.report.panels import (
     BEYOND,
@@ -30,7 +31,7 @@ from sandbox.report.panels import (
     shortened,
 )
 from sandbox.report.paths import draw_fixed, draw_path, draw_truth, moving_axes
-from sandbox.report.plots import COLOURS, MOST_BODIES
+from sandbox.report.plots import MOST_BODIES
 from sandbox.trajectory import FloatArray
 
 FLOOR = 1e-16
@@ -163,7 +164,7 @@ def draw_energy(comparison: Comparison) -> Figure:
 
 def _colours(comparison: Comparison) -> dict[str, str]:
     """Return a colour for each engine that has a run."""
-    return dict(zip(comparison.trajectories, cycle(COLOURS), strict=False))
+    return {name: colour_of(name) for name in comparison.trajectories}
 
 
 def _widths(comparison: Comparison) -> Iterator[float]:

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 
 from sandbox.measure.closed_form import ClosedForm, closed_form
 from sandbox.measure.energy import energies
+from sandbox.report.colours import COLOURS
 from sandbox.report.figure_file import FORMATS, write_figure
 from sandbox.report.panels import (
     CLOSED,
@@ -37,8 +38,6 @@ MOST_BODIES = 5
 MOST_CONTACTS = 40
 """From here on contacts would hide the curves, and are left out."""
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9")
-"""Of Okabe and Ito (2008): told apart under every common colour blindness. Their yellow is too pale on white."""
 ENERGY = {"kinetic": "#56B4E9", "potential": "#CC79A7", "total": "#444444"}
 
 

@@ -67,10 +67,11 @@ def test_folder_gets_plots_and_document(tmp_path: Path, capfd: pytest.CaptureFix
     out = tmp_path / "new" / "folder"
     status, document, err = json_of(capfd, "compare", written(tmp_path), "--engine", "pymunk", "--out", str(out))
     assert (status, err) == (0, [])
-    names = ["comparison.json", "energy.png", "error.png", "trajectories.png"]
+    names = ["comparison.json", "energy.png", "error.png", "report.html", "trajectories.png"]
     assert sorted(path.name for path in out.iterdir()) == names
     assert document_of((out / "comparison.json").read_text(encoding="utf-8")) == document
-    for name in names[1:]:
+    assert "<h1><bdi>Drop</bdi></h1>" in (out / "report.html").read_text(encoding="utf-8")
+    for name in (name for name in names if name.endswith(".png")):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
 
 

@@ -7,7 +7,8 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sandbox.report.plots import COLOURS, draw_run, format_of, plot_run
+from sandbox.report.colours import COLOURS
+from sandbox.report.plots import draw_run, format_of, plot_run
 from sandbox.scene.file import loads
 from sandbox.scene.model import Ball, Scene
 from sandbox.trajectory import Trajectory

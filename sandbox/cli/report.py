@@ -1,0 +1,118 @@
+"""`sandbox report`: one page over many scenes, each compared on every engine."""
+
+from pathlib import Path
+
+import click
+
+from sandbox.batch.interrupt import uninterrupted
+from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
+from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.measure.compare import compare
+from sandbox.measure.recorder import TooLargeError
+from sandbox.measure.versions import machine, versions
+from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.file import load
+from sandbox.scene.model import Scene
+from sandbox.scene.shipped import shipped
+
+USUAL = "benchmark/"
+"""Shipped scenes whose names begin so are reported where none is named."""
+NAME = "report.html"
+"""Of the page, where a folder is given."""
+
+
+@click.command(name="report")
+@click.argument("scenes", nargs=-1)
+@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="which engine(s); by default all")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of every scene")
+@click.option("--why", is_flag=True, help="say of each engine that is off which knob matters; takes many times as long")
+@click.option(
+    "--out", type=click.Path(path_type=Path), required=True, metavar="PATH", help="the page, .html, or its folder"
+)
+@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
+@click.option("--quiet", is_flag=True, help="no progress, no summary")
+def command(
+    scenes: tuple[str, ...],
+    engines: str | None,
+    overrides: tuple[str, ...],
+    why: bool,
+    out: Path,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Compare many scenes and write one page that needs no network. SCENES: files or shipped; else all benchmarks."""
+    faults: list[Fault] = []
+    names = None if engines is None else list(dict.fromkeys(name.strip() for name in engines.split(",")))
+    for name in names or ():
+        with gathering(faults, "--engine", (UnknownEngineError,)):
+            engine_named(name)
+    read: list[tuple[str, Scene]] = []
+    for name in scenes or [scene.name for scene in shipped() if scene.name.startswith(USUAL)]:
+        with gathering(faults):
+            path = paths_of([name])[0][1]
+            require_scene(name, path)
+            read.append((name, load(path, overrides)))
+    if not read and not faults:
+        faults.append(Fault("SCENES", None, "", "no benchmark scenes ship here; name some"))
+    if not faults:
+        with gathering(faults):
+            out = _page_path(out)
+    if faults:
+        for fault in faults:
+            click.echo(str(fault), err=True)
+        if as_json:
+            print_json({"scenes": [], "page": None, "faults": fault_rows(faults)})
+        return 2
+
+    from sandbox.report.page.document import write_page
+    from sandbox.report.page.overview import Overview, SceneReport
+
+    overview, status = Overview(asked=len(read)), 0
+    told: list[dict[str, object]] = []
+    try:
+        for k, (name, scene) in enumerate(read):
+            if not quiet:
+                click.echo(f"{k + 1}/{len(read)} {name}", err=True)
+            try:
+                found = compare(scene, names, why=why)
+            except (TooLargeError, SceneError) as error:
+                status = 1
+                click.echo(f"{name}: {error}", err=True)
+                overview.add(SceneReport(name, failure=str(error)))
+                told.append(
+                    {"scene": name, "title": scene.title, "status": "failed", "reason": str(error), "engines": []}
+                )
+                continue
+            with uninterrupted():
+                overview.add(SceneReport(name, found))
+            told.append({**found.document(name), "status": "ok", "reason": None})
+    except KeyboardInterrupt:
+        status = 130
+        click.echo(f"interrupted: {len(told)} of {len(read)} scenes are finished and kept", err=True)
+    finally:
+        with uninterrupted(), gathering(faults, "--out", (OSError,)):
+            write_page(overview.page(), out)
+    if faults:
+        click.echo(str(faults[0]), err=True)
+        return 2
+    if as_json:
+        print_json({"scenes": told, "page": str(out), "machine": machine(), "versions": versions()})
+    elif not quiet:
+        click.echo(f"written: {out} ({out.stat().st_size / 1e6:.2g} MB)")
+    return status
+
+
+def _page_path(out: Path) -> Path:
+    """Return the file to write: what ends in `.html`, or `report.html` in a folder, which is made.
+
+    Raises:
+        SceneError: it cannot be written there.
+    """
+    try:
+        if out.suffix.lower() not in {".html", ".htm"} or out.is_dir():
+            out.mkdir(parents=True, exist_ok=True)
+            return out / NAME
+        out.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SceneError([Fault("--out", None, "", f"{out}: {error.strerror or error}")]) from None
+    return out

@@ -1,0 +1,175 @@
+"""Extremes as a page: a table an axis with a verdict a cell, limits, and how good the forecasts were."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from sandbox.measure.versions import machine, versions
+from sandbox.report.page.document import Page, Section, write_page
+from sandbox.report.page.markup import Child, Markup, joined, tag
+from sandbox.report.page.tables import Column, table
+from sandbox.report.page.verdicts import Shade, badge, engine_name
+from sandbox.report.page.wording import NONE, number, plural
+
+Document = Mapping[str, Any]
+"""What `sandbox extremes --json` prints."""
+
+SIGNS: dict[str, tuple[str, Shade]] = {
+    "exact": ("✓", "good"),
+    "degraded": ("~", "fair"),
+    "refused": ("–", "none"),
+    "failed": ("✕", "bad"),
+}
+MEANING = {
+    "exact": "as right as can be told",
+    "degraded": "off, but within every bound",
+    "refused": "declined beforehand, with a reason",
+    "failed": "broke a bound: the cell says which",
+}
+
+
+def write_extremes(document: Document, path: str | Path) -> Path:
+    """Write the page of the extremes, to a temporary name first, and return its path.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    return write_page(extremes_page(document), path)
+
+
+def extremes_page(document: Document) -> Page:
+    """Return the page of the extremes."""
+    cells: Sequence[Document] = document["cells"]
+    verdicts = [cell["verdict"] for cell in cells]
+    counts = [f"{verdicts.count(word):,} {word}" for word in SIGNS if word in verdicts]
+    keys = [tag("li", badge(f"{sign} {word}", shade), " ", MEANING[word]) for word, (sign, shade) in SIGNS.items()]
+    lead = joined(tag("p", f"{plural(len(cells), 'cell')}: {', '.join(counts)}."), tag("ul", *keys, class_="keys"))
+    axes = dict.fromkeys(str(cell["axis"]) for cell in cells)
+    heats = [joined(tag("h3", axis.replace("_", " ")), _heat(axis, cells)) for axis in axes]
+    sections = [Section("Axis by axis", joined(*heats), lead="Point at a cell for its reason.")]
+    if document.get("limits"):
+        lead_ = "The last level that passed, and the first that failed; found by halving the interval between them."
+        sections.append(Section("Limits", _limits(document["limits"]), lead=lead_))
+    if document.get("predictions"):
+        sections.append(Section("Forecasts", _forecasts(document["predictions"]), lead=FORECASTS))
+    return Page(
+        "How far each engine goes",
+        "Extremes",
+        sections,
+        lead,
+        document.get("versions") or versions(),
+        document.get("machine") or machine(),
+    )
+
+
+FORECASTS = (
+    "Before each run it was forecast what would go wrong. Precision is the share of warnings that came true, "
+    "recall the share of what went wrong that was warned of."
+)
+
+
+def _heat(axis: str, cells: Sequence[Document]) -> Markup:
+    """Return the table of an axis: a row an engine and setup, a column a level."""
+    mine = [cell for cell in cells if cell["axis"] == axis]
+    levels = sorted(dict.fromkeys(_level(cell) for cell in mine))
+    rows: dict[tuple[str, str], dict[tuple[float, ...], Document]] = {}
+    for cell in mine:
+        rows.setdefault((cell["engine"], _setup(cell)), {})[_level(cell)] = cell
+    head = tag("tr", tag("th", "engine", scope="col"), *(tag("th", _told(level), scope="col") for level in levels))
+    body = [
+        tag(
+            "tr",
+            tag("th", engine_name(engine), f" {setup}" if setup else None, scope="row"),
+            *(_cell(found.get(level)) for level in levels),
+        )
+        for (engine, setup), found in rows.items()
+    ]
+    caption = tag("caption", f"Verdicts along {axis}", class_="unseen")
+    whole = tag("table", caption, tag("thead", head), tag("tbody", *body))
+    return tag("div", whole, class_="table heat", tabindex="0", role="region", aria_label=f"Verdicts along {axis}")
+
+
+def _cell(cell: Document | None) -> Markup:
+    if cell is None:
+        return tag("td", "", class_="cell")
+    word = str(cell["verdict"])
+    sign, _ = SIGNS.get(word, (word, "none"))
+    about = f"{word}: {cell['reason']}" if cell.get("reason") else word
+    return tag(
+        "td",
+        tag("span", sign, aria_hidden="true"),
+        tag("span", about, class_="unseen"),
+        class_=f"cell {word}",
+        title=about,
+    )
+
+
+def _level(cell: Document) -> tuple[float, ...]:
+    level = cell["level"]
+    return tuple(float(each) for each in level) if isinstance(level, list | tuple) else (float(level),)
+
+
+def _told(level: tuple[float, ...]) -> str:
+    return " × ".join(number(each, 4) for each in level)
+
+
+def _setup(cell: Document) -> str:
+    """Return what is set besides the axis, in a few words."""
+    if cell.get("setup"):
+        return "" if cell["setup"] in {"default", "plain", cell["engine"]} else str(cell["setup"])
+    changed = [f"{key} {value}" for key, value in (cell.get("settings") or {}).items()]
+    return ", ".join(changed).replace("_", " ")
+
+
+def _limits(rows: Sequence[Document]) -> Markup:
+    columns = (
+        Column("axis"),
+        Column("engine"),
+        Column("settings"),
+        Column("good up to", True),
+        Column("first failure", True),
+    )
+    cells: list[list[Child]] = [
+        [
+            str(row["axis"]).replace("_", " "),
+            engine_name(row["engine"]),
+            _setup(row) or "as they are",
+            _limit(row.get("limit")),
+            _limit(row.get("first_failure")),
+        ]
+        for row in rows
+    ]
+    return table(columns, cells, "Limits")
+
+
+def _limit(value: object) -> str:
+    if isinstance(value, int | float):
+        return number(float(value), 4)
+    return NONE if value is None else str(value)
+
+
+def _forecasts(predictions: Document | Sequence[Document]) -> Markup:
+    """Return a row a kind of warning. A single object stands for all kinds together."""
+    rows = [predictions] if isinstance(predictions, Mapping) else predictions
+    columns = (
+        Column("warning"),
+        Column("precision", True),
+        Column("recall", True),
+        Column("right", True),
+        Column("false alarms", True),
+        Column("not forecast", True),
+    )
+    cells: list[list[Child]] = [
+        [
+            str(row.get("kind", "all")).replace("_", " "),
+            _percent(row.get("precision")),
+            _percent(row.get("recall")),
+            *(number(row.get(key)) for key in ("true_positives", "false_positives", "false_negatives")),
+        ]
+        for row in rows
+    ]
+    return table(columns, cells, "Forecasts")
+
+
+def _percent(value: float | None) -> str:
+    return NONE if value is None else f"{100.0 * value:.0f} %"

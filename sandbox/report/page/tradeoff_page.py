@@ -1,0 +1,206 @@
+"""A trade-off as a page: the answers first, then error against cost, what the error consists of, and all figures."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from sandbox.measure.compare import Comparison
+from sandbox.report.page.comparison_page import HOW, linked_plots
+from sandbox.report.page.document import Page, Section, write_page
+from sandbox.report.page.markup import Child, Markup, data, joined, tag
+from sandbox.report.page.settings_text import settings_text
+from sandbox.report.page.split_bars import split_bars
+from sandbox.report.page.tables import Column, table
+from sandbox.report.page.tradeoff_chart import chart_keys, tradeoff_chart
+from sandbox.report.page.verdicts import badge, engine_name
+from sandbox.report.page.wording import NONE, number, plural
+from sandbox.report.work_points import Document, WorkPoint, pareto_of, told, work_points
+
+
+def write_tradeoff(document: Document, path: str | Path, comparison: Comparison | None = None) -> Path:
+    """Write the page of a trade-off, to a temporary name first, and return its path.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    return write_page(tradeoff_page(document, comparison), path)
+
+
+def tradeoff_page(document: Document, comparison: Comparison | None = None) -> Page:
+    """Return the page of a trade-off.
+
+    Args:
+        document: what `sandbox tradeoff --json` prints.
+        comparison: of the scene, to be replayed beside it.
+    """
+    sections = [Section("Error against cost", weighed(document, "trade"), lead=POINTS), *details(document)]
+    if comparison is not None and comparison.trajectories:
+        sections.append(Section("Replay", linked_plots(comparison, "plot"), lead=HOW))
+    lead = joined(answers(document), tag("p", truth_of(document), class_="soft"))
+    title = document.get("title") or str(document.get("scene") or "Untitled scene")
+    return Page(title, "Trade-off", sections, lead, document.get("versions") or {}, document.get("machine") or {})
+
+
+POINTS = "Every point is a setting. Click one for its [solver] table, to be copied into the scene file."
+
+
+def answers(document: Document) -> Markup | None:
+    """Return the sentences that people came for."""
+    told_ = document.get("answers") or []
+    return (
+        tag("ul", *(tag("li", f"{text[:1].upper()}{text[1:]}") for text in told_), class_="answers") if told_ else None
+    )
+
+
+def truth_of(document: Document) -> str:
+    """Say what errors are measured against."""
+    if not document.get("truth"):
+        return "There is no truth to measure errors against."
+    about = f" ({document['truth_about']})" if document.get("truth_about") else ""
+    until = document.get("trusted_until")
+    trusted = "" if until is None else f", trusted until {number(until, 4)} s"
+    return f"Errors are against the truth: {str(document['truth']).replace('_', ' ')}{about}{trusted}."
+
+
+def weighed(document: Document, name: str) -> Markup:
+    """Return the chart beside what the chosen point is.
+
+    Args:
+        document: of the trade-off.
+        name: begins the names in it, which no other on the page may share.
+    """
+    points = work_points(document)
+    chosen = tag(
+        "aside",
+        tag("h3", "No point chosen", class_="what"),
+        tag("dl", class_="figures"),
+        tag("pre", tag("code", ""), hidden=True),
+        tag("button", "Copy", type="button", class_="copy", hidden=True),
+        class_="chosen",
+        aria_live="polite",
+    )
+    chart = tag("div", tradeoff_chart(document, name), chart_keys(document))
+    facts = data([_facts(point, document) for point in points], class_="facts")
+    return tag("div", chart, chosen, facts, class_="weigh")
+
+
+def _facts(point: WorkPoint, document: Document) -> dict[str, Any]:
+    """Return what is told of a point that is chosen."""
+    unit, metric = document.get("unit") or "", document["metric"].replace("_", " ")
+    row = point.document
+    repeats = row.get("repeats")
+    figures = [
+        (metric, f"{number(point.error)} {unit}".rstrip() if point.error is not None else NONE),
+        ("cost", f"{number(point.cost)} ms per s" if point.cost is not None else NONE),
+        ("median cost", f"{number(row.get('cost_median_ms_per_second'))} ms per s" if repeats else NONE),
+        ("repeats", str(repeats) if repeats else NONE),
+        *((str(name).replace("_", " "), f"{count:,}") for name, count in (row.get("work") or {}).items()),
+    ]
+    if point.status != "ok":
+        figures.insert(0, (point.status, point.reason or "no reason given"))
+    title = next(told(point, document["metric"], unit))
+    return {"title": title, "figures": figures, "text": settings_text(point.settings, point.engine)}
+
+
+def details(document: Document) -> list[Section]:
+    """Return the tables and bars below the chart, those that there is something for."""
+    found = []
+    points = work_points(document)
+    unit = document.get("unit") or ""
+    front = pareto_of(document, points)
+    if front:
+        lead = "From the cheapest to the closest; no other setting that was tried is both cheaper and closer."
+        found.append(Section("The Pareto front", _front_table(front, document), lead=lead))
+    if document.get("split"):
+        lead = (
+            "What would be left with no time step at all is the model's; what more iterations would take away "
+            "is the solver's; the rest is the time step's."
+        )
+        found.append(Section("What the error consists of", split_bars(document["split"], unit), lead=lead))
+    if document.get("proposals"):
+        found.append(Section("Cheaper models", _proposals(document["proposals"], unit)))
+    others = _points_table(points, document, "All points")
+    summary = tag("summary", f"{plural(len(points), 'point')}, with metrics and work counters")
+    found.append(Section("All that was tried", tag("details", summary, others)))
+    return found
+
+
+def _front_table(points: Sequence[WorkPoint], document: Document) -> Markup:
+    """Return a row a point of the front."""
+    unit = document.get("unit") or ""
+    columns = (
+        Column("engine"),
+        Column("changes"),
+        Column(f"{document['metric'].replace('_', ' ')}{', ' if unit else ''}{unit}", True),
+        Column("ms per s", True, "milliseconds per simulated second, the least of the repeats"),
+        Column("median", True),
+        Column("repeats", True),
+    )
+    rows = [
+        [
+            engine_name(point.engine),
+            _changes(point),
+            number(point.error),
+            number(point.cost),
+            number(point.document.get("cost_median_ms_per_second")),
+            str(point.document.get("repeats", NONE)),
+        ]
+        for point in points
+    ]
+    return table(columns, rows, "The Pareto front")
+
+
+def _points_table(points: Sequence[WorkPoint], document: Document, caption: str) -> Markup:
+    """Return a row a point, with every metric and counter that any of them has."""
+    unit = document.get("unit") or ""
+    metrics = _keys(points, "metrics", document["metric"])
+    work = _keys(points, "work", "")
+    head = [Column("engine"), Column("changes"), Column("verdict")]
+    head += [Column(f"{document['metric'].replace('_', ' ')}{', ' if unit else ''}{unit}", True)]
+    head += [Column("ms per s", True, "milliseconds per simulated second, the least of the repeats")]
+    head += [Column(name.replace("_", " "), True) for name in (*metrics, *work)]
+    rows = []
+    for point in points:
+        cells: list[Child] = [engine_name(point.engine), _changes(point)]
+        cells.append(badge(point.status, "good" if point.whole else "bad", point.reason))
+        cells += [number(point.error), number(point.cost)]
+        cells += [number((point.document.get("metrics") or {}).get(name)) for name in metrics]
+        for name in work:
+            value = (point.document.get("work") or {}).get(name)
+            cells.append(NONE if value is None else f"{value:,}")
+        rows.append(cells)
+    return table(head, rows, caption)
+
+
+def _keys(points: Sequence[WorkPoint], field: str, without: str) -> list[str]:
+    keys = dict.fromkeys(key for point in points for key in point.document.get(field) or {})
+    return [key for key in keys if key != without]
+
+
+def _changes(point: WorkPoint) -> str:
+    """Return what a point changes of the scene's own solver, in a line."""
+    changes = point.document.get("changes") or {}
+    words = [f"{key} {number(value, 4) if isinstance(value, float) else value}" for key, value in changes.items()]
+    return ", ".join(words).replace("_", " ") or "as the scene has it"
+
+
+def _proposals(proposals: Sequence[Document], unit: str) -> Markup:
+    columns = (
+        Column("instead"),
+        Column("engine"),
+        Column(f"error{', ' if unit else ''}{unit}", True),
+        Column("ms per s", True),
+        Column("of the cost", True),
+    )
+    rows = [
+        [
+            str(each.get("what")).replace("_", " "),
+            engine_name(each["engine"]) if each.get("engine") else NONE,
+            number(each.get("error")),
+            number(each.get("cost_ms_per_second")),
+            f"×{number(each['ratio'])}" if each.get("ratio") is not None else NONE,
+        ]
+        for each in proposals
+    ]
+    sentences = [tag("li", each["sentence"]) for each in proposals if each.get("sentence")]
+    return joined(tag("ul", *sentences, class_="plain") if sentences else None, table(columns, rows, "Cheaper models"))
