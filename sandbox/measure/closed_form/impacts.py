@@ -123,14 +123,14 @@ def _followed(given: Given) -> Impacts | None:
     leg = Leg(0.0, bodies.position, bodies.velocity)
     legs: list[Leg] = [leg]
     rows: list[ContactEvent] = []
-    last: Impact | None = None
     while True:
         found = _next(leg, reach, apart)
         if found is None or found.time > duration:
             return Impacts(given, tuple(legs), tuple(rows))
         if len(rows) == MOST_IMPACTS:
             return None
-        if last is not None and not passes_on and found.time - last.time <= AT_ONCE and {*last.pair} & {*found.pair}:
+        together = [row for row in rows if found.time - row.time <= AT_ONCE and {*row.pair} & {*found.pair}]
+        if together and not passes_on:
             return None
         i, j = found.pair
         if friction[i, j] > 0.0 and _slips(leg, bodies.angular_velocity, found):
@@ -138,7 +138,6 @@ def _followed(given: Given) -> Impacts | None:
         leg, row = _parted(leg, found, mass, float(restitution[i, j]), bodies.radius)
         legs.append(leg)
         rows.append(row)
-        last = found
 
 
 def _next(leg: Leg, reach: FloatArray, apart: BoolArray) -> Impact | None:

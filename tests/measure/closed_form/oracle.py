@@ -19,7 +19,7 @@ def integrated(
 ) -> FloatArray:
     """Return the state at T times, (state, T); steps are short, as between them its order is but seven."""
     end = float(time[-1])
-    done = solve_ivp(law, (0.0, end), start, "DOP853", time, rtol=1e-13, atol=1e-13, max_step=0.02)
+    done = solve_ivp(law, (0.0, end), start, "DOP853", time, rtol=1e-13, atol=1e-13, max_step=0.05)
     assert done.success
     return np.asarray(done.y)
 
