@@ -6,10 +6,11 @@ from collections import Counter
 import click
 
 from sandbox.cli.table import WIDE
+from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.picking import called, written
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.split import Split
-from sandbox.measure.tradeoff.weighed import Tradeoff, figure
+from sandbox.measure.tradeoff.weighed import Tradeoff
 
 MOST_REASONS = 3
 """Failures told of by their reason."""
@@ -63,7 +64,11 @@ def _about(found: Tradeoff) -> str:
 def _cells(point: Point) -> list[str]:
     assert point.error is not None and point.cost is not None and point.cost_median is not None
     steps = {"dt", "substeps", "iterations"}
-    words = ", ".join(f"{key} {written(value)}" for key, value in point.changes.items() if key not in steps)
+    words = ", ".join(
+        f"no {key}" if value is None else f"{key} {written(value)}"
+        for key, value in point.changes.items()
+        if key not in steps
+    )
     own = point.settings
     return [
         point.engine,

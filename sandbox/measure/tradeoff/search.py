@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import cycle
-from time import perf_counter
 
+from sandbox.measure.compare.patience import working
 from sandbox.measure.tradeoff.front import outdone
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.trial import Trial, tried
@@ -20,9 +20,11 @@ MARGIN = 0.7
 """A trial is outdone by one that takes no more than this share of its time and is at least as right; times of a single
 run say no more."""
 ENOUGH = 1e-6
-"""Errors below this share of the tolerance are as good as none."""
+"""Errors below this share of the tolerance are as good as none; where none is tolerated, of a single miss."""
 SLOW = 0.2
-"""The share of the patience that a single run may take."""
+"""The share of the patience that one variant's run may take, for each seed."""
+LEAST = 1.0
+"""s that an engine's own settings may always take."""
 
 Told = Callable[[str], None]
 
@@ -44,14 +46,15 @@ class Search:
     """trials"""
     told: Told
     trials: dict[Variant, Trial] = field(default_factory=dict)
-    untried: int = 0
+    untried: set[Variant] = field(default_factory=set)
     """variants that would have taken too long"""
 
     def run(self) -> list[Trial]:
         """Try variants until none is worth it, or the patience is at its end; return all trials in order."""
-        self._began = perf_counter()
+        self._began = working()
+        starts = self.space.starts()
         expanded: set[Variant] = set()
-        for variant in self.space.starts():
+        for variant in starts:
             self._try(variant)
         aims = (
             [self._near_tolerance, self._near_budget, self._cheap]
@@ -76,39 +79,47 @@ class Search:
         return list(self.trials.values())
 
     def _goes_on(self) -> bool:
-        return len(self.trials) < self.most and perf_counter() - self._began < self.patience
+        return len(self.trials) < self.most and self._left > 0.0
+
+    @property
+    def _left(self) -> float:
+        return self.patience - (working() - self._began)
 
     def _try(self, variant: Variant, parent: Trial | None = None) -> Trial | None:
         """Try a variant that was not tried, unless by its parent's time it would take too long."""
         if variant in self.trials:
             return self.trials[variant]
-        left = self.patience - (perf_counter() - self._began)
+        allowed = min(SLOW * self.patience * len(self.judges), self._left)
         if parent is not None:
             expected = parent.seconds * variant.work / parent.variant.work * len(self.judges)
-            if expected > max(left, 0.0):
-                self.untried += 1
+            if expected > max(allowed, 0.0):
+                self.untried.add(variant)
                 return None
         self.told(f"{len(self.trials) + 1} tried: {_called(variant)}")
-        found = tried(variant, self.space, self.judges, max(SLOW * self.patience, 1.0))
+        found = tried(variant, self.space, self.judges, max(allowed, LEAST if parent is None else 0.0))
         self.trials[variant] = found
         return found
 
     def _error(self, trial: Trial) -> float:
-        return max(trial.error(self.metric), ENOUGH * self.tolerance)
+        """Return a trial's error, never 0: logarithms are taken of it."""
+        return max(trial.error(self.metric), ENOUGH * (self.tolerance or 1.0))
 
     def _promising(self, trial: Trial) -> bool:
-        """Tell whether to look around a trial: nothing on its engine outdoes it, or it failed at the very start."""
+        """Tell whether to look around a trial: nothing on its engine outdoes it, or all there failed as it did."""
         if trial.status in ("refused", "stopped"):
             return False
-        if math.isinf(trial.error(self.metric)):  # it says nothing of its neighbours but that coarser ones fail too
-            return trial.variant in self.space.starts()
-        same = (t for t in self.trials.values() if t.status == "ok" and t.variant.engine == trial.variant.engine)
-        others = [(t.seconds, self._error(t)) for t in same]
-        return not outdone(trial.seconds, self._error(trial), others, MARGIN)
+        same = [t for t in self.trials.values() if t.variant.engine == trial.variant.engine]
+        good = [t for t in same if math.isfinite(t.error(self.metric))]
+        if math.isinf(trial.error(self.metric)):  # what is finer may do better, as long as nothing does well
+            silent = trial.status == "ok" and trial.metrics.get(self.metric) is None
+            return not good and (
+                trial is same[0] if silent else trial.variant.work >= max(t.variant.work for t in same)
+            )
+        return not outdone(trial.seconds, self._error(trial), [(t.seconds, self._error(t)) for t in good], MARGIN)
 
     def _near_tolerance(self, trial: Trial) -> float:
-        error = self._error(trial)
-        return abs(math.log(error / self.tolerance)) if math.isfinite(error) else math.inf
+        error, wanted = self._error(trial), self.tolerance or ENOUGH
+        return abs(math.log(error / wanted)) if math.isfinite(error) else math.inf
 
     def _near_budget(self, trial: Trial) -> float:
         assert self.budget is not None

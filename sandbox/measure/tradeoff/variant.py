@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain
 from typing import Any, get_args
 
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.recorder import frame_count
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.part import MAX_STEPS
@@ -53,7 +53,7 @@ class Variant:
         return float(self.finer) * self.substeps * (1.0 + self.iterations / 20.0)
 
     def settings(self, base: Settings) -> Settings:
-        """Return the settings in full; frames are kept at the same times, or where those are too close, at fewer.
+        """Return the settings in full; frames are kept at times at which the base keeps them too, if not at all these.
 
         Raises:
             pydantic.ValidationError: dt leaves its bounds.
@@ -61,7 +61,7 @@ class Variant:
         every = Fraction(base.record_every) * self.finer
         return base.replace(
             dt=float(Fraction(base.dt) / self.finer),
-            record_every=int(every) if every.denominator == 1 else 1,
+            record_every=every.numerator,
             substeps=self.substeps,
             iterations=self.iterations,
             **dict(self.words),
@@ -69,8 +69,11 @@ class Variant:
 
     def with_word(self, key: str, value: Any) -> "Variant":
         """Return the variant with another way of doing one thing."""
-        kept = [(k, v) for k, v in self.words if k != key]
-        return replace(self, words=tuple(sorted([*kept, (key, value)])))
+        return replace(self, words=tuple(sorted([*self.without_word(key).words, (key, value)])))
+
+    def without_word(self, key: str) -> "Variant":
+        """Return the variant with one thing done as the scene has it, or as the engine likes it."""
+        return replace(self, words=tuple((k, v) for k, v in self.words if k != key))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,13 +111,27 @@ class Space:
             return False
         return not ENGINES[variant.engine].missing(self.scene, settings)
 
-    def near(self, variant: Variant) -> Iterator[Variant]:
-        """Yield the sound variants that are one choice away, each choice up and down."""
+    def filled(self, variant: Variant) -> Settings:
+        """Return a variant's settings as the engine fills them in."""
+        return ENGINES[variant.engine].resolve(self.scene, self.settings(variant))
+
+    def plain(self, variant: Variant) -> Variant:
+        """Return a variant without the words that say what is done anyway, so that none goes by two names."""
+        filled = self.filled(variant)
+        for key, _ in variant.words:
+            less = variant.without_word(key)
+            if self.filled(less) == filled:
+                variant = less
+        return variant
+
+    def near(self, variant: Variant) -> list[Variant]:
+        """Return the sound variants that are one choice away, each choice up and down."""
         if variant.engine == "exact":  # for whom dt is but the time between two frames
-            yield from filter(self.sound, [replace(variant, finer=variant.finer / 2)])
+            others: Iterator[Variant] = iter([replace(variant, finer=variant.finer / 2)])
         else:
-            yield from filter(self.sound, self._steps(variant))
-        yield from filter(self.sound, self._ways(variant))
+            others = chain(self._steps(variant), self._ways(variant))
+        found = dict.fromkeys(self.plain(other) for other in others if self.sound(other))
+        return [other for other in found if other != variant]
 
     def _steps(self, variant: Variant) -> Iterator[Variant]:
         own = self.own(variant.engine)
@@ -132,7 +149,7 @@ class Space:
                 yield replace(variant, iterations=variant.iterations // 2)
 
     def _ways(self, variant: Variant) -> Iterator[Variant]:
-        filled = ENGINES[variant.engine].resolve(self.scene, self.settings(variant))
+        filled = self.filled(variant)
         for key, values in WORDS.items():
             if key == "joints" and not len(self.scene.links):
                 continue
@@ -156,7 +173,3 @@ class Space:
         return bool(len(self.scene.links)) or (
             self.touches and (meet.mutual or len(self.scene.fixed) > 1 or meet.solids)
         )
-
-    def frames(self, variant: Variant) -> int:
-        """Return how many steps a variant's run has."""
-        return frame_count(self.scene, self.settings(variant))[0]
