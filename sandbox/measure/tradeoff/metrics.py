@@ -62,13 +62,11 @@ def bounce_height(run: Trajectory, judge: Judge) -> float | None:
     both = there(run, mine) & there(truth, its) & (truth.time[its] <= judge.until)[:, None]
     worst = None
     for number in np.flatnonzero(judge.moving).tolist():
-        own = (truth.contact_pair == number).any(axis=1)
-        kept = both[:, number] & (truth.time[its] >= np.min(truth.contact_time[own], initial=np.inf))
+        touched = truth.contact_time[(truth.contact_pair == number).any(axis=1)]
+        kept = both[:, number] & (truth.time[its] >= np.min(touched, initial=np.inf))
         if kept.any():
-            tops = [
-                _highest(each.position[rows[kept], number], judge.down) for each, rows in ((run, mine), (truth, its))
-            ]
-            off = abs(tops[0] - tops[1])
+            own, right = run.position[mine[kept], number], truth.position[its[kept], number]
+            off = abs(_highest(own, judge.down) - _highest(right, judge.down))
             worst = off if worst is None else max(worst, off)
     return worst
 
