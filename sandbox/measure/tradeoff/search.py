@@ -111,10 +111,9 @@ class Search:
         same = [t for t in self.trials.values() if t.variant.engine == trial.variant.engine]
         good = [t for t in same if math.isfinite(t.error(self.metric))]
         if math.isinf(trial.error(self.metric)):  # what is finer may do better, as long as nothing does well
-            silent = trial.status == "ok" and trial.metrics.get(self.metric) is None
-            return not good and (
-                trial is same[0] if silent else trial.variant.work >= max(t.variant.work for t in same)
-            )
+            if trial.status == "ok" and trial.metrics.get(self.metric) is None:
+                return not good and trial is same[0]
+            return not good and trial.variant.work >= max(t.variant.work for t in same)
         return not outdone(trial.seconds, self._error(trial), [(t.seconds, self._error(t)) for t in good], MARGIN)
 
     def _near_tolerance(self, trial: Trial) -> float:

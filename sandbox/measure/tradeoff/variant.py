@@ -83,6 +83,8 @@ class Space:
     scene: Scene
     base: Settings
     engines: tuple[str, ...]
+    frame: float = 1.0 / 60.0
+    """s that a game shows a picture; `exact` is not asked for fewer"""
 
     def starts(self) -> list[Variant]:
         """Return each engine with the scene's own settings; what only some engines take is left out for the others."""
@@ -105,6 +107,8 @@ class Space:
         try:
             settings = self.settings(variant)
         except ValidationError:
+            return False
+        if variant.engine == "exact" and variant.finer < 1 and settings.dt > self.frame:
             return False
         steps = self.scene.world.duration / settings.dt
         if not FEWEST_STEPS <= steps <= MAX_STEPS / variant.substeps:

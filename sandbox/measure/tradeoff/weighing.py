@@ -92,7 +92,7 @@ def tradeoff(
     close = _closeness(scene, metric, tolerance)
     judges = _judges(scene, base, close, known, zoom)
     aim = aim_at(judges[0], metric, tolerance, budget, fps)
-    space = Space(scene, base, tuple(name for name in names if not _refusal(scene, name, base)))
+    space = Space(scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps)
     hurry = None if aim.hurry is None else aim.hurry * scene.world.duration
     search = Search(space, judges, aim.metric.name, aim.tolerance, hurry, patience, most, say)
     trials = search.run()
