@@ -72,8 +72,7 @@ def bounce_height(run: Trajectory, judge: Judge) -> float | None:
 
 
 def _highest(places: FloatArray, down: FloatArray) -> float:
-    height = -(places @ down)
-    return float(height.max()) if np.isfinite(height).all() else math.inf
+    return -float((places @ down).min()) if np.isfinite(places).all() else math.inf
 
 
 def energy(run: Trajectory, judge: Judge) -> float | None:

@@ -31,6 +31,7 @@ class Point:
     """ms per simulated second: the least of separate repeats, nothing recorded"""
     cost_median: float | None
     repeats: int
+    """0 where another point is as right and by far cheaper: the cost is then of the run that gave the error"""
     work: Mapping[str, int]
     """deterministic counters: substeps, pair tests, contact iterations, events"""
 

@@ -1,7 +1,8 @@
 """Search: which variants are worth a run. It refines near the front, and stops branches that are outdone.
 
-From each engine's own settings on, the variants one choice away are tried: of those trials that nothing outdoes on
-the same engine, the one that matters most for what is asked. At last the smallest number of substeps and of iterations
+First each engine's substeps are doubled until it meets the tolerance, if it can, so that there is an answer. From its
+own settings on, the variants one choice away are tried then: of those trials that nothing outdoes on the same engine,
+the one that matters most for what is asked. At last the smallest number of substeps and of iterations
 that still meets the tolerance is closed in on.
 """
 
@@ -23,6 +24,8 @@ ENOUGH = 1e-6
 """Errors below this share of the tolerance are as good as none; where none is tolerated, of a single miss."""
 SLOW = 0.2
 """The share of the patience that one variant's run may take, for each seed."""
+FALLS = 0.8
+"""An error that half the step leaves more of than this share has other causes than the step."""
 LEAST = 1.0
 """s that an engine's own settings may always take."""
 
@@ -55,7 +58,7 @@ class Search:
         starts = self.space.starts()
         expanded: set[Variant] = set()
         for variant in starts:
-            self._try(variant)
+            self._reach(self._try(variant))
         aims = (
             [self._near_tolerance, self._near_budget, self._cheap]
             if self.budget
@@ -77,6 +80,18 @@ class Search:
                     self._try(variant, best)
         self._close_in()
         return list(self.trials.values())
+
+    def _reach(self, trial: Trial | None) -> None:
+        """Double the substeps until the tolerance is met, or an error that there is falls no further."""
+        while trial is not None and trial.error(self.metric) > self.tolerance and trial.variant.engine != "exact":
+            finer = replace(trial.variant, substeps=2 * trial.variant.substeps)
+            if trial.status in ("refused", "stopped") or not self.space.sound(finer) or not self._goes_on():
+                return
+            found = self._try(finer, trial)
+            before = trial.error(self.metric)
+            if found is not None and math.isfinite(before) and found.error(self.metric) > FALLS * before:
+                return
+            trial = found
 
     def _goes_on(self) -> bool:
         return len(self.trials) < self.most and self._left > 0.0

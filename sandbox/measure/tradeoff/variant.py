@@ -1,7 +1,7 @@
 """Variant: one engine with one choice of settings, and the variants that are one choice away."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import chain
@@ -85,6 +85,8 @@ class Space:
     engines: tuple[str, ...]
     frame: float = 1.0 / 60.0
     """s that a game shows a picture; `exact` is not asked for fewer"""
+    _sound: dict[Variant, bool] = field(default_factory=dict, init=False, repr=False)
+    _filled: dict[Variant, Settings] = field(default_factory=dict, init=False, repr=False)
 
     def starts(self) -> list[Variant]:
         """Return each engine with the scene's own settings; what only some engines take is left out for the others."""
@@ -92,7 +94,12 @@ class Space:
 
     def own(self, engine: str) -> Settings:
         """Return the settings that an engine's variants differ from: the scene's, or of these what all engines take."""
-        return self.base if not ENGINES[engine].missing(self.scene, self.base) else self.base.common()
+        return self._own[engine]
+
+    @cached_property
+    def _own(self) -> dict[str, Settings]:
+        kept = {name: not ENGINES[name].missing(self.scene, self.base) for name in self.engines}
+        return {name: self.base if whole else self.base.common() for name, whole in kept.items()}
 
     def settings(self, variant: Variant) -> Settings:
         """Return a variant's settings in full, choices that are left to the engine still open."""
@@ -100,6 +107,11 @@ class Space:
 
     def sound(self, variant: Variant) -> bool:
         """Tell whether a variant can be run at all."""
+        if variant not in self._sound:
+            self._sound[variant] = self._can_run(variant)
+        return self._sound[variant]
+
+    def _can_run(self, variant: Variant) -> bool:
         if not (COARSEST <= variant.finer <= FINEST and 1 <= variant.substeps <= MOST_SUBSTEPS):
             return False
         if not 1 <= variant.iterations <= MOST_ITERATIONS:
@@ -117,7 +129,9 @@ class Space:
 
     def filled(self, variant: Variant) -> Settings:
         """Return a variant's settings as the engine fills them in."""
-        return ENGINES[variant.engine].resolve(self.scene, self.settings(variant))
+        if variant not in self._filled:
+            self._filled[variant] = ENGINES[variant.engine].resolve(self.scene, self.settings(variant))
+        return self._filled[variant]
 
     def plain(self, variant: Variant) -> Variant:
         """Return a variant without the words that say what is done anyway, so that none goes by two names."""

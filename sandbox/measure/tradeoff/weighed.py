@@ -78,7 +78,7 @@ class Tradeoff:
     def answers(self) -> list[str]:
         """Return the sentences that people come for."""
         unit = self.metric.unit
-        wanted = f"within {figure(self.tolerance, unit)}"
+        wanted = f"with {self.metric.name} within {figure(self.tolerance, unit)}"
         lines = [
             f"cheapest setting {wanted}: {self.within_tolerance.sentence}"
             if self.within_tolerance is not None

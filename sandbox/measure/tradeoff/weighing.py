@@ -30,7 +30,7 @@ PATIENCE = 60.0
 REPEATS = 5
 POINTS = 120
 NEAR = 0.5
-"""What takes more than the inverse of this share of a point that is as right is not timed again."""
+"""What takes more than the inverse of this share of a point that is as right is not timed apart."""
 AGAIN = 0.5
 """The share of the patience that timing again may take."""
 SEEDS = 2**63
@@ -178,15 +178,14 @@ def _refused(scene: Scene, names: Sequence[str], base: Settings) -> list[Point]:
 
 
 def _timed(trials: Sequence[Trial], space: Space, aim: Aim, repeats: int, patience: float) -> list[Point]:
-    """Time what got to its end, and what is near the front again and again."""
+    """Time what is near the front again and again; of what is far from it, the run that was recorded says enough."""
     ok = [trial for trial in trials if trial.status == "ok"]
-    ways = [(trial.variant.engine, space.settings(trial.variant)) for trial in ok]
-    once = dict(zip(ok, costs(space.scene, ways, 1, patience), strict=True))
-    seen = [(c.least, t.error(aim.metric.name)) for t, c in once.items() if c is not None]
-    near = [t for t, c in once.items() if c is not None and not outdone(c.least, t.error(aim.metric.name), seen, NEAR)]
+    seen = [(trial.seconds, trial.error(aim.metric.name)) for trial in ok]
+    near = [trial for trial in ok if not outdone(trial.seconds, trial.error(aim.metric.name), seen, NEAR)]
     ways = [(trial.variant.engine, space.settings(trial.variant)) for trial in near]
-    often = dict(zip(near, costs(space.scene, ways, repeats, AGAIN * patience), strict=True))
-    return [_point(trial, space, aim, often.get(trial) or once.get(trial)) for trial in trials]
+    found = dict(zip(near, costs(space.scene, ways, repeats, AGAIN * patience), strict=True))
+    rough = {trial: Cost.of([trial.seconds], space.scene.world.duration)._replace(repeats=0) for trial in ok}
+    return [_point(trial, space, aim, {**rough, **found}.get(trial)) for trial in trials]
 
 
 def _point(trial: Trial, space: Space, aim: Aim, cost: Cost | None) -> Point:
