@@ -55,16 +55,19 @@ def usual_metric(judge: Judge) -> Metric:
     """Return what a scene is best scored by where nothing else is asked for.
 
     The distance from the truth, if it is trusted to the end. Else an invariant: how well joints hold, where there are
-    some; energy, where nothing takes any; the depth of overlaps, where bodies can meet.
+    some; energy, where nothing takes any; the depth of overlaps, where bodies can meet. Where there is none of these,
+    the distance from the truth as far as it is trusted, or at last energy.
     """
     scene = judge.scene
     if judge.truth is not None and judge.until >= scene.world.duration:
         return METRICS["max_position"]
     if np.isin(scene.links.kind, HOLDING).any():
         return METRICS["joint_error"]
-    if keeps_energy(scene) or not meetings(scene).touches.any():
+    if keeps_energy(scene):
         return METRICS["energy"]
-    return METRICS["penetration"]
+    if meetings(scene).touches.any():
+        return METRICS["penetration"]
+    return METRICS["energy" if judge.truth is None else "max_position"]
 
 
 def keeps_energy(scene: Scene) -> bool:

@@ -45,7 +45,7 @@ def told(point: Point, aim: Aim, fresh: float | None) -> str:
     unit = aim.metric.unit
     off = f"{aim.metric.name} {figure(point.error, unit)}"
     if aim.metric.name == "passes" and point.error > 0.0:
-        off += f", 1 in {1.0 / point.error:.3g}"
+        off += f", 1 in {1.0 / point.error:.3g} passes unseen"
     again = "" if fresh is None else f", {figure(fresh, unit)} on fresh seeds"
     share = point.cost / 10.0
     long = point.settings.dt > (1.0 + LONGER) / aim.fps

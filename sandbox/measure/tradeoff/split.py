@@ -52,7 +52,7 @@ class Split:
 
 
 def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split | None:
-    """Take the position error of an engine's settings apart; None where a run does not get to its end, or no truth is.
+    """Take the position error of an engine's settings apart; None where no truth is, or no finer run ends in time.
 
     The model's part is what is left at the finest step, if halving the step changed it by less than a tenth; a part
     that still shrinks belongs to the time step.
@@ -76,8 +76,10 @@ def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split 
     finest, times, before = converged, 1, None
     for factor, run in runs.finer(many):
         before, finest, times = finest, run, factor
+    if before is None:
+        return None
     left = runs.apart(finest, judge.truth.trajectory)
-    still = before is None or runs.apart(before, judge.truth.trajectory) > 1.1 * left
+    still = runs.apart(before, judge.truth.trajectory) > 1.1 * left
     return Split(
         engine,
         ENGINES[engine].resolve(judge.scene, asked),

@@ -17,7 +17,7 @@ from sandbox.scene.settings import Detection, Integrator, Joints, Response, Sett
 
 MOST_SUBSTEPS, MOST_ITERATIONS = 512, 1000
 FEWEST_STEPS = 4
-"""A run of fewer says nothing."""
+"""A run of fewer says nothing, and is tried only where the scene has no more itself."""
 FINEST, COARSEST = Fraction(256), Fraction(1, 16)
 """How many frames are made of one of the scene's own."""
 
@@ -123,7 +123,7 @@ class Space:
         if variant.engine == "exact" and variant.finer < 1 and settings.dt > self.frame:
             return False
         steps = self.scene.world.duration / settings.dt
-        if not FEWEST_STEPS <= steps <= MAX_STEPS / variant.substeps:
+        if (variant.finer < 1 and steps < FEWEST_STEPS) or steps > MAX_STEPS / variant.substeps:
             return False
         return not ENGINES[variant.engine].missing(self.scene, settings)
 
