@@ -48,8 +48,10 @@ def print_tradeoff(scene: str, found: Tradeoff) -> None:
     console.width = max(console.width, Console(width=10_000).measure(table).maximum)
     console.print(Text(f"{scene}: {found.scene.title}" if found.scene.title else scene), soft_wrap=True)
     console.print(Text(_about(found)), soft_wrap=True)
-    console.print(table)
-    for line in [*_failures(found), *map(_split, found.splits), *found.answers(), *_cheaper(found)]:
+    if found.pareto:
+        console.print(table)
+    splits = [_split(each) for each in found.splits if each.total >= NOTHING]
+    for line in [*_failures(found), *splits, *found.answers(), *_cheaper(found)]:
         click.echo(line)
 
 

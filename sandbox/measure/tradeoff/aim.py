@@ -56,9 +56,11 @@ def usual_metric(judge: Judge) -> Metric:
 
     The distance from the truth, if it is trusted to the end. Else an invariant: how well joints hold, where there are
     some; energy, where nothing takes any; the depth of overlaps, where bodies can meet. Where there is none of these,
-    the distance from the truth as far as it is trusted, or at last energy.
+    the distance from the truth as far as it is trusted, or at last energy; that too where nothing moves.
     """
     scene = judge.scene
+    if not judge.moving.any():
+        return METRICS["energy"]
     if judge.truth is not None and judge.until >= scene.world.duration:
         return METRICS["max_position"]
     if np.isin(scene.links.kind, HOLDING).any():

@@ -77,6 +77,9 @@ class Tradeoff:
 
     def answers(self) -> list[str]:
         """Return the sentences that people come for."""
+        ran = [point for point in self.points if point.status == "ok"]
+        if ran and all(point.error is None for point in ran):
+            return [f"{self.metric.name} says nothing of this scene; another --metric would"]
         unit = self.metric.unit
         wanted = f"with {self.metric.name} within {figure(self.tolerance, unit)}"
         lines = [

@@ -224,6 +224,14 @@ def test_nothing_that_moves_is_no_trap() -> None:
     found = weighed(still, most=3)
     json.dumps(found.document(), allow_nan=False)
     assert all(point.status == "ok" for point in found.points)
+    assert found.metric.name == "energy"
+    assert found.within_tolerance is not None
+
+
+def test_metric_that_says_nothing_is_told() -> None:
+    found = weighed(scene_of(DROP), metric="joint_error", most=3)
+    assert found.within_tolerance is None
+    assert found.answers() == ["joint_error says nothing of this scene; another --metric would"]
 
 
 def test_who_watches_is_told_what_is_being_done() -> None:
