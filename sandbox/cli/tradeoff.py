@@ -1,5 +1,6 @@
 """`sandbox tradeoff`: error against cost over engines and settings, and the setting to take."""
 
+import math
 from pathlib import Path
 
 import click
@@ -11,7 +12,7 @@ from sandbox.cli.telling import telling
 from sandbox.cli.tradeoff_table import print_tradeoff
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.recorder import TooLargeError
-from sandbox.measure.tradeoff.aim import UnknownMetricError, metric_named
+from sandbox.measure.tradeoff.aim import UnknownMetricError, require_aim
 from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.weighed import Tradeoff
 from sandbox.measure.tradeoff.weighing import PATIENCE, POINTS, REPEATS, tradeoff
@@ -20,6 +21,7 @@ from sandbox.scene.file import load
 from sandbox.scene.model import Scene
 from sandbox.scene.rewrite import write_solver
 
+USUAL_FPS = 60.0
 POSITIVE = click.FloatRange(min=0.0, min_open=True)
 
 
@@ -30,7 +32,9 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True)
 @click.option("--metric", metavar="NAME", help=f"what the error is counted in: {', '.join(METRICS)}")
 @click.option("--tolerance", type=click.FloatRange(min=0.0), metavar="X", help="error that is allowed, in its unit")
 @click.option("--budget", type=POSITIVE, metavar="MS", help="milliseconds a frame that may be spent")
-@click.option("--fps", type=POSITIVE, default=60.0, metavar="N", help="frames a second of the budget; by default 60")
+@click.option(
+    "--fps", type=POSITIVE, default=USUAL_FPS, metavar="N", help="frames a second of the budget; by default 60"
+)
 @click.option("--seeds", type=click.IntRange(1, 1000), default=1, metavar="N", help="errors are the worst of N seeds")
 @click.option("--zoom", type=POSITIVE, metavar="PX", help="pixels a metre, for errors on the screen")
 @click.option("--patience", type=POSITIVE, default=PATIENCE, metavar="S", help="s that the search may take")
@@ -66,9 +70,18 @@ def command(
     for name in names or ():
         with gathering(faults, "--engine", (UnknownEngineError,)):
             engine_named(name)
-    if metric is not None:
-        with gathering(faults, "--metric", (UnknownMetricError,)):
-            metric_named(metric)
+    with gathering(faults, "--metric", (UnknownMetricError,)):
+        require_aim(metric, None, None, USUAL_FPS)
+    for flag, figures in (
+        ("--tolerance", (metric if metric in METRICS else None, tolerance, None, USUAL_FPS)),
+        ("--budget", (None, None, budget, USUAL_FPS)),
+        ("--fps", (None, None, None, fps)),
+    ):
+        with gathering(faults, flag, (ValueError,)):
+            require_aim(*figures)
+    for flag, figure in (("--zoom", zoom), ("--patience", patience)):
+        if figure is not None and not math.isfinite(figure):
+            faults.append(Fault(flag, None, "", f"is {figure:g}; it is positive and finite"))
     read: Scene | None = None
     path = scene
     with gathering(faults):
@@ -77,6 +90,9 @@ def command(
         read = load(path, overrides)
     if write and overrides:
         faults.append(Fault("--write", None, "", "the file lacks what --set changes; leave one of the two out"))
+    elif write and read is not None:
+        with gathering(faults):
+            write_solver(path, {})  # changes nothing, but tells whether it could
     with gathering(faults):
         require_folder(out)
     if out is not None and not faults:
@@ -127,7 +143,9 @@ def _kept(
 ) -> int:
     """Write what was asked for, and say so; return 2 where something cannot be written."""
     faults: list[Fault] = []
-    if write and found.within_tolerance is not None:
+    if write and found.within_tolerance is None:
+        _say(f"not written: {path} stays as it is, as no setting that was tried is within the tolerance", silent)
+    elif write and found.within_tolerance is not None:
         with gathering(faults):
             changed = write_solver(path, found.within_tolerance.point.changes)
             _say(f"written: {path}" if changed else f"{path}: has the recommended [solver] already", silent)

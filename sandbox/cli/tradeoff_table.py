@@ -6,11 +6,14 @@ from collections import Counter
 import click
 
 from sandbox.cli.table import WIDE
+from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.picking import called, written
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.split import Split
-from sandbox.measure.tradeoff.weighed import Tradeoff, figure
+from sandbox.measure.tradeoff.weighed import Tradeoff
 
+NOTHING = 1e-12
+"""m"""
 MOST_REASONS = 3
 """Failures told of by their reason."""
 
@@ -45,13 +48,15 @@ def print_tradeoff(scene: str, found: Tradeoff) -> None:
     console.width = max(console.width, Console(width=10_000).measure(table).maximum)
     console.print(Text(f"{scene}: {found.scene.title}" if found.scene.title else scene), soft_wrap=True)
     console.print(Text(_about(found)), soft_wrap=True)
-    console.print(table)
-    for line in [*_failures(found), *map(_split, found.splits), *found.answers(), *_cheaper(found)]:
+    if found.pareto:
+        console.print(table)
+    splits = [_split(each) for each in found.splits if each.total >= NOTHING]
+    for line in [*_failures(found), *splits, *found.answers(), *_cheaper(found)]:
         click.echo(line)
 
 
 def _about(found: Tradeoff) -> str:
-    truth = "no engine here can run it" if found.best is None else str(found.truth).replace("_", " ")
+    truth = "none is known" if found.best is None else str(found.truth).replace("_", " ")
     whole = found.scene.world.duration
     until = "" if found.best is None else f", trusted until {found.best.trusted_until:.4g} s of {whole:.4g} s"
     seeds = f", the worst of {len(found.seeds)} seeds" if len(found.seeds) > 1 else ""
@@ -63,7 +68,11 @@ def _about(found: Tradeoff) -> str:
 def _cells(point: Point) -> list[str]:
     assert point.error is not None and point.cost is not None and point.cost_median is not None
     steps = {"dt", "substeps", "iterations"}
-    words = ", ".join(f"{key} {written(value)}" for key, value in point.changes.items() if key not in steps)
+    words = ", ".join(
+        f"no {key}" if value is None else f"{key} {written(value)}"
+        for key, value in point.changes.items()
+        if key not in steps
+    )
     own = point.settings
     return [
         point.engine,
@@ -88,10 +97,15 @@ def _failures(found: Tradeoff) -> list[str]:
 
 
 def _split(each: Split) -> str:
-    least = f"{figure(each.left, 'm')} at {each.finest} times the substeps"
-    model = f"no more than {least} the model" if each.model is None else f"{figure(each.model, 'm')} the model"
-    parts = f"{figure(each.time_step, 'm')} the time step, {figure(each.solver, 'm')} the iterations, {model}"
-    return f"{each.engine} as the scene has it is {figure(each.total, 'm')} off: {parts}"
+    left = f"at most {_part(each.left)} the model, as is left at {each.finest} times the substeps"
+    model = left if each.model is None else f"{_part(each.model)} the model"
+    parts = f"{_part(each.time_step)} the time step, {_part(each.solver)} the iterations, {model}"
+    return f"{each.engine} as the scene has it is {_part(each.total)} off: {parts}"
+
+
+def _part(metres: float) -> str:
+    """Write a part of an error; nobody cares how much rounding it is."""
+    return "nothing" if metres < NOTHING else figure(metres, "m")
 
 
 def _cheaper(found: Tradeoff) -> list[str]:

@@ -2,6 +2,7 @@
 
 from time import perf_counter
 
+from sandbox.engines.compiling import COMPILING
 from sandbox.measure.run import run
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -12,10 +13,15 @@ class TookTooLongError(Exception):
     """A run was given up."""
 
 
+def working() -> float:
+    """Return the time by a clock that stands still while something is compiled, s: only differences mean anything."""
+    return perf_counter() - COMPILING.seconds
+
+
 def patient_run(scene: Scene, engine: str, settings: Settings, seconds: float, *, audit: bool = False) -> Trajectory:
     """Run a scene, but give up after some time; looked at between steps, as a step cannot be interrupted.
 
-    The time runs from the end of the first step on: an engine may compile in it.
+    The time runs from the end of the first step on, and stands still while an engine compiles.
 
     Args:
         scene: what to run.
@@ -32,8 +38,8 @@ def patient_run(scene: Scene, engine: str, settings: Settings, seconds: float, *
 
     def watch(share: float) -> None:
         nonlocal began
-        began = perf_counter() if began is None else began
-        if share < 1.0 and perf_counter() - began > seconds:
+        began = working() if began is None else began
+        if share < 1.0 and working() - began > seconds:
             raise TookTooLongError(f"given up after {seconds:.3g} s, {share:.0%} done")
 
     return run(scene, engine, audit=audit, progress=watch, **settings.model_dump())

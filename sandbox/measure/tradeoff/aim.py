@@ -34,9 +34,9 @@ class Aim(NamedTuple):
     """frames a second"""
 
     @property
-    def most(self) -> float | None:
-        """The budget in ms per simulated second."""
-        return None if self.budget is None else self.budget * self.fps
+    def hurry(self) -> float | None:
+        """The budget in s per simulated second."""
+        return None if self.budget is None else 1e-3 * self.budget * self.fps
 
 
 def metric_named(name: str) -> Metric:
@@ -55,16 +55,21 @@ def usual_metric(judge: Judge) -> Metric:
     """Return what a scene is best scored by where nothing else is asked for.
 
     The distance from the truth, if it is trusted to the end. Else an invariant: how well joints hold, where there are
-    some; energy, where nothing takes any; the depth of overlaps, where bodies can meet.
+    some; energy, where nothing takes any; the depth of overlaps, where bodies can meet. Where there is none of these,
+    the distance from the truth as far as it is trusted, or at last energy; that too where nothing moves.
     """
     scene = judge.scene
+    if not judge.moving.any():
+        return METRICS["energy"]
     if judge.truth is not None and judge.until >= scene.world.duration:
         return METRICS["max_position"]
     if np.isin(scene.links.kind, HOLDING).any():
         return METRICS["joint_error"]
-    if keeps_energy(scene) or not meetings(scene).touches.any():
+    if keeps_energy(scene):
         return METRICS["energy"]
-    return METRICS["penetration"]
+    if meetings(scene).touches.any():
+        return METRICS["penetration"]
+    return METRICS["energy" if judge.truth is None else "max_position"]
 
 
 def keeps_energy(scene: Scene) -> bool:
@@ -76,19 +81,24 @@ def keeps_energy(scene: Scene) -> bool:
     return bool((restitution == 1.0).all() and meet.friction == 0.0)
 
 
-def aim_at(judge: Judge, metric: str | None, tolerance: float | None, budget: float | None, fps: float) -> Aim:
-    """Return what is asked, with what was left open filled in.
+def require_aim(metric: str | None, tolerance: float | None, budget: float | None, fps: float) -> None:
+    """Make sure that what is asked makes sense, before anything is run.
 
     Raises:
         UnknownMetricError: no metric has that name.
-        ValueError: a figure is not positive and finite.
+        ValueError: a figure is not positive and finite; of what is counted, none may be tolerated.
     """
-    chosen = usual_metric(judge) if metric is None else metric_named(metric)
-    if tolerance is None:
-        tolerance = 0.0 if chosen.name in COUNTED else USUAL.get(chosen.unit, usual_tolerance(judge.scene))
-    elif not (0.0 < tolerance < math.inf or (tolerance == 0.0 and chosen.name in COUNTED)):
+    counted = metric is not None and metric_named(metric).name in COUNTED
+    if tolerance is not None and not (0.0 < tolerance < math.inf or (tolerance == 0.0 and counted)):
         raise ValueError(f"a tolerance of {tolerance:g}; it is positive and finite")
     for what, value in (("budget", budget), ("fps", fps)):
         if value is not None and not 0.0 < value < math.inf:
             raise ValueError(f"a {what} of {value:g}; it is positive and finite")
+
+
+def aim_at(judge: Judge, metric: str | None, tolerance: float | None, budget: float | None, fps: float) -> Aim:
+    """Return what is asked, which makes sense (`require_aim`), with what was left open filled in."""
+    chosen = usual_metric(judge) if metric is None else metric_named(metric)
+    if tolerance is None:
+        tolerance = 0.0 if chosen.name in COUNTED else USUAL.get(chosen.unit, usual_tolerance(judge.scene))
     return Aim(chosen, tolerance, budget, fps)

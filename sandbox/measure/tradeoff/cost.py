@@ -2,12 +2,11 @@
 
 import statistics
 from collections.abc import Sequence
-from time import perf_counter
 from typing import NamedTuple
 
-from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.registry import start
+from sandbox.measure.compare.patience import working
 from sandbox.measure.schedule import schedule
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -41,7 +40,7 @@ def seconds_of(scene: Scene, engine: str, settings: Settings) -> float | None:
     part = stretches[-1].part
     simulation = start(scene, engine, settings)
     try:
-        began, compiled = perf_counter(), COMPILING.seconds
+        began = working()
         for stretch in stretches:
             for _ in range(stretch.steps):
                 simulation.step()
@@ -49,7 +48,7 @@ def seconds_of(scene: Scene, engine: str, settings: Settings) -> float | None:
         if part > 0.0:
             simulation.finish(part)
             simulation.frame()
-        return perf_counter() - began - (COMPILING.seconds - compiled)
+        return working() - began
     except (Divergence, Exhaustion):
         return None
     finally:
@@ -63,16 +62,19 @@ def costs(scene: Scene, ways: Sequence[tuple[str, Settings]], repeats: int, most
         scene: what to run.
         ways: engine and settings of each.
         repeats: how often each is run.
-        most: s; a way that takes longer than this is not run again.
+        most: s that all of it may take; no turn is begun that would take longer. The first always is.
 
     Returns:
         The cost of each; None where a way does not get to its end.
     """
     taken: list[list[float]] = [[] for _ in ways]
     failed = [False] * len(ways)
+    began = working()
     for turn in range(repeats):
+        if turn and (working() - began) * (turn + 1) / turn > most:
+            break
         for k, (engine, settings) in enumerate(ways):
-            if failed[k] or (turn and min(taken[k]) > most):
+            if failed[k]:
                 continue
             seconds = seconds_of(scene, engine, settings)
             if seconds is None:

@@ -23,4 +23,4 @@ def pareto(items: Iterable[T], cost: Callable[[T], float], error: Callable[[T], 
 
 def outdone(cost: float, error: float, others: Sequence[tuple[float, float]], margin: float) -> bool:
     """Tell whether another, (cost, error) each, is at least as right and cheaper by a margin, such as 0.8."""
-    return any(its_cost <= margin * cost and its_error <= error for its_cost, its_error in others)
+    return any(its_cost < margin * cost and its_error <= error for its_cost, its_error in others)

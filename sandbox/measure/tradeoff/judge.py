@@ -1,11 +1,12 @@
 """Judge: what a scene's runs are held against, worked out once for all of them."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
+from sandbox.measure.compare.errors import Errors, errors
 from sandbox.measure.compare.truth import Truth
 from sandbox.scene.model import Scene
 from sandbox.trajectory import BoolArray, FloatArray, Trajectory
@@ -26,6 +27,7 @@ class Judge:
     truth: Truth | None
     zoom: float
     """px/m"""
+    _last: list[tuple[Trajectory, Errors]] = field(default_factory=list, init=False, repr=False)
 
     @property
     def until(self) -> float:
@@ -53,6 +55,15 @@ class Judge:
         if gravity > 0.0:
             return np.sqrt(2.0 * gravity * STILL * bodies.thin)
         return np.full(len(bodies), 1e-3 * float(np.hypot(*bodies.velocity.T).max(initial=0.0)))
+
+    def errors(self, run: Trajectory) -> Errors:
+        """Return the errors of a run against the truth; several metrics ask for those of the same run."""
+        assert self.truth is not None
+        for known, found in self._last:
+            if known is run:
+                return found
+        self._last[:] = [(run, errors(run, self.truth.trajectory, self.moving))]
+        return self._last[0][1]
 
     @cached_property
     def still(self) -> BoolArray:

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.measure.compare.drift import energy_drift
-from sandbox.measure.compare.errors import errors
 from sandbox.measure.compare.gaps import gap
+from sandbox.measure.compare.runs import common_frames, there
 from sandbox.measure.joint_error import joint_error
 from sandbox.measure.tradeoff.judge import Judge, strayed
-from sandbox.trajectory import Trajectory
+from sandbox.trajectory import FloatArray, Trajectory
 
 Measure = Callable[[Trajectory, Judge], float | None]
 
@@ -30,54 +30,49 @@ def max_position(run: Trajectory, judge: Judge) -> float | None:
     """Return the largest distance of any body from the truth, m, in any frame that the truth is trusted in."""
     if judge.truth is None:
         return None
-    return errors(run, judge.truth.trajectory, judge.moving).until(judge.until).max_position
+    return judge.errors(run).until(judge.until).max_position
 
 
 def rms_position(run: Trajectory, judge: Judge) -> float | None:
     """Return the root of the mean square distance from the truth, m."""
     if judge.truth is None:
         return None
-    return errors(run, judge.truth.trajectory, judge.moving).until(judge.until).rms_position
+    return judge.errors(run).until(judge.until).rms_position
 
 
 def final_position(run: Trajectory, judge: Judge) -> float | None:
-    """Return the largest distance from the truth in the last frame that it is trusted in, m."""
+    """Return the largest distance from the truth in the last frame that it is trusted in and any body is left, m."""
     if judge.truth is None:
         return None
-    found = errors(run, judge.truth.trajectory, judge.moving)
-    kept = np.flatnonzero(found.time <= judge.until)
+    found = judge.errors(run)
+    kept = np.flatnonzero((found.time <= judge.until) & (found.count > 0.0))
     return float(found.position[kept[-1]]) if len(kept) else None
 
 
 def bounce_height(run: Trajectory, judge: Judge) -> float | None:
     """Return by how much any body's highest place after its first contact differs from the truth's, m.
 
-    From the truth's first contact on, so that a body that fell through is told by the height it lacks. None without
-    gravity, or where nothing is touched.
+    From the truth's first contact on, so that a body that fell through is told by the height it lacks. Both are looked
+    at in the same frames, those that they share. None without gravity, or where nothing is touched.
     """
     if judge.truth is None or judge.down is None:
         return None
     truth = judge.truth.trajectory
+    mine, its = common_frames(run, truth)
+    both = there(run, mine) & there(truth, its) & (truth.time[its] <= judge.until)[:, None]
     worst = None
     for number in np.flatnonzero(judge.moving).tolist():
-        own = (truth.contact_pair == number).any(axis=1) & (truth.contact_time <= judge.until)
-        if not own.any():
-            continue
-        first = float(truth.contact_time[own].min())
-        tops = [_highest(each, number, first, judge) for each in (run, truth)]
-        if None not in tops:
-            off = abs(tops[0] - tops[1])  # type: ignore[operator] # neither is None
+        touched = truth.contact_time[(truth.contact_pair == number).any(axis=1)]
+        kept = both[:, number] & (truth.time[its] >= np.min(touched, initial=np.inf))
+        if kept.any():
+            own, right = run.position[mine[kept], number], truth.position[its[kept], number]
+            off = abs(_highest(own, judge.down) - _highest(right, judge.down))
             worst = off if worst is None else max(worst, off)
     return worst
 
 
-def _highest(run: Trajectory, number: int, since: float, judge: Judge) -> float | None:
-    assert judge.down is not None
-    frames = (run.time >= since) & (run.time <= judge.until)
-    if not frames.any():
-        return None
-    height = -(run.position[frames, number] @ judge.down)
-    return float(height.max()) if np.isfinite(height).all() else math.inf
+def _highest(places: FloatArray, down: FloatArray) -> float:
+    return -float((places @ down).min()) if np.isfinite(places).all() else math.inf
 
 
 def energy(run: Trajectory, judge: Judge) -> float | None:

@@ -3,11 +3,15 @@
 from collections.abc import Callable, Sequence
 
 from sandbox.measure.tradeoff.aim import Aim
+from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.point import Point
-from sandbox.measure.tradeoff.weighed import Pick, figure
+from sandbox.measure.tradeoff.weighed import Pick
 
 FRESH = 3
 """Seeds that a pick is run on again."""
+
+LONGER = 0.01
+"""The share by which a step may last longer than a frame, such as 0.0167 s at 60 a second, and nobody sees."""
 
 Again = Callable[[Point], float]
 """Runs a point on fresh seeds and returns the worst error, infinite where a run fails."""
@@ -24,10 +28,10 @@ def cheapest(points: Sequence[Point], aim: Aim, fresh: Sequence[int], again: Aga
 
 
 def best(points: Sequence[Point], aim: Aim, fresh: Sequence[int], again: Again) -> Pick | None:
-    """Return the point of the least error within the budget, the cheapest of equals; None where none is."""
-    if aim.most is None:
+    """Return the point of the least error whose every frame is within the budget, the cheapest of equals; or None."""
+    if aim.budget is None:
         return None
-    able = [p for p in points if p.usable and (p.cost_median or 0.0) <= aim.most]
+    able = [p for p in points if p.usable and p.frame(aim.fps) <= aim.budget]
     point = min(able, key=lambda each: (each.error or 0.0, each.cost or 0.0), default=None)
     if point is None:
         return None
@@ -41,16 +45,20 @@ def told(point: Point, aim: Aim, fresh: float | None) -> str:
     unit = aim.metric.unit
     off = f"{aim.metric.name} {figure(point.error, unit)}"
     if aim.metric.name == "passes" and point.error > 0.0:
-        off += f", 1 in {1.0 / point.error:.3g}"
+        off += f", 1 in {1.0 / point.error:.3g} passes unseen"
     again = "" if fresh is None else f", {figure(fresh, unit)} on fresh seeds"
     share = point.cost / 10.0
-    return f"{called(point)}: {off}{again}, {point.cost:.3g} ms a simulated second ({share:.2g} % of real time)"
+    long = point.settings.dt > (1.0 + LONGER) / aim.fps
+    steps = f"; a step lasts longer than a frame at {aim.fps:g} a second: draw in between" if long else ""
+    return f"{called(point)}: {off}{again}, {point.cost:.3g} ms a simulated second ({share:.2g} % of real time){steps}"
 
 
 def called(point: Point) -> str:
     """Name an engine and what its settings change: `reference with integrator = rk4`."""
-    changes = ", ".join(f"{key} = {written(value)}" for key, value in point.changes.items())
-    return f"{point.engine} with {changes}" if changes else f"{point.engine} as the scene has it"
+    changes = ", ".join(f"{key} = {written(value)}" for key, value in point.changes.items() if value is not None)
+    dropped = ", ".join(key for key, value in point.changes.items() if value is None)
+    parts = [f"{word} {what}" for word, what in (("with", changes), ("without", dropped)) if what]
+    return " ".join([point.engine, *parts]) if parts else f"{point.engine} as the scene has it"
 
 
 def written(value: object) -> str:

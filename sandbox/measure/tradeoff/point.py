@@ -31,6 +31,7 @@ class Point:
     """ms per simulated second: the least of separate repeats, nothing recorded"""
     cost_median: float | None
     repeats: int
+    """0 where another point is as right and by far cheaper: the cost is then of the run that gave the error"""
     work: Mapping[str, int]
     """deterministic counters: substeps, pair tests, contact iterations, events"""
 
@@ -40,21 +41,27 @@ class Point:
             "engine": self.engine,
             "settings": self.settings.model_dump(mode="json"),
             "changes": dict(self.changes),
-            "error": _number(self.error),
-            "cost_ms_per_second": _number(self.cost),
-            "cost_median_ms_per_second": _number(self.cost_median),
+            "error": number(self.error),
+            "cost_ms_per_second": number(self.cost),
+            "cost_median_ms_per_second": number(self.cost_median),
             "repeats": self.repeats,
             "status": self.status,
             "reason": self.reason,
-            "metrics": {name: _number(value) for name, value in self.metrics.items()},
+            "metrics": {name: number(value) for name, value in self.metrics.items()},
             "work": dict(self.work),
         }
 
     @property
     def usable(self) -> bool:
-        """Whether it has both figures, so that it can be weighed."""
-        return self.status == "ok" and self.error is not None and self.cost is not None
+        """Whether it has both figures, and these are finite, so that it can be weighed."""
+        return self.status == "ok" and number(self.error) is not None and number(self.cost) is not None
+
+    def frame(self, fps: float) -> float:
+        """Return what the dearest frame of a game takes, ms: one step where dt is longer than a frame. It is usable."""
+        assert self.cost_median is not None
+        return self.cost_median * max(1.0 / fps, self.settings.dt)
 
 
-def _number(value: float | None) -> float | None:
+def number(value: float | None) -> float | None:
+    """Return a figure as JSON can have it: None where it is not finite."""
     return value if value is not None and math.isfinite(value) else None

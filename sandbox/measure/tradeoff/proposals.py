@@ -4,15 +4,18 @@ A formula needs no engine; an exact engine needs no step; and a scene that deman
 left out has changed nothing that anybody would see.
 """
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from time import perf_counter
 from typing import Any
+
+import numpy as np
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.closed import solved
-from sandbox.measure.compare.patience import TookTooLongError, patient_run
-from sandbox.measure.tradeoff.cost import Cost, costs, seconds_of
+from sandbox.measure.compare.patience import TookTooLongError, patient_run, working
+from sandbox.measure.tradeoff.cost import seconds_of
+from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.scene.document import to_document
@@ -21,6 +24,7 @@ from sandbox.scene.file import from_document
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
+from sandbox.trajectory import IntArray
 
 CHEAPER = 0.9
 """What a proposal may cost at most, as a share of what it stands in for: less is within the noise."""
@@ -50,51 +54,66 @@ class Proposal:
 
 
 def proposals(
-    judge: Judge, metric: str, tolerance: float, engine: str, settings: Settings, patience: float, repeats: int = 3
+    judges: Sequence[Judge],
+    metric: str,
+    tolerance: float,
+    engine: str,
+    settings: Settings,
+    patience: float,
+    repeats: int = 3,
 ) -> list[Proposal]:
     """Return the cheaper models that stay within the tolerance, the cheapest first.
 
     Args:
-        judge: gives scene and truth.
+        judges: of the scene, and of the same with other seeds: a model has to do well on all.
         metric: what the error is counted in.
         tolerance: in its unit.
         engine: whose setting they would stand in for.
         settings: these, choices left to the engine still open.
-        patience: s that one run may take.
-        repeats: how often each is timed.
+        patience: s that one run may take, and the timing of one model.
+        repeats: how often each is timed, if there is the time.
     """
-    found = [*_formula(judge, metric, tolerance, engine, settings, repeats)]
-    for what, scene in _simpler(judge):
-        error = _error(judge, metric, scene, engine, settings, patience)
-        if error is None or error > tolerance:
-            continue
-        own, its = _timed(judge.scene, scene, engine, settings, repeats)
-        if own is not None and its is not None and its.least <= CHEAPER * own.least:
-            found.append(_proposal(what, engine, error, its.least, its.least / own.least, metric))
+    found = [*_formula(judges, metric, tolerance, engine, settings, patience, repeats)]
+    for what, change in _simplifications(judges):
+        error, simpler = 0.0, None
+        for judge in judges:
+            changed = _changed(judge.scene, change)
+            off = None if changed is None else _error(judge, metric, changed, engine, settings, patience)
+            error = max(error, math.inf if off is None else off)
+            if not error <= tolerance:
+                break
+            simpler = simpler or changed
+        if simpler is not None and error <= tolerance:
+            own, its = _timed(judges[0].scene, simpler, engine, settings, patience, repeats)
+            if own is not None and its is not None and its <= CHEAPER * own:
+                found.append(_proposal(what, engine, error, its, own, judges[0].scene, metric))
     return sorted(found, key=lambda each: each.ratio)
 
 
 def _formula(
-    judge: Judge, metric: str, tolerance: float, engine: str, settings: Settings, repeats: int
+    judges: Sequence[Judge],
+    metric: str,
+    tolerance: float,
+    engine: str,
+    settings: Settings,
+    patience: float,
+    repeats: int,
 ) -> Iterator[Proposal]:
     """Propose the closed form, where the scene has one for all of it."""
-    scene = judge.scene
-    if judge.truth is None or judge.truth.kind != "closed_form":
+    if any(judge.truth is None or judge.truth.kind != "closed_form" for judge in judges):
         return
-    took = []
+    scene, took, forms = judges[0].scene, [], [solved(judge.scene, settings) for judge in judges]
+    errors = [None if f is None else METRICS[metric].measure(f, j) for f, j in zip(forms, judges, strict=True)]
+    worst = max(math.inf if each is None or math.isnan(each) else each for each in errors)
+    own, _ = _timed(scene, None, engine, settings, patience, repeats)
+    if worst > tolerance or own is None:
+        return
     for _ in range(repeats):
-        began = perf_counter()
-        form = solved(scene, settings)
-        took.append(perf_counter() - began)
-    own = [seconds_of(scene, engine, settings) for _ in range(repeats)]
-    if form is None or None in own:
-        return
-    error = METRICS[metric].measure(form, judge)
-    if error is not None and error <= tolerance:
-        least, base = min(took), min(each for each in own if each is not None)
-        if least <= CHEAPER * base:
-            what = "no engine: the scene has a closed form"
-            yield _proposal(what, None, error, 1e3 * least / scene.world.duration, least / base, metric)
+        began = working()
+        solved(scene, settings)
+        took.append(working() - began)
+    if min(took) <= CHEAPER * own:
+        yield _proposal("no engine: the scene has a closed form", None, worst, min(took), own, scene, metric)
 
 
 def _error(judge: Judge, metric: str, scene: Scene, engine: str, settings: Settings, patience: float) -> float | None:
@@ -108,38 +127,39 @@ def _error(judge: Judge, metric: str, scene: Scene, engine: str, settings: Setti
 
 
 def _timed(
-    scene: Scene, other: Scene, engine: str, settings: Settings, repeats: int
-) -> tuple[Cost | None, Cost | None]:
-    """Time two scenes in turns."""
-    pairs = [
-        (costs(scene, [(engine, settings)], 1, 0.0)[0], costs(other, [(engine, settings)], 1, 0.0)[0])
-        for _ in range(repeats)
-    ]
-    sides = []
-    for side in zip(*pairs, strict=True):
-        took = [each.least for each in side if each is not None]
-        sides.append(Cost(min(took), sorted(took)[len(took) // 2], len(took)) if len(took) == repeats else None)
-    return sides[0], sides[1]
+    scene: Scene, other: Scene | None, engine: str, settings: Settings, patience: float, repeats: int
+) -> tuple[float | None, float | None]:
+    """Return the least time that each of two scenes takes in turns, s; None where one does not get to its end."""
+    both = [each for each in (scene, other) if each is not None]
+    taken: list[list[float]] = [[] for _ in both]
+    began = working()
+    for turn in range(repeats):
+        if turn and (working() - began) * (turn + 1) / turn > patience:
+            break
+        for each, times in zip(both, taken, strict=True):
+            seconds = seconds_of(each, engine, settings)
+            if seconds is None:
+                return None, None
+            times.append(seconds)
+    return min(taken[0]), min(taken[-1]) if other is not None else None
 
 
-def _simpler(judge: Judge) -> Iterator[tuple[str, Scene]]:
-    """Yield scenes that demand less, and what was left out; none that lays its bodies out otherwise."""
-    scene = judge.scene
-    for what, change in _simplifications(judge):
-        document = to_document(scene)
-        change(document)
-        try:
-            simpler = from_document(document)
-        except SceneError:
-            continue
-        if simpler.bodies.position.tobytes() == scene.bodies.position.tobytes():
-            yield what, simpler
+def _changed(scene: Scene, change: Callable[[dict[str, Any]], None]) -> Scene | None:
+    """Return a scene that demands less; None where that is no sound scene, or lays its bodies out otherwise."""
+    document = to_document(scene)
+    change(document)
+    try:
+        simpler = from_document(document)
+    except SceneError:
+        return None
+    return simpler if simpler.bodies.position.tobytes() == scene.bodies.position.tobytes() else None
 
 
-def _simplifications(judge: Judge) -> Iterator[Simplification]:
-    scene, world = judge.scene, judge.scene.world
-    meet = meetings(scene)
-    met = judge.truth.trajectory.contact_pair if judge.truth is not None and judge.until == world.duration else None
+def _simplifications(judges: Sequence[Judge]) -> Iterator[Simplification]:
+    """Yield what could be left out, by what the truths of all seeds and the scene say."""
+    scene = judges[0].scene
+    world, meet = scene.world, meetings(scene)
+    met = _met(judges)
     if met is not None and meet.touches.any():
         if not len(met):
             yield 'nothing meets anything: collides = "none" for all that moves', _collides(scene, "none")
@@ -149,6 +169,16 @@ def _simplifications(judge: Judge) -> Iterator[Simplification]:
         yield "no drag", _without_drag
     if any(each.friction for each in (*scene.materials, *scene.pairs, *scene.movers, *scene.fixed)):
         yield "no friction", _without_friction
+
+
+def _met(judges: Sequence[Judge]) -> IntArray | None:
+    """Return the pairs that meet in any of the truths, (C, 2); None where one is not trusted to its end."""
+    found = []
+    for judge in judges:
+        if judge.truth is None or judge.until < judge.scene.world.duration:
+            return None
+        found.append(judge.truth.trajectory.contact_pair)
+    return np.concatenate(found)
 
 
 def _collides(scene: Scene, word: str) -> Callable[[dict[str, Any]], None]:
@@ -173,8 +203,12 @@ def _without_friction(document: dict[str, Any]) -> None:
                 element["friction"] = 0.0
 
 
-def _proposal(what: str, engine: str | None, error: float, cost: float, ratio: float, metric: str) -> Proposal:
-    unit = METRICS[metric].unit
-    size = f"{error:.2g} {unit}".strip()
-    sentence = f"{what}: {size} off, at {ratio:.2g} of the cost ({cost:.3g} ms a simulated second)"
+def _proposal(
+    what: str, engine: str | None, error: float, took: float, instead: float, scene: Scene, metric: str
+) -> Proposal:
+    cost, ratio = 1e3 * took / scene.world.duration, took / instead
+    sentence = (
+        f"{what}: {metric} {figure(error, METRICS[metric].unit)}, {cost:.3g} ms a simulated second,"
+        f" {ratio:.2g} of what that setting takes"
+    )
     return Proposal(what, engine, error, cost, ratio, sentence)

@@ -1,7 +1,8 @@
 """Search: which variants are worth a run. It refines near the front, and stops branches that are outdone.
 
-From each engine's own settings on, the variants one choice away are tried: of those trials that nothing outdoes on
-the same engine, the one that matters most for what is asked. At last the smallest number of substeps and of iterations
+First each engine's substeps are doubled until it meets the tolerance, if it can, so that there is an answer. From its
+own settings on, the variants one choice away are tried then: of those trials that nothing outdoes on the same engine,
+the one that matters most for what is asked. At last the smallest number of substeps and of iterations
 that still meets the tolerance is closed in on.
 """
 
@@ -9,8 +10,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import cycle
-from time import perf_counter
 
+from sandbox.measure.compare.patience import working
 from sandbox.measure.tradeoff.front import outdone
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.trial import Trial, tried
@@ -20,9 +21,21 @@ MARGIN = 0.7
 """A trial is outdone by one that takes no more than this share of its time and is at least as right; times of a single
 run say no more."""
 ENOUGH = 1e-6
-"""Errors below this share of the tolerance are as good as none."""
+"""Errors below this share of the tolerance are as good as none; where none is tolerated, of a single miss."""
 SLOW = 0.2
-"""The share of the patience that a single run may take."""
+"""The share of the patience that one variant's run may take, for each seed."""
+FALLS = 0.8
+"""Where half the step leaves more than this share of an error, it was of no use."""
+FLAT = 2
+"""So often it may be of none."""
+FAR = 16
+"""times its own substeps an engine goes at first: beyond, another way of doing things may be the cheaper one."""
+WIDE = 0.8
+"""The share of trials and time after which nothing new is looked for, so that some is left to close in."""
+LITTLE = 0.95
+"""What leaves more than this share of the error of something cheaper is not gone on from."""
+LEAST = 1.0
+"""s that an engine's own settings may always take."""
 
 Told = Callable[[str], None]
 
@@ -44,22 +57,22 @@ class Search:
     """trials"""
     told: Told
     trials: dict[Variant, Trial] = field(default_factory=dict)
-    untried: int = 0
+    untried: set[Variant] = field(default_factory=set)
     """variants that would have taken too long"""
 
     def run(self) -> list[Trial]:
         """Try variants until none is worth it, or the patience is at its end; return all trials in order."""
-        self._began = perf_counter()
+        self._began = working()
         expanded: set[Variant] = set()
-        for variant in self.space.starts():
-            self._try(variant)
+        for start in [self._try(variant) for variant in self.space.starts()[: self.most]]:
+            self._reach(start)
         aims = (
             [self._near_tolerance, self._near_budget, self._cheap]
             if self.budget
             else [self._near_tolerance, self._cheap]
         )
         turns = cycle([(engine, aim) for aim in aims for engine in self.space.engines])
-        while self._goes_on():
+        while self._goes_on(WIDE):
             open_trials = [t for v, t in self.trials.items() if v not in expanded and self._promising(t)]
             if not open_trials:
                 break
@@ -70,45 +83,74 @@ class Search:
             best = min(own, key=aim)
             expanded.add(best.variant)
             for variant in self.space.near(best.variant):
-                if self._goes_on():
+                if self._goes_on(WIDE):
                     self._try(variant, best)
         self._close_in()
         return list(self.trials.values())
 
-    def _goes_on(self) -> bool:
-        return len(self.trials) < self.most and perf_counter() - self._began < self.patience
+    def _reach(self, trial: Trial | None) -> None:
+        """Double the substeps until the tolerance is met, or again and again leave the error what it is.
+
+        What is missed is missed by 2 and by 4 substeps as well, and by 8 no more: the first that changes nothing does
+        not end it, and where none may be missed, nothing but time.
+        """
+        flat = 0
+        while trial is not None and trial.error(self.metric) > self.tolerance and trial.variant.engine != "exact":
+            finer = replace(trial.variant, substeps=2 * trial.variant.substeps)
+            if trial.status in ("refused", "stopped") or not self.space.sound(finer) or not self._goes_on():
+                return
+            if self.tolerance > 0.0 and finer.substeps > FAR * self.space.own(finer.engine).substeps:
+                return
+            found = self._try(finer, trial)
+            before = trial.error(self.metric)
+            if found is not None and math.isfinite(before) and found.error(self.metric) > FALLS * before:
+                flat += 1
+                if flat > FLAT and self.tolerance > 0.0:
+                    return
+            trial = found
+
+    def _goes_on(self, share: float = 1.0) -> bool:
+        return len(self.trials) < share * self.most and self._left > (1.0 - share) * self.patience
+
+    @property
+    def _left(self) -> float:
+        return self.patience - (working() - self._began)
 
     def _try(self, variant: Variant, parent: Trial | None = None) -> Trial | None:
         """Try a variant that was not tried, unless by its parent's time it would take too long."""
         if variant in self.trials:
             return self.trials[variant]
-        left = self.patience - (perf_counter() - self._began)
+        allowed = min(SLOW * self.patience * len(self.judges), self._left)
         if parent is not None:
             expected = parent.seconds * variant.work / parent.variant.work * len(self.judges)
-            if expected > max(left, 0.0):
-                self.untried += 1
+            if expected > max(allowed, 0.0):
+                self.untried.add(variant)
                 return None
         self.told(f"{len(self.trials) + 1} tried: {_called(variant)}")
-        found = tried(variant, self.space, self.judges, max(SLOW * self.patience, 1.0))
+        found = tried(variant, self.space, self.judges, max(allowed, LEAST if parent is None else 0.0))
         self.trials[variant] = found
         return found
 
     def _error(self, trial: Trial) -> float:
-        return max(trial.error(self.metric), ENOUGH * self.tolerance)
+        """Return a trial's error, never 0: logarithms are taken of it."""
+        return max(trial.error(self.metric), ENOUGH * (self.tolerance or 1.0))
 
     def _promising(self, trial: Trial) -> bool:
-        """Tell whether to look around a trial: nothing on its engine outdoes it, or it failed at the very start."""
+        """Tell whether to look around a trial: nothing on its engine outdoes it, or all there failed as it did."""
         if trial.status in ("refused", "stopped"):
             return False
-        if math.isinf(trial.error(self.metric)):  # it says nothing of its neighbours but that coarser ones fail too
-            return trial.variant in self.space.starts()
-        same = (t for t in self.trials.values() if t.status == "ok" and t.variant.engine == trial.variant.engine)
-        others = [(t.seconds, self._error(t)) for t in same]
+        same = [t for t in self.trials.values() if t.variant.engine == trial.variant.engine]
+        good = [t for t in same if math.isfinite(t.error(self.metric))]
+        if math.isinf(trial.error(self.metric)):  # what is finer may do better, as long as nothing does well
+            if trial.status == "ok" and trial.metrics.get(self.metric) is None:
+                return not good and trial is same[0]
+            return not good and trial.variant.work >= max(t.variant.work for t in same)
+        others = [(t.seconds, LITTLE * self._error(t)) for t in good]
         return not outdone(trial.seconds, self._error(trial), others, MARGIN)
 
     def _near_tolerance(self, trial: Trial) -> float:
-        error = self._error(trial)
-        return abs(math.log(error / self.tolerance)) if math.isfinite(error) else math.inf
+        error, wanted = self._error(trial), self.tolerance or ENOUGH
+        return abs(math.log(error / wanted)) if math.isfinite(error) else math.inf
 
     def _near_budget(self, trial: Trial) -> float:
         assert self.budget is not None
@@ -118,16 +160,28 @@ class Search:
         return trial.seconds if math.isfinite(trial.error(self.metric)) else math.inf
 
     def _close_in(self) -> None:
-        """Between a variant that misses the tolerance and one that meets it, halve the gap until it is closed."""
-        for knob in ("substeps", "iterations"):
-            for meeting in [t for t in self.trials.values() if t.error(self.metric) <= self.tolerance]:
-                high = meeting.variant
-                low = _with(high, knob, getattr(high, knob) // 2)
-                if low not in self.trials or self.trials[low].error(self.metric) <= self.tolerance:
-                    continue
-                if not self._promising(meeting):
-                    continue
-                self._halve(knob, getattr(low, knob), getattr(high, knob), meeting)
+        """Of what meets the tolerance, and is outdone by nothing, find the fewest substeps and iterations that do."""
+        knobs = ("substeps", "iterations") if self.space.iterates else ("substeps",)
+        for knob in knobs:
+            for meeting in [t for t in self.trials.values() if self._meets(t) and t.variant.engine != "exact"]:
+                if self._promising(meeting):
+                    self._fewer(knob, meeting)
+
+    def _meets(self, trial: Trial) -> bool:
+        return trial.error(self.metric) <= self.tolerance
+
+    def _fewer(self, knob: str, meeting: Trial) -> None:
+        """Halve a number as long as the tolerance is met, then close the gap to what misses it."""
+        while self._goes_on():
+            value = getattr(meeting.variant, knob)
+            less = _with(meeting.variant, knob, value // 2)
+            found = self._try(less, meeting) if self.space.sound(less) else None
+            if found is None:
+                return
+            if not self._meets(found):
+                self._halve(knob, value // 2, value, meeting)
+                return
+            meeting = found
 
     def _halve(self, knob: str, low: int, high: int, meeting: Trial) -> None:
         while high - low > max(1, high // 8) and self._goes_on():
@@ -137,7 +191,7 @@ class Search:
             found = self._try(middle, meeting)
             if found is None:
                 return
-            if found.error(self.metric) <= self.tolerance:
+            if self._meets(found):
                 high = getattr(middle, knob)
             else:
                 low = getattr(middle, knob)

@@ -6,16 +6,16 @@ the time step's and the model's parts; the whole is at most their sum, and may b
 """
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from time import perf_counter
+from dataclasses import dataclass
 from typing import Any
 
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.errors import errors
-from sandbox.measure.compare.patience import TookTooLongError, patient_run
+from sandbox.measure.compare.patience import TookTooLongError, patient_run, working
 from sandbox.measure.tradeoff.judge import Judge
+from sandbox.measure.tradeoff.point import number
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
@@ -46,11 +46,13 @@ class Split:
 
     def document(self) -> dict[str, Any]:
         """Return it as a JSON object."""
-        return {**asdict(self), "settings": self.settings.model_dump(mode="json")}
+        figures = ("total", "solver", "time_step", "model", "left")
+        own = {"engine": self.engine, "settings": self.settings.model_dump(mode="json")}
+        return {**own, **{key: number(getattr(self, key)) for key in figures}, "finest": self.finest}
 
 
 def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split | None:
-    """Take the position error of an engine's settings apart; None where a run does not get to its end, or no truth is.
+    """Take the position error of an engine's settings apart; None where no truth is, or no finer run ends in time.
 
     The model's part is what is left at the finest step, if halving the step changed it by less than a tenth; a part
     that still shrinks belongs to the time step.
@@ -63,7 +65,7 @@ def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split 
     """
     if judge.truth is None:
         return None
-    runs = _Runs(judge, engine, perf_counter() + patience)
+    runs = _Runs(judge, engine, working() + patience)
     own = runs.of(asked)
     if own is None:
         return None
@@ -74,8 +76,10 @@ def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split 
     finest, times, before = converged, 1, None
     for factor, run in runs.finer(many):
         before, finest, times = finest, run, factor
+    if before is None:
+        return None
     left = runs.apart(finest, judge.truth.trajectory)
-    still = before is None or runs.apart(before, judge.truth.trajectory) > 1.1 * left
+    still = runs.apart(before, judge.truth.trajectory) > 1.1 * left
     return Split(
         engine,
         ENGINES[engine].resolve(judge.scene, asked),
@@ -93,11 +97,11 @@ class _Runs:
     judge: Judge
     engine: str
     end: float
-    """of the patience, s, by the clock"""
+    """of the patience, s, by the clock of `working`"""
 
     def of(self, settings: Settings) -> Trajectory | None:
         """Return a run that got to its end, or None."""
-        left = self.end - perf_counter()
+        left = self.end - working()
         if left <= 0.0:
             return None
         try:

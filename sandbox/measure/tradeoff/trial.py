@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.compare.patience import TookTooLongError, patient_run
+from sandbox.measure.compare.patience import TookTooLongError, patient_run, working
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS, measured
@@ -40,23 +40,24 @@ def tried(variant: Variant, space: Space, judges: Sequence[Judge], patience: flo
         variant: what to run.
         space: it is of this.
         judges: of the same scene with other seeds.
-        patience: s that one run may take.
+        patience: s that all these runs together may take.
     """
     asked = space.settings(variant)
     filled = ENGINES[variant.engine].resolve(space.scene, asked)
     worst: dict[str, float | None] = dict.fromkeys(METRICS)
-    seconds, work = 0.0, {}
+    seconds, work, began = 0.0, {}, working()
     for judge in judges:
+        left = max(patience - (working() - began), 0.0)
         try:
-            run = patient_run(judge.scene, variant.engine, asked, patience, audit=True)
+            run = patient_run(judge.scene, variant.engine, asked, left, audit=True)
         except TookTooLongError as error:
-            return Trial(variant, filled, "stopped", str(error), worst, patience, {})
+            return Trial(variant, filled, "stopped", str(error), dict.fromkeys(METRICS), patience, {})
         except TooLargeError as error:
-            return Trial(variant, filled, "failed", str(error), worst, 0.0, {})
+            return Trial(variant, filled, "failed", str(error), dict.fromkeys(METRICS), 0.0, {})
         seconds = max(seconds, float(run.info["seconds"]))
         work = dict(run.info["work"])
         if run.status != "ok":
-            return Trial(variant, filled, run.status, run.reason, worst, seconds, work)
+            return Trial(variant, filled, run.status, run.reason, dict.fromkeys(METRICS), seconds, work)
         worst = {name: _worse(worst[name], found) for name, found in measured(run, judge).items()}
     return Trial(variant, filled, "ok", None, worst, seconds, work)
 
@@ -64,4 +65,4 @@ def tried(variant: Variant, space: Space, judges: Sequence[Judge], patience: flo
 def _worse(a: float | None, b: float | None) -> float | None:
     if a is None or b is None:
         return a if b is None else b
-    return max(a, b)
+    return math.nan if math.isnan(a) or math.isnan(b) else max(a, b)

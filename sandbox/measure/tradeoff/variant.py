@@ -1,15 +1,15 @@
 """Variant: one engine with one choice of settings, and the variants that are one choice away."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain
 from typing import Any, get_args
 
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.recorder import frame_count
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.part import MAX_STEPS
@@ -17,7 +17,7 @@ from sandbox.scene.settings import Detection, Integrator, Joints, Response, Sett
 
 MOST_SUBSTEPS, MOST_ITERATIONS = 512, 1000
 FEWEST_STEPS = 4
-"""A run of fewer says nothing."""
+"""A run of fewer says nothing, and is tried only where the scene has no more itself."""
 FINEST, COARSEST = Fraction(256), Fraction(1, 16)
 """How many frames are made of one of the scene's own."""
 
@@ -53,7 +53,7 @@ class Variant:
         return float(self.finer) * self.substeps * (1.0 + self.iterations / 20.0)
 
     def settings(self, base: Settings) -> Settings:
-        """Return the settings in full; frames are kept at the same times, or where those are too close, at fewer.
+        """Return the settings in full; frames are kept at times at which the base keeps them too, if not at all these.
 
         Raises:
             pydantic.ValidationError: dt leaves its bounds.
@@ -61,7 +61,7 @@ class Variant:
         every = Fraction(base.record_every) * self.finer
         return base.replace(
             dt=float(Fraction(base.dt) / self.finer),
-            record_every=int(every) if every.denominator == 1 else 1,
+            record_every=every.numerator,
             substeps=self.substeps,
             iterations=self.iterations,
             **dict(self.words),
@@ -69,8 +69,11 @@ class Variant:
 
     def with_word(self, key: str, value: Any) -> "Variant":
         """Return the variant with another way of doing one thing."""
-        kept = [(k, v) for k, v in self.words if k != key]
-        return replace(self, words=tuple(sorted([*kept, (key, value)])))
+        return replace(self, words=tuple(sorted([*self.without_word(key).words, (key, value)])))
+
+    def without_word(self, key: str) -> "Variant":
+        """Return the variant with one thing done as the scene has it, or as the engine likes it."""
+        return replace(self, words=tuple((k, v) for k, v in self.words if k != key))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +83,10 @@ class Space:
     scene: Scene
     base: Settings
     engines: tuple[str, ...]
+    frame: float = 1.0 / 60.0
+    """s that a game shows a picture; `exact` is not asked for fewer"""
+    _sound: dict[Variant, bool] = field(default_factory=dict, init=False, repr=False)
+    _filled: dict[Variant, Settings] = field(default_factory=dict, init=False, repr=False)
 
     def starts(self) -> list[Variant]:
         """Return each engine with the scene's own settings; what only some engines take is left out for the others."""
@@ -87,7 +94,12 @@ class Space:
 
     def own(self, engine: str) -> Settings:
         """Return the settings that an engine's variants differ from: the scene's, or of these what all engines take."""
-        return self.base if not ENGINES[engine].missing(self.scene, self.base) else self.base.common()
+        return self._own[engine]
+
+    @cached_property
+    def _own(self) -> dict[str, Settings]:
+        kept = {name: not ENGINES[name].missing(self.scene, self.base) for name in self.engines}
+        return {name: self.base if whole else self.base.common() for name, whole in kept.items()}
 
     def settings(self, variant: Variant) -> Settings:
         """Return a variant's settings in full, choices that are left to the engine still open."""
@@ -95,6 +107,11 @@ class Space:
 
     def sound(self, variant: Variant) -> bool:
         """Tell whether a variant can be run at all."""
+        if variant not in self._sound:
+            self._sound[variant] = self._can_run(variant)
+        return self._sound[variant]
+
+    def _can_run(self, variant: Variant) -> bool:
         if not (COARSEST <= variant.finer <= FINEST and 1 <= variant.substeps <= MOST_SUBSTEPS):
             return False
         if not 1 <= variant.iterations <= MOST_ITERATIONS:
@@ -103,18 +120,36 @@ class Space:
             settings = self.settings(variant)
         except ValidationError:
             return False
+        if variant.engine == "exact" and variant.finer < 1 and settings.dt > self.frame:
+            return False
         steps = self.scene.world.duration / settings.dt
-        if not FEWEST_STEPS <= steps <= MAX_STEPS / variant.substeps:
+        if (variant.finer < 1 and steps < FEWEST_STEPS) or steps > MAX_STEPS / variant.substeps:
             return False
         return not ENGINES[variant.engine].missing(self.scene, settings)
 
-    def near(self, variant: Variant) -> Iterator[Variant]:
-        """Yield the sound variants that are one choice away, each choice up and down."""
+    def filled(self, variant: Variant) -> Settings:
+        """Return a variant's settings as the engine fills them in."""
+        if variant not in self._filled:
+            self._filled[variant] = ENGINES[variant.engine].resolve(self.scene, self.settings(variant))
+        return self._filled[variant]
+
+    def plain(self, variant: Variant) -> Variant:
+        """Return a variant without the words that say what is done anyway, so that none goes by two names."""
+        filled = self.filled(variant)
+        for key, _ in variant.words:
+            less = variant.without_word(key)
+            if self.filled(less) == filled:
+                variant = less
+        return variant
+
+    def near(self, variant: Variant) -> list[Variant]:
+        """Return the sound variants that are one choice away, each choice up and down."""
         if variant.engine == "exact":  # for whom dt is but the time between two frames
-            yield from filter(self.sound, [replace(variant, finer=variant.finer / 2)])
+            others: Iterator[Variant] = iter([replace(variant, finer=variant.finer / 2)])
         else:
-            yield from filter(self.sound, self._steps(variant))
-        yield from filter(self.sound, self._ways(variant))
+            others = chain(self._steps(variant), self._ways(variant))
+        found = dict.fromkeys(self.plain(other) for other in others if self.sound(other))
+        return [other for other in found if other != variant]
 
     def _steps(self, variant: Variant) -> Iterator[Variant]:
         own = self.own(variant.engine)
@@ -132,7 +167,7 @@ class Space:
                 yield replace(variant, iterations=variant.iterations // 2)
 
     def _ways(self, variant: Variant) -> Iterator[Variant]:
-        filled = ENGINES[variant.engine].resolve(self.scene, self.settings(variant))
+        filled = self.filled(variant)
         for key, values in WORDS.items():
             if key == "joints" and not len(self.scene.links):
                 continue
@@ -156,7 +191,3 @@ class Space:
         return bool(len(self.scene.links)) or (
             self.touches and (meet.mutual or len(self.scene.fixed) > 1 or meet.solids)
         )
-
-    def frames(self, variant: Variant) -> int:
-        """Return how many steps a variant's run has."""
-        return frame_count(self.scene, self.settings(variant))[0]

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from sandbox.measure.compare.truth import Truth
+from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.metrics import Metric
-from sandbox.measure.tradeoff.point import Point
+from sandbox.measure.tradeoff.point import Point, number
 from sandbox.measure.tradeoff.proposals import Proposal
 from sandbox.measure.tradeoff.split import Split
 from sandbox.scene.model import Scene
@@ -29,7 +30,7 @@ class Pick:
         more = {
             "sentence": self.sentence,
             "fresh_seeds": list(self.fresh_seeds),
-            "fresh_error": _number(self.fresh_error),
+            "fresh_error": number(self.fresh_error),
         }
         return {**self.point.document(), **more}
 
@@ -72,12 +73,15 @@ class Tradeoff:
     @property
     def floors(self) -> dict[str, float]:
         """The error of each engine that no setting of its step and its iterations removes, m, where there is one."""
-        return {each.engine: each.model for each in self.splits if each.model is not None}
+        return {each.engine: each.model for each in self.splits if each.model is not None and math.isfinite(each.model)}
 
     def answers(self) -> list[str]:
         """Return the sentences that people come for."""
+        ran = [point for point in self.points if point.status == "ok"]
+        if ran and all(point.error is None for point in ran):
+            return [f"{self.metric.name} says nothing of this scene; another --metric would"]
         unit = self.metric.unit
-        wanted = f"within {figure(self.tolerance, unit)}"
+        wanted = f"with {self.metric.name} within {figure(self.tolerance, unit)}"
         lines = [
             f"cheapest setting {wanted}: {self.within_tolerance.sentence}"
             if self.within_tolerance is not None
@@ -123,16 +127,3 @@ class Tradeoff:
             "untried": self.untried,
             "machine": dict(self.machine),
         }
-
-
-def figure(value: float, unit: str) -> str:
-    """Write a figure with its unit, lengths in the unit that reads best."""
-    if unit == "m" and 0.0 < value < 1.0:
-        for size, name in ((1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")):
-            if value >= size:
-                return f"{value / size:.3g} {name}"
-    return f"{value:.3g} {unit}".strip()
-
-
-def _number(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None

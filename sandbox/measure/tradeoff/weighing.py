@@ -1,7 +1,7 @@
 """Weighing: a scene's engines and settings, tried, timed and held against the best known truth."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from sandbox.engines.registry import ENGINES, engine_named
@@ -9,17 +9,17 @@ from sandbox.measure.compare.comparing import usual_tolerance
 from sandbox.measure.compare.truth import truth_of
 from sandbox.measure.recorder import require_memory
 from sandbox.measure.seeds import is_random, seeded
-from sandbox.measure.tradeoff.aim import Aim, aim_at, metric_named
+from sandbox.measure.tradeoff.aim import Aim, aim_at, metric_named, require_aim
 from sandbox.measure.tradeoff.cost import Cost, costs
 from sandbox.measure.tradeoff.front import outdone, pareto
 from sandbox.measure.tradeoff.judge import Judge, zoom_of
 from sandbox.measure.tradeoff.picking import FRESH, Again, best, cheapest
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.proposals import Proposal, proposals
-from sandbox.measure.tradeoff.search import Search, Told
+from sandbox.measure.tradeoff.search import SLOW, Search, Told
 from sandbox.measure.tradeoff.split import Split, split
 from sandbox.measure.tradeoff.trial import Trial, tried
-from sandbox.measure.tradeoff.variant import Space
+from sandbox.measure.tradeoff.variant import Space, Variant
 from sandbox.measure.tradeoff.weighed import Tradeoff
 from sandbox.measure.versions import machine, versions
 from sandbox.scene.model import Scene
@@ -30,9 +30,11 @@ PATIENCE = 60.0
 REPEATS = 5
 POINTS = 120
 NEAR = 0.5
-"""What takes more than the inverse of this share of a point that is as right is not timed again."""
-SLOW = 0.2
-"""The share of the patience that one run may take."""
+"""What takes more than the inverse of this share of a point that is as right is not timed apart."""
+AGAIN = 0.5
+"""The share of the patience that timing again may take."""
+SEEDS = 2**63
+"""They go on at 0."""
 
 
 def tradeoff(
@@ -80,23 +82,25 @@ def tradeoff(
     for name in names:
         engine_named(name)
     _require_sense(seeds, zoom, patience, repeats, most)
+    require_aim(metric, tolerance, budget, fps)
     base = scene.solver.replace(**settings) if settings else scene.solver
     require_memory(scene, base, 4 * len(scene.bodies))
     say = told or _silent
 
     say("the truth")
-    random = is_random(scene)
-    judges = _judges(scene, base, metric, tolerance, seeds if random else 1, zoom)
+    known, fresh = _seeds(scene, seeds)
+    close = _closeness(scene, metric, tolerance)
+    judges = _judges(scene, base, close, known, zoom)
     aim = aim_at(judges[0], metric, tolerance, budget, fps)
-    space = Space(scene, base, tuple(name for name in names if not _refusal(scene, name, base)))
-    hurry = None if aim.most is None else aim.most * scene.world.duration / 1e3
+    space = Space(scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps)
+    hurry = None if aim.hurry is None else aim.hurry * scene.world.duration
     search = Search(space, judges, aim.metric.name, aim.tolerance, hurry, patience, most, say)
     trials = search.run()
 
     say("timing")
     points = [*_timed(trials, space, aim, repeats, patience), *_refused(scene, names, base)]
-    fresh = tuple(scene.world.seed + len(judges) + k for k in range(FRESH)) if random else ()
-    again = _again(space, trials, points, aim, fresh, judges, patience)
+    trial_of = {id(point): trial for point, trial in zip(points, trials, strict=False)}  # the refused have none
+    again = _again(space, trial_of, aim, lambda: _judges(scene, base, close, fresh, judges[0].zoom), patience)
     say("held to its word")
     within = cheapest(points, aim, fresh, again)
     say("where the error comes from, and what a cheaper model would do")
@@ -108,14 +112,14 @@ def tradeoff(
         tuple(points),
         tuple(pareto([p for p in points if p.usable], lambda p: p.cost or 0.0, lambda p: p.error or 0.0)),
         tuple(_splits(judges[0], space, patience)),
-        tuple(_proposals(judges[0], aim, within.point if within else None, space, patience)),
+        tuple(_proposals(judges, aim, within.point if within else None, space, patience)),
         aim.tolerance,
         budget,
         fps,
         within,
         best(points, aim, fresh, again),
-        tuple(judge.scene.world.seed for judge in judges),
-        search.untried,
+        known,
+        len(search.untried - set(search.trials)),
         {**machine(), **versions()},
     )
 
@@ -129,16 +133,27 @@ def _require_sense(seeds: int, zoom: float | None, patience: float, repeats: int
             raise ValueError(f"a {what} of {figure:g}; it is positive and finite")
 
 
-def _judges(
-    scene: Scene, base: Settings, metric: str | None, tolerance: float | None, seeds: int, zoom: float | None
-) -> list[Judge]:
-    """Return a judge for each seed, the scene's own first."""
+def _seeds(scene: Scene, count: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the seeds that are tried, the scene's own first, and as fresh ones those behind them."""
+    if not is_random(scene):
+        return (scene.world.seed,), ()
+    found = tuple((scene.world.seed + k) % SEEDS for k in range(count + FRESH))
+    return found[:count], found[count:]
+
+
+def _closeness(scene: Scene, metric: str | None, tolerance: float | None) -> float:
+    """Return how far off a truth may be, m."""
     close = usual_tolerance(scene)
     if tolerance is not None and tolerance > 0.0 and (metric is None or metric_named(metric).unit == "m"):
         close = min(close, tolerance)
+    return close
+
+
+def _judges(scene: Scene, base: Settings, close: float, seeds: Sequence[int], zoom: float | None) -> list[Judge]:
+    """Return a judge for each seed."""
     found = []
-    for k in range(seeds):
-        own = scene if k == 0 else seeded(scene, scene.world.seed + k)
+    for seed in seeds:
+        own = scene if seed == scene.world.seed else seeded(scene, seed)
         truth = truth_of(own, base, close)
         found.append(Judge(own, truth, zoom_of(own, truth) if zoom is None else zoom))
     return found
@@ -163,15 +178,14 @@ def _refused(scene: Scene, names: Sequence[str], base: Settings) -> list[Point]:
 
 
 def _timed(trials: Sequence[Trial], space: Space, aim: Aim, repeats: int, patience: float) -> list[Point]:
-    """Time what got to its end, and what is near the front again and again."""
+    """Time what is near the front again and again; of what is far from it, the run that was recorded says enough."""
     ok = [trial for trial in trials if trial.status == "ok"]
-    ways = [(trial.variant.engine, space.settings(trial.variant)) for trial in ok]
-    once = dict(zip(ok, costs(space.scene, ways, 1, patience), strict=True))
-    seen = [(c.least, t.error(aim.metric.name)) for t, c in once.items() if c is not None]
-    near = [t for t, c in once.items() if c is not None and not outdone(c.least, t.error(aim.metric.name), seen, NEAR)]
+    seen = [(trial.seconds, trial.error(aim.metric.name)) for trial in ok]
+    near = [trial for trial in ok if not outdone(trial.seconds, trial.error(aim.metric.name), seen, NEAR)]
     ways = [(trial.variant.engine, space.settings(trial.variant)) for trial in near]
-    often = dict(zip(near, costs(space.scene, ways, repeats, SLOW * patience), strict=True))
-    return [_point(trial, space, aim, often.get(trial) or once.get(trial)) for trial in trials]
+    found = dict(zip(near, costs(space.scene, ways, repeats, AGAIN * patience), strict=True))
+    rough = {trial: Cost.of([trial.seconds], space.scene.world.duration)._replace(repeats=0) for trial in ok}
+    return [_point(trial, space, aim, {**rough, **found}.get(trial)) for trial in trials]
 
 
 def _point(trial: Trial, space: Space, aim: Aim, cost: Cost | None) -> Point:
@@ -200,25 +214,18 @@ def changes(base: Settings, chosen: Settings) -> dict[str, Any]:
 
 
 def _again(
-    space: Space,
-    trials: Sequence[Trial],
-    points: Sequence[Point],
-    aim: Aim,
-    fresh: Sequence[int],
-    judges: Sequence[Judge],
-    patience: float,
+    space: Space, trial_of: Mapping[int, Trial], aim: Aim, judging: Callable[[], list[Judge]], patience: float
 ) -> Again:
-    """Return who runs a point on fresh seeds."""
+    """Return who runs a point on fresh seeds; who judges is asked for when there is one."""
     made: list[Judge] = []
+    known: dict[Variant, float] = {}
 
     def again(point: Point) -> float:
-        if not made:
-            for seed in fresh:
-                scene = seeded(space.scene, seed)
-                truth = truth_of(scene, space.base, usual_tolerance(scene))
-                made.append(Judge(scene, truth, judges[0].zoom))
-        trial = trials[list(points).index(point)]
-        return tried(trial.variant, space, made, SLOW * patience).error(aim.metric.name)
+        made[:] = made or judging()
+        variant = trial_of[id(point)].variant
+        if variant not in known:
+            known[variant] = tried(variant, space, made, SLOW * patience * len(made)).error(aim.metric.name)
+        return known[variant]
 
     return again
 
@@ -228,13 +235,13 @@ def _splits(judge: Judge, space: Space, patience: float) -> list[Split]:
     return [each for each in found if each is not None]
 
 
-def _proposals(judge: Judge, aim: Aim, pick: Point | None, space: Space, patience: float) -> list[Proposal]:
+def _proposals(judges: Sequence[Judge], aim: Aim, pick: Point | None, space: Space, patience: float) -> list[Proposal]:
     """Propose cheaper models than the pick's; where there is none, than the first engine's with its own settings."""
     if not space.engines:
         return []
     engine = space.engines[0] if pick is None else pick.engine
     chosen = space.own(engine) if pick is None else pick.asked
-    return proposals(judge, aim.metric.name, aim.tolerance, engine, chosen, SLOW * patience)
+    return proposals(judges, aim.metric.name, aim.tolerance, engine, chosen, SLOW * patience)
 
 
 def _silent(_: str) -> None:

@@ -1,0 +1,114 @@
+"""Proposals: cheaper models, told of only where they keep to the tolerance. Costs are made by hand; errors are not."""
+
+import json
+
+import pytest
+from trials_by_hand import DROP, scene_of
+
+from sandbox.measure.compare.truth import truth_of
+from sandbox.measure.tradeoff import proposals as module
+from sandbox.measure.tradeoff.judge import Judge
+from sandbox.measure.tradeoff.proposals import Proposal, proposals
+from sandbox.scene.demands import Demand, demands
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+APART = """
+[world]
+gravity = [0.0, -10.0]
+duration = 0.4
+[solver]
+dt = 0.02
+[[plane]]
+name = "ground"
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+[[ball]]
+name = "a"
+position = [0.0, 0.6]
+radius = 0.5
+restitution = 0.5
+[[ball]]
+name = "b"
+position = [3.0, 0.6]
+radius = 0.5
+restitution = 0.5
+"""
+"""Two balls that both bounce, and never meet."""
+
+DRAGGED = DROP.replace("duration = 0.4", "duration = 0.2\nlinear_drag = {}")
+
+
+def price(scene: Scene, engine: str, settings: Settings) -> float:
+    """Every demand costs a second: what demands less is cheaper, on whatever machine."""
+    return float(len(demands(scene)))
+
+
+def proposed(
+    monkeypatch: pytest.MonkeyPatch, *texts: str, tolerance: float = 1e-3, metric: str = "max_position"
+) -> list[Proposal]:
+    monkeypatch.setattr(module, "seconds_of", price)
+    judges = []
+    for text in texts:
+        scene = scene_of(text)
+        judges.append(Judge(scene, truth_of(scene, scene.solver, 1e-6), 100.0))
+    return proposals(judges, metric, tolerance, "pymunk", judges[0].scene.solver.replace(substeps=32), 60.0, 2)
+
+
+def test_balls_that_never_meet_need_not_look_for_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    # By the fine step, first order, it is g·h·T/2 = 0.001 m off, with what the bounce adds.
+    found = proposed(monkeypatch, APART, tolerance=0.01)
+    (fixed,) = [each for each in found if "fixed" in each.what]
+    assert fixed.engine == "pymunk"
+    assert fixed.error <= 0.01
+    assert fixed.ratio < 1.0
+    apart = scene_of(APART)
+    assert Demand.BALL_BALL in demands(apart)
+    assert fixed.ratio == (len(demands(apart)) - 1) / len(demands(apart))
+
+
+def test_balls_that_meet_on_another_seed_have_to_look(monkeypatch: pytest.MonkeyPatch) -> None:
+    meeting = APART.replace("[3.0, 0.6]", "[1.2, 0.6]\nvelocity = [-2.0, 0.0]")
+    assert not [each for each in proposed(monkeypatch, APART, meeting, tolerance=10.0) if "fixed" in each.what]
+
+
+def test_drag_that_does_nothing_may_go_and_drag_that_does_may_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    weak, strong = (proposed(monkeypatch, DRAGGED.format(drag), tolerance=2e-3) for drag in ("1e-4", "5.0"))
+    assert "no drag" in [each.what for each in weak]
+    assert "no drag" not in [each.what for each in strong]
+
+
+def test_closed_form_is_proposed_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = proposed(monkeypatch, DROP)
+    assert found[0].engine is None
+    assert "closed form" in found[0].what
+    assert found[0].error == 0.0
+    assert [each.ratio for each in found] == sorted(each.ratio for each in found)
+
+
+def test_nothing_beyond_the_tolerance_is_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
+    for tolerance in (1e-12, 1e-4, 1e-2):
+        for text in (APART, DRAGGED.format("0.1")):
+            assert all(each.error <= tolerance for each in proposed(monkeypatch, text, tolerance=tolerance))
+
+
+def test_what_is_no_cheaper_is_not_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "CHEAPER", 0.0)
+    assert proposed(monkeypatch, APART, tolerance=10.0) == []
+
+
+def test_metric_that_says_nothing_proposes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert proposed(monkeypatch, APART, tolerance=10.0, metric="joint_error") == []
+
+
+def test_scene_without_anything_to_leave_out_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of(DROP)
+    monkeypatch.setattr(module, "seconds_of", price)
+    assert proposals([Judge(scene, None, 1.0)], "energy", 1.0, "pymunk", scene.solver, 60.0) == []
+
+
+def test_document_is_json(monkeypatch: pytest.MonkeyPatch) -> None:
+    (first, *_) = proposed(monkeypatch, DROP)
+    document = json.loads(json.dumps(first.document(), allow_nan=False))
+    assert set(document) == {"what", "engine", "error", "cost_ms_per_second", "ratio", "sentence"}
+    assert "max_position 0 m" in document["sentence"]

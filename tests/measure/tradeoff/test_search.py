@@ -1,0 +1,244 @@
+"""The search, on landscapes made by hand: error and cost are functions of the variant alone."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import pytest
+from trials_by_hand import DROP, judge_of, scene_of
+
+from sandbox.measure.tradeoff import search as module
+from sandbox.measure.tradeoff.judge import Judge
+from sandbox.measure.tradeoff.metrics import METRICS
+from sandbox.measure.tradeoff.search import Search
+from sandbox.measure.tradeoff.trial import Trial
+from sandbox.measure.tradeoff.variant import Space, Variant
+from sandbox.scene.model import Scene
+
+Law = Callable[[Variant], float | None]
+"""The error of a variant; infinite where it diverges, None where the metric says nothing of it."""
+
+CHAIN = """
+[world]
+gravity = [0.0, -10.0]
+duration = 0.4
+[solver]
+dt = 0.01
+[[rope]]
+name = "chain"
+kind = "rods"
+start = [0.0, 0.0]
+end = [1.0, 0.0]
+links = 5
+radius = 0.05
+fix = ["start"]
+"""
+
+
+def steps(variant: Variant) -> float:
+    """Return substeps in one of the scene's steps."""
+    return float(variant.finer) * variant.substeps
+
+
+def order(power: float, at_one: float = 1.0, floor: float = 0.0) -> Law:
+    return lambda variant: at_one * steps(variant) ** -power + floor
+
+
+class Landscape:
+    """Trials as a law has them; costs are the variant's work, and those of some words more."""
+
+    def __init__(self, law: Law, price: Callable[[Variant], float] = lambda variant: 1.0) -> None:
+        self.law, self.price = law, price
+        self.asked: list[Variant] = []
+
+    def __call__(self, variant: Variant, space: Space, judges: Sequence[Judge], patience: float) -> Trial:
+        self.asked.append(variant)
+        error = self.law(variant)
+        bad = error is not None and math.isinf(error)
+        metrics = {**dict.fromkeys(METRICS), "max_position": None if bad else error}
+        seconds = 1e-3 * variant.work * self.price(variant)
+        status, reason = ("diverged", "by law") if bad else ("ok", None)
+        return Trial(variant, space.settings(variant), status, reason, metrics, seconds, {})
+
+
+def searched(
+    monkeypatch: pytest.MonkeyPatch,
+    landscape: Landscape,
+    tolerance: float,
+    *,
+    engines: tuple[str, ...] = ("pymunk",),
+    scene: Scene | None = None,
+    budget: float | None = None,
+    most: int = 150,
+    patience: float = 1e6,
+) -> Search:
+    monkeypatch.setattr(module, "tried", landscape)
+    scene = scene_of(DROP) if scene is None else scene
+    judges = [judge_of(scene, until=0.0)]
+    space = Space(scene, scene.solver, engines)
+    found = Search(space, judges, "max_position", tolerance, budget, patience, most, lambda _: None)
+    found.run()
+    return found
+
+
+def cheapest(search: Search) -> Trial:
+    good = [trial for trial in search.trials.values() if trial.error("max_position") <= search.tolerance]
+    return min(good, key=lambda trial: trial.seconds)
+
+
+@pytest.mark.parametrize(("power", "tolerance"), [(1.0, 0.3), (1.0, 0.0023), (2.0, 0.011), (4.0, 0.0023)])
+def test_fewest_steps_within_the_tolerance_are_found(
+    monkeypatch: pytest.MonkeyPatch, power: float, tolerance: float
+) -> None:
+    search = searched(monkeypatch, Landscape(order(power)), tolerance)
+    needed = tolerance ** (-1.0 / power)
+    got = steps(cheapest(search).variant)
+    # It closes in to an eighth of what it takes, or to the next whole number.
+    assert needed <= got <= max(needed * 9.0 / 8.0, math.ceil(needed)) + 1e-9
+
+
+def test_coarser_than_the_scene_is_found_where_it_will_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = searched(monkeypatch, Landscape(order(1.0)), 5.0)
+    assert steps(cheapest(search).variant) == 0.25  # 1/4 of the steps: 4 times the error; 1/8 leaves too few steps
+
+
+def test_errors_of_nothing_are_no_trap(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = searched(monkeypatch, Landscape(lambda _: 0.0), 1e-3)
+    assert steps(cheapest(search).variant) == 0.25
+
+
+@pytest.mark.parametrize("needed", [1, 3, 40])
+def test_nothing_tolerated_is_no_trap(monkeypatch: pytest.MonkeyPatch, needed: int) -> None:
+    search = searched(monkeypatch, Landscape(lambda v: 0.0 if steps(v) >= needed else 2.0), 0.0)
+    assert needed <= steps(cheapest(search).variant) <= max(needed * 9 / 8, needed)
+
+
+def test_floor_of_the_model_is_not_dug_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    landscape = Landscape(order(1.0, floor=0.5))
+    search = searched(monkeypatch, landscape, 0.1)
+    assert not [t for t in search.trials.values() if t.error("max_position") <= 0.1]
+    # 64 substeps leave 0.97 of what 32 do: that is not gone on from.
+    assert max(map(steps, landscape.asked)) == 64.0
+
+
+def test_better_way_is_found_where_the_usual_one_has_a_floor(monkeypatch: pytest.MonkeyPatch) -> None:
+    def law(variant: Variant) -> float:
+        good = dict(variant.words).get("integrator") == "rk4"
+        return steps(variant) ** -4.0 * 0.1 if good else 0.5 + 1.0 / steps(variant)
+
+    search = searched(monkeypatch, Landscape(law), 0.01, engines=("reference",), most=60)
+    found = cheapest(search).variant
+    assert dict(found.words)["integrator"] == "rk4"
+    assert steps(found) == 2.0
+
+
+def test_two_words_that_only_help_together_with_steps_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def law(variant: Variant) -> float:
+        words = dict(variant.words)
+        helping = (words.get("integrator") == "velocity_verlet") + (words.get("detection") == "swept")
+        return 10.0 ** (-2 * helping) / steps(variant)
+
+    search = searched(monkeypatch, Landscape(law), 0.5e-4, engines=("reference",), most=80)
+    assert dict(cheapest(search).variant.words) == {"detection": "swept", "integrator": "velocity_verlet"}
+    assert steps(cheapest(search).variant) == 2.0
+
+
+def test_iterations_that_are_needed_are_found_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = searched(monkeypatch, Landscape(lambda v: 30.0 / v.iterations), 1.0, scene=scene_of(CHAIN))
+    assert 30 <= cheapest(search).variant.iterations <= 33
+    assert steps(cheapest(search).variant) <= 1.0
+
+
+def test_start_that_diverges_is_refined(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = searched(monkeypatch, Landscape(lambda v: 0.01 if steps(v) >= 13 else math.inf), 0.1)
+    assert 13 <= steps(cheapest(search).variant) <= 14
+    failed = [trial for trial in search.trials.values() if trial.status == "diverged"]
+    assert [trial.reason for trial in failed] == ["by law"] * len(failed)
+    assert any(trial.variant == Variant("pymunk") for trial in failed)
+
+
+def test_metric_that_says_nothing_is_not_sought_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    landscape = Landscape(lambda _: None)
+    searched(monkeypatch, landscape, 0.1)
+    assert len(landscape.asked) < 20
+
+
+def test_dominated_branches_are_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where words only cost, each is tried beside the front and none is gone on from."""
+    landscape = Landscape(order(1.0), price=lambda variant: 3.0 ** len(variant.words))
+    search = searched(monkeypatch, landscape, 0.1, engines=("reference",))
+    assert not cheapest(search).variant.words
+    assert not [variant for variant in landscape.asked if len(variant.words) > 1]
+
+
+def test_no_variant_is_tried_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    landscape = Landscape(order(1.0))
+    search = searched(monkeypatch, landscape, 0.01, engines=("pymunk", "exact", "reference"), most=60)
+    assert len(set(landscape.asked)) == len(landscape.asked)
+    assert list(search.trials) == landscape.asked
+    filled = {(v.engine, search.space.filled(v)) for v in landscape.asked}
+    assert len(filled) == len(landscape.asked)
+
+
+def test_same_landscape_is_searched_in_the_same_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = []
+    for _ in range(2):
+        landscape = Landscape(order(1.0))
+        searched(monkeypatch, landscape, 0.02, engines=("pymunk", "reference"), most=40)
+        ways.append(landscape.asked)
+    assert ways[0] == ways[1]
+
+
+@pytest.mark.parametrize("most", [1, 2, 7])
+def test_most_is_kept(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
+    landscape = Landscape(order(1.0))
+    searched(monkeypatch, landscape, 1e-3, most=most)
+    # The last fifth is kept for closing in, of which nothing meets the tolerance here.
+    assert max(1.0, 0.8 * most) <= len(landscape.asked) <= most
+
+
+def test_patience_is_kept_by_a_clock_that_the_trials_move(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    landscape = Landscape(order(1.0))
+
+    def slow(variant: Variant, space: Space, judges: Sequence[Judge], patience: float) -> Trial:
+        found = landscape(variant, space, judges, patience)
+        now[0] += found.seconds
+        allowed.append(patience)
+        return found
+
+    allowed: list[float] = []
+    monkeypatch.setattr(module, "working", lambda: now[0])
+    monkeypatch.setattr(module, "tried", slow)
+    scene = scene_of(DROP)
+    space = Space(scene, scene.solver, ("pymunk",))
+    search = Search(space, [judge_of(scene, until=0.0)], "max_position", 1e-3, None, 0.1, 400, lambda _: None)
+    search.run()
+    assert now[0] <= 0.1 + 1e-12  # what would take longer than what is left was left out
+    assert search.untried
+    assert max(allowed[1:]) <= 0.2 * 0.1  # a fifth of it, for one
+
+
+def test_budget_is_aimed_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tolerance is met at once; what the budget buys is looked for all the same, and a finer step is better."""
+    budget = 1e-3 * Variant("pymunk", substeps=20).work
+    search = searched(monkeypatch, Landscape(order(1.0)), 2.0, budget=budget)
+    able = [trial for trial in search.trials.values() if trial.seconds <= budget]
+    best = min(able, key=lambda trial: trial.error("max_position"))
+    assert steps(best.variant) >= 10.0  # within a factor of 2 of what it buys
+
+
+def test_every_engine_gets_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    landscape = Landscape(order(1.0))
+    searched(monkeypatch, landscape, 0.05, engines=("pymunk", "exact", "reference"), most=60)
+    assert {variant.engine for variant in landscape.asked} == {"pymunk", "exact", "reference"}
+
+
+def test_nobody_to_ask_is_no_trap(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert searched(monkeypatch, Landscape(order(1.0)), 0.1, engines=()).trials == {}
+
+
+def test_steps_of_a_scene_longer_than_its_duration_are_tried_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of(DROP.replace("dt = 0.02", "dt = 1.0"))
+    search = searched(monkeypatch, Landscape(order(1.0)), 0.1, scene=scene)
+    assert search.space.starts()[0] in search.trials
+    assert 10.0 <= steps(cheapest(search).variant) <= 11.25  # an eighth more at most

@@ -1,0 +1,242 @@
+"""Weighing: small scenes from end to end, their picks run again by others."""
+
+import json
+import math
+from typing import Any
+
+import pytest
+from trials_by_hand import DROP, scene_of
+
+import sandbox
+from sandbox.engines.registry import ENGINES, UnknownEngineError
+from sandbox.measure.compare.truth import truth_of
+from sandbox.measure.seeds import seeded
+from sandbox.measure.tradeoff import Tradeoff, tradeoff
+from sandbox.measure.tradeoff import weighing as module
+from sandbox.measure.tradeoff.aim import UnknownMetricError
+from sandbox.measure.tradeoff.judge import Judge
+from sandbox.measure.tradeoff.metrics import METRICS
+from sandbox.measure.tradeoff.picking import called
+from sandbox.measure.tradeoff.point import Point
+from sandbox.scene.model import Scene
+
+PROMISED = {"scene", "truth", "metric", "points", "pareto", "within_tolerance", "within_budget"}
+OF_A_POINT = {"engine", "settings", "error", "cost_ms_per_second", "status"}
+RANDOM = """
+[world]
+gravity = [0.0, -10.0]
+duration = 0.3
+seed = 4
+[solver]
+dt = 0.02
+[[plane]]
+name = "ground"
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+[[grid]]
+name = "g"
+origin = [0.0, 1.0]
+columns = 3
+rows = 1
+spacing = [3.0, 1.0]
+radius = 0.5
+velocity_jitter = 1.0
+restitution = 0.5
+"""
+JOINED = """
+[world]
+gravity = [0.0, -10.0]
+duration = 0.2
+[solver]
+dt = 0.02
+[[ball]]
+name = "hook"
+position = [0.0, 0.0]
+radius = 0.1
+fixed = true
+[[ball]]
+name = "bob"
+position = [1.0, 0.0]
+radius = 0.1
+[[joint]]
+kind = "rod"
+between = ["hook", "bob"]
+"""
+
+
+def weighed(scene: Scene, *engines: str, **more: Any) -> Tradeoff:
+    return tradeoff(scene, engines or ("pymunk",), **{"patience": 60.0, "most": 14, "repeats": 1, **more})
+
+
+def error_of(scene: Scene, point: Point, metric: str = "max_position") -> float:
+    """Run a point's settings on their own and return the error."""
+    settings = point.asked.model_dump()
+    run = sandbox.run(scene, point.engine, **settings)
+    judge = Judge(scene, truth_of(scene, scene.solver, 1e-4), 100.0)
+    error = METRICS[metric].measure(run, judge)
+    assert error is not None
+    return error
+
+
+def test_pick_keeps_to_the_tolerance_when_run_on_its_own() -> None:
+    scene = scene_of(DROP)
+    found = weighed(scene, tolerance=4e-3)
+    assert found.truth == "closed_form"
+    assert found.metric.name == "max_position"
+    assert found.within_tolerance is not None
+    point = found.within_tolerance.point
+    assert point.error is not None
+    assert point.error <= 4e-3
+    assert error_of(scene, point) == point.error
+    assert all(point.cost <= p.cost for p in found.points if p.usable and p.error <= 4e-3)  # type: ignore[operator]
+
+
+def test_pick_of_a_random_scene_keeps_to_the_tolerance_on_seeds_that_nobody_used() -> None:
+    scene = scene_of(RANDOM)
+    found = weighed(scene, tolerance=6e-3, seeds=2)
+    assert found.seeds == (4, 5)
+    assert found.within_tolerance is not None
+    assert found.within_tolerance.fresh_seeds == (6, 7, 8)
+    assert found.within_tolerance.fresh_error is not None
+    assert found.within_tolerance.fresh_error <= 6e-3
+    for seed in (101, 102):
+        assert error_of(seeded(scene, seed), found.within_tolerance.point) <= 6e-3
+
+
+def test_seeds_go_round_at_their_end() -> None:
+    last = scene_of(RANDOM.replace("seed = 4", f"seed = {2**63 - 1}"))
+    found = weighed(last, tolerance=1.0, most=1)
+    assert found.within_tolerance is not None
+    assert found.within_tolerance.fresh_seeds == (0, 1, 2)
+
+
+def test_scene_without_chances_has_one_seed() -> None:
+    found = weighed(scene_of(DROP), seeds=5, most=1)
+    assert found.seeds == (0,)
+    assert found.within_tolerance is None or found.within_tolerance.fresh_seeds == ()
+
+
+def test_refused_engine_is_a_point_that_says_why() -> None:
+    found = weighed(scene_of(JOINED), "pymunk", "exact", most=2)
+    (refused,) = [point for point in found.points if point.engine == "exact"]
+    assert refused.status == "refused"
+    assert "rod" in (refused.reason or "")
+    assert (refused.error, refused.cost) == (None, None)
+
+
+def test_nobody_able_is_an_answer_too() -> None:
+    found = weighed(scene_of(JOINED), "exact")
+    assert [point.status for point in found.points] == ["refused"]
+    assert (found.pareto, found.within_tolerance) == ((), None)
+    assert "none of the 1" in found.answers()[0]
+
+
+def test_settings_that_diverge_are_points_with_a_reason() -> None:
+    wild = scene_of(
+        DROP.replace("gravity = [0.0, -10.0]", "gravity = [1e9, 0.0]").replace("duration = 0.4", "duration = 10.0")
+    )
+    found = weighed(wild, most=2, dt=0.1, metric="energy")
+    bad = [point for point in found.points if point.status == "diverged"]
+    assert bad
+    assert all(point.reason and point.error is None and not point.usable for point in bad)
+    assert not set(map(id, bad)) & set(map(id, found.pareto))
+    json.dumps(found.document(), allow_nan=False)
+
+
+def test_words_that_an_engine_lacks_are_left_out_for_it() -> None:
+    scene = scene_of(DROP.replace("dt = 0.02", 'dt = 0.02\nintegrator = "rk4"'))
+    assert ENGINES["pymunk"].missing(scene, scene.solver)
+    found = weighed(scene, most=3)
+    assert [point.status for point in found.points] == ["ok"] * 3
+    assert found.points[0].changes == {"integrator": None}
+    assert "without integrator" in called(found.points[0])
+
+
+def test_document_has_the_keys_promised_and_no_figure_that_json_lacks() -> None:
+    found = weighed(scene_of(DROP), tolerance=4e-3, budget=5.0)
+    document = json.loads(json.dumps(found.document("drop.toml"), allow_nan=False))
+    assert set(document) >= PROMISED
+    assert (document["scene"], document["metric"], document["truth"]) == ("drop.toml", "max_position", "closed_form")
+    for row in [*document["points"], *document["pareto"], document["within_tolerance"], document["within_budget"]]:
+        assert set(row) >= OF_A_POINT
+    errors = [row["error"] for row in document["pareto"]]
+    costs = [row["cost_ms_per_second"] for row in document["pareto"]]
+    assert errors == sorted(errors, reverse=True)
+    assert costs == sorted(costs)
+    assert len(document["answers"]) == 2
+
+
+def test_work_is_counted_and_the_same_every_time() -> None:
+    first, second = (weighed(scene_of(DROP), most=3) for _ in range(2))
+    assert [point.work for point in first.points] == [point.work for point in second.points]
+    assert all(point.work for point in first.points)
+
+
+def test_metric_in_pixels_scales_with_the_zoom() -> None:
+    scene = scene_of(DROP)
+    small, large = (weighed(scene, metric="pixels", zoom=zoom, most=1).points[0].error for zoom in (10.0, 1000.0))
+    assert small is not None
+    assert large == pytest.approx(100.0 * small, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"tolerance": 0.0},
+        {"tolerance": math.nan},
+        {"tolerance": math.inf},
+        {"tolerance": -1.0, "metric": "missed_contacts"},
+        {"budget": 0.0},
+        {"budget": math.inf},
+        {"fps": math.nan},
+        {"seeds": 0},
+        {"zoom": -1.0},
+        {"patience": 0.0},
+        {"repeats": 0},
+        {"most": 0},
+    ],
+)
+def test_senseless_figure_is_refused_before_anything_is_run(
+    wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "truth_of", None)
+    with pytest.raises(ValueError, match=r"at least|positive"):
+        tradeoff(scene_of(DROP), **wrong)
+
+
+def test_unknown_names_are_refused_before_anything_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "truth_of", None)
+    with pytest.raises(UnknownMetricError, match="metrics: max_position"):
+        tradeoff(scene_of(DROP), metric="beauty")
+    with pytest.raises(UnknownEngineError, match="engines: pymunk"):
+        tradeoff(scene_of(DROP), ["unity"])
+
+
+def test_nothing_missed_is_a_tolerance_of_nothing() -> None:
+    found = weighed(scene_of(DROP), metric="missed_contacts", most=3)
+    assert found.tolerance == 0.0
+    assert found.within_tolerance is not None
+    assert found.within_tolerance.point.error == 0.0
+
+
+def test_nothing_that_moves_is_no_trap() -> None:
+    still = scene_of(DROP.replace("radius = 0.5", "radius = 0.5\nfixed = true"))
+    found = weighed(still, most=3)
+    json.dumps(found.document(), allow_nan=False)
+    assert all(point.status == "ok" for point in found.points)
+    assert found.metric.name == "energy"
+    assert found.within_tolerance is not None
+
+
+def test_metric_that_says_nothing_is_told() -> None:
+    found = weighed(scene_of(DROP), metric="joint_error", most=3)
+    assert found.within_tolerance is None
+    assert found.answers() == ["joint_error says nothing of this scene; another --metric would"]
+
+
+def test_who_watches_is_told_what_is_being_done() -> None:
+    told: list[str] = []
+    weighed(scene_of(DROP), most=2, told=told.append)
+    assert told[0] == "the truth"
+    assert "1 tried: pymunk, dt, 1 × 10" in told
+    assert "timing" in told
