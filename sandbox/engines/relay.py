@@ -91,9 +91,8 @@ class Relay:
         relay._leg = begun(point.scene, point.engine, point.wanted, point.bodies, point.frame, lasting, point.broken)
         relay._leg.origin, relay._leg.steps = point.origin, point.steps
         relay._retired, relay._broken, relay._work = dict(point.retired), dict(point.broken), Counter()
-        relay._forces, relay._pulls = dict(point.forces), Pulls(point.pulls)
-        relay._throttles = dict(point.throttles)
-        relay._kept, relay._observer, relay._books = None, None, Succession()
+        relay._forces, relay._throttles = dict(point.forces), dict(point.throttles)
+        relay._kept, relay._observer, relay._books, relay._pulls = None, None, Succession(), Pulls(point.pulls)
         return relay
 
     @property
