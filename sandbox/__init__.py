@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sandbox.engines.relay import start
     from sandbox.measure.compare import compare
     from sandbox.measure.run import run
+    from sandbox.measure.tradeoff import tradeoff
     from sandbox.recording import Recording
     from sandbox.scene.demands import demands
     from sandbox.scene.faults import Fault, SceneError
@@ -42,6 +43,7 @@ __all__ = [
     "loads",
     "run",
     "start",
+    "tradeoff",
 ]
 
 _HOMES = {
@@ -61,6 +63,7 @@ _HOMES = {
     "loads": "sandbox.scene.file",
     "run": "sandbox.measure.run",
     "start": "sandbox.engines.relay",
+    "tradeoff": "sandbox.measure.tradeoff",
 }
 
 

@@ -25,6 +25,7 @@ NAMES = [
     "loads",
     "run",
     "start",
+    "tradeoff",
 ]
 
 TEXT = '[world]\nduration = 0.1\n[[ball]]\nname = "a"\nposition = [0, 0]\nvelocity = [1, 0]\nradius = 1\n'

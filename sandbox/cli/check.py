@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from sandbox.cli.reading import fault_rows, paths_of, print_json
+from sandbox.cli.reading import fault_rows, paths_of, print_json, require_scene
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.forecast import at_most, largest_safe_dt, notes, warnings
 from sandbox.scene.demands import JOINTS, Item, bill
@@ -29,6 +29,7 @@ def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, 
     for name in scenes:
         try:
             path = paths_of([name])[0][1]
+            require_scene(name, path)
             scene = load(path, overrides)
         except SceneError as error:
             status = 2

@@ -1,23 +1,20 @@
 """`sandbox compare`: one scene on several engines, scored against the best known truth."""
 
-import json
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import click
 
 from sandbox.cli.comparison_table import print_comparison
-from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json
+from sandbox.cli.folder import make_folder, require_folder, write_json
+from sandbox.cli.minimising import faults_of, minimised
+from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
+from sandbox.cli.telling import telling
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.compare import Comparison, compare
-from sandbox.measure.compare.comparing import Told
 from sandbox.measure.recorder import TooLargeError
-from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.faults import Fault
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
-from sandbox.whole import whole
 
 
 @click.command(name="compare")
@@ -32,6 +29,15 @@ from sandbox.whole import whole
 )
 @click.option("--why", is_flag=True, help="rerun with one knob changed at a time, and say which one matters")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write plots and comparison.json")
+@click.option(
+    "--minimise",
+    is_flag=False,
+    flag_value="",
+    metavar="[FILE]",
+    help="leave out bodies while two engines, or one and the truth, still part, and write the smallest scene; "
+    "by default SCENE.min.toml here",
+)
+@click.option("--force", is_flag=True, help="let --minimise replace a file that exists")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 @click.option("--quiet", is_flag=True, help="no table, no progress")
 def command(
@@ -41,6 +47,8 @@ def command(
     tolerance: float | None,
     why: bool,
     out: Path | None,
+    minimise: str | None,
+    force: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -51,20 +59,29 @@ def command(
         with gathering(faults, "--engine", (UnknownEngineError,)):
             engine_named(name)
     read: Scene | None = None
+    path = ""
     with gathering(faults):
-        read = load(paths_of([scene])[0][1], overrides)
+        path = paths_of([scene])[0][1]
+        require_scene(scene, path)
+        read = load(path, overrides)
     with gathering(faults, "--tolerance", (ValueError,)):
         if tolerance == float("inf") or tolerance != tolerance:
             raise ValueError(f"{tolerance} m; a tolerance is finite")
-    if out is not None and out.exists() and not out.is_dir():
-        faults.append(Fault("--out", None, "", f"{out}: is no folder"))
+    with gathering(faults):
+        require_folder(out)
+
+    smallest = None if minimise is None else Path(minimise or f"{Path(path or scene).stem}.min.toml")
+    if smallest is not None:
+        faults += faults_of(smallest, path, force)
+    elif force:
+        faults.append(Fault("--force", None, "", "is of --minimise; there is nothing else to replace"))
 
     if out is not None and not faults:
         with gathering(faults):
-            _make_folder(out)
+            make_folder(out)
     comparison: Comparison | None = None
     if read is not None and not faults:
-        with gathering(faults, scene, (TooLargeError,)), _telling(quiet or as_json) as told:
+        with gathering(faults, scene, (TooLargeError,)), telling(quiet or as_json) as told:
             comparison = compare(read, names, tolerance=tolerance, why=why, told=told)
     if comparison is None:
         for fault in faults:
@@ -80,10 +97,19 @@ def command(
             what = row.reason if row.status == "refused" else f"{row.engine} {row.status}: {row.reason}"
             click.echo(f"{scene}: {what}", err=True)
     document = comparison.document(scene)
+    if not as_json and not quiet:
+        print_comparison(scene, comparison, why, refusals=names is None)
+    if smallest is not None:
+        with telling(quiet or as_json) as told:
+            answer = minimised(scene, comparison, names, smallest, told)
+        document["minimised"] = answer.document
+        status = answer.status or status
+        if answer.status:
+            click.echo(answer.sentence, err=True)
+        elif not as_json and not quiet:
+            click.echo(answer.sentence)
     if as_json:
         print_json(document)
-    elif not quiet:
-        print_comparison(scene, comparison, why, refusals=names is None)
     if out is not None:
         try:
             _write(comparison, document, out)
@@ -95,31 +121,9 @@ def command(
     return status
 
 
-def _make_folder(out: Path) -> None:
-    """Make the folder before the runs, so that what could not be written is refused first."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SceneError([Fault("--out", None, "", f"{out}: {error.strerror or error}")]) from None
-
-
 def _write(comparison: Comparison, document: dict[str, object], out: Path) -> None:
     """Write the plots and the document into a folder, each to a temporary name first."""
     from sandbox.report.comparison import plot_comparison
 
     plot_comparison(comparison, out)
-    with whole(out / "comparison.json") as temporary:
-        temporary.write_text(json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1), encoding="utf-8")
-
-
-@contextmanager
-def _telling(silent: bool) -> Iterator[Told | None]:
-    """Yield who says what is being done: a line that comes and goes on a terminal, nobody elsewhere."""
-    if silent or not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.text import Text
-
-    with Console(stderr=True).status("") as line:
-        yield lambda what: line.update(Text(what))
+    write_json(document, out / "comparison.json")

@@ -83,7 +83,17 @@ class Simulation(Protocol):
 
     @property
     def work(self) -> Mapping[str, int]:
-        """What was done so far, counted and not timed: the same on every machine. What is counted is the engine's."""
+        """What was done so far, counted and not timed: the same on every machine, at every repeat.
+
+        Of these, what the engine has and can tell:
+
+        - `substeps`: solver steps, one that is cut short at the end included;
+        - `broad_tests`: tests of the broad phase, whether two may be near;
+        - `pair_tests`: tests of two for contact, or for when they will touch;
+        - `contacts`: contacts found in them, one that lasts at every look anew;
+        - `contact_iterations`, `joint_iterations`: contacts and joints that the solver visited, over all its passes;
+        - `events`, `predictions`: of an event-driven engine, what happened, and how often it looked ahead.
+        """
 
     def step(self) -> None:
         """Advance by one dt.

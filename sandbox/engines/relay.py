@@ -142,7 +142,9 @@ class Relay:
     @property
     def work(self) -> Mapping[str, int]:
         """What was done so far, by all engines that took part."""
-        return dict(self._work + Counter(self._leg.simulation.work)) if self._work else self._leg.simulation.work
+        total = Counter(self._work)
+        total.update(self._leg.simulation.work)
+        return dict(total)
 
     def step(self) -> None:
         """Advance by one dt.

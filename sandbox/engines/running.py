@@ -1,5 +1,6 @@
 """Running: what every simulation here has of its own accord: a clock, a lock, an end, and a fingerprint."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import NoReturn
@@ -29,6 +30,11 @@ class Running(ABC):
     def time(self) -> float:
         """Simulated time, s."""
         return (self._steps + self._part) * self._settings.dt
+
+    @property
+    def substeps(self) -> int:
+        """How many substeps there have been, one that was cut short at the end included."""
+        return self._steps * self._settings.substeps + math.ceil(self._part * self._settings.substeps)
 
     @property
     def settings(self) -> Settings:

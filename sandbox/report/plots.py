@@ -199,12 +199,15 @@ def _draw_energy(panel: Axes, trajectory: Trajectory, scene: Scene, bodies: Bodi
     if not forms or any(number not in forms for number in np.flatnonzero(~bodies.fixed).tolist()):
         return
     position, velocity = trajectory.position.copy(), trajectory.velocity.copy()
+    spin = trajectory.angular_velocity.copy()
     valid = np.ones(len(trajectory.time), dtype=np.bool_)
     for number, form in forms.items():
         position[:, number], velocity[:, number] = form.position, form.velocity
         valid &= form.valid
-    # No closed form here turns a body, so spins stay as they were recorded.
-    ideal = energies(replace(trajectory, position=position, velocity=velocity), scene, bodies=bodies)
+        # What nothing turns keeps the spin that was recorded.
+        spin[:, number] = spin[:, number] if form.spin is None else form.spin
+    exact = replace(trajectory, position=position, velocity=velocity, angular_velocity=spin)
+    ideal = energies(exact, scene, bodies=bodies)
     for name in ENERGY:
         draw_closed(panel, trajectory.time, getattr(ideal, name), valid)
 

@@ -80,7 +80,7 @@ class Lines:
         return self._lines.get(location)
 
 
-_TOKEN = re.compile(
+TOKEN = re.compile(
     r'''"""(?:\\.|[^\\])*?"{3,5}|'{3}.*?'{3,5}|"(?:\\.|[^"\\])*"|'[^']*'|#[^\n]*|[][{},=\n]|[^][{},=#"'\s]+''',
     re.DOTALL,
 )
@@ -96,7 +96,7 @@ def _lines_of(text: str) -> dict[Location, int]:
     line, start, begun, state = 1, 0, 1, "key"
     where: Location = ()  # of the value at hand
 
-    for token in _TOKEN.finditer(text + "\n"):
+    for token in TOKEN.finditer(text + "\n"):
         sign = token[0]
         if sign == "\n" or sign[0] == "#":
             if state == "heading":

@@ -41,7 +41,7 @@ def test_table_says_the_truth_first(tmp_path: Path, capfd: pytest.CaptureFixture
     status, out, err = lines_of(capfd, "compare", scene, "--engines", "pymunk")
     assert (status, err) == (0, [])
     assert out[0] == f"{scene}: Drop"
-    assert out[1] == "truth: closed form (formulas for every body); trusted until 0.5 s of 0.5 s; tolerance 0.005 m"
+    assert out[1] == "truth: closed form (bouncing); trusted until 0.5 s of 0.5 s; tolerance 0.005 m"
     assert out[2].split()[:3] == ["engine", "dt", "status"]
     assert out[3].split()[:3] == ["pymunk", "0.01", "ok"]
 

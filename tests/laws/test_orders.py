@@ -7,6 +7,7 @@ from ways import INTEGRATORS, Way, drop
 
 from sandbox.engines.reference.integrators import INTEGRATORS as TABLE
 from sandbox.measure.closed_form import bounces
+from sandbox.measure.compare.closed import solved
 from sandbox.scene.file import from_document
 
 STEPS = np.array([0.04, 0.02, 0.01, 0.005])
@@ -72,3 +73,49 @@ def test_bisection_and_an_exact_flight_leave_only_its_epsilon():
     exact = bounces(np.array([0.8]), 1.0, 0.0, 9.81, 0.8)[0][0]
     done = Way("reference", {"integrator": "velocity_verlet", "detection": "bisect"}).run(scene)
     assert done.position[-1, 0, 1] - 0.5 == pytest.approx(exact, abs=1e-9)  # 1e-9 of 0.01 s at 4.4 m/s, 1.8-fold
+
+
+SPRING = {
+    "world": {"duration": 1.3},
+    "ball": [{"name": "m", "position": [1.1, 0.0], "velocity": [0.3, 0.0], "radius": 0.1, "collides": "none"}],
+    "joint": [{"kind": "spring", "between": ["m"], "rest_length": 1.0, "stiffness": 39.0, "damping": 0.5}],
+}
+ORBIT = {
+    "world": {"duration": 2.0},
+    "ball": [{"position": [1.0, 0.0], "velocity": [0.2, 1.1], "radius": 0.01, "collides": "none"}],
+    "attraction": [{"toward": [0.0, 0.0], "strength": 1.0}],
+}
+PENDULUM = {
+    "world": {"gravity": [0.0, -9.81], "duration": 1.3},
+    "ball": [{"name": "m", "position": [0.8, -0.6], "velocity": [1.5, 2.0], "radius": 0.1, "collides": "none"}],
+    "joint": [{"kind": "rod", "between": ["m"], "length": 1.0}],
+}
+RATTLE = {"joints": "rattle"}
+SMOOTH = [
+    *(
+        (document, Way("reference", {"integrator": word}), TABLE[word].order)
+        for document in (SPRING, ORBIT)
+        for word in INTEGRATORS
+    ),
+    *(
+        (PENDULUM, Way("reference", {"integrator": word} | RATTLE), 2)
+        for word in ("velocity_verlet", "leapfrog", "rk4")
+    ),
+    (PENDULUM, Way("reference", {"integrator": "semi_implicit_euler"}), 1),
+    *((document, Way("pymunk", {}), 1) for document in (SPRING, ORBIT, PENDULUM)),
+]
+
+
+@pytest.mark.parametrize(
+    ("document", "way", "order"),
+    SMOOTH,
+    ids=["-".join((*sorted({"joint", "attraction"} & set(d)), w.engine, *w.settings.values())) for d, w, _ in SMOOTH],
+)
+def test_springs_orbits_and_pendulums_converge_to_their_closed_forms(document, way, order):
+    """The largest error of any frame: at a single one, errors of different sign may cancel."""
+    scene, errors = from_document(document), []
+    for dt in STEPS / 2.0:
+        truth = solved(scene, scene.solver.replace(dt=float(dt)))
+        done = way.run(scene, dt=float(dt))
+        errors.append(np.hypot(*(done.position - truth.position)[:, 0].T).max())
+    assert fitted(errors) == pytest.approx(order, abs=0.2)  # a fit over three halvings

@@ -7,8 +7,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sandbox.measure.closed_form import bounces, closed_form, free_flight, valid_until, why_not
-from sandbox.scene.file import loads
+from sandbox.measure.compare.closed import solved
+from sandbox.scene.file import load, loads
 from sandbox.scene.model import Scene, World
+from sandbox.scene.shipped import find
 from sandbox.trajectory import Trajectory
 
 G = 9.81
@@ -334,3 +336,17 @@ def test_closed_form_is_none_where_there_is_none() -> None:
     spawned = run_of(plain, time, names=("ball", "spawned"))
     assert closed_form(spawned, plain, 0) is None
     assert closed_form(spawned, plain, 1) is None
+
+
+def test_closed_form_of_what_swings_rolls_or_stands_is_that_of_its_scene() -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    for name in ("pendulum_90", "slide_to_roll", "newtons_cradle", "kepler", "tower"):
+        scene = load(find(name), ["world.duration=1.0", "solver.dt=0.1"])
+        right, last = solved(scene, scene.solver), len(scene.bodies) - 1
+        form = closed_form(run_of(scene, time, contacts=((0.0, (last, -1)),)), scene, last)
+        assert right is not None
+        assert form is not None
+        assert form.spin is not None
+        assert form.valid.all()
+        assert form.position == pytest.approx(right.position[:, last], abs=1e-15)  # times that round differently
+        assert form.spin == pytest.approx(right.angular_velocity[:, last], abs=1e-14)  # likewise

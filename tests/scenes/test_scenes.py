@@ -23,18 +23,26 @@ MEETING = {Demand.TRANSLATION, Demand.BALL_BALL, Demand.RESTITUTION}
 BOX = {*FALLING, Demand.POLYGONS, Demand.FRICTION, Demand.ROTATION}
 PENDULUM = {*FALLING, Demand.RODS}
 DEMANDED = {
+    "benchmark/bounce_to_rest": {*FALLING, Demand.BALL_PLANE, Demand.RESTITUTION},
     "benchmark/box_slides": BOX,
     "benchmark/box_sticks": BOX,
+    "benchmark/break_shot": MEETING,
+    "benchmark/chain_of_20": PENDULUM,
     "benchmark/double_pendulum": PENDULUM,
+    "benchmark/elastic_ball": {*FALLING, Demand.BALL_PLANE, Demand.RESTITUTION},
     "benchmark/heavy_on_light": BOX,
     "benchmark/kepler": {Demand.TRANSLATION, Demand.ATTRACTION},
+    "benchmark/oblique": MEETING,
     "benchmark/pendulum_170": PENDULUM,
     "benchmark/pendulum_5": PENDULUM,
     "benchmark/pendulum_90": PENDULUM,
+    "benchmark/projectile": FALLING,
+    "benchmark/rest_depth": {*FALLING, Demand.BALL_PLANE, Demand.FRICTION, Demand.ROTATION},
     "benchmark/slide_to_roll": {*FALLING, Demand.BALL_PLANE, Demand.FRICTION, Demand.ROTATION},
     "benchmark/slide_to_stop": BOX,
     "benchmark/spring": {Demand.TRANSLATION, Demand.SPRINGS},
     "benchmark/stiff_spring": {Demand.TRANSLATION, Demand.SPRINGS},
+    "benchmark/stiff_spring_beyond": {Demand.TRANSLATION, Demand.SPRINGS},
     "tutorial/spaceship": {
         Demand.TRANSLATION,
         Demand.ROTATION,

@@ -1,6 +1,7 @@
 """Advance: event after event up to a time, all in one kernel call."""
 
 from sandbox.engines.exact.arena import (
+    ACCOUNTING,
     AT_INSTANT,
     BALL,
     BUDGET,
@@ -28,6 +29,7 @@ from sandbox.engines.exact.arena import (
     WITH,
     Arena,
 )
+from sandbox.engines.exact.booking import book_hit, book_slide
 from sandbox.engines.exact.impact import bring, hit_ball, hit_knob, log_hit
 from sandbox.engines.exact.log import ROOM
 from sandbox.engines.exact.motion import place, turned
@@ -60,6 +62,14 @@ def start(arena: Arena) -> None:
 
 
 @kernel
+def arrive(arena: Arena, i: int, t: float, late: float) -> None:
+    """Bring a ball to a time, and book what its sliding took until then."""
+    if arena.counts[ACCOUNTING] != 0:
+        book_slide(arena, i, t, late)
+    bring(arena.state, arena.tags, arena.log, i, t, late)
+
+
+@kernel
 def look_ahead(arena: Arena) -> None:
     """Predict every ball's earliest event anew."""
     for k in range(len(arena.movers)):
@@ -72,7 +82,7 @@ def renew(arena: Arena, t: float) -> None:
     arena.world[NOW], arena.world[NOW_LATE] = t, 0.0
     for i in range(len(arena.state)):
         if arena.state[i, LIGHTNESS] > 0.0:
-            bring(arena.state, arena.tags, arena.log, i, t, 0.0)
+            arrive(arena, i, t, 0.0)
             knocked(arena, i)
     start(arena)
 
@@ -125,13 +135,15 @@ def happen(arena: Arena, i: int, kind: int, partner: int, t: float, late: float)
     Others that were to meet them are left: their times stay bounds, and are looked at when they come up.
     """
     state, tags = arena.state, arena.tags
-    bring(state, tags, arena.log, i, t, late)
+    arrive(arena, i, t, late)
     both = kind == BALL and state[partner, LIGHTNESS] > 0.0
     if kind == BALL:
-        bring(state, tags, arena.log, partner, t, late)
+        arrive(arena, partner, t, late)
         jx, jy, nx, ny = hit_ball(state, tags, arena.surfaces, arena.world[HOP], i, partner)
         if arena.counts[RECORDING] != 0:
             log_hit(arena, i, partner, jx, jy, nx, ny)
+        if arena.counts[ACCOUNTING] != 0:
+            book_hit(arena, i, partner, jx, jy, nx, ny)
     elif kind == FLAT:
         hit_flat(arena, i, partner)
     elif kind == KNOB:

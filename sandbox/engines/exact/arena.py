@@ -15,10 +15,12 @@ from sandbox.trajectory import FloatArray, IntArray
 
 T, X, Y, VX, VY, AX, AY, RADIUS, LATE, ANGLE, SPIN, ALPHA, SLIDES, SINCE = range(14)
 LAST_TIME, NEXT_LATE, LIGHTNESS, READINESS, FORCE = range(14, 19)
+BOOKED, BOOKED_LATE = 22, 23
 """Columns of `state`: the ball's own time, s; place, velocity, acceleration; radius, m; what rounding has cut off its
 own time; angle, spin and its rate; when its sliding or spinning on a support ends; from when on its supports' impulses
 are not logged yet; when it last hit something; what rounding has cut off its next event's time; 1/mass, 0 for what
-never moves; 1/moment, 0 for what cannot turn; force of each of two supports on it, N."""
+never moves; 1/moment, 0 for what cannot turn; force of each of two supports on it, N, four columns; up to when what its
+sliding took is in the account, and what rounding has cut off that."""
 
 WIDTH = 24
 """Columns of `state`: what prediction reads stands first."""
@@ -40,15 +42,18 @@ RESTITUTION, FRICTION = range(2)
 """Places of `surfaces`."""
 
 GX, GY, HOP, NOW, NOW_LATE, SECOND, INSTANT = range(7)
+BY_NORMAL, BY_RUBBING, BY_PHANTOM = range(7, 10)
 """Places of `world`: gravity, m/s²; the speed of a hop, m/s; the time of the last event, s, and what rounding has cut
-off it; the starts of the second and of the instant in which events are being counted."""
+off it; the starts of the second and of the instant in which events are being counted; energy that impulses along
+normals and along surfaces took, J, negative, and that either gave."""
 
 NONE, SLIP_ENDS, EDGE, FLAT, KNOB, BALL = range(6)
 """Kinds of event, in the order in which those of one ball at one instant happen."""
 
-RECORDING, ROWS, EVENTS, IN_SECOND, AT_INSTANT, WHO, WHAT, WITH, BUDGET = range(9)
+RECORDING, ROWS, EVENTS, IN_SECOND, AT_INSTANT, WHO, WHAT, WITH, BUDGET, PREDICTIONS, PAIR_TESTS, ACCOUNTING = range(12)
 """Places of `count`: whether contacts are logged, how many rows there are; events so far, in the present second and
-instant; the last event's ball, kind and partner; how many events a second may have."""
+instant; the last event's ball, kind and partner; how many events a second may have; how often a ball looked ahead,
+and at how many others, flats and knobs; whether energy is accounted for."""
 
 HOP_TIME, HOP_MOST = 5e-5, 5e-4
 """s and m/s: what would rest on a ball or on anything round hops instead, with g·HOP_TIME or HOP_MOST if that is less:
@@ -82,9 +87,9 @@ class Arena(NamedTuple):
     knob_tags: IntArray
     """(K, 2)"""
     world: FloatArray
-    """(7,)"""
+    """(10,)"""
     counts: IntArray
-    """(9,)"""
+    """(12,)"""
     log: FloatArray
     """(C, 7) time, point, normal, impulse"""
     log_pair: IntArray
@@ -114,8 +119,8 @@ def arena_of(roster: Roster) -> Arena:
         flat_tags=np.column_stack((flat_thing, flat_thing, flat_knobs)),
         knobs=knobs,
         knob_tags=np.column_stack((knob_thing, knob_thing)),
-        world=np.zeros(7),
-        counts=np.zeros(9, np.int64),
+        world=np.zeros(10),
+        counts=np.zeros(12, np.int64),
         log=np.empty((0, 7)),
         log_pair=np.empty((0, 2), np.int64),
     )

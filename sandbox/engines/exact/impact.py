@@ -3,6 +3,7 @@
 import math
 
 from sandbox.engines.exact.arena import (
+    ACCOUNTING,
     ANGLE,
     AX,
     AY,
@@ -29,6 +30,7 @@ from sandbox.engines.exact.arena import (
     X,
     Y,
 )
+from sandbox.engines.exact.booking import book_strike
 from sandbox.engines.exact.log import add_impulse, log_rest, open_row
 from sandbox.engines.exact.motion import place, turned
 from sandbox.engines.exact.roots import NOISE
@@ -92,6 +94,8 @@ def strike(arena: Arena, i: int, nx: float, ny: float, rebound: float, friction:
     state[i, VX] += jx * im
     state[i, VY] += jy * im
     state[i, SPIN] -= r * across * ii
+    if arena.counts[ACCOUNTING] != 0:
+        book_strike(arena, i, nx, ny, normal, across)
     return jx, jy
 
 

@@ -22,6 +22,8 @@ from sandbox.engines.exact.arena import (
     NONE,
     NX,
     NY,
+    PAIR_TESTS,
+    PREDICTIONS,
     PX,
     PY,
     RADIUS,
@@ -115,6 +117,8 @@ def edge_time(flats: FloatArray, f: int, x: float, y: float, vx: float, vy: floa
 @kernel
 def predict(arena: Arena, i: int, now: float, late: float) -> None:
     """Write down a ball's earliest event from now on."""
+    arena.counts[PREDICTIONS] += 1
+    arena.counts[PAIR_TESTS] += len(arena.flats) + len(arena.knobs) + len(arena.others)
     foresee(
         arena.state,
         arena.tags,

@@ -7,7 +7,9 @@ from typing import NoReturn
 import numpy as np
 
 from sandbox.action import Action
+from sandbox.engines.account import Account, Cause
 from sandbox.engines.acting import perform
+from sandbox.engines.booked import booked
 from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.exact.advance import (
@@ -15,6 +17,7 @@ from sandbox.engines.exact.advance import (
     FULL,
     PAUSED,
     advance,
+    arrive,
     changed,
     evaluate,
     look_ahead,
@@ -28,6 +31,8 @@ from sandbox.engines.exact.arena import (
     LIGHTNESS,
     NOW,
     NOW_LATE,
+    PAIR_TESTS,
+    PREDICTIONS,
     RECORDING,
     ROWS,
     SINCE,
@@ -37,13 +42,14 @@ from sandbox.engines.exact.arena import (
     VX,
     VY,
     Arena,
+    T,
     X,
     Y,
     arena_of,
     renewed,
 )
+from sandbox.engines.exact.books import Books
 from sandbox.engines.exact.excess import too_many
-from sandbox.engines.exact.impact import bring
 from sandbox.engines.exact.log import log_rests, open_rest, taken, with_room
 from sandbox.engines.exact.predict import predict
 from sandbox.engines.exact.support import freed, knocked
@@ -75,6 +81,7 @@ class ExactSimulation(Running):
         super().__init__(settings)
         self._troupe = Troupe(scene, settings.dt)
         self._stopped: float | None = None
+        self._books: Books | None = None
         self._arena: Arena = arena_of(self._troupe)
         tell_if_slow(len(scene.bodies))
         self._allow()
@@ -108,8 +115,13 @@ class ExactSimulation(Running):
 
     @property
     def work(self) -> Mapping[str, int]:
-        """What was done so far: events."""
-        return {"events": self.events}
+        """What was done so far: events, predictions, and at how many others, flats and knobs these looked."""
+        counts = self._arena.counts
+        return {
+            "events": self.events,
+            "predictions": int(counts[PREDICTIONS]),
+            "pair_tests": int(counts[PAIR_TESTS]),
+        }
 
     def step(self) -> None:
         """Advance by one dt.
@@ -149,7 +161,8 @@ class ExactSimulation(Running):
         with self._turn, np.errstate(all="ignore"):
             self._check_running()
             self._troupe.settled()
-            leaving = perform(action, self._troupe)
+            with booked(self._outside, Cause.ACTIONS, self):
+                leaving = perform(action, self._troupe)
             self._acted()
             if leaving is not None:
                 self._take_out(np.asarray([leaving]))
@@ -178,6 +191,17 @@ class ExactSimulation(Running):
                     open_rest(arena, i, which)
             log_rests(arena, now)
         return taken(arena)
+
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy that each cause has brought since the first call, J; that call starts the accounting."""
+        with np.errstate(all="ignore"):
+            if self._books is None:
+                self._books = Books(self._arena, self.time)
+            return self._books.entries(self._arena, self.time)
+
+    @property
+    def _outside(self) -> Account | None:
+        return None if self._books is None else self._books.account
 
     def watch(self, observer: Observer) -> None:
         """Do nothing: there are no substeps to call an observer after, and no contact is missed."""
@@ -226,14 +250,16 @@ class ExactSimulation(Running):
         troupe, now = self._troupe, self.time
         touched = sorted(troupe.kicked | troupe.moved)
         for i in touched:
-            bring(self._arena.state, self._arena.tags, self._arena.log, i, now, 0.0)
+            arrive(self._arena, i, now, 0.0)
             self._arena.state[i, X : Y + 1], self._arena.state[i, VX : VY + 1] = troupe.position[i], troupe.velocity[i]
             self._arena.state[i, ANGLE], self._arena.state[i, SPIN] = troupe.angle[i], troupe.angular_velocity[i]
         arena = self._arena
         for i in troupe.moved:
             freed(arena, i)
         if troupe.renewed:
+            known = len(arena.state)
             self._arena = arena = renewed(arena, troupe)
+            arena.state[known:, T] = now  # who has just been spawned has not moved before
             self._allow()
             renew(arena, now)
             return
@@ -253,12 +279,13 @@ class ExactSimulation(Running):
         now = self.time
         with np.errstate(all="ignore"):
             for i in numbers.tolist():
-                bring(self._arena.state, self._arena.tags, self._arena.log, i, now, 0.0)
+                arrive(self._arena, i, now, 0.0)
                 freed(self._arena, i)
                 self._arena.state[i, VX : SPIN + 2] = 0.0
                 self._arena.next_time[i] = np.inf
                 self._arena.tags[i, STAMP] += 1
-        self._troupe.take_out(numbers, now)
+        with booked(self._outside, Cause.RETIRED, self):
+            self._troupe.take_out(numbers, now)
         self._arena = renewed(self._arena, self._troupe)
 
     def _allow(self) -> None:

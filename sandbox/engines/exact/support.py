@@ -44,6 +44,7 @@ from sandbox.engines.exact.arena import (
     X,
     Y,
 )
+from sandbox.engines.exact.booking import book_spin, book_velocity
 from sandbox.engines.exact.impact import note, strike
 from sandbox.engines.exact.log import add_impulse, open_rest, open_row
 from sandbox.engines.exact.predict import parallel
@@ -168,6 +169,7 @@ def single(arena: Arena, i: int, f: int, press: float) -> None:
     if slip == 0.0 and abs(pull) <= most * ease:
         drive = -pull / ease
         if ii > 0.0 and friction > 0.0:
+            book_spin(arena, i, v / r)
             state[i, SPIN] = v / r
     else:
         downhill = slip if slip != 0.0 else pull
@@ -189,6 +191,7 @@ def keep(arena: Arena, i: int, which: int, vx: float, vy: float) -> None:
     """Set a ball's velocity to what its supports leave of it, and log the little that this changes."""
     state, im = arena.state, arena.state[i, LIGHTNESS]
     add_impulse(arena, arena.tags[i, ROW + which], (state[i, VX] - vx) / im, (state[i, VY] - vy) / im)
+    book_velocity(arena, i, vx, vy)
     state[i, VX], state[i, VY] = vx, vy
 
 
@@ -223,6 +226,7 @@ def corner(arena: Arena, i: int) -> None:
     state, r = arena.state, arena.state[i, RADIUS]
     im, ii = arena.state[i, LIGHTNESS], arena.state[i, READINESS]
     if abs(state[i, SPIN]) * r <= REST_TIME * (abs(arena.world[GX]) + abs(arena.world[GY])) and ii > 0.0:
+        book_spin(arena, i, 0.0)
         state[i, SPIN] = 0.0
     turning = 0.0
     if state[i, SPIN] != 0.0 and ii > 0.0:
@@ -233,6 +237,7 @@ def corner(arena: Arena, i: int) -> None:
         if turning == 0.0 or calm < 0.0 or other < 0.0 or (first < 0.0) != (second < 0.0):
             release(arena, i, 0 if first < 0.0 else 1)
             return
+        book_spin(arena, i, 0.0)
         state[i, SPIN], turning = 0.0, 0.0  # it jams: no two forces within friction let it turn on
         first, second, mu, nu = calm, other, 0.0, 0.0
     keep(arena, i, 1, 0.0, 0.0)
@@ -253,11 +258,12 @@ def slip_ends(arena: Arena, i: int) -> None:
     """Let a ball's slip be zero, or in a corner its spin, as it is at the end of sliding but for rounding."""
     state, f = arena.state, arena.tags[i, SUPPORT]
     if arena.tags[i, SUPPORT + 1] >= 0:
+        book_spin(arena, i, 0.0)
         state[i, SPIN] = 0.0
     elif arena.state[i, READINESS] > 0.0:
-        state[i, SPIN] = (-state[i, VX] * arena.flats[f, NY] + state[i, VY] * arena.flats[f, NX]) / arena.state[
-            i, RADIUS
-        ]
+        spin = (-state[i, VX] * arena.flats[f, NY] + state[i, VY] * arena.flats[f, NX]) / state[i, RADIUS]
+        book_spin(arena, i, spin)
+        state[i, SPIN] = spin
     else:
         v = state[i, SPIN] * arena.state[i, RADIUS]
         keep(arena, i, 0, -v * arena.flats[f, NY], v * arena.flats[f, NX])

@@ -25,6 +25,8 @@ class Field:
         self._began = scene.began
         self.level = [0.0 if thrust.key else 1.0 for thrust in scene.thrusts]
         """how far each thrust is open"""
+        self.told: dict[str, tuple[float, float, float, float, float]] | None = None
+        """what each body in the space was last kicked by: the pull of others, m/s², thrusts, N and N·m; where wanted"""
         self._thrusts: dict[str, list[tuple[int, Thrust, Point]]] = {}
         bodies = scene.bodies
         for k, thrust in enumerate(scene.thrusts):
@@ -69,12 +71,16 @@ class Field:
         def kick(body: pymunk.Body, gravity: tuple[float, float], damping: float, dt: float) -> None:
             x, y = body.position
             ax, ay = self._pull(name, x, y, body.mass, members) if self.attracts else (0.0, 0.0)
+            pull, push, torque = (ax, ay), (0.0, 0.0), 0.0
             if thrusts:
                 cos, sin = body.rotation_vector  # math.cos raises where the angle is no longer finite
                 fx, fy, torque = self._thrust(thrusts)
-                ax += (cos * fx - sin * fy) / body.mass
-                ay += (sin * fx + cos * fy) / body.mass
+                push = cos * fx - sin * fy, sin * fx + cos * fy
+                ax += push[0] / body.mass
+                ay += push[1] / body.mass
                 body.torque += torque
+            if self.told is not None:
+                self.told[name] = (*pull, *push, torque)
             pymunk.Body.update_velocity(body, (gravity[0] + ax, gravity[1] + ay), damping, dt)
 
         body.velocity_func = kick

@@ -4,7 +4,7 @@ Each operation is the one that Munk2D performs for a body (`cpBodyUpdatePosition
 order and with its roundings, so the result is bit-identical; only the loop over bodies is compiled, or numpy's.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -76,6 +76,16 @@ class FreeFlight:
     def _fly(self, numbers: IntArray) -> None:
         self.numbers, self._runs = numbers, runs_of(numbers)
         self.forces_changed()
+
+    @property
+    def even(self) -> bool:
+        """Whether gravity alone acts."""
+        return self._field is None and not (self._pushed or self._twisted or self._dragged)
+
+    @property
+    def pushes(self) -> Mapping[int, tuple[FloatArray, float]]:
+        """Steady forces, N, and torques, N·m, by the number of the body."""
+        return self._steady
 
     def forces_changed(self) -> None:
         """Work out anew which stages a substep needs."""

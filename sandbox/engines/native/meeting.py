@@ -11,6 +11,7 @@ from sandbox.engines.native.field import Field
 from sandbox.engines.native.ground import Ground, shuffled
 from sandbox.engines.native.member import Member
 from sandbox.engines.native.memory import RememberedImpulses, without
+from sandbox.engines.native.points import PointReader, Points
 from sandbox.engines.native.reader import Reader
 from sandbox.engines.native.space import (
     SurfaceSetter,
@@ -42,14 +43,17 @@ class MeetingBodies:
         self._surface_of: IntArray = np.empty(0, np.int64)
         self._moments: FloatArray = np.empty(0)
         self._touches: BoolArray = np.empty(0, np.bool_)
-        self._tethers = Tethers(self._space)
+        self.tethers = Tethers(self._space)
+        """the joints that hold"""
         self._polygons = False
         self._named: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
         self._remembered: RememberedImpulses | None = None
+        self._points: PointReader | None = None
         self.field = Field(scene)
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
-        self._steady: dict[int, tuple[FloatArray, float]] = {}
+        self.steady: dict[int, tuple[FloatArray, float]] = {}
+        """steady forces, N, and torques, N·m, by the number of the body"""
         self._moving = 0
         self._state: tuple[IntArray, FloatArray] | None = None
 
@@ -119,6 +123,7 @@ class MeetingBodies:
 
     def _register(self) -> None:
         moving = {m.body.id: number for number, m in self._members.items() if m.moves}
+        self._reader.records = {self._members[number].body._body: number for number in moving.values()}
         still = {m.body.id: number for number, m in self._members.items() if not m.moves}
         self._reader.assign(moving, still | self._ground.ids)
         self._state = None
@@ -128,12 +133,12 @@ class MeetingBodies:
         if not len(numbers):
             return
         for number in numbers.tolist():
-            self._tethers.untie(number)
+            self.tethers.untie(number)
             member = self._members.pop(number)
             self._moving -= member.moves
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
             del self._named[self._name_of.pop(number)]  # in place: the field looks into it
-            self._steady.pop(number, None)
+            self.steady.pop(number, None)
         self._reader.members_changed()
         self._state = None
 
@@ -141,12 +146,17 @@ class MeetingBodies:
         """Join the bodies that are here as a scene says, once; what is joined is always here."""
         assert self._settings.bias is not None
         if self._members:
-            self._tethers.tie(links, lambda number: self._members[number].body, self._settings.bias)
+            self.tethers.tie(links, lambda number: self._members[number].body, self._settings.bias)
+
+    @property
+    def joined(self) -> int:
+        """How many joints there are that pymunk solves."""
+        return len(self.tethers) if self._moving else 0
 
     @property
     def breakable(self) -> bool:
         """Whether some joint may break."""
-        return self._tethers.breakable
+        return self.tethers.breakable
 
     def torn(
         self, position: FloatArray, velocity: FloatArray, angle: FloatArray, angular_velocity: FloatArray
@@ -155,7 +165,7 @@ class MeetingBodies:
 
         Of arrays in scene order: the present state.
         """
-        return self._tethers.torn(position, velocity, angle, angular_velocity, self._settings.h)
+        return self.tethers.torn(position, velocity, angle, angular_velocity, self._settings.h)
 
     @property
     def joints(self) -> bool:
@@ -193,13 +203,13 @@ class MeetingBodies:
             mass = np.asarray([self._members[n].body.mass for n in numbers.tolist()])[:, None]
             push = np.zeros((len(numbers), 2))
             for row, number in enumerate(numbers.tolist()):
-                if number in self._steady:
-                    push[row] = self._steady[number][0] * (1.0 / mass[row])
+                if number in self.steady:
+                    push[row] = self.steady[number][0] * (1.0 / mass[row])
             self._reader.push(mass * acceleration(world, state[:, 3:5], push, self._settings.h))
         else:
-            for number, (force, _) in self._steady.items():
+            for number, (force, _) in self.steady.items():
                 self._members[number].body.force = float(force[0]), float(force[1])
-        for number, (_, torque) in self._steady.items():
+        for number, (_, torque) in self.steady.items():
             self._members[number].body.torque = torque
 
     def _read(self) -> tuple[IntArray, FloatArray]:
@@ -223,11 +233,21 @@ class MeetingBodies:
         if not self._moving:
             return NOTHING
         found = self._reader.touching(self._polygons)
+        remembered = self._remember()
+        remembered.pairs = True
+        ids, impulses = remembered.take()
+        return without(found, self._reader.numbers(ids), impulses) if len(ids) else found
+
+    def _remember(self) -> RememberedImpulses:
         if self._remembered is None:
             self._remembered = RememberedImpulses(self._space)
-            return found
-        ids, impulses = self._remembered.take()
-        return without(found, self._reader.numbers(ids), impulses) if len(ids) else found
+        return self._remembered
+
+    def points(self) -> Points:
+        """Return the contact points of the last substep; from the first call on, their impulses add up."""
+        if self._points is None:
+            self._points = PointReader(self._space, self._remember())
+        return self._points.read(self._reader.records)
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a body that is not finite or beyond all bounds, and what is the matter; else None."""
@@ -265,9 +285,9 @@ class MeetingBodies:
     def push(self, number: int, force: FloatArray, torque: float) -> None:
         """Let a steady force (N) and torque (N·m) act on a body from now on."""
         if force.any() or torque:
-            self._steady[number] = force, torque
+            self.steady[number] = force, torque
         else:
-            self._steady.pop(number, None)
+            self.steady.pop(number, None)
 
     def set_position(self, number: int, position: FloatArray) -> None:
         """Put a body somewhere, m."""

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pymunk
 
+from sandbox.engines.native.record import impulses_of
 from sandbox.engines.touching import Touching
 from sandbox.trajectory import FloatArray, IntArray
 
@@ -24,11 +25,20 @@ class RememberedImpulses:
     def __init__(self, space: pymunk.Space) -> None:
         self._ids: list[tuple[int, int]] = []
         self._impulses: list[tuple[float, float]] = []
+        self.pairs = False
+        """whether anybody takes them"""
+        self.points: dict[int, FloatArray] | None = None
+        """the same point by point, (C, 2) by the address of the arbiter; where a dict is put here"""
         space.on_collision(begin=self._begin)
 
     def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
         x, y = arbiter.total_impulse
-        if x or y:
+        if not (x or y):
+            return
+        if self.points is not None:
+            where, impulses = impulses_of(arbiter)
+            self.points[where] = impulses
+        if self.pairs:
             a, b = arbiter.shapes
             if a.body is not None and b.body is not None:
                 self._ids.append((a.body.id, b.body.id))

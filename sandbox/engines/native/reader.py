@@ -1,5 +1,7 @@
 """Reader: the state of a space in one call a frame, through pymunk.batch and one reused buffer."""
 
+from typing import Any
+
 import numpy as np
 import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
@@ -41,6 +43,8 @@ class Reader:
         self._moved, self._first, self._all = True, True, 0
         self._rows: IntArray = np.empty(0, np.int64)
         self._numbers: IntArray = np.empty(0, np.int64)
+        self.records: dict[Any, int] = {}
+        """Which number each moving body's own record (`cpBody`) stands for; those that left may still be there"""
         self.slots: slice | IntArray = self._numbers
         """Where in scene order the rows of `state` belong; a slice where that is possible, which is faster."""
 

@@ -6,10 +6,13 @@ from types import MappingProxyType
 import numpy as np
 
 from sandbox.action import Action
+from sandbox.engines.account import Account, Cause
 from sandbox.engines.acting import perform
+from sandbox.engines.booked import booked
 from sandbox.engines.contract import Divergence, Observer
 from sandbox.engines.expiry import Expiry
 from sandbox.engines.ledger import ContactLedger
+from sandbox.engines.native.books import Books
 from sandbox.engines.native.population import Population
 from sandbox.engines.running import Running
 from sandbox.scene.bodies import Bodies
@@ -34,8 +37,10 @@ class NativeSimulation(Running):
         self._population = Population(scene, settings)
         self._ledger: ContactLedger | None = None
         self._observer: Observer | None = None
+        self._books: Books | None = None
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
+        self._work = {"contacts": 0, "contact_iterations": 0, "joint_iterations": 0}
         self._expiry = Expiry(scene.bodies, scene.began, settings.h)
         self._still: tuple[FloatArray, FloatArray] | None = None  # angles and spins, which frames share if they can
 
@@ -61,8 +66,12 @@ class NativeSimulation(Running):
 
     @property
     def work(self) -> Mapping[str, int]:
-        """What was done so far: substeps; pymunk does not tell how much it looks at."""
-        return {"substeps": self._steps * self._settings.substeps}
+        """What was done so far; pymunk does not tell how many pairs it looks at.
+
+        Its contacts, and with them `contact_iterations`, count only from the first call of `contacts` or `watch` on:
+        until then nobody asks pymunk for them.
+        """
+        return {"substeps": self.substeps, **self._work}
 
     @property
     def flying(self) -> int:
@@ -101,7 +110,7 @@ class NativeSimulation(Running):
         whole, rest = divmod(part * self._settings.substeps, 1.0)
         self._advance(int(whole))
         before = [array.copy() for array in self._state()]
-        self._substep(int(whole), look=False)  # its contacts lie beyond the end
+        self._substep(int(whole), look=False, share=rest)  # its contacts lie beyond the end
         self._part = part
         self._guard()
         for now, old in zip(self._state(), before, strict=True):
@@ -118,8 +127,10 @@ class NativeSimulation(Running):
         with self._turn:
             self._check_running()
             self._still = None
-            leaving = perform(action, self._population)
-            self._population.changed()
+            with booked(self._outside, Cause.ACTIONS, self):
+                leaving = perform(action, self._population)
+                self._population.changed()
+                self._still = None
             if self._ledger is not None:
                 self._ledger.joints = self._population.meeting.joints  # a spawned body may have several pieces
             if leaving is not None:
@@ -145,6 +156,16 @@ class NativeSimulation(Running):
             self._record(self.time)
         return self._ledger.take()
 
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy that each cause has brought since the first call, J; that call opens the account."""
+        if self._books is None:
+            self._books = Books(self._population)
+        return self._books.account.entries()
+
+    @property
+    def _outside(self) -> Account | None:
+        return None if self._books is None else self._books.account
+
     def watch(self, observer: Observer) -> None:
         """Have an observer called after every substep; this records contacts too."""
         if self._ledger is None:
@@ -162,32 +183,49 @@ class NativeSimulation(Running):
 
     def _advance(self, substeps: int) -> None:
         """Advance by some substeps from the beginning of a step: both halves apart, as they never meet."""
-        together = self._observer is not None  # who is told of all bodies after each
+        # An observer is told of all bodies after each substep, and the books are of all.
+        together = self._observer is not None or self._books is not None
         if not together:
             self._population.free.step(substeps)
         if together or self._ledger is not None or len(self._population.meeting):
             for k in range(substeps):
                 self._substep(k, fly=together)
 
-    def _substep(self, k: int, look: bool = True, fly: bool = True) -> None:
-        """Advance by h, the k-th time in this step; those in flight may have done so already."""
+    def _substep(self, k: int, look: bool = True, fly: bool = True, share: float = 1.0) -> None:
+        """Advance by h, the k-th time in this step; those in flight may have done so already.
+
+        A share of it is booked: what lies beyond is cut off afterwards.
+        """
         population, h = self._population, self._settings.h
         start = self.time + k * h
         before = self._state()[0].copy() if self._observer is not None else None
+        opening = self._books.opening() if self._books is not None else None
         if fly:
             population.free.step()
         population.meeting.step(start)
+        self._work["joint_iterations"] += population.meeting.joined * self._settings.iterations
         population.changed()
+        if self._books is not None:
+            self._books.substep(opening, share)
         if population.meeting.breakable and look:
-            self._broken |= dict.fromkeys(population.torn().tolist(), self._after(k + 1))
+            self._come_apart(population.torn(), self._after(k + 1))
         if self._ledger is not None and look:
             self._record(start + h)
             if self._observer is not None and before is not None:
                 self._observer(start, before, self._state()[0], self._ledger.pairs())
 
+    def _come_apart(self, numbers: IntArray, time: float) -> None:
+        """Note that joints, by their numbers, have come apart."""
+        self._broken |= dict.fromkeys(numbers.tolist(), time)
+        if self._books is not None and len(numbers):
+            self._books.parted(numbers)
+
     def _record(self, time: float) -> None:
         if self._ledger is not None:
-            self._ledger.record(time, self._population.meeting.touching())
+            now = self._population.meeting.touching()
+            self._work["contacts"] += len(now.a)
+            self._work["contact_iterations"] += len(now.a) * self._settings.iterations
+            self._ledger.record(time, now)
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the present arrays in scene order; they belong to the population."""
@@ -214,6 +252,8 @@ class NativeSimulation(Running):
             self._take_out(going)
 
     def _take_out(self, numbers: IntArray) -> None:
+        with booked(self._outside, Cause.RETIRED, self):
+            self._still = None
+            self._population.take_out(numbers)
         self._still = None
-        self._population.take_out(numbers)
         self._retired |= dict.fromkeys(numbers.tolist(), self.time)

@@ -1,6 +1,7 @@
 """Tethers: the links of a scene between the bodies of a space, for as long as both are there and the link is whole."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import pymunk
@@ -11,6 +12,22 @@ from sandbox.scene.links import WORLD, LinkKind, Links
 from sandbox.trajectory import FloatArray, IntArray
 
 
+class Held(NamedTuple):
+    """Links by what they do."""
+
+    springs: Links
+    rotary: Links
+    """rotary springs"""
+    rigid: Links
+    """all but springs"""
+    motors: Links
+    """those of them"""
+
+    def __bool__(self) -> bool:
+        """Tell whether there are any."""
+        return len(self.springs) + len(self.rotary) + len(self.rigid) > 0
+
+
 class Tethers:
     """The constraints in a space, by the numbers of their links."""
 
@@ -18,7 +35,11 @@ class Tethers:
         self._space = space
         self._links: Links | None = None
         self._constraints: dict[int, pymunk.Constraint] = {}
+        self._sorted: Held | None = None
         self._watch(Links.none())
+
+    def __len__(self) -> int:
+        return len(self._constraints)
 
     def tie(self, links: Links, body: Callable[[int], pymunk.Body], bias: float) -> None:
         """Join bodies as a scene says, once.
@@ -77,6 +98,23 @@ class Tethers:
             self._release(numbers.tolist())
         return numbers
 
+    @property
+    def held(self) -> "Held":
+        """The links that are there."""
+        if self._sorted is None:
+            springs, rotary = LinkKind.SPRING, LinkKind.ROTARY_SPRING
+            there = self._there
+            rigid = there.some(~np.isin(there.kind, (springs, rotary)))
+            self._sorted = Held(there.of(springs), there.of(rotary), rigid, rigid.of(LinkKind.MOTOR))
+        return self._sorted
+
+    def impulses(self, links: Links) -> FloatArray:
+        """Return what pymunk tells of each of some links' impulses in the last substep, (K,) N·s or N·m·s.
+
+        Of joints it is the size, of springs what along them pushes apart.
+        """
+        return np.asarray([self._constraints[k].impulse for k in links.number.tolist()], dtype=np.float64)
+
     def _release(self, numbers: list[int]) -> None:
         if not numbers:
             return
@@ -87,6 +125,8 @@ class Tethers:
 
     def _watch(self, links: Links) -> None:
         """Sort out which of the links that are there may break."""
+        self._there: Links = links
+        self._sorted = None
         some = links.some(np.isfinite(links.strength))
         kinds = LinkKind.SPRING, LinkKind.ROTARY_SPRING
         self._springs, self._rotary = some.of(kinds[0]), some.of(kinds[1])

@@ -70,7 +70,7 @@ class BallFinder(Finder):
         """
         roster = self._roster
         near = self.candidates(start, 2.0 * self.farthest(start, end))
-        self.work["narrow_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
+        self.work["pair_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
         planes, segments = roster.fixtures.planes, roster.fixtures.segments
         share, key = first_touch(
             start, end, roster.radius, self.able, near.balls, planes, near.segments, segments, rest

@@ -13,6 +13,9 @@ from sandbox.engines.reference.segments import SegmentBoxes
 from sandbox.engines.roster import NOTHING, Roster
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
+WORK = "broad_tests", "pair_tests", "contacts", "contact_iterations", "joint_iterations"
+"""What is counted; the solvers count their passes in with what is found."""
+
 
 class Candidates(NamedTuple):
     """The pairs that the broad phases handed on, by ascending key. Every body is a candidate for every plane."""
@@ -31,7 +34,7 @@ class Finder(ABC):
         self._ball_keys, self._segment_keys = np.empty(64, np.int64), np.empty(64, np.int64)
         self._out = _room_for(64)
         self._none = self._out.of(slice(0))
-        self.work: Counter[str] = Counter(broad_tests=0, narrow_tests=0, contacts=0)
+        self.work: Counter[str] = Counter(dict.fromkeys(WORK, 0))
         self.population_changed()
 
     def population_changed(self) -> None:
@@ -77,7 +80,7 @@ class Finder(ABC):
         if size > len(self._out.key):
             self._out = _room_for(2 * size)
             self._looked(position, near, reach)
-        self.work["narrow_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
+        self.work["pair_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
         self.work["contacts"] += size
         return self._out.of(slice(0, size)) if size else self._none
 

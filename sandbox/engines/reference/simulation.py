@@ -63,8 +63,8 @@ class ReferenceSimulation(Running):
 
     @property
     def work(self) -> Mapping[str, int]:
-        """What was done so far: substeps, tests of the broad and narrow phases, contacts found."""
-        return {"substeps": self._steps * self._settings.substeps, **self._stage.finder.work}
+        """What was done so far, all that the contract names but events."""
+        return {"substeps": self.substeps, **self._stage.finder.work}
 
     def step(self) -> None:
         """Advance by one dt.

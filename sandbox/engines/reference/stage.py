@@ -183,6 +183,7 @@ class Stage:
             moved[0] += shift
         if self._joints is not None and self._joints.how != "impulses":
             self._joints.project(self.x, moved, h)
+            self.finder.work["joint_iterations"] += self._joints.visits
         return moved
 
     def overlaps(self, x: State) -> Manifolds:
@@ -208,6 +209,7 @@ class Stage:
             target = -(1.0 - self._bias**h) / h * np.minimum(contacts.separation + self._slop, 0.0)
             self._pushes = bool(target.any())
             if self._pushes:
+                self.finder.work["contact_iterations"] += contacts.size * self._settings.iterations
                 inverse = self._roster.inverse_mass, self._roster.inverse_moment
                 solve_overlaps(contacts, target, self.push, *inverse, np.zeros_like(target), self._settings.iterations)
         self._memory = contacts.key.copy(), impulse, h
@@ -269,7 +271,9 @@ class Stage:
         self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray, joined: bool = False
     ) -> None:
         inverse = self._roster.inverse_mass, self._roster.inverse_moment
+        self.finder.work["contact_iterations"] += contacts.size * self._settings.iterations
         if self._joints is not None and joined:
+            self.finder.work["joint_iterations"] += self._joints.visits
             rows, times = self._joints.rows, self._settings.iterations
             solve_together(contacts, bounce, rows, velocity, *inverse, impulse, times)
             return

@@ -1,21 +1,15 @@
-"""A whole run by formula: where the scene alone guarantees one for every body, from start to end."""
-
-import math
+"""A whole run by formula: the solution of a scene as the trajectory that an engine without error would leave."""
 
 import numpy as np
 
 from sandbox.engines.expiry import SLACK
-from sandbox.measure.closed_form import Bouncing, bouncing, driven, free_flight, why_not
+from sandbox.measure.closed_form import Solution, solution
 from sandbox.measure.compare.runs import frames_as_run
 from sandbox.measure.recorder import frame_count
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
-from sandbox.trajectory import Contacts, FloatArray, Trajectory
-
-CHUNK = 1_000_000
-"""Frames × bodies evaluated at once."""
+from sandbox.trajectory import FloatArray, Trajectory
 
 
 def frame_times(scene: Scene, settings: Settings) -> FloatArray:
@@ -29,40 +23,23 @@ def frame_times(scene: Scene, settings: Settings) -> FloatArray:
 
 
 def solved(scene: Scene, settings: Settings) -> Trajectory | None:
-    """Return the run that formulas make of a scene, or None where they do not cover all of it.
+    """Return the run that formulas make of a scene, or None where they do not cover all of it (`closed_form`)."""
+    found = solution(scene)
+    return None if found is None else as_run(found, settings)
 
-    They do where each body that moves either can meet nothing, and flies under gravity and linear drag, or is a ball
-    that can meet only the one plane there is, and bounces straight (`closed_form.bouncing`); no two bodies can meet,
-    and nothing joins, attracts or thrusts them. Nothing turns a body then. One that leaves `world.bounds`, or whose
-    life is over, is retired at the first frame of that. Contacts are the impacts, in the order of time; from the one
-    on after which a flight would be shorter than dt, a single row that lasts to the end.
+
+def as_run(found: Solution, settings: Settings) -> Trajectory:
+    """Return a solution at the frames of a run, with its contacts.
+
+    A body that leaves `world.bounds`, or whose life is over, is retired at the first frame of that. Contacts are in the
+    order of time; from the bounce on after which a flight would be shorter than dt, a single row that lasts to the end.
     """
-    bodies, meet = scene.bodies, meetings(scene)
-    if why_not(scene) is not None or meet.mutual or driven(scene, bodies).any():
-        return None
-    moving = np.flatnonzero(~bodies.fixed)
-    bouncers: dict[int, Bouncing] = {}
-    for number in moving[~meet.free[moving]].tolist():
-        form = bouncing(scene, bodies, number) if len(scene.fixed) == 1 else None
-        if form is None:
-            return None
-        bouncers[number] = form
-
-    time = frame_times(scene, settings)
-    position = np.repeat(bodies.position[None], len(time), axis=0)
-    velocity = np.where(bodies.fixed[:, None], 0.0, np.repeat(bodies.velocity[None], len(time), axis=0))
-    flying = moving[meet.free[moving]]
-    for part in np.array_split(flying, max(1, len(flying) * len(time) // CHUNK)):
-        start = bodies.position[part], bodies.velocity[part]
-        position[:, part], velocity[:, part] = free_flight(time, *start, scene.world)
-    for number, form in bouncers.items():
-        position[:, number], velocity[:, number] = form.at(time)
+    scene = found.scene
+    bodies, time = scene.bodies, frame_times(scene, settings)
+    position, velocity, angle, spin = found.at(time)
     retired = _retire(scene, bodies, time, position, velocity, settings.dt)
-    contacts = _impacts(bodies, bouncers, settings.dt, np.fmin(retired, scene.world.duration))
-    spin = np.where(bodies.fixed, 0.0, bodies.angular_velocity)
-    return frames_as_run(
-        scene, settings, time, (position, velocity, bodies.angle + time[:, None] * spin, spin), contacts, retired
-    )
+    contacts = found.contacts(np.fmin(retired, scene.world.duration), settings.dt)
+    return frames_as_run(scene, settings, time, (position, velocity, angle, spin), contacts, retired)
 
 
 def _retire(
@@ -87,46 +64,3 @@ def _retire(
         retired[number] = time[first]
         position[first:, number], velocity[first:, number] = position[first, number], 0.0
     return retired
-
-
-def _impacts(bodies: Bodies, bouncers: dict[int, Bouncing], dt: float, until: FloatArray) -> Contacts:
-    """Return the contacts of balls with the only fixed thing, which is −1."""
-    rows = [
-        (time, number, impulse)
-        for number, form in bouncers.items()
-        for time, impulse in _impacts_of(form, float(bodies.mass[number]), dt, float(until[number]))
-    ]
-    if not rows:
-        return Contacts.none()
-    rows.sort()
-    time, number, size = (np.asarray(column) for column in zip(*rows, strict=True))
-    number = number.astype(np.int64)
-    normal = np.asarray([bouncers[n].normal for n in number.tolist()])
-    along = np.asarray([bouncers[n].along for n in number.tolist()])
-    start = np.asarray([bouncers[n].start - bouncers[n].height * bouncers[n].normal for n in number.tolist()])
-    point = start + time[:, None] * along - bodies.radius[number, None] * normal
-    pair = np.column_stack((number, np.full(len(number), -1, dtype=np.int64)))
-    return Contacts(time, pair, point, -normal, -size[:, None] * normal)
-
-
-def _impacts_of(form: Bouncing, mass: float, dt: float, until: float) -> list[tuple[float, float]]:
-    """Return time, s, and impulse, N·s, of each impact up to a time; flights shorter than dt are one last row."""
-    g, e = form.gravity, form.restitution
-    if g == 0.0:
-        time = form.height / -form.speed if form.speed < 0 else math.inf
-        return [(time, -mass * (1 + e) * form.speed)] if time <= until else []
-    impact = math.sqrt(form.speed**2 + 2.0 * g * form.height)
-    # The two forms of one root, each free of cancellation for its sign.
-    up = form.speed > 0 or impact == 0
-    time = (form.speed + impact) / g if up else 2.0 * form.height / (impact - form.speed)
-    rows = []
-    while time <= until:
-        flight = 2.0 * e * impact / g
-        if flight < dt:
-            _, velocity = form.at(np.asarray([until]))
-            gained = float(velocity[0] @ form.normal) + impact
-            rows.append((time, mass * (gained + g * (until - time))))
-            break
-        rows.append((time, mass * (1 + e) * impact))
-        time, impact = time + flight, e * impact
-    return rows

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.compare.closed import solved
+from sandbox.measure.closed_form import solution
+from sandbox.measure.compare.closed import as_run
 from sandbox.measure.compare.horizon import NUDGE, agree_until, nudged
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.compare.refined import refined
@@ -50,9 +51,9 @@ def truth_of(scene: Scene, settings: Settings, tolerance: float) -> Truth | None
     Raises:
         TooLargeError: the frames would not fit into memory.
     """
-    form = solved(scene, settings)
+    form = solution(scene)
     if form is not None:
-        return Truth("closed_form", "formulas for every body", form, scene.world.duration)
+        return Truth("closed_form", form.about, as_run(form, settings), scene.world.duration)
 
     note = ""
     exact = ENGINES.get("exact")

@@ -1,1 +1,6 @@
 """The trade of speed for accuracy: measured over engines and settings."""
+
+from sandbox.measure.tradeoff.weighed import Tradeoff
+from sandbox.measure.tradeoff.weighing import tradeoff
+
+__all__ = ["Tradeoff", "tradeoff"]

@@ -1,5 +1,6 @@
 """Point: one setting of one engine, with its error and its cost."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +13,8 @@ class Point:
     """What one setting costs, and what it buys. What is unknown is None."""
 
     engine: str
+    asked: Settings
+    """what the engine was given; what is None there was left to it"""
     settings: Settings
     """as the engine filled them in"""
     changes: Mapping[str, Any]
@@ -31,7 +34,27 @@ class Point:
     work: Mapping[str, int]
     """deterministic counters: substeps, pair tests, contact iterations, events"""
 
+    def document(self) -> dict[str, Any]:
+        """Return it as a JSON object; figures that are not finite are null."""
+        return {
+            "engine": self.engine,
+            "settings": self.settings.model_dump(mode="json"),
+            "changes": dict(self.changes),
+            "error": _number(self.error),
+            "cost_ms_per_second": _number(self.cost),
+            "cost_median_ms_per_second": _number(self.cost_median),
+            "repeats": self.repeats,
+            "status": self.status,
+            "reason": self.reason,
+            "metrics": {name: _number(value) for name, value in self.metrics.items()},
+            "work": dict(self.work),
+        }
+
     @property
     def usable(self) -> bool:
         """Whether it has both figures, so that it can be weighed."""
         return self.status == "ok" and self.error is not None and self.cost is not None
+
+
+def _number(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

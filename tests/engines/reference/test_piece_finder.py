@@ -106,7 +106,7 @@ def test_the_test_that_fits_looks_at_least():
         roster = Roster(planks(), 0.01)
         finder = PieceFinder(roster, broad_phase)
         finder.overlaps(np.column_stack((roster.position, roster.angle)))
-        looked[broad_phase] = finder.work["narrow_tests"]
+        looked[broad_phase] = finder.work["pair_tests"]
     assert looked["oriented"] == 0
     assert looked["circles"] == sum(1 for i in range(40) for j in range(i) if 0.13 * (i - j) <= math.hypot(0.1, 5.0))
 

@@ -345,7 +345,7 @@ def test_work_is_counted():
     work = simulation.work
     assert work["substeps"] == 120
     assert work["broad_tests"] >= 120 * 6  # pairs that may meet: a, b, c with each other, and with the rock
-    assert 0 < work["contacts"] <= work["narrow_tests"]
+    assert 0 < work["contacts"] <= work["pair_tests"]
 
 
 def test_a_scene_of_nothing_runs():

@@ -70,9 +70,9 @@ def test_frames_lie_where_an_engine_keeps_them(solver: str) -> None:
         ("fireworks", True),
         ("fast_ball", True),
         ("circle_half_plane", True),
-        ("two_balls", False),
+        ("two_balls", True),
         ("bullet", False),
-        ("incline", False),
+        ("incline", True),
         ("gas", False),
     ],
 )

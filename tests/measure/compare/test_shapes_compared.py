@@ -11,7 +11,7 @@ from sandbox.measure.compare.comparing import compare, usual_tolerance
 from sandbox.measure.compare.drift import energy_drift, momentum_drift
 from sandbox.measure.compare.gaps import gap
 from sandbox.measure.compare.horizon import NUDGE, nudged
-from sandbox.measure.compare.truth import truth_of
+from sandbox.measure.compare.refined import refined
 from sandbox.measure.compare.why import knobs
 from sandbox.measure.run import run
 from sandbox.scene.file import loads
@@ -44,21 +44,21 @@ def tower(boxes: int) -> Scene:
     return loads(text)
 
 
-def test_truth_of_a_crate_that_slides_is_the_formula() -> None:
+def test_a_crate_that_slides_is_refined_to_the_formula() -> None:
     scene = sliding(0.3)
-    truth = truth_of(scene, scene.solver, usual_tolerance(scene))
+    truth = refined(scene, scene.solver, usual_tolerance(scene))
     assert truth is not None
-    assert (truth.kind, truth.trusted_until) == ("refined", 0.5)
+    assert truth.agrees_until == 0.5
     way = -(truth.trajectory.position[:, 0] - scene.bodies.position[0]) @ (math.cos(SLOPE), math.sin(SLOPE))
     right = 0.5 * 9.81 * (math.sin(SLOPE) - 0.3 * math.cos(SLOPE)) * truth.trajectory.time**2
     assert way == pytest.approx(right, abs=0.1 * usual_tolerance(scene))  # to which successive answers agree
 
 
-def test_truth_of_a_pendulum_is_at_the_bottom_after_a_quarter_of_its_period() -> None:
+def test_a_pendulum_is_refined_until_it_is_at_the_bottom_after_a_quarter_of_its_period() -> None:
     scene = loads(PENDULUM)
-    truth = truth_of(scene, scene.solver, 1e-3)
+    truth = refined(scene, scene.solver, 1e-3)
     assert truth is not None
-    assert (truth.kind, truth.trusted_until) == ("refined", 1.0)
+    assert truth.agrees_until == 1.0
     # From the horizontal the period of 1 m is 2.3678419 s: after a quarter the bob is below what holds it.
     x = np.interp(2.3678419 / 4.0, truth.trajectory.time, truth.trajectory.position[:, 0, 0])
     assert x == pytest.approx(0.0, abs=3e-4)  # the agreement, and a chord of 4.4 m/s · 10 ms that bends by 1e-4 m

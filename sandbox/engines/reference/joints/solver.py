@@ -105,6 +105,11 @@ class JointSolver:
         self.rows.impulse[:] = memory[self._held.link]
         self._given = np.zeros((len(self.links), 2))
 
+    @property
+    def visits(self) -> int:
+        """How often a step looks at a joint, over all passes; RATTLE's second stage passes over all again."""
+        return len(self._held.kind) * self._iterations * (2 if self.how == "rattle" else 1)
+
     def forces(self, x: State) -> FloatArray:
         """Return the accelerations (N, 3) by springs in a state, m/s² and rad/s²; in xpbd there are none."""
         out: FloatArray = np.zeros_like(x[1])

@@ -1,0 +1,21 @@
+"""Telling what is being done, while it is done."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+Told = Callable[[str], None]
+"""Called with what is being done now."""
+
+
+@contextmanager
+def telling(silent: bool) -> Iterator[Told | None]:
+    """Yield who says what is being done: a line that comes and goes on a terminal, nobody elsewhere."""
+    if silent or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    with Console(stderr=True).status("") as line:
+        yield lambda what: line.update(Text(what))

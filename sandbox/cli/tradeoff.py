@@ -1,0 +1,155 @@
+"""`sandbox tradeoff`: error against cost over engines and settings, and the setting to take."""
+
+from pathlib import Path
+
+import click
+
+from sandbox.batch.plan import USUAL
+from sandbox.cli.folder import make_folder, require_folder, write_json
+from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
+from sandbox.cli.telling import telling
+from sandbox.cli.tradeoff_table import print_tradeoff
+from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.measure.recorder import TooLargeError
+from sandbox.measure.tradeoff.aim import UnknownMetricError, metric_named
+from sandbox.measure.tradeoff.metrics import METRICS
+from sandbox.measure.tradeoff.weighed import Tradeoff
+from sandbox.measure.tradeoff.weighing import PATIENCE, POINTS, REPEATS, tradeoff
+from sandbox.scene.faults import Fault
+from sandbox.scene.file import load
+from sandbox.scene.model import Scene
+from sandbox.scene.rewrite import write_solver
+
+POSITIVE = click.FloatRange(min=0.0, min_open=True)
+
+
+@click.command(name="tradeoff")
+@click.argument("scene")
+@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="which engine(s); by default all")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
+@click.option("--metric", metavar="NAME", help=f"what the error is counted in: {', '.join(METRICS)}")
+@click.option("--tolerance", type=click.FloatRange(min=0.0), metavar="X", help="error that is allowed, in its unit")
+@click.option("--budget", type=POSITIVE, metavar="MS", help="milliseconds a frame that may be spent")
+@click.option("--fps", type=POSITIVE, default=60.0, metavar="N", help="frames a second of the budget; by default 60")
+@click.option("--seeds", type=click.IntRange(1, 1000), default=1, metavar="N", help="errors are the worst of N seeds")
+@click.option("--zoom", type=POSITIVE, metavar="PX", help="pixels a metre, for errors on the screen")
+@click.option("--patience", type=POSITIVE, default=PATIENCE, metavar="S", help="s that the search may take")
+@click.option("--points", type=click.IntRange(1, 100_000), default=POINTS, metavar="N", help="most settings to try")
+@click.option("--repeats", type=click.IntRange(1, 1000), default=REPEATS, metavar="N", help="timings near the front")
+@click.option("--write", is_flag=True, help="put the recommended [solver] into the scene file")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write tradeoff.json and a report page")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw it: .png, .svg or .pdf")
+@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
+@click.option("--quiet", is_flag=True, help="no table, no progress")
+def command(
+    scene: str,
+    engines: str | None,
+    overrides: tuple[str, ...],
+    metric: str | None,
+    tolerance: float | None,
+    budget: float | None,
+    fps: float,
+    seeds: int,
+    zoom: float | None,
+    patience: float,
+    points: int,
+    repeats: int,
+    write: bool,
+    out: Path | None,
+    plot: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Measure error against cost over engines and settings. SCENE is a file or a shipped one."""
+    faults: list[Fault] = []
+    names = None if engines is None else list(dict.fromkeys(name.strip() for name in engines.split(",")))
+    for name in names or ():
+        with gathering(faults, "--engine", (UnknownEngineError,)):
+            engine_named(name)
+    if metric is not None:
+        with gathering(faults, "--metric", (UnknownMetricError,)):
+            metric_named(metric)
+    read: Scene | None = None
+    path = scene
+    with gathering(faults):
+        path = paths_of([scene])[0][1]
+        require_scene(scene, path)
+        read = load(path, overrides)
+    if write and overrides:
+        faults.append(Fault("--write", None, "", "the file lacks what --set changes; leave one of the two out"))
+    with gathering(faults):
+        require_folder(out)
+    if out is not None and not faults:
+        with gathering(faults):
+            make_folder(out)
+    found: Tradeoff | None = None
+    if read is not None and not faults:
+        with gathering(faults, scene, (TooLargeError, ValueError)), telling(quiet or as_json) as told:
+            found = tradeoff(
+                read,
+                names,
+                metric=metric,
+                tolerance=tolerance,
+                budget=budget,
+                fps=fps,
+                seeds=seeds,
+                zoom=zoom,
+                patience=patience,
+                repeats=repeats,
+                most=points,
+                told=told,
+            )
+    if found is None:
+        for fault in faults:
+            click.echo(str(fault), err=True)
+        if as_json:
+            empty: dict[str, object] = {"truth": None, "metric": metric, "points": [], "pareto": []}
+            nothing = {"within_tolerance": None, "within_budget": None, "faults": fault_rows(faults)}
+            print_json({"scene": scene, **empty, **nothing})
+        return 2
+    document = found.document(scene)
+    if as_json:
+        print_json(document)
+    elif not quiet:
+        print_tradeoff(scene, found)
+    status = 1 if found.within_tolerance is None or (budget is not None and found.within_budget is None) else 0
+    return max(status, _kept(found, document, path, write, out, plot, quiet or as_json))
+
+
+def _kept(
+    found: Tradeoff,
+    document: dict[str, object],
+    path: str,
+    write: bool,
+    out: Path | None,
+    plot: Path | None,
+    silent: bool,
+) -> int:
+    """Write what was asked for, and say so; return 2 where something cannot be written."""
+    faults: list[Fault] = []
+    if write and found.within_tolerance is not None:
+        with gathering(faults):
+            changed = write_solver(path, found.within_tolerance.point.changes)
+            _say(f"written: {path}" if changed else f"{path}: has the recommended [solver] already", silent)
+            engine = found.within_tolerance.point.engine
+            if engine != USUAL:
+                _say(f"run it with --engine {engine}", silent)
+    try:
+        if plot is not None:
+            from sandbox.report.work_precision import plot_tradeoff
+
+            plot_tradeoff(document, plot)
+            _say(f"written: {plot}", silent)
+        if out is not None:
+            write_json(document, out / "tradeoff.json")
+            _say(f"written: {out}", silent)
+    except OSError as error:
+        faults.append(Fault("--out" if plot is None else "--plot", None, "", f"{error.filename}: {error.strerror}"))
+    for fault in faults:
+        click.echo(str(fault), err=True)
+    return 2 if faults else 0
+
+
+def _say(text: str, silent: bool) -> None:
+    if not silent:
+        click.echo(text)

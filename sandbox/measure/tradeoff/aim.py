@@ -1,0 +1,94 @@
+"""Aim: what is asked of a trade-off: in which metric, how right, how cheap."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.measure.compare.comparing import usual_tolerance
+from sandbox.measure.joint_error import HOLDING
+from sandbox.measure.tradeoff.judge import Judge
+from sandbox.measure.tradeoff.metrics import METRICS, Metric
+from sandbox.scene.meetings import meetings
+from sandbox.scene.model import Scene
+
+USUAL = {"px": 1.0, "s": 0.05, "": 0.01}
+"""Tolerances by unit where none is given; of lengths it is `compare`'s: 1 % of the smallest radius."""
+COUNTED = frozenset({"missed_contacts"})
+"""Metrics that count: none is tolerated."""
+
+
+class UnknownMetricError(ValueError):
+    """No metric has that name."""
+
+
+class Aim(NamedTuple):
+    """What is asked."""
+
+    metric: Metric
+    tolerance: float
+    """in its unit"""
+    budget: float | None
+    """ms a frame"""
+    fps: float
+    """frames a second"""
+
+    @property
+    def most(self) -> float | None:
+        """The budget in ms per simulated second."""
+        return None if self.budget is None else self.budget * self.fps
+
+
+def metric_named(name: str) -> Metric:
+    """Return a metric.
+
+    Raises:
+        UnknownMetricError: with the names there are.
+    """
+    try:
+        return METRICS[name]
+    except KeyError:
+        raise UnknownMetricError(f"no metric {name!r}; metrics: {', '.join(METRICS)}") from None
+
+
+def usual_metric(judge: Judge) -> Metric:
+    """Return what a scene is best scored by where nothing else is asked for.
+
+    The distance from the truth, if it is trusted to the end. Else an invariant: how well joints hold, where there are
+    some; energy, where nothing takes any; the depth of overlaps, where bodies can meet.
+    """
+    scene = judge.scene
+    if judge.truth is not None and judge.until >= scene.world.duration:
+        return METRICS["max_position"]
+    if np.isin(scene.links.kind, HOLDING).any():
+        return METRICS["joint_error"]
+    if keeps_energy(scene) or not meetings(scene).touches.any():
+        return METRICS["energy"]
+    return METRICS["penetration"]
+
+
+def keeps_energy(scene: Scene) -> bool:
+    """Tell whether nothing in a scene takes energy: no drag, no friction, no damper, elastic contacts, no thrust."""
+    if scene.world.linear_drag or scene.world.quadratic_drag or scene.thrusts or scene.links.figures[:, 2].any():
+        return False
+    meet = meetings(scene)
+    restitution = meet.surfaces.restitution[meet.touching]
+    return bool((restitution == 1.0).all() and meet.friction == 0.0)
+
+
+def aim_at(judge: Judge, metric: str | None, tolerance: float | None, budget: float | None, fps: float) -> Aim:
+    """Return what is asked, with what was left open filled in.
+
+    Raises:
+        UnknownMetricError: no metric has that name.
+        ValueError: a figure is not positive and finite.
+    """
+    chosen = usual_metric(judge) if metric is None else metric_named(metric)
+    if tolerance is None:
+        tolerance = 0.0 if chosen.name in COUNTED else USUAL.get(chosen.unit, usual_tolerance(judge.scene))
+    elif not (0.0 < tolerance < math.inf or (tolerance == 0.0 and chosen.name in COUNTED)):
+        raise ValueError(f"a tolerance of {tolerance:g}; it is positive and finite")
+    for what, value in (("budget", budget), ("fps", fps)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise ValueError(f"a {what} of {value:g}; it is positive and finite")
+    return Aim(chosen, tolerance, budget, fps)

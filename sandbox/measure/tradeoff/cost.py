@@ -1,0 +1,83 @@
+"""Cost: what a setting takes, in milliseconds per simulated second. Nothing is recorded while it is timed."""
+
+import statistics
+from collections.abc import Sequence
+from time import perf_counter
+from typing import NamedTuple
+
+from sandbox.engines.compiling import COMPILING
+from sandbox.engines.contract import Divergence, Exhaustion
+from sandbox.engines.registry import start
+from sandbox.measure.schedule import schedule
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+
+class Cost(NamedTuple):
+    """Of separate repeats."""
+
+    least: float
+    """ms per simulated second"""
+    median: float
+    """ms per simulated second"""
+    repeats: int
+
+    @classmethod
+    def of(cls, seconds: Sequence[float], duration: float) -> "Cost":
+        """Return the cost of runs that took so many seconds each, of a scene of a duration, s."""
+        scale = 1e3 / duration
+        return cls(min(seconds) * scale, statistics.median(seconds) * scale, len(seconds))
+
+
+def seconds_of(scene: Scene, engine: str, settings: Settings) -> float | None:
+    """Step a scene from start to end as a game does, reading every frame, and return the seconds that took.
+
+    Setting up and compiling do not count. None where the run does not get to its end.
+
+    Raises:
+        Refusal: the engine lacks something.
+    """
+    stretches = schedule(scene.world.duration, settings.dt)
+    part = stretches[-1].part
+    simulation = start(scene, engine, settings)
+    try:
+        began, compiled = perf_counter(), COMPILING.seconds
+        for stretch in stretches:
+            for _ in range(stretch.steps):
+                simulation.step()
+                simulation.frame()
+        if part > 0.0:
+            simulation.finish(part)
+            simulation.frame()
+        return perf_counter() - began - (COMPILING.seconds - compiled)
+    except (Divergence, Exhaustion):
+        return None
+    finally:
+        simulation.close()
+
+
+def costs(scene: Scene, ways: Sequence[tuple[str, Settings]], repeats: int, most: float) -> list[Cost | None]:
+    """Time several ways to run a scene, in turns, so that a machine that slows down does so for all of them.
+
+    Args:
+        scene: what to run.
+        ways: engine and settings of each.
+        repeats: how often each is run.
+        most: s; a way that takes longer than this is not run again.
+
+    Returns:
+        The cost of each; None where a way does not get to its end.
+    """
+    taken: list[list[float]] = [[] for _ in ways]
+    failed = [False] * len(ways)
+    for turn in range(repeats):
+        for k, (engine, settings) in enumerate(ways):
+            if failed[k] or (turn and min(taken[k]) > most):
+                continue
+            seconds = seconds_of(scene, engine, settings)
+            if seconds is None:
+                failed[k] = True
+            else:
+                taken[k].append(seconds)
+    duration = scene.world.duration
+    return [Cost.of(each, duration) if each and not failed[k] else None for k, each in enumerate(taken)]

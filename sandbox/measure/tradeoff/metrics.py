@@ -1,0 +1,177 @@
+"""Metrics: what an error can be counted in. Each is a function of a run and its judge; None where it says nothing."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.measure.compare.drift import energy_drift
+from sandbox.measure.compare.errors import errors
+from sandbox.measure.compare.gaps import gap
+from sandbox.measure.joint_error import joint_error
+from sandbox.measure.tradeoff.judge import Judge, strayed
+from sandbox.trajectory import Trajectory
+
+Measure = Callable[[Trajectory, Judge], float | None]
+
+
+class Metric(NamedTuple):
+    """One way to count an error."""
+
+    name: str
+    unit: str
+    """empty for plain numbers and shares"""
+    about: str
+    measure: Measure
+
+
+def max_position(run: Trajectory, judge: Judge) -> float | None:
+    """Return the largest distance of any body from the truth, m, in any frame that the truth is trusted in."""
+    if judge.truth is None:
+        return None
+    return errors(run, judge.truth.trajectory, judge.moving).until(judge.until).max_position
+
+
+def rms_position(run: Trajectory, judge: Judge) -> float | None:
+    """Return the root of the mean square distance from the truth, m."""
+    if judge.truth is None:
+        return None
+    return errors(run, judge.truth.trajectory, judge.moving).until(judge.until).rms_position
+
+
+def final_position(run: Trajectory, judge: Judge) -> float | None:
+    """Return the largest distance from the truth in the last frame that it is trusted in, m."""
+    if judge.truth is None:
+        return None
+    found = errors(run, judge.truth.trajectory, judge.moving)
+    kept = np.flatnonzero(found.time <= judge.until)
+    return float(found.position[kept[-1]]) if len(kept) else None
+
+
+def bounce_height(run: Trajectory, judge: Judge) -> float | None:
+    """Return by how much any body's highest place after its first contact differs from the truth's, m.
+
+    From the truth's first contact on, so that a body that fell through is told by the height it lacks. None without
+    gravity, or where nothing is touched.
+    """
+    if judge.truth is None or judge.down is None:
+        return None
+    truth = judge.truth.trajectory
+    worst = None
+    for number in np.flatnonzero(judge.moving).tolist():
+        own = (truth.contact_pair == number).any(axis=1) & (truth.contact_time <= judge.until)
+        if not own.any():
+            continue
+        first = float(truth.contact_time[own].min())
+        tops = [_highest(each, number, first, judge) for each in (run, truth)]
+        if None not in tops:
+            off = abs(tops[0] - tops[1])  # type: ignore[operator] # neither is None
+            worst = off if worst is None else max(worst, off)
+    return worst
+
+
+def _highest(run: Trajectory, number: int, since: float, judge: Judge) -> float | None:
+    assert judge.down is not None
+    frames = (run.time >= since) & (run.time <= judge.until)
+    if not frames.any():
+        return None
+    height = -(run.position[frames, number] @ judge.down)
+    return float(height.max()) if np.isfinite(height).all() else math.inf
+
+
+def energy(run: Trajectory, judge: Judge) -> float | None:
+    """Return what energy drifted by, as a share of the energy in motion (`compare.drift`)."""
+    truth = None if judge.truth is None else judge.truth.trajectory
+    share = energy_drift(run, judge.scene, truth, judge.until == judge.scene.world.duration).share
+    return None if share is None else abs(share)
+
+
+def joints(run: Trajectory, judge: Judge) -> float | None:
+    """Return the largest error of any joint, as a share (`measure.joint_error`)."""
+    return joint_error(run, judge.scene)
+
+
+def penetration(run: Trajectory, judge: Judge) -> float | None:
+    """Return the deepest overlap of any two that touched, in any frame, m. None where nothing touches."""
+    pairs = np.unique(run.contact_pair, axis=0)
+    if not len(pairs):
+        return None
+    scene = judge.scene
+    with np.errstate(over="ignore", invalid="ignore"):
+        gaps = [gap(scene, scene.bodies, run.position, run.angle, (a, b)) for a, b in pairs.tolist()]
+        return max(0.0, -min(float(np.nanmin(each, initial=np.inf)) for each in gaps))
+
+
+def drift(run: Trajectory, judge: Judge) -> float | None:
+    """Return how far any body gets in the second half that lies still then in truth, m. None where none does."""
+    if not judge.still.any():
+        return None
+    return float(strayed(run)[judge.still].max())
+
+
+def missed_contacts(run: Trajectory, judge: Judge) -> float | None:  # noqa: ARG001, as all metrics are called
+    """Return how many contacts the engine never saw, by sweeping its own steps."""
+    count = run.missed_contacts
+    return None if count is None else float(count)
+
+
+def passes(run: Trajectory, judge: Judge) -> float | None:  # noqa: ARG001, as above
+    """Return the share of all meetings that were passed through unseen: 0.1 is 1 bullet in 10. None without any."""
+    missed = run.missed_contacts
+    if missed is None or not missed + len(run.contact_time):
+        return None
+    return missed / (missed + len(run.contact_time))
+
+
+def settle_time(run: Trajectory, judge: Judge) -> float | None:
+    """Return by how much the time at which all has settled differs from the truth's, s; infinite if it never does.
+
+    None where the truth does not settle, or is not trusted to its end.
+    """
+    if judge.truth is None or judge.until < judge.scene.world.duration:
+        return None
+    own, right = _settled(run, judge), _settled(judge.truth.trajectory, judge)
+    return None if math.isinf(right) else abs(own - right)
+
+
+def _settled(run: Trajectory, judge: Judge) -> float:
+    """Return the time of the first frame from which on every body is slow, s; inf for never."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        speed = np.hypot(*np.moveaxis(run.velocity, 2, 0))
+        loud = np.flatnonzero((~(speed <= judge.quiet))[:, judge.moving].any(axis=1))
+    if not len(loud):
+        return 0.0
+    return float(run.time[loud[-1] + 1]) if loud[-1] + 1 < len(run.time) else math.inf
+
+
+def pixels(run: Trajectory, judge: Judge) -> float | None:
+    """Return the largest distance from the truth on the screen, px."""
+    away = max_position(run, judge)
+    return None if away is None else away * judge.zoom
+
+
+METRICS: Mapping[str, Metric] = {
+    metric.name: metric
+    for metric in (
+        Metric("max_position", "m", "largest distance from the truth", max_position),
+        Metric("final_position", "m", "distance from the truth at the end", final_position),
+        Metric("rms_position", "m", "root of the mean square distance from the truth", rms_position),
+        Metric("pixels", "px", "largest distance from the truth on the screen", pixels),
+        Metric("bounce_height", "m", "how much too high or low it bounces", bounce_height),
+        Metric("energy", "", "drift of energy, as a share of the energy in motion", energy),
+        Metric("joint_error", "", "largest error of a joint, as a share", joints),
+        Metric("penetration", "m", "deepest overlap", penetration),
+        Metric("drift", "m", "how far what lies still strays", drift),
+        Metric("missed_contacts", "", "contacts that were never seen", missed_contacts),
+        Metric("passes", "", "share of meetings that were passed through", passes),
+        Metric("settle_time", "s", "how much too soon or late all settles", settle_time),
+    )
+}
+
+
+def measured(run: Trajectory, judge: Judge) -> dict[str, float | None]:
+    """Return every metric of a run by name; all None where it has no frames."""
+    if not len(run.time):
+        return dict.fromkeys(METRICS)
+    return {name: metric.measure(run, judge) for name, metric in METRICS.items()}

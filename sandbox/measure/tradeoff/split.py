@@ -1,0 +1,128 @@
+"""Split: an error taken apart into what the model, the time step and the solver's iterations each cause.
+
+Three limits are measured on the way from a setting to the truth: the same step with very many iterations, the finest
+step with very many iterations, and the truth. The largest distances between neighbours on that way are the solver's,
+the time step's and the model's parts; the whole is at most their sum, and may be less where they cancel.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from time import perf_counter
+from typing import Any
+
+from pydantic import ValidationError
+
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.compare.errors import errors
+from sandbox.measure.compare.patience import TookTooLongError, patient_run
+from sandbox.measure.tradeoff.judge import Judge
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import Trajectory
+
+MANY_ITERATIONS = 16
+"""How many times the iterations stand for infinitely many."""
+FINEST = 16
+"""How many times the substeps stand for a step of 0, if there is the time; else as many as there is time for."""
+
+
+@dataclass(frozen=True)
+class Split:
+    """The largest distances, m, between the settings' own run, the limits, and the truth."""
+
+    engine: str
+    settings: Settings
+    total: float
+    """from the truth"""
+    solver: float
+    """from the same step with many iterations"""
+    time_step: float
+    """from there to the finest step"""
+    model: float | None
+    """from there to the truth; None where the distance to it is still shrinking with the step"""
+    left: float
+    """what the finest step is still off by; the model's part and what is left of the time step's"""
+    finest: int
+    """substeps in one of the settings' own, in the finest step"""
+
+    def document(self) -> dict[str, Any]:
+        """Return it as a JSON object."""
+        return {**asdict(self), "settings": self.settings.model_dump(mode="json")}
+
+
+def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split | None:
+    """Take the position error of an engine's settings apart; None where a run does not get to its end, or no truth is.
+
+    The model's part is what is left at the finest step, if halving the step changed it by less than a tenth; a part
+    that still shrinks belongs to the time step.
+
+    Args:
+        judge: gives scene and truth.
+        engine: its name.
+        asked: settings, choices left to the engine still open.
+        patience: s that all runs together may take.
+    """
+    if judge.truth is None:
+        return None
+    runs = _Runs(judge, engine, perf_counter() + patience)
+    own = runs.of(asked)
+    if own is None:
+        return None
+    many = asked.replace(iterations=min(asked.iterations * MANY_ITERATIONS, 10_000))
+    converged = runs.of(many)
+    if converged is None:
+        return None
+    finest, times, before = converged, 1, None
+    for factor, run in runs.finer(many):
+        before, finest, times = finest, run, factor
+    left = runs.apart(finest, judge.truth.trajectory)
+    still = before is None or runs.apart(before, judge.truth.trajectory) > 1.1 * left
+    return Split(
+        engine,
+        ENGINES[engine].resolve(judge.scene, asked),
+        total=runs.apart(own, judge.truth.trajectory),
+        solver=runs.apart(own, converged),
+        time_step=runs.apart(converged, finest),
+        model=None if still else left,
+        left=left,
+        finest=times,
+    )
+
+
+@dataclass(frozen=True)
+class _Runs:
+    judge: Judge
+    engine: str
+    end: float
+    """of the patience, s, by the clock"""
+
+    def of(self, settings: Settings) -> Trajectory | None:
+        """Return a run that got to its end, or None."""
+        left = self.end - perf_counter()
+        if left <= 0.0:
+            return None
+        try:
+            found = patient_run(self.judge.scene, self.engine, settings, left)
+        except TookTooLongError:
+            return None
+        return found if found.status == "ok" else None
+
+    def finer(self, settings: Settings) -> Iterator[tuple[int, Trajectory]]:
+        """Yield runs of ever more substeps, 2, 4, 8 …, as long as they get to their end in time."""
+        factor = 2
+        while factor <= FINEST:
+            try:
+                finer = settings.replace(substeps=settings.substeps * factor)
+            except ValidationError:
+                return
+            if ENGINES[self.engine].missing(self.judge.scene, finer):
+                return
+            found = self.of(finer)
+            if found is None:
+                return
+            yield factor, found
+            factor *= 2
+
+    def apart(self, a: Trajectory, b: Trajectory) -> float:
+        """Return the largest distance of any body in the two runs, m, as far as the truth is trusted."""
+        found = errors(a, b, self.judge.moving).until(self.judge.until).max_position
+        return 0.0 if found is None else found

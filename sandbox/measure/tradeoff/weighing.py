@@ -1,0 +1,241 @@
+"""Weighing: a scene's engines and settings, tried, timed and held against the best known truth."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from sandbox.engines.registry import ENGINES, engine_named
+from sandbox.measure.compare.comparing import usual_tolerance
+from sandbox.measure.compare.truth import truth_of
+from sandbox.measure.recorder import require_memory
+from sandbox.measure.seeds import is_random, seeded
+from sandbox.measure.tradeoff.aim import Aim, aim_at, metric_named
+from sandbox.measure.tradeoff.cost import Cost, costs
+from sandbox.measure.tradeoff.front import outdone, pareto
+from sandbox.measure.tradeoff.judge import Judge, zoom_of
+from sandbox.measure.tradeoff.picking import FRESH, Again, best, cheapest
+from sandbox.measure.tradeoff.point import Point
+from sandbox.measure.tradeoff.proposals import Proposal, proposals
+from sandbox.measure.tradeoff.search import Search, Told
+from sandbox.measure.tradeoff.split import Split, split
+from sandbox.measure.tradeoff.trial import Trial, tried
+from sandbox.measure.tradeoff.variant import Space
+from sandbox.measure.tradeoff.weighed import Tradeoff
+from sandbox.measure.versions import machine, versions
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+PATIENCE = 60.0
+"""s that the search may take where nothing else is said; truth and timing come on top."""
+REPEATS = 5
+POINTS = 120
+NEAR = 0.5
+"""What takes more than the inverse of this share of a point that is as right is not timed again."""
+SLOW = 0.2
+"""The share of the patience that one run may take."""
+
+
+def tradeoff(
+    scene: Scene,
+    engines: Sequence[str] | None = None,
+    *,
+    metric: str | None = None,
+    tolerance: float | None = None,
+    budget: float | None = None,
+    fps: float = 60.0,
+    seeds: int = 1,
+    zoom: float | None = None,
+    patience: float = PATIENCE,
+    repeats: int = REPEATS,
+    most: int = POINTS,
+    told: Told | None = None,
+    **settings: Any,
+) -> Tradeoff:
+    """Weigh a scene's settings: error against the best known truth, and cost, over engines and choices.
+
+    Args:
+        scene: what to run.
+        engines: their names; by default all there are. One that cannot run the scene is a point that says why.
+        metric: what the error is counted in (`metrics.METRICS`); by default the largest distance from the truth
+            where that is trusted to the end, else an invariant of the scene.
+        tolerance: in the metric's unit; by default 1 % of the smallest radius, 1 px, 1 %, or none missed.
+        budget: ms a frame, for the best that it buys.
+        fps: frames a second of the budget.
+        seeds: how many, from the scene's own on; errors are the worst of them.
+        zoom: px/m, for errors in pixels; by default all that happens fills a window of 1280 × 720.
+        patience: s that the search may take.
+        repeats: how often what is near the front is timed.
+        most: how many settings are tried.
+        told: who is told what is being done.
+        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
+
+    Raises:
+        UnknownEngineError: no engine has one of the names.
+        UnknownMetricError: no metric has that name.
+        TooLargeError: the frames would not fit into memory.
+        ValueError: a figure is out of range.
+        pydantic.ValidationError: a setting is wrong.
+    """
+    names = tuple(dict.fromkeys(ENGINES if engines is None else engines))
+    for name in names:
+        engine_named(name)
+    _require_sense(seeds, zoom, patience, repeats, most)
+    base = scene.solver.replace(**settings) if settings else scene.solver
+    require_memory(scene, base, 4 * len(scene.bodies))
+    say = told or _silent
+
+    say("the truth")
+    random = is_random(scene)
+    judges = _judges(scene, base, metric, tolerance, seeds if random else 1, zoom)
+    aim = aim_at(judges[0], metric, tolerance, budget, fps)
+    space = Space(scene, base, tuple(name for name in names if not _refusal(scene, name, base)))
+    hurry = None if aim.most is None else aim.most * scene.world.duration / 1e3
+    search = Search(space, judges, aim.metric.name, aim.tolerance, hurry, patience, most, say)
+    trials = search.run()
+
+    say("timing")
+    points = [*_timed(trials, space, aim, repeats, patience), *_refused(scene, names, base)]
+    fresh = tuple(scene.world.seed + len(judges) + k for k in range(FRESH)) if random else ()
+    again = _again(space, trials, points, aim, fresh, judges, patience)
+    say("held to its word")
+    within = cheapest(points, aim, fresh, again)
+    say("where the error comes from, and what a cheaper model would do")
+    return Tradeoff(
+        scene,
+        judges[0].truth,
+        aim.metric,
+        judges[0].zoom,
+        tuple(points),
+        tuple(pareto([p for p in points if p.usable], lambda p: p.cost or 0.0, lambda p: p.error or 0.0)),
+        tuple(_splits(judges[0], space, patience)),
+        tuple(_proposals(judges[0], aim, within.point if within else None, space, patience)),
+        aim.tolerance,
+        budget,
+        fps,
+        within,
+        best(points, aim, fresh, again),
+        tuple(judge.scene.world.seed for judge in judges),
+        search.untried,
+        {**machine(), **versions()},
+    )
+
+
+def _require_sense(seeds: int, zoom: float | None, patience: float, repeats: int, most: int) -> None:
+    for what, value in (("seeds", seeds), ("repeats", repeats), ("most", most)):
+        if value < 1:
+            raise ValueError(f"{what} of {value}; at least 1")
+    for what, figure in (("zoom", zoom), ("patience", patience)):
+        if figure is not None and not 0.0 < figure < math.inf:
+            raise ValueError(f"a {what} of {figure:g}; it is positive and finite")
+
+
+def _judges(
+    scene: Scene, base: Settings, metric: str | None, tolerance: float | None, seeds: int, zoom: float | None
+) -> list[Judge]:
+    """Return a judge for each seed, the scene's own first."""
+    close = usual_tolerance(scene)
+    if tolerance is not None and tolerance > 0.0 and (metric is None or metric_named(metric).unit == "m"):
+        close = min(close, tolerance)
+    found = []
+    for k in range(seeds):
+        own = scene if k == 0 else seeded(scene, scene.world.seed + k)
+        truth = truth_of(own, base, close)
+        found.append(Judge(own, truth, zoom_of(own, truth) if zoom is None else zoom))
+    return found
+
+
+def _refusal(scene: Scene, engine: str, base: Settings) -> str | None:
+    """Return why an engine cannot run a scene, whatever the settings; None where it can."""
+    if not ENGINES[engine].missing(scene, base):
+        return None
+    missing = ENGINES[engine].missing(scene, base.common())
+    return "; ".join(missing) if missing else None
+
+
+def _refused(scene: Scene, names: Sequence[str], base: Settings) -> list[Point]:
+    reasons = ((name, _refusal(scene, name, base)) for name in names)
+    nothing: dict[str, float | None] = {}
+    return [
+        Point(name, base, base, {}, "refused", reason, nothing, None, None, None, 0, {})
+        for name, reason in reasons
+        if reason is not None
+    ]
+
+
+def _timed(trials: Sequence[Trial], space: Space, aim: Aim, repeats: int, patience: float) -> list[Point]:
+    """Time what got to its end, and what is near the front again and again."""
+    ok = [trial for trial in trials if trial.status == "ok"]
+    ways = [(trial.variant.engine, space.settings(trial.variant)) for trial in ok]
+    once = dict(zip(ok, costs(space.scene, ways, 1, patience), strict=True))
+    seen = [(c.least, t.error(aim.metric.name)) for t, c in once.items() if c is not None]
+    near = [t for t, c in once.items() if c is not None and not outdone(c.least, t.error(aim.metric.name), seen, NEAR)]
+    ways = [(trial.variant.engine, space.settings(trial.variant)) for trial in near]
+    often = dict(zip(near, costs(space.scene, ways, repeats, SLOW * patience), strict=True))
+    return [_point(trial, space, aim, often.get(trial) or once.get(trial)) for trial in trials]
+
+
+def _point(trial: Trial, space: Space, aim: Aim, cost: Cost | None) -> Point:
+    error = trial.metrics.get(aim.metric.name) if trial.status == "ok" else None
+    asked = space.settings(trial.variant)
+    return Point(
+        trial.variant.engine,
+        asked,
+        trial.settings,
+        changes(space.base, asked),
+        trial.status,
+        trial.reason,
+        trial.metrics,
+        error,
+        None if cost is None else cost.least,
+        None if cost is None else cost.median,
+        0 if cost is None else cost.repeats,
+        trial.work,
+    )
+
+
+def changes(base: Settings, chosen: Settings) -> dict[str, Any]:
+    """Return what settings change of others, but for which frames are kept; None for what they leave open again."""
+    before, after = base.model_dump(), chosen.model_dump()
+    return {key: value for key, value in after.items() if value != before[key] and key != "record_every"}
+
+
+def _again(
+    space: Space,
+    trials: Sequence[Trial],
+    points: Sequence[Point],
+    aim: Aim,
+    fresh: Sequence[int],
+    judges: Sequence[Judge],
+    patience: float,
+) -> Again:
+    """Return who runs a point on fresh seeds."""
+    made: list[Judge] = []
+
+    def again(point: Point) -> float:
+        if not made:
+            for seed in fresh:
+                scene = seeded(space.scene, seed)
+                truth = truth_of(scene, space.base, usual_tolerance(scene))
+                made.append(Judge(scene, truth, judges[0].zoom))
+        trial = trials[list(points).index(point)]
+        return tried(trial.variant, space, made, SLOW * patience).error(aim.metric.name)
+
+    return again
+
+
+def _splits(judge: Judge, space: Space, patience: float) -> list[Split]:
+    found = (split(judge, name, space.own(name), SLOW * patience) for name in space.engines if name != "exact")
+    return [each for each in found if each is not None]
+
+
+def _proposals(judge: Judge, aim: Aim, pick: Point | None, space: Space, patience: float) -> list[Proposal]:
+    """Propose cheaper models than the pick's; where there is none, than the first engine's with its own settings."""
+    if not space.engines:
+        return []
+    engine = space.engines[0] if pick is None else pick.engine
+    chosen = space.own(engine) if pick is None else pick.asked
+    return proposals(judge, aim.metric.name, aim.tolerance, engine, chosen, SLOW * patience)
+
+
+def _silent(_: str) -> None:
+    pass

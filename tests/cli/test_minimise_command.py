@@ -1,0 +1,144 @@
+"""`sandbox compare --minimise`: the file, what is said of it, and what is refused before anything is run."""
+
+from pathlib import Path
+
+import pytest
+from calling import document_of, json_of, lines_of, written
+
+from sandbox.cli import minimising
+from sandbox.cli.main import call
+from sandbox.measure.compare.minimise import Minimised, minimise
+from sandbox.scene.file import load
+
+TUNNEL = """
+title = "Tunnel"
+[world]
+duration = 0.02
+[solver]
+dt = 0.001
+[[plane]]
+point = [0.0, -50.0]
+normal = [0.0, 1.0]
+[[wall]]
+name = "thin"
+points = [[1.0, -1.0], [1.0, 1.0]]
+thickness = 0.02
+[[grid]]
+origin = [-5.0, 4.0]
+columns = 3
+spacing = [0.5, 0.5]
+radius = 0.1
+[[ball]]
+name = "bullet"
+position = [0.05, 0.0]
+velocity = [100.0, 0.0]
+radius = 0.01
+"""
+CHOICE = ("--engines", "pymunk,exact", "--minimise")
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_the_smallest_scene_is_written_here_and_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "scenes"
+    folder.mkdir()
+    scene = written(folder, TUNNEL, "tunnel.toml")
+    status, out, err = lines_of(capfd, "compare", scene, *CHOICE)
+    assert (status, err) == (0, [])
+    assert out[-3].startswith("minimised: 4 bodies to 1, 2 fixed things to 1, in ")
+    parts = 'pymunk and exact differ by more than 0.0001 m from 0.01 s on, "bullet" first'
+    assert out[-2:] == [parts, "written: tunnel.min.toml"]
+    text = Path("tunnel.min.toml").read_text(encoding="utf-8")
+    assert text.splitlines()[:3] == [
+        f"# {parts}.",
+        "# Minimised: 4 bodies to 1, 2 fixed things to 1, of tunnel.toml.",
+        "# See: sandbox compare tunnel.min.toml --engines pymunk,exact --tolerance 0.0001",
+    ]
+    least = load("tunnel.min.toml")
+    assert (least.title, least.bodies.names, least.fixed_names) == ("Tunnel, minimised", ("bullet",), ("thin",))
+    again = text.splitlines()[2].split("sandbox ")[1].split()
+    status, document, _ = json_of(capfd, *again)
+    assert status == 0
+    assert [row["first_divergence"] for row in document["engines"]] == [0.01, None]
+
+
+def test_json_says_it_in_one_document(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path, TUNNEL, "tunnel.toml")
+    status, document, err = json_of(capfd, "compare", scene, *CHOICE, "small.toml")
+    assert (status, err) == (0, [])
+    assert document["minimised"] == {
+        "path": "small.toml",
+        "bodies_before": 4,
+        "bodies_after": 1,
+        "fixed_before": 2,
+        "fixed_after": 1,
+        "runs": document["minimised"]["runs"],
+        "first_divergence": 0.01,
+        "error": None,
+    }
+    assert 5 < document["minimised"]["runs"] < 50
+    assert len(document["engines"]) == 2
+
+
+@pytest.mark.parametrize("engines", ["pymunk,exact", "exact", "pymunk,reference,exact"])
+def test_where_nobody_disagrees_it_says_so(engines: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path, TUNNEL.replace("[100.0", "[1.0"), "slow.toml")
+    status, document, err = json_of(capfd, "compare", scene, "--engines", engines, "--minimise")
+    assert status == 1
+    assert err[-1] == f"{scene}: nothing to minimise: {document['minimised']['error']}"
+    assert (document["minimised"]["path"], document["minimised"]["bodies_after"]) == (None, 4)
+    assert not Path("slow.min.toml").exists()
+
+
+def test_an_engine_that_refuses_disagrees_with_nobody(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    box = "[world]\nduration = 0.02\n[[box]]\nposition = [0.0, 9.0]\nsize = [1.0, 1.0]\n"
+    box += "[[plane]]\npoint = [0.0, 0.0]\nnormal = [0.0, 1.0]\n"
+    scene = written(tmp_path, box, "box.toml")
+    status, _, err = lines_of(capfd, "compare", scene, *CHOICE)
+    assert status == 1
+    assert err[-1] == f"{scene}: nothing to minimise: exact cannot run the scene"
+
+
+def test_what_cannot_be_written_is_refused_before_the_runs(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path, TUNNEL, "tunnel.toml")
+    Path("old.toml").write_text("kept", encoding="utf-8")
+    for file, reason in (
+        ("old.toml", "exists; --force replaces it"),
+        ("tunnel.toml", "is the scene itself"),
+        (".", "is a folder"),
+        ("nowhere/small.toml", "there is no such folder"),
+    ):
+        status, out, err = lines_of(capfd, "compare", scene, *CHOICE, file)
+        assert (status, out, len(err)) == (2, [], 1)
+        assert err[0].startswith(f"--minimise: {file}: {reason}")
+    assert Path("old.toml").read_text(encoding="utf-8") == "kept"
+    assert lines_of(capfd, "compare", scene, "--force")[0] == 2
+    assert lines_of(capfd, "compare", scene, *CHOICE, "old.toml", "--force", "--quiet") == (0, [], [])
+    assert load("old.toml").bodies.names == ("bullet",)
+
+
+def test_interrupted_it_writes_what_it_has(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*arguments: object, **options: object) -> Minimised:
+        count = 0
+
+        def told(_: str) -> None:
+            nonlocal count
+            count += 1
+            if count == 6:
+                raise KeyboardInterrupt
+
+        return minimise(*arguments, **{**options, "told": told})
+
+    monkeypatch.setattr(minimising, "minimise", interrupted)
+    scene = written(tmp_path, TUNNEL, "tunnel.toml")
+    status = call(["compare", scene, *CHOICE, "--json"])
+    out, err = capfd.readouterr()
+    assert status == 130
+    assert document_of(out)["minimised"]["error"] == "interrupted"
+    assert err.splitlines()[-1] == "interrupted: there may be a smaller one"
+    assert len(load("tunnel.min.toml").bodies) < 4

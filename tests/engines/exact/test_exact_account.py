@@ -1,0 +1,158 @@
+"""The account of the exact engine: it closes to rounding, obeys closed forms, and leaves no trace on the run."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sandbox
+from sandbox.action import Action, Impulse, Move, Remove, SetParameter, Spawn
+from sandbox.engines.account import Cause
+from sandbox.engines.registry import start
+from sandbox.engines.succession import total_energy
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Scene
+
+SCENES = Path(__file__).parents[3] / "scenes"
+G = 10.0
+CLOSES = 1e-12  # rounding of thousands of sums; a thousandth of what is promised
+
+Timed = Sequence[tuple[int, Action]]
+
+
+def kept(scene: Scene, steps: int, actions: Timed = (), part: float | None = None) -> Mapping[Cause, float]:
+    """Run a scene with an account and a twin without one; return the account, which closes."""
+    simulation, twin = start(scene, "exact"), start(scene, "exact")
+    assert not any(simulation.account().values())
+    began = total_energy(simulation)
+    seen = [began]
+    for k in range(steps):
+        for at, action in actions:
+            if at == k:
+                simulation.apply(action)
+                twin.apply(action)
+        simulation.step()
+        twin.step()
+        simulation.account()  # slides are booked in as many pieces as it is asked for
+        seen.append(total_energy(simulation))
+    if part is not None:
+        simulation.finish(part)
+        twin.finish(part)
+    assert simulation.state_hash() == twin.state_hash()
+    account = simulation.account()
+    scale = max(np.abs(seen).max(), max(map(abs, account.values())))
+    assert total_energy(simulation) - began == pytest.approx(sum(account.values()), abs=CLOSES * scale)
+    return account
+
+
+def scene_of(*balls: dict[str, Any], e: float = 0.5, mu: float = 0.0, slope: float = 0.0, g: float = G) -> Scene:
+    coat = {"restitution": e, "friction": mu}
+    gravity = [-g * np.sin(slope), -g * np.cos(slope)]
+    return from_document(
+        {
+            "world": {"gravity": gravity, "duration": 5.0},
+            "solver": {"dt": 0.01},
+            "plane": [{"point": [0, 0], "normal": [0, 1], "material": "coat"}],
+            "material": [{"name": "coat"}],
+            "pair": [{"between": ["coat", "coat"], **coat}],
+            "ball": [{"material": "coat", **ball} for ball in balls],
+        }
+    )
+
+
+def ball(name: str, x: float, y: float, **more: Any) -> dict[str, Any]:
+    return {"name": name, "position": [x, y], "radius": 0.5, "mass": 2.0, **more}
+
+
+@pytest.mark.parametrize(
+    ("name", "steps"),
+    [
+        ("tutorial/fireworks", 60),
+        ("tutorial/bounce", 200),
+        ("benchmark/two_balls", 150),
+        ("benchmark/newtons_cradle", 150),
+        ("benchmark/incline", 150),
+        ("benchmark/slide_to_roll", 150),
+        ("benchmark/gas", 150),
+    ],
+)
+def test_exact_account_of_a_shipped_scene_closes(name: str, steps: int) -> None:
+    kept(sandbox.load(SCENES / f"{name}.toml"), steps)
+
+
+def test_endless_bounces_end_at_rest_and_restitution_has_all_of_the_height() -> None:
+    account = kept(scene_of(ball("a", 0, 1.5)), 300)
+    assert account[Cause.RESTITUTION] == pytest.approx(-2.0 * G * 1.0, rel=1e-12)  # rounding of some 50 bounces
+    assert account[Cause.PHANTOM] == pytest.approx(0.0, abs=1e-14)  # rounding
+
+
+def test_sliding_ball_loses_a_third_of_its_energy_to_friction_until_it_rolls() -> None:
+    account = kept(scene_of(ball("a", 0, 0.5, velocity=[3.0, 0.0]), mu=0.2), 200)
+    # A disc rolls at two thirds of its speed: of ½ m v² a third is gone.
+    assert account[Cause.FRICTION] == pytest.approx(-0.5 * 2.0 * 9.0 / 3.0, rel=1e-12)  # rounding
+    assert account[Cause.RESTITUTION] == pytest.approx(0.0, abs=1e-14)  # rounding
+
+
+def test_friction_downhill_is_force_times_way_slipped() -> None:
+    slope, mu, steps = 0.8, 0.2, 150
+    account = kept(scene_of(ball("a", 0, 0.5), mu=mu, slope=slope), steps)
+    force, time = mu * 2.0 * G * np.cos(slope), steps * 0.01
+    # From rest it slides and turns: the slip grows by a + 2 F/m, of which friction brings 3 F/m less.
+    slip = 0.5 * (G * np.sin(slope) - 3.0 * force / 2.0) * time**2
+    assert account[Cause.FRICTION] == pytest.approx(-force * slip, rel=1e-12)  # rounding
+
+
+def test_head_on_impact_takes_what_restitution_leaves_over() -> None:
+    e, v, m1, m2 = 0.5, 4.0, 2.0, 6.0
+    balls = ball("a", 0, 3, velocity=[v, 0]), ball("b", 2, 3, mass=m2)
+    account = kept(scene_of(*balls, e=e, g=0.0), 60)
+    assert account[Cause.RESTITUTION] == pytest.approx(-0.5 * m1 * m2 / (m1 + m2) * (1 - e**2) * v**2, rel=1e-14)
+    assert account[Cause.FRICTION] == 0.0
+
+
+def test_rough_oblique_impact_books_both_ways_apart() -> None:
+    mu, e, v, w = 0.1, 0.5, 3.0, 4.0
+    account = kept(scene_of(ball("a", 0, 0.8, velocity=[w, -v]), e=e, mu=mu, g=0.0), 20)
+    normal = 2.0 * (1 + e) * v
+    # Friction slips throughout: it takes μ J times the mean slip, w less half of 3 μ J/m.
+    assert account[Cause.FRICTION] == pytest.approx(-mu * normal * (w - 1.5 * mu * normal / 2.0), rel=1e-14)
+    assert account[Cause.RESTITUTION] == pytest.approx(-0.5 * 2.0 * (1 - e**2) * v**2, rel=1e-14)  # rounding, as above
+
+
+def test_elastic_gas_of_the_exact_engine_has_no_friction() -> None:
+    account = kept(sandbox.load(SCENES / "benchmark/gas.toml"), 100)
+    assert account[Cause.FRICTION] == 0.0
+    assert account[Cause.RESTITUTION] == pytest.approx(0.0, abs=1e-13 * 78.5)  # rounding, of the gas's energy
+
+
+ACTIONS: Timed = [
+    (5, Impulse(time=0, body="a", impulse=(1.0, 0.5), angular=0.1)),
+    (20, Spawn(time=0, ball={"name": "n", "position": (0.5, 3.0), "radius": 0.1, "mass": 2.0, "velocity": (1.0, 2.0)})),
+    (30, Remove(time=0, body="c")),
+    (40, SetParameter(time=0, path="world.gravity", value=[1.0, -5.0])),
+    (60, Move(time=0, body="a", position=(9.0, 2.0))),
+]
+
+
+@pytest.mark.parametrize("part", [None, 0.37])
+def test_exact_account_goes_on_through_actions(part: float | None) -> None:
+    balls = ball("a", 0, 0.5), ball("b", 3, 1.0, velocity=[-1, 0]), ball("c", 6, 3, collides="none")
+    account = kept(scene_of(*balls, mu=0.3), 80, ACTIONS, part)
+    assert account[Cause.RETIRED] < 0.0
+    assert account[Cause.ACTIONS] != 0.0
+    assert account[Cause.FRICTION] < 0.0
+
+
+def test_ball_spawned_with_a_velocity_starts_where_it_was_put() -> None:
+    simulation = start(scene_of(ball("a", 9, 0.5)), "exact")
+    for _ in range(50):
+        simulation.step()
+    new = {"name": "n", "position": (0.0, 3.0), "radius": 0.1, "velocity": (1.0, 2.0), "angular_velocity": 4.0}
+    simulation.apply(Spawn(time=0, ball=new))
+    simulation.step()
+    frame = simulation.frame()
+    # It had moved since time 0 once, by half of its velocities.
+    assert frame.position[-1] == pytest.approx([0.01, 3.0 + 2.0 * 0.01 - 0.5 * G * 0.01**2], rel=1e-14)  # rounding
+    assert frame.angle[-1] == pytest.approx(0.04, rel=1e-14)  # rounding
