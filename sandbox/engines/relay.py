@@ -5,8 +5,7 @@ and time goes on. What engines remember beyond that state, such as the impulses 
 """
 
 from collections import Counter
-from collections.abc import Mapping
-from contextlib import nullcontext
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Self
@@ -22,7 +21,7 @@ from sandbox.engines.leg import Leg, begun
 from sandbox.engines.pull import Pulls
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import start as start_engine
-from sandbox.engines.succession import Succession, total_energy
+from sandbox.engines.succession import Succession
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene, default_name
 from sandbox.scene.settings import Settings
@@ -56,7 +55,7 @@ class Relay:
         self._throttles: dict[str, Throttle] = {}
         self._kept: list[Contacts] | None = None  # of earlier legs, since the last call; none before the first
         self._observer: Observer | None = None
-        self._account: Succession | None = None  # none before it is asked for
+        self._books = Succession()
 
     def checkpoint(self) -> Checkpoint:
         """Return what `resumed` goes on from."""
@@ -92,9 +91,8 @@ class Relay:
         relay._leg = begun(point.scene, point.engine, point.wanted, point.bodies, point.frame, lasting, point.broken)
         relay._leg.origin, relay._leg.steps = point.origin, point.steps
         relay._retired, relay._broken, relay._work = dict(point.retired), dict(point.broken), Counter()
-        relay._forces, relay._pulls = dict(point.forces), Pulls(point.pulls)
-        relay._throttles = dict(point.throttles)
-        relay._kept, relay._observer, relay._account = None, None, None
+        relay._forces, relay._throttles = dict(point.forces), dict(point.throttles)
+        relay._kept, relay._observer, relay._books, relay._pulls = None, None, Succession(), Pulls(point.pulls)
         return relay
 
     @property
@@ -155,15 +153,7 @@ class Relay:
             Divergence: the state is not finite, or beyond all bounds.
             Exhaustion: the step asks for more than can be had.
         """
-        self._pull(self.settings.dt)
-        self._leg.steps += 1
-        try:
-            self._leg.simulation.step()
-        except Divergence as divergence:
-            raise self._later(divergence) from None
-        except Exhaustion:
-            self._leg.steps -= 1
-            raise
+        self._advance(1.0, self._leg.simulation.step)
 
     def finish(self, part: float) -> None:
         """Advance by a last part of dt, 0 < part < 1.
@@ -172,23 +162,21 @@ class Relay:
             Divergence: as `step`.
             ValueError: there is no such part.
         """
-        self._pull(self.settings.dt * part)
+        self._advance(part, lambda: self._leg.simulation.finish(part))
+
+    def _advance(self, part: float, advance: Callable[[], None]) -> None:
+        """Let hands draw bodies, and the engine advance, by a part of a step."""
+        simulation = self._leg.simulation
+        with self._books.hands(simulation):
+            self._pulls.act(simulation, self.settings.dt * part)
         self._leg.steps += part
         try:
-            self._leg.simulation.finish(part)
+            advance()
         except Divergence as divergence:
-            raise self._later(divergence) from None
+            raise Divergence(self.time, divergence.body, divergence.what) from None
         except Exhaustion:
             self._leg.steps -= part
             raise
-
-    def _pull(self, h: float) -> None:
-        """Let hands draw bodies for a step of h, s."""
-        with self._account.hands() if self._account is not None else nullcontext():
-            self._pulls.act(self._leg.simulation, h)
-
-    def _later(self, divergence: Divergence) -> Divergence:
-        return Divergence(self.time, divergence.body, divergence.what)
 
     def apply(self, action: Action) -> None:
         """Do what an action says, now; its time is the caller's affair.
@@ -255,7 +243,13 @@ class Relay:
             leg = begun(self.scene, engine, wanted, bodies, frame, lasting, broken)
         except (Refusal, UnknownEngineError) as refusal:
             raise ActionError(str(refusal)) from None
-        old, before = self._leg, 0.0 if self._account is None else total_energy(self)
+        with self._books.passing(self, leg.simulation):
+            self._take_up(leg, retired, broken)
+            self.engine, self.wanted = engine, wanted
+
+    def _take_up(self, leg: Leg, retired: dict[int, float], broken: dict[int, float]) -> None:
+        """Go on with a leg, and let the old one go."""
+        old = self._leg
         if leg.simulation.settings.dt == old.simulation.settings.dt:  # so that frames go on to lie at k·dt
             leg.origin, leg.steps = old.origin, old.steps
         leg.simulation.patience = old.simulation.patience
@@ -264,13 +258,10 @@ class Relay:
             leg.simulation.contacts()
         self._work.update(old.simulation.work)
         self._retired, self._broken = retired, broken
-        self.engine, self.wanted = engine, wanted
         old.simulation.close()
         self._leg = leg
         if self._observer is not None:
             self._leg.watched_by(self._observer)
-        if self._account is not None:
-            self._account.pass_on(leg.simulation, total_energy(self) - before)
 
     def _acting(self) -> dict[str, Force]:
         """Return the steady forces on bodies that are there; on who has left they have ended."""
@@ -294,9 +285,7 @@ class Relay:
 
     def account(self) -> Mapping[Cause, float]:
         """Return the energy, J, that each cause has brought since the first call, over all engines that took part."""
-        if self._account is None:
-            self._account = Succession(self._leg.simulation)
-        return self._account.entries()
+        return self._books.entries(self._leg.simulation)
 
     def watch(self, observer: Observer) -> None:
         """Have an observer called after every substep."""

@@ -11,35 +11,46 @@ from sandbox.engines.energy import energy_of
 
 
 class Succession:
-    """Energy by cause, J, of simulations one after the other; what is done between them is an action."""
+    """Energy by cause, J, of simulations one after the other; what is done between them is an action.
 
-    def __init__(self, first: Simulation) -> None:
-        """Open the account of the first."""
-        self._own = Account()
-        self._present = first
-        first.account()
+    Nothing is kept before entries are asked for.
+    """
 
-    def entries(self) -> Mapping[Cause, float]:
-        """Return what each cause has brought so far, J."""
-        present = self._present.account()
-        return {cause: energy + present[cause] for cause, energy in self._own.entries().items()}
+    def __init__(self) -> None:
+        self._past: Account | None = None  # of earlier simulations, and of what is done here
 
-    def pass_on(self, heir: Simulation, gained: float) -> None:
-        """Go on with another simulation, whose state has so much more energy, J, than the last had."""
-        for cause, energy in self._present.account().items():
-            self._own.add(cause, energy)
-        self._own.enter(Cause.ACTIONS, gained)
-        heir.account()
-        self._present = heir
+    def entries(self, present: Simulation) -> Mapping[Cause, float]:
+        """Return what each cause has brought since the first call, J, the present simulation's entries among them."""
+        if self._past is None:
+            self._past = Account()
+        own = present.account()
+        return {cause: energy + own[cause] for cause, energy in self._past.entries().items()}
 
     @contextmanager
-    def hands(self) -> Iterator[None]:
-        """Book as drives what is done meanwhile: to an engine each impulse of a hand is an action like any other."""
-        before = self._present.account()[Cause.ACTIONS]
+    def passing(self, whole: Simulation, heir: Simulation) -> Iterator[None]:
+        """Book what changes while an heir takes over within the whole: to `ACTIONS`, as someone asked for it."""
+        if self._past is None:
+            yield
+            return
+        energy, entries = total_energy(whole), whole.account()
         yield
-        work = self._present.account()[Cause.ACTIONS] - before
-        self._own.enter(Cause.DRIVES, work)
-        self._own.enter(Cause.ACTIONS, -work)
+        self._past = Account()
+        for cause, brought in entries.items():
+            self._past.add(cause, brought)
+        heir.account()
+        self._past.enter(Cause.ACTIONS, total_energy(whole) - energy)
+
+    @contextmanager
+    def hands(self, present: Simulation) -> Iterator[None]:
+        """Book as drives what is done meanwhile: to an engine each impulse of a hand is an action like any other."""
+        if self._past is None:
+            yield
+            return
+        before = present.account()[Cause.ACTIONS]
+        yield
+        work = present.account()[Cause.ACTIONS] - before
+        self._past.enter(Cause.DRIVES, work)
+        self._past.enter(Cause.ACTIONS, -work)
 
 
 def total_energy(simulation: Simulation) -> float:

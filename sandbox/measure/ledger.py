@@ -39,7 +39,8 @@ class Ledger:
     @property
     def residual(self) -> FloatArray:
         """(T,) J, what no cause accounts for."""
-        return np.asarray(self.total - self.total[0] - self.entries.sum(axis=1))
+        with np.errstate(invalid="ignore"):  # infinity less infinity, of a run that diverged
+            return np.asarray(self.total - self.total[0] - self.entries.sum(axis=1))
 
     @property
     def closes_to(self) -> float:
