@@ -9,6 +9,7 @@ from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, req
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.compare import compare
 from sandbox.measure.recorder import TooLargeError
+from sandbox.measure.tradeoff import tradeoff
 from sandbox.measure.versions import machine, versions
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import load
@@ -17,6 +18,7 @@ from sandbox.scene.shipped import shipped
 
 USUAL = "benchmark/"
 """Shipped scenes whose names begin so are reported where none is named."""
+PATIENCE = 5.0
 NAME = "report.html"
 """Of the page, where a folder is given."""
 
@@ -25,6 +27,13 @@ NAME = "report.html"
 @click.argument("scenes", nargs=-1)
 @click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="which engine(s); by default all")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of every scene")
+@click.option(
+    "--patience",
+    type=click.FloatRange(min=0.0),
+    default=PATIENCE,
+    metavar="S",
+    help=f"s that the search for a trade-off may take in each scene, by default {PATIENCE:g}; 0 leaves it out",
+)
 @click.option("--why", is_flag=True, help="say of each engine that is off which knob matters; takes many times as long")
 @click.option(
     "--out", type=click.Path(path_type=Path), required=True, metavar="PATH", help="the page, .html, or its folder"
@@ -35,6 +44,7 @@ def command(
     scenes: tuple[str, ...],
     engines: str | None,
     overrides: tuple[str, ...],
+    patience: float,
     why: bool,
     out: Path,
     as_json: bool,
@@ -75,6 +85,7 @@ def command(
                 click.echo(f"{k + 1}/{len(read)} {name}", err=True)
             try:
                 found = compare(scene, names, why=why)
+                weighed = tradeoff(scene, names, patience=patience).document(name) if patience else None
             except (TooLargeError, SceneError) as error:
                 status = 1
                 click.echo(f"{name}: {error}", err=True)
@@ -84,8 +95,8 @@ def command(
                 )
                 continue
             with uninterrupted():
-                overview.add(SceneReport(name, found))
-            told.append({**found.document(name), "status": "ok", "reason": None})
+                overview.add(SceneReport(name, found, tradeoff=weighed))
+            told.append({**found.document(name), "status": "ok", "reason": None, "tradeoff": weighed})
     except KeyboardInterrupt:
         status = 130
         click.echo(f"interrupted: {len(told)} of {len(read)} scenes are finished and kept", err=True)

@@ -50,9 +50,9 @@ class Running(ABC):
     def frame(self) -> Frame:
         """Return the present state."""
 
+    @abstractmethod
     def account(self) -> Mapping[Cause, float]:
         """Return the energy, J, that each cause has brought since the first call."""
-        raise NotImplementedError(f"{type(self).__name__} keeps no account of energy")
 
     def _after(self, substeps: int) -> float:
         """Return the time after so many substeps of the present step, s; after all of them, the next frame's."""

@@ -109,7 +109,11 @@ class Comparison:
     def sentence(self) -> str:
         """Say what the truth is, and how far it goes."""
         if self.best is None:
-            return "truth: none; no engine here can run the scene"
+            able = any(row.status != "refused" for row in self.rows)
+            why = (
+                "no engine gets to an answer that a finer step confirms" if able else "no engine here can run the scene"
+            )
+            return f"truth: none; {why}"
         whole = self.scene.world.duration
         name = self.best.kind.replace("_", " ")
         until = f"trusted until {self.best.trusted_until:.4g} s of {whole:.4g} s"
