@@ -83,7 +83,7 @@ class Search:
             best = min(own, key=aim)
             expanded.add(best.variant)
             for variant in self.space.near(best.variant):
-                if self._goes_on(WIDE):
+                if self._goes_on(WIDE) and (best.status != "stopped" or variant.work < best.variant.work):
                     self._try(variant, best)
         self._close_in()
         return list(self.trials.values())
@@ -137,10 +137,12 @@ class Search:
 
     def _promising(self, trial: Trial) -> bool:
         """Tell whether to look around a trial: nothing on its engine outdoes it, or all there failed as it did."""
-        if trial.status in ("refused", "stopped"):
+        if trial.status == "refused":
             return False
         same = [t for t in self.trials.values() if t.variant.engine == trial.variant.engine]
         good = [t for t in same if math.isfinite(t.error(self.metric))]
+        if trial.status == "stopped":  # what takes less may get to its end, as long as nothing does
+            return not good and trial.variant.work <= min(t.variant.work for t in same)
         if math.isinf(trial.error(self.metric)):  # what is finer may do better, as long as nothing does well
             if trial.status == "ok" and trial.metrics.get(self.metric) is None:
                 return not good and trial is same[0]

@@ -161,6 +161,10 @@ class Space:
             yield replace(variant, substeps=variant.substeps * 2)
             if variant.substeps % 2 == 0:
                 yield replace(variant, substeps=variant.substeps // 2)
+        if variant.finer <= 1:  # as fine, but with half the frames, and back
+            yield replace(variant, finer=variant.finer / 2, substeps=variant.substeps * 2)
+        if variant.finer < 1 and variant.substeps % 2 == 0:
+            yield replace(variant, finer=variant.finer * 2, substeps=variant.substeps // 2)
         if self.iterates:
             yield replace(variant, iterations=variant.iterations * 2)
             if variant.iterations > 1:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import pytest
 from trials_by_hand import DROP, judge_of, scene_of
@@ -70,8 +71,9 @@ def searched(
     budget: float | None = None,
     most: int = 150,
     patience: float = 1e6,
+    trying: Callable[[Variant, Space, Sequence[Judge], float], Trial] | None = None,
 ) -> Search:
-    monkeypatch.setattr(module, "tried", landscape)
+    monkeypatch.setattr(module, "tried", trying or landscape)
     scene = scene_of(DROP) if scene is None else scene
     judges = [judge_of(scene, until=0.0)]
     space = Space(scene, scene.solver, engines)
@@ -154,6 +156,19 @@ def test_start_that_diverges_is_refined(monkeypatch: pytest.MonkeyPatch) -> None
     failed = [trial for trial in search.trials.values() if trial.status == "diverged"]
     assert [trial.reason for trial in failed] == ["by law"] * len(failed)
     assert any(trial.variant == Variant("pymunk") for trial in failed)
+
+
+def test_coarser_steps_are_tried_where_the_scenes_own_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    landscape = Landscape(order(1.0))
+
+    def impatient(variant: Variant, space: Space, judges: Sequence[Judge], patience: float) -> Trial:
+        found = landscape(variant, space, judges, patience)
+        return found if steps(variant) <= 0.25 else replace(found, status="stopped", metrics=dict.fromkeys(METRICS))
+
+    search = searched(monkeypatch, landscape, 5.0, trying=impatient)
+    assert steps(cheapest(search).variant) == 0.25
+    assert max(map(steps, landscape.asked)) == 1.0
+    assert landscape.asked[1].work < landscape.asked[0].work  # nothing as slow is tried beside it
 
 
 def test_metric_that_says_nothing_is_not_sought_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
