@@ -25,8 +25,8 @@ GRAZE = 1e-6
 """The share of a half width by which bodies that were laid out to touch may overlap: rounding."""
 
 
-def warnings(scene: Scene, settings: Settings | None = None) -> list[Warning]:
-    """Return what would go wrong with a scene at its own settings, or at others."""
+def warnings(scene: Scene, settings: Settings | None = None, engine: str | None = None) -> list[Warning]:
+    """Return what would go wrong with a scene at its own settings, or at others; of one engine, only what concerns it."""
     settings = scene.solver if settings is None else settings
     meet, close = meetings(scene), laid(scene)
     return [
