@@ -15,6 +15,7 @@ COMMANDS = {
     "run": "run scenes headless and tell how they went",
     "play": "the window: play a scene, or pick one",
     "compare": "one scene on several engines, against the best known truth",
+    "extremes": "how far each engine and setting goes before it breaks",
     "check": "check scenes: faults, what they demand, who can run them, what would go wrong",
     "scenes": "list the scenes that ship",
     "engines": "list the engines",

@@ -48,6 +48,8 @@ class Outcome:
     solver: Mapping[str, Any] = field(default_factory=dict)
     """the settings in full, as the engine resolved them"""
     seconds: float = 0.0
+    slow: bool = False
+    """whether it was stopped as it took too long: then the verdict is the machine's too"""
 
     @classmethod
     def read(cls, document: Mapping[str, Any]) -> Self:

@@ -24,7 +24,7 @@ def judge(seen: Evidence) -> Outcome:
             if wrong is not None:
                 return Outcome("failed", wrong, name, figures=figures)
         if name == "bounded":  # a state that is not finite has no figures
-            figures["moved"] = float((seen.moved / seen.width).max())
+            figures |= {"moved": float((seen.moved / seen.width).max()), "gained": seen.gained}
     if case.error is None:
         return Outcome("degraded", "no rule is broken; what it should be is not known", figures=figures)
     error = case.error(seen.scene, run)

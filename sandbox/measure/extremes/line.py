@@ -49,7 +49,9 @@ def axis_line(
     whose = axis.name, setup.engine, setup.name, dict(setup.changes)
     if not known:
         return Limit(*whose, None, None, cells[levels[0]].outcome.reason, unit=axis.unit, refused=True)
-    found = boundary(known, (lambda level: look(level).passed) if halve else None, axis.scale)
+    # Where time was up, another machine gets farther: that is worth no halving.
+    hung = next((cell.outcome.slow for cell in cells.values() if cell.verdict == "failed"), False)
+    found = boundary(known, None if hung or not halve else lambda level: look(level).passed, axis.scale)
     reason, rule = "nothing failed", None
     if found.first_failure is not None:
         worst = cells[found.first_failure].outcome

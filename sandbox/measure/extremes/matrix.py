@@ -18,7 +18,7 @@ from sandbox.measure.extremes.setup import Setup, of_engines
 from sandbox.measure.extremes.warden import Warden
 from sandbox.measure.versions import machine, versions
 
-SECONDS, MEMORY = 20.0, 2048
+SECONDS, MEMORY = 30.0, 2048
 """What a cell may take, s, and a worker, MiB; its libraries alone take 600 MiB of address space."""
 
 

@@ -11,15 +11,16 @@ from sandbox.scene.model import Plane, Scene
 from sandbox.scene.near import near_pairs
 from sandbox.trajectory import FloatArray, Trajectory
 
-MOST_LOOKED = 200_000
-"""Frames × bodies looked at: of more, frames are left out."""
+MOST_DISCS, MOST_SHAPES = 100_000, 10_000
+"""Frames × bodies looked at, of discs alone and of other shapes: of more, frames are left out."""
 MOST_APART = 50
 """Bodies up to which pairs of other shapes, and fixed things other than planes, are looked at one by one."""
 
 
-def looked_at(run: Trajectory, most: int = MOST_LOOKED) -> list[int]:
+def looked_at(run: Trajectory, scene: Scene) -> list[int]:
     """Return the frames that are looked at, by their numbers: evenly spread, first and last among them."""
     frames, bodies = run.position.shape[:2]
+    most = MOST_DISCS if scene.bodies.round.all() else MOST_SHAPES
     count = min(frames, max(2, most // max(bodies, 1)))
     return np.unique(np.linspace(0, frames - 1, count).round().astype(np.int64)).tolist()
 

@@ -32,6 +32,7 @@ RESTING = 0.02
 """The share of √(g·width) below which a body is at rest."""
 STANDING = 0.5
 """The share of its width by which what should stand may have moved."""
+SLOPS = 2.0
 GRAZE = 1e-9
 """m, as engines count it as touching."""
 
@@ -49,7 +50,7 @@ class Evidence:
     @cached_property
     def few(self) -> Trajectory:
         """The run, with as many of its frames as can be looked at closely."""
-        frames = looked_at(self.run)
+        frames = looked_at(self.run, self.scene)
         return self.run if len(frames) == len(self.run.time) else self.run.at(frames)
 
     @cached_property
@@ -116,14 +117,17 @@ def through(seen: Evidence) -> str | None:
 
 
 def overlap(seen: Evidence) -> str | None:
-    """No overlap beyond slop + v·h, with the speeds there have been so far, and a step's fall."""
+    """No overlap beyond slop + v·h, with the speeds there have been so far, and a step's fall.
+
+    The slop counts twice: what exceeds it is put right little by little, and what rests lies a little deeper.
+    """
     run, scene, h = seen.few, seen.scene, seen.settings.h
     fastest = np.maximum.accumulate(np.hypot(run.velocity[..., 0], run.velocity[..., 1]).max(axis=1))
     closing = (2.0 if meetings(scene).mutual else 1.0) * (fastest + math.hypot(*scene.world.gravity) * h)
-    deep, allowed = deepest(run, scene), (seen.settings.slop or 0.0) + closing * h + GRAZE
+    deep, allowed = deepest(run, scene), SLOPS * (seen.settings.slop or 0.0) + closing * h + GRAZE
     worst = int((deep - allowed).argmax())
     if deep[worst] > allowed[worst]:
-        return f"an overlap of {deep[worst]:.3g} m at {run.time[worst]:.3g} s; slop + v·h is {allowed[worst]:.3g} m"
+        return f"an overlap of {deep[worst]:.3g} m at {run.time[worst]:.3g} s; {SLOPS:g} slop + v·h is {allowed[worst]:.3g} m"
     return None
 
 
@@ -131,7 +135,7 @@ def parted(seen: Evidence) -> str | None:
     """In the end no overlap but the slop is left."""
     last = seen.run.at([-1])
     left, slop = float(deepest(last, seen.scene)[0]), seen.settings.slop or 0.0
-    if left > 1.05 * slop + GRAZE:  # corrections come ever closer to the slop, and never get there
+    if left > SLOPS * slop + GRAZE:
         return f"an overlap of {left:.3g} m is left; slop is {slop:.3g} m"
     return None
 
@@ -172,9 +176,9 @@ RULES: dict[str, Rule] = {
     "joints": joints,
     "energy": energy,
     "momentum": momentum,
+    "stands": stands,
     "overlap": overlap,
     "parted": parted,
-    "stands": stands,
     "settles": settles,
 }
 """In the order in which they are looked at: the first that is broken is told."""

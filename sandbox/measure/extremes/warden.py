@@ -75,7 +75,8 @@ class Warden:
                 said = self._said.get(timeout=max(until - monotonic(), 0.0))
             except Empty:
                 self._end()
-                return Outcome("failed", f"took longer than {self._seconds:g} s, and was stopped", "process")
+                reason = f"took longer than {self._seconds:g} s, and was stopped"
+                return Outcome("failed", reason, "process", seconds=self._seconds, slow=True)
             if said is None:
                 return self._dead()
             told = json.loads(said)

@@ -24,7 +24,7 @@ def _gas(p: Parameters) -> Document:
     rows = math.ceil(p["count"] / columns)
     grid = {"name": "atom", "origin": [0.5, 0.5], "columns": columns, "rows": rows, "spacing": [1.0, 1.0]}
     return {
-        "world": {"duration": 0.5, "seed": 1},
+        "world": {"duration": 0.2, "seed": 1},
         "solver": {"dt": p["dt"]},
         "plane": _box(float(columns), float(rows)),
         "grid": [{**grid, "radius": 0.4, "velocity_jitter": 1.0, "restitution": 1.0}],

@@ -22,7 +22,7 @@ def _chain(p: Parameters) -> Document:
     return {
         "world": {"gravity": [0.0, -G], "duration": 3.0},
         "solver": {"dt": p["dt"], "iterations": p["iterations"]},
-        "rope": [{**rope, "radius": 0.02, "mass": 0.1}],
+        "rope": [{**rope, "fix": ["start"], "radius": 0.02, "mass": 0.1}],
     }
 
 

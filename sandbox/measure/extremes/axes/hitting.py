@@ -7,7 +7,7 @@ from sandbox.measure.extremes.case import Case, Document, Parameters
 from sandbox.scene.model import Scene
 from sandbox.trajectory import Trajectory
 
-SPEED, GAP, DT = 1.0, 0.5, 0.01  # m/s, m, s
+SPEED, GAP, DT = 1.0, 0.3, 0.01  # m/s, m, s
 
 
 def _head_on(p: Parameters) -> Document:

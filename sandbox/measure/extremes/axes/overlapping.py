@@ -14,8 +14,8 @@ def _pair(p: Parameters) -> Document:
     apart = 2.0 * RADIUS * (1.0 - p["depth"])
     ball = {"radius": RADIUS, "restitution": 0.5}
     return {
-        "world": {"duration": 5.0},
-        "solver": {"dt": 1 / 120},
+        "world": {"duration": 3.0},
+        "solver": {"dt": 1 / 60},
         "ball": [
             {"position": [0.0, 0.0], "mass": 1.0, **ball},
             {"position": [apart, 0.0], "mass": p["mass_ratio"], **ball},

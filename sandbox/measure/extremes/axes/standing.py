@@ -55,7 +55,7 @@ TWO = Case(
 TOWER = Case(
     "tower",
     "boxes of 1 m stand on each other",
-    {"rows": 10, "dt": 1 / 240, "iterations": 10},
+    {"rows": 10, "dt": 1 / 120, "iterations": 20},
     _tower,
     STANDS,
     _displaced,
@@ -64,7 +64,7 @@ TOWER = Case(
 
 RATIOS = (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
 ITERATIONS = (1000, 200, 100, 50, 20, 10, 5, 2, 1)
-FALLS = frozenset({"bounded", "energy", "overlap", "stands", "settles"})
+FALLS = frozenset({"bounded", "energy", "stands", "settles"})
 
 AXES = (
     Axis(
@@ -91,7 +91,7 @@ AXES = (
     ),
     Axis(
         "stack",
-        "boxes in a tower, 240 Hz, 10 iterations",
+        "boxes in a tower, 120 Hz, 20 iterations",
         "boxes",
         TOWER,
         "rows",
@@ -103,7 +103,7 @@ AXES = (
     ),
     Axis(
         "tower_iterations",
-        "iterations that hold a tower of 10 boxes, 240 Hz",
+        "iterations that hold a tower of 10 boxes, 120 Hz",
         "",
         TOWER,
         "iterations",
