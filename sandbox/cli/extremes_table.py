@@ -21,21 +21,20 @@ def print_extremes(result: Extremes) -> None:
     from rich.text import Text
 
     console = Console(width=None if sys.stdout.isatty() else WIDE)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for head in ("axis", "setup", "levels"):
-        table.add_column(head, no_wrap=True)
-    for head in ("passes up to", "fails at"):
-        table.add_column(head, justify="right", no_wrap=True)
-    table.add_column("why", no_wrap=True, overflow="ellipsis")
+    first = max((len(limit.axis) for limit in result.limits), default=0)
+    second = max((len(limit.setup) for limit in result.limits), default=0)
+    across = max((len(list(_row(result, limit))) for limit in result.limits), default=0)
+    last = ""
     for limit in result.limits:
-        levels = Text()
-        for cell in _row(result, limit):
-            levels.append(LETTERS[cell.verdict], STYLES[cell.verdict])
-        what = f"{limit.rule}: {limit.reason}" if limit.rule else limit.reason
-        note = "" if limit.monotone else " (not the last: it passes again beyond)"
-        table.add_row(limit.axis, limit.setup, levels, _level(limit.limit), _level(limit.first_failure), what + note)
+        line = Text(f"{limit.axis if limit.axis != last else '':<{first}}  {limit.setup:<{second}}  ")
+        cells = list(_row(result, limit))
+        for cell in cells:
+            line.append(LETTERS[cell.verdict], STYLES[cell.verdict])
+        line.append(f"{'':<{across - len(cells)}}  {_reached(limit)}")
+        line.truncate(max(console.width, 60), overflow="ellipsis")
+        console.print(line, soft_wrap=True)
+        last = limit.axis
     if result.limits:
-        console.print(table)
         legend = ", ".join(f"{letter} {word}" for word, letter in LETTERS.items())
         console.print(f"levels, from the easiest to the hardest: {legend}", style="dim", soft_wrap=True)
     scores = [score for score in result.predictions if score.precision is not None or score.recall is not None]
@@ -64,6 +63,18 @@ def _sums(result: Extremes) -> Iterator[str]:
             told = ", ".join(f"{count[word]:,} {word}" for word in WORDS if count[word])
             yield f"{what}: {len(cells):,} cells: {told}"
     yield f"{result.seconds:.0f} s on {result.plan.workers} worker(s)"
+
+
+def _reached(limit: Limit) -> str:
+    """Say how far it goes."""
+    if limit.refused:
+        return f"refused: {limit.reason}"
+    if limit.first_failure is None:
+        return f"all of them, up to {_level(limit.limit)}"
+    if limit.limit is None:
+        return f"none: {limit.rule}: {limit.reason}"
+    beyond = "" if limit.monotone else ", though more passes or fails than one boundary tells"
+    return f"up to {_level(limit.limit)}, fails at {_level(limit.first_failure)}{beyond}: {limit.rule}: {limit.reason}"
 
 
 def _level(value: float | None) -> str:

@@ -54,11 +54,11 @@ def _told(value: float | None) -> str:
     return "no level" if value is None else f"{value:.4g}"
 
 
-def store(result: Extremes, path: str | Path) -> Path:
-    """Write the limits of a run, with versions and tolerance, to a temporary name first."""
+def store(result: Extremes, path: str | Path, others: Stored = ()) -> Path:
+    """Write the limits of a run, after others that are kept, with versions and tolerance; to a temporary name first."""
     whole_document = result.document()
     kept = {key: whole_document[key] for key in ("tolerance", "timeout", "memory", "versions", "machine")}
-    document = {**kept, "limits": whole_document["limits"]}
+    document = {**kept, "limits": [*map(dict, others), *whole_document["limits"]]}
     path = Path(path)
     with whole(path) as temporary:
         text = json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1)

@@ -25,6 +25,8 @@ def judge(seen: Evidence) -> Outcome:
                 return Outcome("failed", wrong, name, figures=figures)
         if name == "bounded":  # a state that is not finite has no figures
             figures |= {"moved": float((seen.moved / seen.width).max()), "gained": seen.gained}
+            if run.info["joint_error"] is not None:
+                figures["joints"] = run.info["joint_error"]
     if case.error is None:
         return Outcome("degraded", "no rule is broken; what it should be is not known", figures=figures)
     error = case.error(seen.scene, run)

@@ -68,6 +68,4 @@ def pair_line(pair: Pair, setup: Setup, overrides: tuple[str, ...], ask: Ask, ke
 
 
 def _task(case: Case, parameters: dict[str, float], setup: Setup, overrides: tuple[str, ...]) -> Task:
-    # What a pair or an override asks for outranks the setup, which would undo it.
-    own = {key: value for key, value in setup.changes.items() if key not in parameters}
-    return Task(case.name, parameters, setup.engine, own, overrides)
+    return Task(case.name, parameters, setup.engine, dict(setup.changes), overrides)

@@ -43,8 +43,10 @@ class Plan:
         return axis.quick if self.quick else axis.levels
 
     def setups(self, of: Axis | Pair) -> tuple[Setup, ...]:
-        """Return what an axis or a pair is run on."""
-        return of_engines(of.setups, self.engines)
+        """Return what an axis or a pair is run on; a pair on no setup that differs by what the pair varies itself."""
+        setups = of_engines(of.setups, self.engines)
+        varied = {of.first.parameter, of.second.parameter} if isinstance(of, Pair) else set()
+        return tuple(setup for setup in setups if not varied & set(setup.changes))
 
 
 @dataclass(frozen=True)

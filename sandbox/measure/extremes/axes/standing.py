@@ -96,7 +96,7 @@ AXES = (
         TOWER,
         "rows",
         (2, 5, 10, 20, 50, 100),
-        (2, 10, 50),
+        (2, 10, 20),
         scale="whole",
         kind="stack",
         blamed=FALLS,
