@@ -32,9 +32,7 @@ def main() -> int:
     unknown = [name for name in names if name not in AXES]
     if unknown or arguments.workers < 1 or not arguments.timeout > 0.0:
         parser.error(f"no axis {', '.join(unknown)}" if unknown else "--workers is 1 or more, --timeout above 0")
-    plan = Plan(
-        tuple(AXES[name] for name in names), pairs=(), seconds=arguments.timeout, workers=arguments.workers
-    )
+    plan = Plan(tuple(AXES[name] for name in names), pairs=(), seconds=arguments.timeout, workers=arguments.workers)
     result = extremes(plan, _told)
     if result.interrupted:
         print("interrupted: nothing is stored or compared", file=sys.stderr)

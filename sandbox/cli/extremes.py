@@ -36,7 +36,9 @@ LEAST_MEMORY = 1024
 @click.option("--memory", type=click.IntRange(LEAST_MEMORY), default=MEMORY, metavar="MB", help="of each worker")
 @click.option("--workers", type=click.IntRange(1, 256), metavar="N", help="how many at once; by default one a core")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write heat maps and extremes.json")
-@click.option("--against", type=click.Path(path_type=Path), metavar="FILE", help="hold the boundaries against stored ones")
+@click.option(
+    "--against", type=click.Path(path_type=Path), metavar="FILE", help="hold the boundaries against stored ones"
+)
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 @click.option("--quiet", is_flag=True, help="no tables, no progress")
 def command(

@@ -48,8 +48,8 @@ def print_extremes(result: Extremes) -> None:
             shares = (_share(score.precision), _share(score.recall))
             table.add_row(score.kind, *map(str, counts), *shares)
         console.print(table)
-    for line in _sums(result):
-        console.print(line, soft_wrap=True)
+    for told in _sums(result):
+        console.print(told, soft_wrap=True)
 
 
 def _row(result: Extremes, limit: Limit) -> Iterator[Cell]:

@@ -142,9 +142,7 @@ def _single(cell: Cell) -> float:
 
 def _draw_pair(panel: Axes, cells: Sequence[Cell], pair: Pair) -> None:
     place = {
-        (a, b): (row, column)
-        for row, a in enumerate(pair.first.levels)
-        for column, b in enumerate(pair.second.levels)
+        (a, b): (row, column) for row, a in enumerate(pair.first.levels) for column, b in enumerate(pair.second.levels)
     }
     known = {place[c.level]: c for c in cells if isinstance(c.level, tuple)}
     _fields(panel, known, len(pair.first.levels), len(pair.second.levels))
@@ -172,8 +170,4 @@ def _fields(panel: Axes, cells: dict[tuple[int, int], Cell], rows: int, columns:
 
 def _legend(figure: Figure, top: float) -> None:
     patches = [Patch(color=COLOURS[word], label=f"{MARKS[word]}  {MEANINGS[word]}") for word in WORDS]
-    figure.legend(
-        handles=patches, loc="upper left", bbox_to_anchor=(0.005, top), ncols=4, frameon=False, fontsize=9
-    )
-
-
+    figure.legend(handles=patches, loc="upper left", bbox_to_anchor=(0.005, top), ncols=4, frameon=False, fontsize=9)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from calling import json_of, lines_of, process
 
-SMALL = ("extremes", "--axes", "restitution,stiffness", "--quick", "--workers", "1")
+SMALL = ("extremes", "--axes", "stiffness,restitution", "--engines", "pymunk,exact", "--quick", "--workers", "1")
 
 
 def test_document_has_cells_limits_and_predictions(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -70,9 +70,7 @@ def test_faults_are_a_line_each_before_anything_runs(capfd: pytest.CaptureFixtur
         ("solver.dt=0.01", "varies; leave it out"),
     ],
 )
-def test_override_that_suits_no_scene_is_a_fault(
-    capfd: pytest.CaptureFixture[str], override: str, words: str
-) -> None:
+def test_override_that_suits_no_scene_is_a_fault(capfd: pytest.CaptureFixture[str], override: str, words: str) -> None:
     status, out, errors = lines_of(capfd, "extremes", "--axes", "dt", "--quick", "--set", override)
     assert (status, out) == (2, [])
     assert words in errors[0]

@@ -15,7 +15,8 @@ from sandbox.scene.shipped import shipped
 
 
 def test_commands_are_those_promised() -> None:
-    assert list(COMMANDS) == ["run", "play", "compare", "check", "scenes", "engines", "schema", "export", "replay"]
+    promised = "run play compare extremes check scenes engines schema export replay"
+    assert list(COMMANDS) == promised.split()
 
 
 @pytest.mark.parametrize("command", [None, *COMMANDS])

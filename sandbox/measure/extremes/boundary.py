@@ -63,9 +63,7 @@ class Limit:
         }
 
 
-def boundary(
-    levels: Mapping[float, bool], passes: Passes | None, scale: Scale, tolerance: float = TOLERANCE
-) -> Found:
+def boundary(levels: Mapping[float, bool], passes: Passes | None, scale: Scale, tolerance: float = TOLERANCE) -> Found:
     """Return the boundary between what passes and what fails.
 
     Args:

@@ -27,7 +27,9 @@ def lifted(scene: Scene) -> float:
     if pull == 0.0 or not moves.any():
         return kinetic
     depth = bodies.position @ (gravity / pull)
-    lowest = max([float(np.asarray(plane.point) @ gravity / pull) for plane in scene.planes], default=float(depth.max()))
+    lowest = max(
+        [float(np.asarray(plane.point) @ gravity / pull) for plane in scene.planes], default=float(depth.max())
+    )
     drop = np.maximum(lowest - depth, 2.0 * bodies.thin)
     return kinetic + float((bodies.mass * pull * drop)[moves].sum())
 
@@ -51,7 +53,7 @@ class Case:
     useless: float = np.inf
     """share from which on an answer is of no use, and fails the rule `truth`"""
     gain: float | Callable[[Scene, Settings, str], float] = 0.01
-    """share of the stake by which energy may exceed that of the start; it may depend on settings and the engine's name"""
+    """share of the stake by which energy may exceed that of the start; or what tells it, by settings and engine"""
     stake: Callable[[Scene], float] = lifted
     """J, against which a gain is held"""
     through: Callable[[Scene, Trajectory], str | None] | None = None

@@ -146,9 +146,7 @@ def _jobs(plan: Plan) -> Iterator[tuple[str, Job]]:
     for pair in plan.pairs:
         for setup in plan.setups(pair):
 
-            def both(
-                ask: Ask, keep: Callable[[Cell], None], pair: Pair = pair, setup: Setup = setup
-            ) -> Limit | None:
+            def both(ask: Ask, keep: Callable[[Cell], None], pair: Pair = pair, setup: Setup = setup) -> Limit | None:
                 pair_line(pair, setup, plan.overrides, ask, keep)
                 return None
 
@@ -219,9 +217,10 @@ def _work(warden: Warden, waiting: "SimpleQueue[tuple[str, Job]]", said: "Simple
 
 def _order(plan: Plan) -> Callable[[Cell | Limit], tuple[int, ...]]:
     """Return a key that sorts by axis, setup and level as they are listed: threads finish in any order."""
-    names = {each.name: k for k, each in enumerate((*plan.axes, *plan.pairs))}
+    every: tuple[Axis | Pair, ...] = (*plan.axes, *plan.pairs)
+    names = {each.name: k for k, each in enumerate(every)}
     rows: Mapping[tuple[str, str], int] = {
-        (each.name, setup.name): k for each in (*plan.axes, *plan.pairs) for k, setup in enumerate(plan.setups(each))
+        (each.name, setup.name): k for each in every for k, setup in enumerate(plan.setups(each))
     }
     levels: dict[tuple[str, float | tuple[float, float]], int] = {}
     for axis in plan.axes:

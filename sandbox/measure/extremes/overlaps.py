@@ -22,7 +22,7 @@ def looked_at(run: Trajectory, scene: Scene) -> list[int]:
     frames, bodies = run.position.shape[:2]
     most = MOST_DISCS if scene.bodies.round.all() else MOST_SHAPES
     count = min(frames, max(2, most // max(bodies, 1)))
-    return np.unique(np.linspace(0, frames - 1, count).round().astype(np.int64)).tolist()
+    return [int(k) for k in np.unique(np.linspace(0, frames - 1, count).round())]
 
 
 def deepest(run: Trajectory, scene: Scene) -> FloatArray:

@@ -127,7 +127,8 @@ def overlap(seen: Evidence) -> str | None:
     deep, allowed = deepest(run, scene), SLOPS * (seen.settings.slop or 0.0) + closing * h + GRAZE
     worst = int((deep - allowed).argmax())
     if deep[worst] > allowed[worst]:
-        return f"an overlap of {deep[worst]:.3g} m at {run.time[worst]:.3g} s; {SLOPS:g} slop + v·h is {allowed[worst]:.3g} m"
+        most = f"{SLOPS:g} slop + v·h is {allowed[worst]:.3g} m"
+        return f"an overlap of {deep[worst]:.3g} m at {run.time[worst]:.3g} s; {most}"
     return None
 
 

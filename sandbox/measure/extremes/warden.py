@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from queue import Empty, SimpleQueue
 from time import monotonic
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 from sandbox.measure.extremes.cell import Outcome, Task
 from sandbox.measure.extremes.confine import cause_of_death

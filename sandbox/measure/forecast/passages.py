@@ -53,14 +53,14 @@ def largest_safe_dt(scene: Scene, settings: Settings | None = None) -> float:
 
 
 def farther(settings: Settings) -> float:
-    """Return how many times the way that plain looking allows a body may fly in a substep, by the detection; or inf.
+    """Return how many times the way that plain looking allows a body may fly in a substep, by the detection: 1 or inf.
 
     `swept` looks along the whole way, and `shrink` cuts it into pieces that are short enough. `bisect` looks only
-    where the substep ends, but then turns back to the impact: it takes the whole thickness and both radii to be missed,
-    twice as much. Measured with bullets at a wall (`sandbox extremes --axes speed`): the first passes at v·h of 1.00,
-    with `bisect` 2.00, times r + w/2; with the other two none does at 100 times.
+    where the substep ends, and there sees nobody who is past the middle already. Measured with a bullet at a wall
+    (`sandbox extremes --axes speed`): it passes from v·h of 1.00 times r + w/2 on, with `bisect` too; with the other
+    two not at 100 times.
     """
-    return {"bisect": 2.0, "swept": math.inf, "shrink": math.inf}.get(settings.detection or "discrete", 1.0)
+    return math.inf if settings.detection in ("swept", "shrink") else 1.0
 
 
 def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:

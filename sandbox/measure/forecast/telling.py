@@ -31,7 +31,7 @@ GRAZE = 1e-6
 
 
 def warnings(scene: Scene, settings: Settings | None = None, engine: str | None = None) -> list[Warning]:
-    """Return what would go wrong with a scene at its own settings, or at others; of one engine, only what concerns it."""
+    """Return what would go wrong with a scene at its own settings or others; of an engine, only what concerns it."""
     settings = scene.solver if settings is None else settings
     meet, close = meetings(scene), laid(scene)
     events = [*event_warnings(scene, meet)] if engine in (None, "exact") else []

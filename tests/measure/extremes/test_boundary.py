@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.measure.extremes.boundary import Found, boundary, halfway
 from sandbox.measure.extremes.axis import Scale
+from sandbox.measure.extremes.boundary import Found, boundary, halfway
 
 
 def found(edge: float, levels: tuple[float, ...], scale: Scale = "log", falling: bool = False) -> tuple[Found, int]:

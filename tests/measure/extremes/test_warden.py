@@ -72,9 +72,9 @@ def test_task_that_hangs_is_stopped_in_time(tmp_path: Path) -> None:
 
 
 def test_worker_that_cannot_start_is_an_error_with_its_last_words() -> None:
-    with Warden(5.0, 1024, [sys.executable, "-c", "raise SystemExit('no such thing')"]) as keeper:
-        with pytest.raises(WorkerError, match="status 1: no such thing"):
-            keeper.ask(task("well"))
+    command = [sys.executable, "-c", "raise SystemExit('no such thing')"]
+    with Warden(5.0, 1024, command) as keeper, pytest.raises(WorkerError, match="status 1: no such thing"):
+        keeper.ask(task("well"))
 
 
 def test_closed_warden_interrupts_who_asks(tmp_path: Path) -> None:

@@ -8,4 +8,5 @@ _FAMILIES = (falling, flying, hitting, sliding, standing, hanging, crowding, ove
 
 AXES: dict[str, Axis] = {axis.name: axis for family in _FAMILIES for axis in family.AXES}
 PAIRS: tuple[Pair, ...] = tuple(pair for family in _FAMILIES for pair in family.PAIRS)
-CASES: dict[str, Case] = {each.case.name: each.case for each in (*AXES.values(), *PAIRS)}
+CASES: dict[str, Case] = {axis.case.name: axis.case for axis in AXES.values()}
+CASES |= {pair.case.name: pair.case for pair in PAIRS}

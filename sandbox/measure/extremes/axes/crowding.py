@@ -2,7 +2,6 @@
 
 import math
 
-
 from sandbox.measure.energy import energies
 from sandbox.measure.extremes.axis import Axis, Pair, Side
 from sandbox.measure.extremes.case import Case, Document, Parameters
@@ -50,9 +49,7 @@ def _pile(p: Parameters) -> Document:
 
 def _rack(p: Parameters) -> Document:
     radius = 0.0286
-    rows = [
-        [1.0 + row * math.sqrt(3.0) * radius, (2.0 * k - row) * radius] for row in range(5) for k in range(row + 1)
-    ]
+    rows = [[1.0 + row * math.sqrt(3.0) * radius, (2.0 * k - row) * radius] for row in range(5) for k in range(row + 1)]
     ball = {"radius": radius, "mass": 0.17, "restitution": math.sqrt(0.95)}  # they multiply
     return {
         "world": {"duration": 0.3},

@@ -22,9 +22,7 @@ def _bullet(p: Parameters) -> Document:
     return {
         "world": {"duration": STEPS * DT},
         "solver": {"dt": DT, "substeps": p["substeps"]},
-        "wall": [
-            {"points": [[p["offset"], -1.0], [p["offset"], 1.0]], "thickness": THICKNESS, "restitution": 1.0}
-        ],
+        "wall": [{"points": [[p["offset"], -1.0], [p["offset"], 1.0]], "thickness": THICKNESS, "restitution": 1.0}],
         "ball": [
             {
                 "position": [p["offset"] - REACH * (1.0 + JUST_OFF), 0.0],

@@ -5,7 +5,7 @@ import numpy as np
 from sandbox.measure.extremes.axis import Axis, Pair, Side
 from sandbox.measure.extremes.case import Case, Document, Parameters
 from sandbox.scene.model import Scene
-from sandbox.trajectory import Trajectory
+from sandbox.trajectory import FloatArray, Trajectory
 
 SPEED, GAP, DT = 1.0, 0.3, 0.01  # m/s, m, s
 
@@ -24,10 +24,11 @@ def _head_on(p: Parameters) -> Document:
     }  # fmt: skip
 
 
-def _after(scene: Scene) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _after(scene: Scene) -> FloatArray:
     """Return the velocities after the impact, v₁′ = (m₁ − m₂)v/M and v₂′ = 2m₁v/M."""
     first, second = scene.bodies.mass.tolist()
-    return np.asarray([first - second, 2.0 * first]) * SPEED / (first + second)
+    share: float = SPEED / (first + second)
+    return np.asarray([(first - second) * share, 2.0 * first * share])
 
 
 def _velocities_off(scene: Scene, run: Trajectory) -> float:
