@@ -10,14 +10,17 @@ from sandbox.measure.forecast.laid import Laid, laid
 from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, farther, meet_each_other, passages
 from sandbox.measure.forecast.springs import spring_warnings
 from sandbox.measure.forecast.stacks import stack_warnings
+from sandbox.measure.forecast.stretch import stretch_warnings
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.scene.starts import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps
 
-ENOUGH_ITERATIONS = 5
-"""With fewer, bouncing groups gain energy: measured on a break shot, 2.4 times after one iteration."""
+ENOUGH_ITERATIONS = 3
+"""With fewer, bouncing groups can gain energy on pymunk. Measured on break shots of 6 to 36 balls, e = 0.95 and 1, 240
+to 3840 Hz: up to five times after one iteration, in 5 of 54 by a tenth after two, in none after three. The reference
+gained none at one."""
 
 COARSE = 1e-3
 """Share of a radius that the rounding of positions may take."""
@@ -41,10 +44,11 @@ def warnings(scene: Scene, settings: Settings | None = None, engine: str | None 
         *_duration(scene, settings),
         *_tunnelling(scene, settings, meet),
         *_overlaps(scene, meet, close),
-        *_iterations(settings, meet),
+        *(() if engine == "reference" else _iterations(settings, meet)),
         *_rounding(scene, settings, meet),
         *spring_warnings(scene, settings),
         *chain_warnings(scene, settings),
+        *stretch_warnings(scene, settings),
         *stack_warnings(scene, settings, close),
         *events,
     ]
