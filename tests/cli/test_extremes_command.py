@@ -1,6 +1,10 @@
 """`sandbox extremes` on the command line."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -28,22 +32,26 @@ def test_document_has_cells_limits_and_predictions(capfd: pytest.CaptureFixture[
     assert (tmp_path / "extremes.png").stat().st_size > 10_000
     assert json.loads((tmp_path / "extremes.json").read_text(encoding="utf-8")) == document
 
-    # Held against itself, and against boundaries that went farther.
+    # Again, held against boundaries of which one went farther.
     stored = tmp_path / "extremes.json"
-    status, again, errors = json_of(capfd, *SMALL, "--against", str(stored))
-    assert (status, errors, again["changes"]) == (0, [], [])
-    for one, other in zip(document["cells"], again["cells"], strict=True):
-        assert {**one, "seconds": 0.0} == {**other, "seconds": 0.0}
-    for limit in document["limits"]:
+    farther = json.loads(json.dumps(document))
+    for limit in farther["limits"]:
         if (limit["axis"], limit["setup"]) == ("stiffness", "pymunk"):
             limit["limit"] = 3.0
-    stored.write_text(json.dumps(document), encoding="utf-8")
-    status, out, errors = lines_of(capfd, *SMALL, "--against", str(stored))
+    stored.write_text(json.dumps(farther), encoding="utf-8")
+    status, again, (line,) = json_of(capfd, *SMALL, "--against", str(stored))
     assert status == 1
-    (line,) = errors
     assert line.startswith("stiffness on pymunk: worse: passed up to 3, now up to 1.99: ")
-    assert any(row.split()[:2] == ["stiffness", "pymunk"] for row in out)
-    assert any(row.startswith("spring ") for row in out)
+    assert [change["worse"] for change in again["changes"]] == [True]
+    for one, other in zip(document["cells"], again["cells"], strict=True):
+        assert {**one, "seconds": 0.0} == {**other, "seconds": 0.0}
+
+
+def test_table_has_a_line_a_setup(capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, errors = lines_of(capfd, "extremes", "--axes", "speed", "--engines", "exact", "--quick")
+    assert (status, errors) == (0, [])
+    assert out[0] == "speed  exact  EEE  all of them, up to 10"
+    assert "one at a time: 3 cells: 3 exact" in out
 
 
 def test_faults_are_a_line_each_before_anything_runs(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -82,6 +90,21 @@ def test_limits_out_of_range_are_faults(capfd: pytest.CaptureFixture[str], wrong
     status, _, errors = lines_of(capfd, "extremes", "--axes", "speed", *wrong)
     assert (status, len(errors)) == (2, 1)
     assert wrong[0] in errors[0]
+
+
+@pytest.mark.slow
+def test_interrupted_run_keeps_what_is_finished(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sandbox", "extremes", "--axes", "speed,dt", "--no-pairs", "--workers", "1"]
+    running = subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(8.0)  # enough for some cells, and not for all; where none is finished, none is kept
+    for _ in range(2):  # the impatient press it twice
+        running.send_signal(signal.SIGINT)
+    out, errors = running.communicate(timeout=60.0)
+    document = json.loads(out)
+    assert running.returncode == 130
+    assert document["interrupted"]
+    assert errors == f"interrupted: {len(document['cells'])} cells are finished and kept\n"
+    assert all(cell["verdict"] in ("exact", "degraded", "refused", "failed") for cell in document["cells"])
 
 
 @pytest.mark.slow

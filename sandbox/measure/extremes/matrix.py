@@ -192,11 +192,22 @@ def _gather(jobs: list[tuple[str, Job]], plan: Plan, told: Told | None) -> _Resu
     except KeyboardInterrupt:
         results.interrupted = True
     finally:
+        while not _closed(wardens, threads):
+            results.interrupted = True
+    return results
+
+
+def _closed(wardens: Sequence[Warden], threads: Sequence[threading.Thread]) -> bool:
+    """End all workers and wait for the threads; return whether that was done, or cut short by another Ctrl-C."""
+    try:
         for warden in wardens:
             warden.close()
         for thread in threads:
-            thread.join(timeout=5.0)
-    return results
+            if thread.is_alive():
+                thread.join(timeout=5.0)
+    except KeyboardInterrupt:
+        return False
+    return True
 
 
 def _work(warden: Warden, waiting: "SimpleQueue[tuple[str, Job]]", said: "SimpleQueue[Message]") -> None:
