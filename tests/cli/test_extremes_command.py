@@ -109,9 +109,11 @@ def test_interrupted_run_keeps_what_is_finished(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_cell_that_takes_too_long_fails_and_the_rest_goes_on(tmp_path: Path) -> None:
-    chosen = ("--axes", "count,speed", "--engines", "exact", "--no-pairs", "--timeout", "0.5", "--json")
+    chosen = ("--axes", "count", "--engines", "exact", "--no-pairs", "--timeout", "0.1", "--json")
     done = process("extremes", *chosen, cwd=tmp_path)
     assert done.returncode == 0
-    cells = {(cell["axis"], cell["level"]): cell for cell in json.loads(done.stdout)["cells"]}
-    assert cells["count", 10_000]["reason"] == "took longer than 0.5 s, and was stopped"
-    assert all(cell["verdict"] == "exact" for (axis, _), cell in cells.items() if axis == "speed")
+    document = json.loads(done.stdout)
+    last = document["cells"][-1]
+    assert (last["level"], last["reason"]) == (10_000, "took longer than 0.1 s, and was stopped")
+    assert len(document["cells"]) == 5
+    assert document["probes"] == []  # where time is up, a boundary would be the machine's
