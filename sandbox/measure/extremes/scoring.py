@@ -10,7 +10,10 @@ from sandbox.measure.extremes.cell import Cell
 
 @dataclass(frozen=True)
 class Score:
-    """How often warnings of a kind were right, over the cells of the axes that are about it; refused ones left out."""
+    """How often warnings of a kind were right, over the cells of the axes that are about it.
+
+    What was refused is left out, and what was stopped as it took too long: nobody knows what would have come.
+    """
 
     kind: str
     true_positives: int = 0
@@ -51,7 +54,7 @@ def scores(cells: Iterable[Cell], axes: Iterable[Axis]) -> tuple[Score, ...]:
         counts.setdefault(str(axis.kind), {})
     for cell in cells:
         its = about.get(cell.axis)
-        if its is None or cell.verdict == "refused":
+        if its is None or cell.verdict == "refused" or cell.outcome.slow:
             continue
         key = (its.kind in cell.outcome.predicted, its.came(cell))
         count = counts[str(its.kind)]

@@ -100,7 +100,7 @@ AXES = (
         (1, 10, 100),
         scale="whole",
         kind="event_rate",
-        blamed=frozenset({"work", "process"}),
+        blamed=frozenset({"work"}),
     ),
     Axis(
         "iterations",
