@@ -140,9 +140,9 @@ def kinds(text: str) -> list[str]:
         (10, 0.5, 3.0, []),
         (10, 0.5, 2.0, []),
         (10, 0.5, 1.99, ["overlap"]),
-        (5, 0.5, 3.0, []),
-        (4, 0.5, 3.0, ["iterations"]),
-        (4, 0.0, 3.0, []),
+        (3, 0.5, 3.0, []),
+        (2, 0.5, 3.0, ["iterations"]),
+        (2, 0.0, 3.0, []),
         (1, 0.5, 1.0, ["overlap", "iterations"]),
     ],
 )
@@ -324,8 +324,17 @@ def test_what_is_torn_apart_by_a_load_is_a_mass_ratio() -> None:
     assert warning.message.startswith("the joint 'j3' is between 'b2' and 'b3', of which one is 100 times as heavy")
 
 
-def test_joints_that_are_not_held_by_impulses_need_no_iterations_for_that() -> None:
-    assert warnings(chain(40, solver="dt = 0.016666\njoints = 'xpbd'")) == []
+@pytest.mark.parametrize("way", ["relaxation", "xpbd", "rattle"])
+@pytest.mark.parametrize(("links", "iterations", "dt"), [(20, 10, 1 / 60), (50, 10, 1 / 240), (20, 2, 1 / 120)])
+def test_chain_held_by_positions_gives_way_as_was_told(way: str, links: int, iterations: int, dt: float) -> None:
+    solver = f"dt = {dt!r}\niterations = {iterations}\njoints = {way!r}\n"
+    scene = chain(links, solver=solver)
+    (warning,) = warnings(scene)
+    assert (warning.kind, warning.figures["joints"]) == ("chain", links)
+    # The law's own factor was measured at 0.8 to 1.8, and is taken as 1.6.
+    told = pytest.approx(warning.figures["share"], rel=0.4)
+    assert run(scene, "reference", audit=False).info["joint_error"] == told
+    assert warnings(scene, scene.solver.replace(dt=0.99 * float(warning.figures["safe_dt"]))) == []
 
 
 def test_loose_and_doubly_held_chains_have_a_slowest_mode_too() -> None:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sandbox.measure.forecast.horizon import horizon_notes
 from sandbox.measure.forecast.warning import Warning
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Mover, Scene
@@ -15,8 +16,8 @@ MOST_TOLD = 20
 
 
 def notes(scene: Scene) -> list[Warning]:
-    """Return notes: into how many convex pieces each concave outline is cut, and what an audit cannot count."""
-    return [*_outlines(scene), *_audit(scene)]
+    """Return notes: how each concave outline is cut, what an audit cannot count, until when positions can be told."""
+    return [*_outlines(scene), *_audit(scene), *horizon_notes(scene)]
 
 
 def _outlines(scene: Scene) -> Iterator[Warning]:

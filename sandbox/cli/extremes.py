@@ -1,0 +1,179 @@
+"""`sandbox extremes`: how far each engine and setting goes before it breaks, and whether the forecast saw it coming."""
+
+import json
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from sandbox.cli.extremes_table import print_extremes
+from sandbox.cli.reading import fault_rows, gathering, print_json
+from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.measure.extremes import Extremes, Plan, extremes
+from sandbox.measure.extremes.axes import AXES, PAIRS
+from sandbox.measure.extremes.axis import Axis
+from sandbox.measure.extremes.boundaries import Change, StoredError, changes, read
+from sandbox.measure.extremes.checking import check_overrides
+from sandbox.measure.extremes.matrix import MEMORY, SECONDS, Progress, Told
+from sandbox.measure.extremes.warden import WorkerError
+from sandbox.scene.faults import Fault
+from sandbox.whole import whole
+
+LEAST_MEMORY = 1024
+"""MiB: what the libraries of a worker take, and some more."""
+
+
+@click.command(name="extremes")
+@click.option("--axes", metavar="NAME[,NAME]", help=f"which axes; by default all: {', '.join(AXES)}")
+@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="which engine(s); by default all")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of every scene")
+@click.option("--quick", is_flag=True, help="few levels, no pairs, boundaries no finer than levels")
+@click.option("--pairs/--no-pairs", default=True, help="two axes at once")
+@click.option("--timeout", type=click.FloatRange(0.1, 86_400.0), default=SECONDS, metavar="S", help="of each cell")
+@click.option("--memory", type=click.IntRange(LEAST_MEMORY), default=MEMORY, metavar="MB", help="of each worker")
+@click.option("--workers", type=click.IntRange(1, 256), metavar="N", help="how many at once; by default one a core")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write heat maps and extremes.json")
+@click.option(
+    "--against", type=click.Path(path_type=Path), metavar="FILE", help="hold the boundaries against stored ones"
+)
+@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
+@click.option("--quiet", is_flag=True, help="no tables, no progress")
+def command(
+    axes: str | None,
+    engines: str | None,
+    overrides: tuple[str, ...],
+    quick: bool,
+    pairs: bool,
+    timeout: float,
+    memory: int,
+    workers: int | None,
+    out: Path | None,
+    against: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Drive every engine to its extremes, one axis at a time and two at once, and tell where it breaks.
+
+    Each cell runs in a process of its own, with limits of time and memory: nothing takes the run down.
+    """
+    faults: list[Fault] = []
+    chosen = _axes(axes, faults)
+    names = None if engines is None else tuple(dict.fromkeys(name.strip() for name in engines.split(",")))
+    for name in names or ():
+        with gathering(faults, "--engine", (UnknownEngineError,)):
+            engine_named(name)
+    stored = None
+    if against is not None:
+        with gathering(faults, "--against", (StoredError,)):
+            stored = read(against)
+    if not math.isfinite(timeout):
+        faults.append(Fault("--timeout", None, "", f"{timeout} s; a limit is finite"))
+    with gathering(faults):
+        check_overrides(overrides, chosen)
+    if out is not None and not faults:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            faults.append(Fault("--out", None, "", f"{out}: {error.strerror or error}"))
+    if faults:
+        for fault in faults:
+            click.echo(str(fault), err=True)
+        if as_json:
+            print_json({"cells": [], "limits": [], "faults": fault_rows(faults)})
+        return 2
+
+    cases = {axis.case.name for axis in chosen}
+    both = tuple(pair for pair in PAIRS if pair.case.name in cases) if pairs and not quick else ()
+    plan = Plan(chosen, both, names, overrides, quick, timeout, memory)
+    if workers is not None:
+        plan = Plan(chosen, both, names, overrides, quick, timeout, memory, workers)
+    try:
+        with _telling(quiet or as_json) as told:
+            result = extremes(plan, told)
+    except WorkerError as error:
+        click.echo(f"--memory: {error}", err=True)
+        return 2
+    return _tell(result, out, stored, as_json, quiet)
+
+
+def _axes(text: str | None, faults: list[Fault]) -> tuple[Axis, ...]:
+    if text is None:
+        return tuple(AXES.values())
+    names = list(dict.fromkeys(name.strip() for name in text.split(",")))
+    faults += [
+        Fault("--axes", None, "", f"no axis {name!r}; axes: {', '.join(AXES)}") for name in names if name not in AXES
+    ]
+    return tuple(AXES[name] for name in names if name in AXES)
+
+
+def _tell(
+    result: Extremes, out: Path | None, stored: Sequence[dict[str, object]] | None, as_json: bool, quiet: bool
+) -> int:
+    """Print what came of it, write it down, and return the exit status."""
+    status = 0
+    document = result.document()
+    found = [] if stored is None else changes(stored, result.limits)
+    worse = [change for change in found if change.worse]
+    if stored is not None:
+        document["changes"] = [change.document() for change in found]
+    for change in worse:
+        click.echo(str(change), err=True)
+        status = 1
+    if result.interrupted:
+        click.echo(f"interrupted: {len(result.cells) + len(result.pairs)} cells are finished and kept", err=True)
+        status = 130
+    if as_json:
+        print_json(document)
+    elif not quiet:
+        print_extremes(result)
+        _tell_changes(found, stored is not None)
+    if out is not None:
+        try:
+            _write(result, document, out)
+        except OSError as error:
+            click.echo(f"--out: {out}: {error.strerror or error}", err=True)
+            return status or 2
+        if not quiet and not as_json:
+            click.echo(f"written: {out}")
+    return status
+
+
+def _tell_changes(found: Sequence[Change], held: bool) -> None:
+    for change in found:
+        if not change.worse:
+            click.echo(str(change))
+    if held and not found:
+        click.echo("every boundary is where it was")
+
+
+def _write(result: Extremes, document: dict[str, object], out: Path) -> None:
+    """Write heat maps and the document into a folder, each to a temporary name first."""
+    from sandbox.report.heatmap import plot_extremes
+
+    plot_extremes(result, out)
+    with whole(out / "extremes.json") as temporary:
+        temporary.write_text(json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1), encoding="utf-8")
+
+
+@contextmanager
+def _telling(silent: bool) -> Iterator[Told | None]:
+    """Yield who is told how far it is: a bar on a terminal, nobody elsewhere."""
+    if silent or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn()
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+        bar = bars.add_task("starting")
+
+        def told(progress: Progress) -> None:
+            text = f"{progress.cells} cells, {progress.failed} failed; {progress.what}"
+            bars.update(bar, description=text, completed=progress.done, total=progress.lines)
+
+        yield told

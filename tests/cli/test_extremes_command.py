@@ -1,0 +1,119 @@
+"""`sandbox extremes` on the command line."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from calling import json_of, lines_of, process
+
+SMALL = ("extremes", "--axes", "stiffness,restitution", "--engines", "pymunk,exact", "--quick", "--workers", "1")
+
+
+def test_document_has_cells_limits_and_predictions(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The same document twice over, but for times; heat maps and the document are written."""
+    status, document, errors = json_of(capfd, *SMALL, "--out", str(tmp_path))
+    assert (status, errors) == (0, [])
+    assert {"axis", "level", "engine", "settings", "verdict", "reason"} <= set(document["cells"][0])
+    assert {"axis", "engine", "settings", "limit", "first_failure"} <= set(document["limits"][0])
+    assert {cell["axis"] for cell in document["cells"]} == {"restitution", "stiffness"}
+    assert {cell["verdict"] for cell in document["cells"]} == {"exact", "degraded", "refused", "failed"}
+    assert all(cell["reason"] for cell in document["cells"])
+    limits = {(limit["axis"], limit["setup"]): limit for limit in document["limits"]}
+    assert limits["stiffness", "pymunk"]["limit"] == 1.99
+    assert limits["stiffness", "pymunk"]["first_failure"] == 2.01
+    assert limits["restitution", "exact"]["first_failure"] is None
+    (spring,) = document["predictions"]
+    assert spring["kind"] == "spring"
+    assert spring["recall"] == 1.0
+    assert (tmp_path / "extremes.png").stat().st_size > 10_000
+    assert json.loads((tmp_path / "extremes.json").read_text(encoding="utf-8")) == document
+
+    # Again, held against boundaries of which one went farther.
+    stored = tmp_path / "extremes.json"
+    farther = json.loads(json.dumps(document))
+    for limit in farther["limits"]:
+        if (limit["axis"], limit["setup"]) == ("stiffness", "pymunk"):
+            limit["limit"] = 3.0
+    stored.write_text(json.dumps(farther), encoding="utf-8")
+    status, again, (line,) = json_of(capfd, *SMALL, "--against", str(stored))
+    assert status == 1
+    assert line.startswith("stiffness on pymunk: worse: passed up to 3, now up to 1.99: ")
+    assert [change["worse"] for change in again["changes"]] == [True]
+    for one, other in zip(document["cells"], again["cells"], strict=True):
+        assert {**one, "seconds": 0.0} == {**other, "seconds": 0.0}
+
+
+def test_table_has_a_line_a_setup(capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, errors = lines_of(capfd, "extremes", "--axes", "speed", "--engines", "exact", "--quick")
+    assert (status, errors) == (0, [])
+    assert out[0] == "speed  exact  EEE  all of them, up to 10"
+    assert "one at a time: 3 cells: 3 exact" in out
+
+
+def test_faults_are_a_line_each_before_anything_runs(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("{}", encoding="utf-8")
+    wrong = ("--axes", "speed,nonsense", "--engines", "pymunk,box3d", "--against", str(file), "--out", str(file))
+    status, document, errors = json_of(capfd, "extremes", *wrong)
+    assert status == 2
+    assert (document["cells"], document["limits"]) == ([], [])
+    assert len(errors) == len(document["faults"]) == 3
+    assert errors[0].startswith("--axes: no axis 'nonsense'; axes: dt, ")
+    assert "no engine 'box3d'" in errors[1]
+    assert "holds no boundaries" in errors[2]
+    status, _, errors = lines_of(capfd, "extremes", "--axes", "speed", "--out", str(file))
+    assert (status, len(errors)) == (2, 1)
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("solver.itterations=3", "itterations"),
+        ("solver.dt", "solver.dt"),
+        ("solver.iterations=0", "iterations"),
+        ("solver.dt=0.01", "varies; leave it out"),
+    ],
+)
+def test_override_that_suits_no_scene_is_a_fault(capfd: pytest.CaptureFixture[str], override: str, words: str) -> None:
+    status, out, errors = lines_of(capfd, "extremes", "--axes", "dt", "--quick", "--set", override)
+    assert (status, out) == (2, [])
+    assert words in errors[0]
+    assert errors[0].startswith("--set")
+
+
+@pytest.mark.parametrize("wrong", [("--timeout", "0"), ("--memory", "10"), ("--workers", "0"), ("--timeout", "nan")])
+def test_limits_out_of_range_are_faults(capfd: pytest.CaptureFixture[str], wrong: tuple[str, str]) -> None:
+    status, _, errors = lines_of(capfd, "extremes", "--axes", "speed", *wrong)
+    assert (status, len(errors)) == (2, 1)
+    assert wrong[0] in errors[0]
+
+
+@pytest.mark.slow
+def test_interrupted_run_keeps_what_is_finished(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sandbox", "extremes", "--axes", "speed,dt", "--no-pairs", "--workers", "1"]
+    running = subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(8.0)  # enough for some cells, and not for all; where none is finished, none is kept
+    for _ in range(2):  # the impatient press it twice
+        running.send_signal(signal.SIGINT)
+    out, errors = running.communicate(timeout=60.0)
+    document = json.loads(out)
+    assert running.returncode == 130
+    assert document["interrupted"]
+    assert errors == f"interrupted: {len(document['cells'])} cells are finished and kept\n"
+    assert all(cell["verdict"] in ("exact", "degraded", "refused", "failed") for cell in document["cells"])
+
+
+@pytest.mark.slow
+def test_cell_that_takes_too_long_fails_and_the_rest_goes_on(tmp_path: Path) -> None:
+    chosen = ("--axes", "count", "--engines", "exact", "--no-pairs", "--timeout", "0.1", "--json")
+    done = process("extremes", *chosen, cwd=tmp_path)
+    assert done.returncode == 0
+    document = json.loads(done.stdout)
+    last = document["cells"][-1]
+    assert (last["level"], last["reason"]) == (10_000, "took longer than 0.1 s, and was stopped")
+    assert len(document["cells"]) == 5
+    assert document["probes"] == []  # where time is up, a boundary would be the machine's

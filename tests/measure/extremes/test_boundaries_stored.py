@@ -1,0 +1,70 @@
+"""Stored boundaries: what is better, worse, and as it was."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sandbox.measure.extremes.boundaries import StoredError, changes, read
+from sandbox.measure.extremes.boundary import Limit
+
+NOW = Limit("speed", "pymunk", "pymunk", {}, 1.0, 1.01, "passed the wall", "through")
+
+
+def before(limit: float | None, first: float | None = 9.0, axis: str = "speed") -> list[dict[str, Any]]:
+    return [{"axis": axis, "setup": "pymunk", "limit": limit, "first_failure": first}]
+
+
+@pytest.mark.parametrize(
+    ("old", "now", "worse"),
+    [
+        (before(1.015), NOW, None),  # both are known to 1 %
+        (before(1.03), NOW, True),
+        (before(0.97), NOW, False),
+        (before(None), NOW, False),
+        (before(1.0), replace(NOW, limit=None), True),
+        (before(None), replace(NOW, limit=None), None),
+        (before(1.0, None), NOW, True),
+        (before(1.0), replace(NOW, first_failure=None), False),
+        (before(10.0, axis="iterations"), replace(NOW, axis="iterations", limit=20.0), True),  # fewer are harder
+        (before(20.0, axis="iterations"), replace(NOW, axis="iterations", limit=10.0), False),
+        (before(10.0, axis="stack"), replace(NOW, axis="stack", unit="boxes", limit=9.0), None),  # one more or less
+        (before(10.0, axis="stack"), replace(NOW, axis="stack", unit="boxes", limit=8.0), True),
+        (before(5.0, axis="chain"), NOW, None),  # not in both
+    ],
+)
+def test_what_has_moved_is_told(old: list[dict[str, Any]], now: Limit, worse: bool | None) -> None:
+    found = changes(old, [now])
+    assert [change.worse for change in found] == ([] if worse is None else [worse])
+
+
+def test_change_is_a_line() -> None:
+    (change,) = changes(before(2.0), [NOW])
+    assert str(change) == "speed on pymunk: worse: passed up to 2, now up to 1: passed the wall"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "cannot be read"),
+        ("[1, 2]", "holds no boundaries"),
+        ('{"limits": [{"axis": "speed"}]}', "holds no boundaries"),
+        ('{"limits": [{"axis": "a", "setup": "b", "limit": "x", "first_failure": null}]}', "no number"),
+        ("[" * 100_000, "cannot be read"),
+    ],
+)
+def test_file_without_boundaries_is_a_fault(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "stored.json"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(StoredError, match=words):
+        read(file)
+
+
+def test_stored_limits_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "stored.json"
+    file.write_text(json.dumps({"limits": [NOW.document()]}), encoding="utf-8")
+    assert changes(read(file), [NOW]) == []
+    with pytest.raises(StoredError, match="No such file"):
+        read(tmp_path / "none.json")

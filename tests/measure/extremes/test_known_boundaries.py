@@ -1,0 +1,99 @@
+"""Boundaries that are known: where engines tunnel, and where springs explode. Axes are sound throughout."""
+
+import math
+
+import pytest
+
+from sandbox.measure.extremes.axes import AXES, PAIRS
+from sandbox.measure.extremes.axis import Axis
+from sandbox.measure.extremes.boundary import Limit
+from sandbox.measure.extremes.cell import Cell, Task
+from sandbox.measure.extremes.line import axis_line
+from sandbox.measure.extremes.setup import Setup
+from sandbox.measure.extremes.trial import attempt
+from sandbox.scene.file import from_document
+
+
+def limit_of(axis: Axis, levels: tuple[float, ...], name: str) -> Limit:
+    (setup,) = (setup for setup in axis.setups if setup.name == name)
+    cells: list[Cell] = []
+    found = axis_line(axis, setup, levels, (), attempt, cells.append)
+    assert found.monotone
+    return found
+
+
+@pytest.mark.parametrize(
+    ("setup", "known"), [("pymunk", 1.0), ("pymunk, 4 substeps", 4.0), ("reference", 1.0), ("reference, bisect", 1.0)]
+)
+def test_bullet_passes_once_a_substep_is_longer_than_radius_and_half_the_wall(setup: str, known: float) -> None:
+    found = limit_of(AXES["speed"], (0.5, 100.0), setup)
+    assert found.rule == "through"
+    assert found.limit == pytest.approx(known, rel=0.01)  # to which boundaries are found
+    assert found.first_failure == pytest.approx(known, rel=0.0101)  # as above, on the other side
+
+
+@pytest.mark.parametrize("setup", ["reference, swept", "reference, shrink", "exact"])
+def test_bullet_passes_none_that_looks_along_its_way(setup: str) -> None:
+    assert limit_of(AXES["speed"], (0.5, 100.0), setup).first_failure is None
+
+
+@pytest.mark.parametrize(
+    ("setup", "known"),
+    [
+        ("pymunk", 2.0),
+        ("reference", 2.0),
+        ("reference, velocity_verlet", 2.0),
+        ("reference, rk4", 2.0 * math.sqrt(2.0)),
+    ],
+)
+def test_swing_grows_from_the_limit_of_its_scheme_on(setup: str, known: float) -> None:
+    found = limit_of(AXES["stiffness"], (1.0, 10.0), setup)
+    # To 1 %; and close to its limit rk4 grows too slowly to be seen in 200 steps, by 1e-4 a step at 0.3 % beyond.
+    assert found.limit == pytest.approx(known, rel=0.011)
+
+
+@pytest.mark.parametrize("name", AXES)
+def test_axis_has_scenes_at_all_its_levels(name: str) -> None:
+    axis = AXES[name]
+    assert set(axis.quick) <= set(axis.levels)
+    rising = axis.levels[-1] > axis.levels[0]
+    assert list(axis.levels) == sorted(axis.levels, reverse=not rising)
+    assert list(axis.quick) == sorted(axis.quick, reverse=not rising)
+    scenes = [from_document(axis.document(level)) for level in axis.quick]
+    assert len({str(scene) for scene in scenes}) == len(scenes)
+
+
+def test_pairs_have_scenes_at_their_corners() -> None:
+    for pair in PAIRS:
+        for a in (pair.first.levels[0], pair.first.levels[-1]):
+            for b in (pair.second.levels[0], pair.second.levels[-1]):
+                from_document(pair.case.document({pair.first.parameter: a, pair.second.parameter: b}))
+    assert len({pair.name for pair in PAIRS}) == len(PAIRS)
+
+
+def test_unknown_parameter_is_an_error() -> None:
+    with pytest.raises(KeyError, match="bullet has no colour"):
+        AXES["speed"].case.document({"colour": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("task", "words"),
+    [
+        (Task("drop", {"dt": 11.0}, "pymunk"), "the scene format refuses: "),
+        (Task("drop", {"dt": 0.01}, "pymunk", {"iterations": 0}), "the scene format refuses: iterations"),
+        (Task("two boxes", {}, "exact"), "it does not model polygons"),
+        (Task("overlap", {"depth": 0.5}, "exact"), "overlap"),
+        (Task("drop", {}, "pymunk", {"detection": "swept"}), "detection 'swept' is not a choice it has"),
+    ],
+)
+def test_what_is_refused_is_refused_with_its_reason(task: Task, words: str) -> None:
+    outcome = attempt(task)
+    assert outcome.verdict == "refused"
+    assert words in outcome.reason
+
+
+def test_same_task_has_the_same_outcome_but_for_its_time() -> None:
+    for setup in (Setup("a", "pymunk"), Setup("b", "reference"), Setup("c", "exact")):
+        task = Task("rack", {"iterations": 10}, setup.engine)
+        first, again = (attempt(task).__dict__ | {"seconds": 0.0} for _ in range(2))
+        assert first == again
