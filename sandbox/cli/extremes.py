@@ -1,6 +1,5 @@
 """`sandbox extremes`: how far each engine and setting goes before it breaks, and whether the forecast saw it coming."""
 
-import json
 import math
 import sys
 from collections.abc import Iterator, Sequence
@@ -10,6 +9,7 @@ from pathlib import Path
 import click
 
 from sandbox.cli.extremes_table import print_extremes
+from sandbox.cli.folder import make_folder, require_folder, write_json
 from sandbox.cli.reading import fault_rows, gathering, print_json
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.extremes import Extremes, Plan, extremes
@@ -20,7 +20,6 @@ from sandbox.measure.extremes.checking import check_overrides
 from sandbox.measure.extremes.matrix import MEMORY, SECONDS, Progress, Told
 from sandbox.measure.extremes.warden import WorkerError
 from sandbox.scene.faults import Fault
-from sandbox.whole import whole
 
 LEAST_MEMORY = 1024
 """MiB: what the libraries of a worker take, and some more."""
@@ -35,7 +34,9 @@ LEAST_MEMORY = 1024
 @click.option("--timeout", type=click.FloatRange(0.1, 86_400.0), default=SECONDS, metavar="S", help="of each cell")
 @click.option("--memory", type=click.IntRange(LEAST_MEMORY), default=MEMORY, metavar="MB", help="of each worker")
 @click.option("--workers", type=click.IntRange(1, 256), metavar="N", help="how many at once; by default one a core")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write heat maps and extremes.json")
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR", help="write report.html, heat maps, extremes.json"
+)
 @click.option(
     "--against", type=click.Path(path_type=Path), metavar="FILE", help="hold the boundaries against stored ones"
 )
@@ -73,11 +74,11 @@ def command(
         faults.append(Fault("--timeout", None, "", f"{timeout} s; a limit is finite"))
     with gathering(faults):
         check_overrides(overrides, chosen)
+    with gathering(faults):
+        require_folder(out)
     if out is not None and not faults:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            faults.append(Fault("--out", None, "", f"{out}: {error.strerror or error}"))
+        with gathering(faults):
+            make_folder(out)
     if faults:
         for fault in faults:
             click.echo(str(fault), err=True)
@@ -150,12 +151,13 @@ def _tell_changes(found: Sequence[Change], held: bool) -> None:
 
 
 def _write(result: Extremes, document: dict[str, object], out: Path) -> None:
-    """Write heat maps and the document into a folder, each to a temporary name first."""
+    """Write heat maps, a page and the document into a folder, each to a temporary name first."""
     from sandbox.report.heatmap import plot_extremes
+    from sandbox.report.page.extremes_page import write_extremes
 
     plot_extremes(result, out)
-    with whole(out / "extremes.json") as temporary:
-        temporary.write_text(json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1), encoding="utf-8")
+    write_extremes(document, out / "report.html")
+    write_json(document, out / "extremes.json")
 
 
 @contextmanager
