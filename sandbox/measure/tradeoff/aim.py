@@ -32,6 +32,8 @@ class Aim(NamedTuple):
     """ms a frame"""
     fps: float
     """frames a second"""
+    step: float = math.inf
+    """s that a step of what is recommended may last: in between, nobody knows how right it is"""
 
     @property
     def hurry(self) -> float | None:

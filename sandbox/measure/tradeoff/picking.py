@@ -10,8 +10,8 @@ from sandbox.measure.tradeoff.weighed import Pick
 FRESH = 3
 """Seeds that a pick is run on again."""
 
-LONGER = 0.01
-"""The share by which a step may last longer than a frame, such as 0.0167 s at 60 a second, and nobody sees."""
+LONGER = 1.01
+"""So many times a frame a step may last, such as 0.0167 s at 60 a second, and nobody sees."""
 
 Again = Callable[[Point], float]
 """Runs a point on fresh seeds and returns the worst error, infinite where a run fails."""
@@ -19,7 +19,8 @@ Again = Callable[[Point], float]
 
 def cheapest(points: Sequence[Point], aim: Aim, fresh: Sequence[int], again: Again) -> Pick | None:
     """Return the cheapest point within the tolerance that keeps to it on fresh seeds too; None where none does."""
-    able = [p for p in points if p.usable and p.error is not None and p.error <= aim.tolerance]
+    able = [p for p in points if p.usable and p.settings.dt <= aim.step]
+    able = [p for p in able if p.error is not None and p.error <= aim.tolerance]
     for point in sorted(able, key=lambda each: each.cost or 0.0):
         error = again(point) if fresh else None
         if error is None or error <= aim.tolerance:
@@ -31,7 +32,7 @@ def best(points: Sequence[Point], aim: Aim, fresh: Sequence[int], again: Again) 
     """Return the point of the least error whose every frame is within the budget, the cheapest of equals; or None."""
     if aim.budget is None:
         return None
-    able = [p for p in points if p.usable and p.frame(aim.fps) <= aim.budget]
+    able = [p for p in points if p.usable and p.settings.dt <= aim.step and p.frame(aim.fps) <= aim.budget]
     point = min(able, key=lambda each: (each.error or 0.0, each.cost or 0.0), default=None)
     if point is None:
         return None
@@ -48,7 +49,7 @@ def told(point: Point, aim: Aim, fresh: float | None) -> str:
         off += f", 1 in {1.0 / point.error:.3g} passes unseen"
     again = "" if fresh is None else f", {figure(fresh, unit)} on fresh seeds"
     share = point.cost / 10.0
-    long = point.settings.dt > (1.0 + LONGER) / aim.fps
+    long = point.settings.dt > LONGER / aim.fps
     steps = f"; a step lasts longer than a frame at {aim.fps:g} a second: draw in between" if long else ""
     return f"{called(point)}: {off}{again}, {point.cost:.3g} ms a simulated second ({share:.2g} % of real time){steps}"
 

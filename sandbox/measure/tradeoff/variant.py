@@ -18,6 +18,8 @@ from sandbox.scene.settings import Detection, Integrator, Joints, Response, Sett
 MOST_SUBSTEPS, MOST_ITERATIONS = 512, 1000
 FEWEST_STEPS = 4
 """A run of fewer says nothing, and is tried only where the scene has no more itself."""
+COARSE = 2.0
+"""Frames of a game that a step may last, unless the scene's own lasts longer: just to see what that does."""
 FINEST, COARSEST = Fraction(256), Fraction(1, 16)
 """How many frames are made of one of the scene's own."""
 
@@ -84,7 +86,7 @@ class Space:
     base: Settings
     engines: tuple[str, ...]
     frame: float = 1.0 / 60.0
-    """s that a game shows a picture; `exact` is not asked for fewer"""
+    """s that a game shows a picture: `exact` is not asked for fewer, nor the others for less than half as many"""
     _sound: dict[Variant, bool] = field(default_factory=dict, init=False, repr=False)
     _filled: dict[Variant, Settings] = field(default_factory=dict, init=False, repr=False)
 
@@ -120,7 +122,8 @@ class Space:
             settings = self.settings(variant)
         except ValidationError:
             return False
-        if variant.engine == "exact" and variant.finer < 1 and settings.dt > self.frame:
+        longest = self.frame if variant.engine == "exact" else COARSE * self.frame
+        if variant.finer < 1 and settings.dt > longest:
             return False
         steps = self.scene.world.duration / settings.dt
         if (variant.finer < 1 and steps < FEWEST_STEPS) or steps > MAX_STEPS / variant.substeps:

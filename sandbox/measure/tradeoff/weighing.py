@@ -13,7 +13,7 @@ from sandbox.measure.tradeoff.aim import Aim, aim_at, metric_named, require_aim
 from sandbox.measure.tradeoff.cost import Cost, costs
 from sandbox.measure.tradeoff.front import outdone, pareto
 from sandbox.measure.tradeoff.judge import Judge, zoom_of
-from sandbox.measure.tradeoff.picking import FRESH, Again, best, cheapest
+from sandbox.measure.tradeoff.picking import FRESH, LONGER, Again, best, cheapest
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.proposals import Proposal, proposals
 from sandbox.measure.tradeoff.search import SLOW, Search, Told
@@ -62,7 +62,7 @@ def tradeoff(
             where that is trusted to the end, else an invariant of the scene.
         tolerance: in the metric's unit; by default 1 % of the smallest radius, 1 px, 1 %, or none missed.
         budget: ms a frame, for the best that it buys.
-        fps: frames a second of the budget.
+        fps: frames a second of the budget; what is recommended steps as often, or as often as the scene does.
         seeds: how many, from the scene's own on; errors are the worst of them.
         zoom: px/m, for errors in pixels; by default all that happens fills a window of 1280 × 720.
         patience: s that the search may take.
@@ -91,7 +91,7 @@ def tradeoff(
     known, fresh = _seeds(scene, seeds)
     close = _closeness(scene, metric, tolerance)
     judges = _judges(scene, base, close, known, zoom)
-    aim = aim_at(judges[0], metric, tolerance, budget, fps)
+    aim = aim_at(judges[0], metric, tolerance, budget, fps)._replace(step=max(base.dt, LONGER / fps))
     space = Space(scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps)
     hurry = None if aim.hurry is None else aim.hurry * scene.world.duration
     search = Search(space, judges, aim.metric.name, aim.tolerance, hurry, patience, most, say)

@@ -71,6 +71,16 @@ def test_step_longer_than_a_frame_has_to_fit_into_one() -> None:
     assert found.point.settings.dt == 0.01
 
 
+def test_step_longer_than_is_wanted_is_not_recommended() -> None:
+    points = [point_of(1.0, 0.0, dt=0.04), point_of(9.0, 0.0, dt=0.02)]
+    for pick in (
+        cheapest(points, AIM._replace(step=0.02), (), never),
+        best(points, AIM._replace(step=0.02), (), never),
+    ):
+        assert pick is not None
+        assert pick.point.settings.dt == 0.02
+
+
 def test_sentence_says_what_it_is_and_what_it_takes() -> None:
     found = cheapest([point_of(12.0, 0.00031, dt=0.01, substeps=4)], AIM, (), never)
     assert found is not None

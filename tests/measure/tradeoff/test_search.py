@@ -76,7 +76,7 @@ def searched(
     monkeypatch.setattr(module, "tried", trying or landscape)
     scene = scene_of(DROP) if scene is None else scene
     judges = [judge_of(scene, until=0.0)]
-    space = Space(scene, scene.solver, engines)
+    space = Space(scene, scene.solver, engines, frame=1.0)
     found = Search(space, judges, "max_position", tolerance, budget, patience, most, lambda _: None)
     found.run()
     return found

@@ -114,6 +114,12 @@ def test_exact_has_but_its_frames() -> None:
     assert found == {Variant("exact", Fraction(1, 2**k)) for k in range(4)}  # up to 0.016 s, a frame of a game
 
 
+def test_steps_last_two_frames_of_a_game_at_most() -> None:
+    space = space_of(dt=0.01)
+    assert max(space.settings(v).dt for v in around(space, "pymunk", rounds=3)) == 0.02  # 0.04 s is beyond 2/60 s
+    assert max(v.dt for v in [space.settings(v) for v in around(space, "exact", rounds=3)]) == 0.01
+
+
 def test_steps_of_a_scene_that_are_coarser_than_a_frame_stay() -> None:
     assert around(space_of(dt=0.05), "exact") == {Variant("exact")}
 
