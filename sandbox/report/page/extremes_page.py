@@ -79,7 +79,7 @@ def _heat(axis: str, cells: Sequence[Document]) -> Markup:
     body = [
         tag(
             "tr",
-            tag("th", engine_name(engine), f" {setup}" if setup else None, scope="row"),
+            tag("th", engine_name(engine), f", {setup}" if setup else None, scope="row"),
             *(_cell(found.get(level)) for level in levels),
         )
         for (engine, setup), found in rows.items()
@@ -116,7 +116,7 @@ def _told(level: tuple[float, ...]) -> str:
 def _setup(cell: Document) -> str:
     """Return what is set besides the axis, in a few words."""
     if cell.get("setup"):
-        return "" if cell["setup"] in {"default", "plain", cell["engine"]} else str(cell["setup"])
+        return "" if cell["setup"] == cell["engine"] else str(cell["setup"]).removeprefix(f"{cell['engine']}, ")
     changed = [f"{key} {value}" for key, value in (cell.get("settings") or {}).items()]
     return ", ".join(changed).replace("_", " ")
 
