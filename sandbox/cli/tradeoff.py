@@ -129,6 +129,9 @@ def command(
     elif not quiet:
         print_tradeoff(scene, found)
     status = 1 if found.within_tolerance is None or (budget is not None and found.within_budget is None) else 0
+    if found.interrupted:
+        click.echo(f"interrupted: {len(found.points)} settings are tried and kept", err=True)
+        status, write = 130, False
     return max(status, _kept(found, document, path, write, out, plot, quiet or as_json))
 
 

@@ -9,6 +9,7 @@ from calling import DROP, FAULTY, document_of, json_of, lines_of, written
 import sandbox
 from sandbox.cli import tradeoff as module
 from sandbox.cli.main import call
+from sandbox.measure.tradeoff.trial import Trial, tried
 from sandbox.scene import rewrite
 
 FEW = ("--engine", "pymunk", "--patience", "60", "--points", "6", "--repeats", "1")
@@ -169,15 +170,50 @@ def test_folder_gets_the_document(tmp_path: Path, capfd: pytest.CaptureFixture[s
     assert document_of((out / "tradeoff.json").read_text(encoding="utf-8")) == document
 
 
-def test_interrupt_is_one_line_and_status_130(
+def interrupted_after(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Interrupt the search when so many settings have been tried."""
+    done = 0
+
+    def until_then(*arguments: Any) -> Trial:
+        nonlocal done
+        if done == count:
+            raise KeyboardInterrupt
+        done += 1
+        return tried(*arguments)
+
+    monkeypatch.setattr("sandbox.measure.tradeoff.search.tried", until_then)
+
+
+def test_interrupt_keeps_what_was_tried(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupted(*_: Any, **__: Any) -> None:
+    interrupted_after(3, monkeypatch)
+    scene = written(tmp_path)
+    status, document, err = json_of(capfd, "tradeoff", scene, "--engine", "pymunk", "--tolerance", "1e-3", "--write")
+    assert (status, err) == (130, ["interrupted: 3 settings are tried and kept"])
+    assert document["interrupted"]
+    assert [row["status"] for row in document["points"]] == ["ok"] * 3
+    assert all(row["cost_ms_per_second"] > 0.0 and row["repeats"] == 0 for row in document["points"])
+    assert Path(scene).read_text(encoding="utf-8") == DROP
+
+
+def test_interrupt_before_anything_is_tried_is_told(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    interrupted_after(0, monkeypatch)
+    assert call(["tradeoff", written(tmp_path), "--engine", "pymunk"]) == 130
+    out, err = capfd.readouterr()
+    assert "none of the 0 that were tried" in out
+    assert err.splitlines() == ["interrupted: 0 settings are tried and kept"]
+
+
+def test_interrupt_while_the_truth_is_sought_is_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sandbox.measure.tradeoff.search.tried", interrupted)
-    scene = written(tmp_path)
-    assert call(["tradeoff", scene, "--write"]) == 130
+    monkeypatch.setattr("sandbox.measure.tradeoff.weighing.truth_of", interrupted)
+    assert call(["tradeoff", written(tmp_path)]) == 130
     out, err = capfd.readouterr()
-    assert (out, err.split()) == ("", ["interrupted"])
-    assert Path(scene).read_text(encoding="utf-8") == DROP
+    assert (out, err.splitlines()[-1]) == ("", "interrupted")

@@ -67,7 +67,8 @@ def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | Non
     were missed agrees with nothing from the first of them on.
 
     The reference is asked first, then every other engine with a step, in the order of the registry; of each, the
-    settings in the order of `PREFERENCES`. Frames stay where they were. None where no engine can run the scene.
+    settings in the order of `PREFERENCES`. Where all of these fail, they are asked again with as many substeps as the
+    settings have. Frames stay where they were. None where no engine can run the scene.
 
     Raises:
         TooLargeError: the frames would not fit into memory.
@@ -75,14 +76,15 @@ def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | Non
     names = sorted((name for name in ENGINES if name != "exact"), key=lambda name: name != "reference")
     iterations = max(settings.iterations, ITERATIONS)
     start = Settings(dt=settings.dt, record_every=settings.record_every, iterations=iterations, slop=SLOP * tolerance)
-    for name in names:
-        for preference in _preferences(scene):
-            wanted = start.replace(**preference)
-            if ENGINES[name].missing(scene, wanted):
-                continue
-            found = _halved(scene, name, wanted, tolerance)
-            if found is not None:
-                return found
+    for substeps in dict.fromkeys((1, settings.substeps)):
+        for name in names:
+            for preference in _preferences(scene):
+                wanted = start.replace(substeps=substeps, **preference)
+                if ENGINES[name].missing(scene, wanted):
+                    continue
+                found = _halved(scene, name, wanted, tolerance)
+                if found is not None:
+                    return found
     return None
 
 

@@ -59,9 +59,18 @@ class Search:
     trials: dict[Variant, Trial] = field(default_factory=dict)
     untried: set[Variant] = field(default_factory=set)
     """variants that would have taken too long"""
+    interrupted: bool = False
+    """by the user; what was tried till then is kept"""
 
     def run(self) -> list[Trial]:
         """Try variants until none is worth it, or the patience is at its end; return all trials in order."""
+        try:
+            self._look()
+        except KeyboardInterrupt:
+            self.interrupted = True
+        return list(self.trials.values())
+
+    def _look(self) -> None:
         self._began = working()
         expanded: set[Variant] = set()
         for start in [self._try(variant) for variant in self.space.starts()[: self.most]]:
@@ -86,7 +95,6 @@ class Search:
                 if self._goes_on(WIDE) and (best.status != "stopped" or variant.work < best.variant.work):
                     self._try(variant, best)
         self._close_in()
-        return list(self.trials.values())
 
     def _reach(self, trial: Trial | None) -> None:
         """Double the substeps until the tolerance is met, or again and again leave the error what it is.

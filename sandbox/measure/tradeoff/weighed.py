@@ -64,6 +64,8 @@ class Tradeoff:
     untried: int
     """variants left out, as they would have taken too long"""
     machine: Mapping[str, Any]
+    interrupted: bool = False
+    """by the user: what was tried till then is here, with the times of the runs that were scored"""
 
     @property
     def truth(self) -> str | None:
@@ -125,5 +127,6 @@ class Tradeoff:
             "within_budget": None if self.within_budget is None else self.within_budget.document(),
             "answers": self.answers(),
             "untried": self.untried,
+            "interrupted": self.interrupted,
             "machine": dict(self.machine),
         }

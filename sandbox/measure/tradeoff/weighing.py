@@ -97,13 +97,20 @@ def tradeoff(
     search = Search(space, judges, aim.metric.name, aim.tolerance, hurry, patience, most, say)
     trials = search.run()
 
+    if search.interrupted:  # what is known is told at once
+        repeats, fresh = 0, ()
     say("timing")
     points = [*_timed(trials, space, aim, repeats, patience), *_refused(scene, names, base)]
     trial_of = {id(point): trial for point, trial in zip(points, trials, strict=False)}  # the refused have none
     again = _again(space, trial_of, aim, lambda: _judges(scene, base, close, fresh, judges[0].zoom), patience)
     say("held to its word")
     within = cheapest(points, aim, fresh, again)
-    say("where the error comes from, and what a cheaper model would do")
+    splits: list[Split] = []
+    cheaper: list[Proposal] = []
+    if not search.interrupted:
+        say("where the error comes from, and what a cheaper model would do")
+        splits = _splits(judges[0], space, patience)
+        cheaper = _proposals(judges, aim, within.point if within else None, space, patience)
     return Tradeoff(
         scene,
         judges[0].truth,
@@ -111,8 +118,8 @@ def tradeoff(
         judges[0].zoom,
         tuple(points),
         tuple(pareto([p for p in points if p.usable], lambda p: p.cost or 0.0, lambda p: p.error or 0.0)),
-        tuple(_splits(judges[0], space, patience)),
-        tuple(_proposals(judges, aim, within.point if within else None, space, patience)),
+        tuple(splits),
+        tuple(cheaper),
         aim.tolerance,
         budget,
         fps,
@@ -121,6 +128,7 @@ def tradeoff(
         known,
         len(search.untried - set(search.trials)),
         {**machine(), **versions()},
+        search.interrupted,
     )
 
 
@@ -178,12 +186,12 @@ def _refused(scene: Scene, names: Sequence[str], base: Settings) -> list[Point]:
 
 
 def _timed(trials: Sequence[Trial], space: Space, aim: Aim, repeats: int, patience: float) -> list[Point]:
-    """Time what is near the front again and again; of what is far from it, the run that was recorded says enough."""
+    """Time what is near the front again and again, if at all; of what is far, the run that was recorded says enough."""
     ok = [trial for trial in trials if trial.status == "ok"]
     seen = [(trial.seconds, trial.error(aim.metric.name)) for trial in ok]
     near = [trial for trial in ok if not outdone(trial.seconds, trial.error(aim.metric.name), seen, NEAR)]
     ways = [(trial.variant.engine, space.settings(trial.variant)) for trial in near]
-    found = dict(zip(near, costs(space.scene, ways, repeats, AGAIN * patience), strict=True))
+    found = dict(zip(near, costs(space.scene, ways, repeats, AGAIN * patience), strict=True)) if repeats else {}
     rough = {trial: Cost.of([trial.seconds], space.scene.world.duration)._replace(repeats=0) for trial in ok}
     return [_point(trial, space, aim, {**rough, **found}.get(trial)) for trial in trials]
 
