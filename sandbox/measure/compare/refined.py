@@ -78,7 +78,7 @@ def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | Non
     start = Settings(dt=settings.dt, record_every=settings.record_every, iterations=iterations, slop=SLOP * tolerance)
     for substeps in dict.fromkeys((1, settings.substeps)):
         for name in names:
-            for preference in _preferences(scene):
+            for preference in preferences(scene):
                 wanted = start.replace(substeps=substeps, **preference)
                 if ENGINES[name].missing(scene, wanted):
                     continue
@@ -88,7 +88,8 @@ def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | Non
     return None
 
 
-def _preferences(scene: Scene) -> tuple[dict[str, object], ...]:
+def preferences(scene: Scene) -> tuple[dict[str, object], ...]:
+    """Return the ways of doing things that agree soonest with a finer step, the best first."""
     if not (len(scene.links) or scene.attractions or scene.thrusts):
         return PREFERENCES
     if len(scene.links.of(*HOLDING, LinkKind.MOTOR)):

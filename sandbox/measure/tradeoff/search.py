@@ -1,9 +1,9 @@
 """Search: which variants are worth a run. It refines near the front, and stops branches that are outdone.
 
-First each engine's substeps are doubled until it meets the tolerance, if it can, so that there is an answer. From its
-own settings on, the variants one choice away are tried then: of those trials that nothing outdoes on the same engine,
-the one that matters most for what is asked. At last the smallest number of substeps and of iterations
-that still meets the tolerance is closed in on.
+First each engine's substeps are doubled until it meets the tolerance, if it can, so that there is an answer; and the
+ways together that are known to suit such a scene are tried. From its own settings on, the variants one choice away are
+tried then: of those trials that nothing outdoes on the same engine, the one that matters most for what is asked. At
+last the smallest number of substeps and of iterations that still meets the tolerance is closed in on.
 """
 
 import math
@@ -73,8 +73,13 @@ class Search:
     def _look(self) -> None:
         self._began = working()
         expanded: set[Variant] = set()
-        for start in [self._try(variant) for variant in self.space.starts()[: self.most]]:
+        starts = [self._try(variant) for variant in self.space.starts()[: self.most]]
+        for start in starts:
             self._reach(start)
+        by_engine = {start.variant.engine: start for start in starts if start is not None and start.status != "stopped"}
+        for variant in self.space.suited():
+            if variant.engine in by_engine and self._goes_on(WIDE):
+                self._try(variant, by_engine[variant.engine])
         aims = (
             [self._near_tolerance, self._near_budget, self._cheap]
             if self.budget

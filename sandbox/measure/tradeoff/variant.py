@@ -1,6 +1,6 @@
 """Variant: one engine with one choice of settings, and the variants that are one choice away."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -10,6 +10,7 @@ from typing import Any, get_args
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.compare.refined import preferences
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.part import MAX_STEPS
@@ -73,6 +74,13 @@ class Variant:
         """Return the variant with another way of doing one thing."""
         return replace(self, words=tuple(sorted([*self.without_word(key).words, (key, value)])))
 
+    def with_words(self, words: Mapping[str, Any]) -> "Variant":
+        """Return the variant with other ways of doing several things."""
+        variant = self
+        for key, value in words.items():
+            variant = variant.with_word(key, value)
+        return variant
+
     def without_word(self, key: str) -> "Variant":
         """Return the variant with one thing done as the scene has it, or as the engine likes it."""
         return replace(self, words=tuple((k, v) for k, v in self.words if k != key))
@@ -93,6 +101,12 @@ class Space:
     def starts(self) -> list[Variant]:
         """Return each engine with the scene's own settings; what only some engines take is left out for the others."""
         return [Variant.of(name, self.own(name)) for name in self.engines]
+
+    def suited(self) -> list[Variant]:
+        """Return the ways together that are known to suit such a scene, which one at a time would not show."""
+        ways = (start.with_words(words) for start in self.starts() for words in preferences(self.scene))
+        found = dict.fromkeys(self.plain(way) for way in ways if self.sound(way))
+        return [way for way in found if way.words]
 
     def own(self, engine: str) -> Settings:
         """Return the settings that an engine's variants differ from: the scene's, or of these what all engines take."""

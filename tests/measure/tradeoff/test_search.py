@@ -182,7 +182,19 @@ def test_dominated_branches_are_stopped(monkeypatch: pytest.MonkeyPatch) -> None
     landscape = Landscape(order(1.0), price=lambda variant: 3.0 ** len(variant.words))
     search = searched(monkeypatch, landscape, 0.1, engines=("reference",))
     assert not cheapest(search).variant.words
-    assert not [variant for variant in landscape.asked if len(variant.words) > 1]
+    together = {variant for variant in landscape.asked if len(variant.words) > 1}
+    assert together == {variant for variant in search.space.suited() if len(variant.words) > 1}
+
+
+def test_ways_that_only_help_together_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Exact flight and impacts within a step: each alone leaves the other's error, and costs more."""
+    both = {("integrator", "velocity_verlet"), ("detection", "swept")}
+    landscape = Landscape(
+        lambda variant: 1e-9 if both <= set(variant.words) else 1.0 / steps(variant),
+        price=lambda variant: 3.0 ** len(variant.words),
+    )
+    search = searched(monkeypatch, landscape, 1e-6, engines=("reference",))
+    assert set(cheapest(search).variant.words) == both
 
 
 def test_no_variant_is_tried_twice(monkeypatch: pytest.MonkeyPatch) -> None:
