@@ -5,8 +5,8 @@ from pathlib import Path
 import click
 
 from sandbox.cli.comparison_table import print_comparison
-from sandbox.cli.folder import make_folder, require_folder, write_json
 from sandbox.cli.minimising import faults_of, minimised
+from sandbox.cli.output import make_folder, require_folder, write_json
 from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
 from sandbox.cli.telling import telling
 from sandbox.engines.registry import UnknownEngineError, engine_named

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from sandbox.cli.extremes_table import print_extremes
-from sandbox.cli.folder import make_folder, require_folder, write_json
+from sandbox.cli.output import make_folder, require_folder, write_json
 from sandbox.cli.reading import fault_rows, gathering, print_json
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.extremes import Extremes, Plan, extremes

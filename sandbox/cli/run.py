@@ -12,11 +12,13 @@ from sandbox.batch.outcome import Outcome, execute
 from sandbox.batch.plan import Job, parse_sweep, plan
 from sandbox.batch.store import Store, StoreError
 from sandbox.cli.ledger_table import print_ledgers
+from sandbox.cli.output import require_picture
 from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json
 from sandbox.cli.table import Row, print_runs
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.recorder import TooLargeError, require_memory
 from sandbox.measure.run import Progress
+from sandbox.measure.seeds import same_chances
 from sandbox.scene.address import AddressError
 from sandbox.scene.faults import Fault, SceneError
 
@@ -153,15 +155,8 @@ def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) 
     if plot is not None:
         if len(jobs) != 1:
             fault("--plot", f"draws one run, but this makes {len(jobs)}")
-        if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
-            fault("--plot", f"{plot}: the name ends in .png, .svg or .pdf")
-        try:
-            if not plot.absolute().parent.is_dir():
-                fault("--plot", f"{plot}: there is no folder {plot.parent}")
-            elif plot.is_dir():
-                fault("--plot", f"{plot}: is a folder")
-        except OSError as error:  # such as a name longer than any file's
-            fault("--plot", f"{plot}: {error.strerror or error}")
+        with gathering(faults):
+            require_picture(plot)
         unknown = [name for name in bodies if name not in jobs[0].scene.bodies.names]
         if unknown:
             fault("--body", f"no body is named {', '.join(map(repr, unknown))}")
@@ -177,11 +172,7 @@ def _tell_if_nothing_is_random(jobs: list[Job]) -> None:
         other = next((scene for scene in others if scene.world.seed != first.world.seed), first)
         if other is first:
             continue
-        same = (
-            getattr(first.bodies, key).tobytes() == getattr(other.bodies, key).tobytes()
-            for key in ("position", "velocity", "lifetime")
-        )
-        if all(same):
+        if same_chances(first, other):
             click.echo(f"{label}: nothing in it is random: all seeds are the same run", err=True)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from sandbox.batch.plan import USUAL
-from sandbox.cli.folder import make_folder, require_folder, write_json
+from sandbox.cli.output import make_folder, require_folder, require_picture, write_json
 from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
 from sandbox.cli.telling import telling
 from sandbox.cli.tradeoff_table import print_tradeoff
@@ -95,6 +95,8 @@ def command(
             write_solver(path, {})  # changes nothing, but tells whether it could
     with gathering(faults):
         require_folder(out)
+    with gathering(faults):
+        require_picture(plot)
     if out is not None and not faults:
         with gathering(faults):
             make_folder(out)
