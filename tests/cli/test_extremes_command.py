@@ -61,10 +61,11 @@ def test_faults_are_a_line_each_before_anything_runs(capfd: pytest.CaptureFixtur
     status, document, errors = json_of(capfd, "extremes", *wrong)
     assert status == 2
     assert (document["cells"], document["limits"]) == ([], [])
-    assert len(errors) == len(document["faults"]) == 3
+    assert len(errors) == len(document["faults"]) == 4
     assert errors[0].startswith("--axes: no axis 'nonsense'; axes: dt, ")
     assert "no engine 'box3d'" in errors[1]
     assert "holds no boundaries" in errors[2]
+    assert errors[3] == f"--out: {file}: is no folder"
     status, _, errors = lines_of(capfd, "extremes", "--axes", "speed", "--out", str(file))
     assert (status, len(errors)) == (2, 1)
 

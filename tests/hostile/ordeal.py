@@ -50,13 +50,8 @@ def say(value):
     print(json.dumps(value))
 """
 
-WAYS = pytest.mark.parametrize("flags", [(), ("-O",)], ids=["plain", "optimised"])
-"""`python -O` leaves out every assert, pymunk's own among them."""
-
-HEAVY = pytest.mark.parametrize(
-    "flags", [(), pytest.param(("-O",), marks=pytest.mark.slow)], ids=["plain", "optimised"]
-)
-"""The same for what takes some seconds."""
+WAYS = pytest.mark.parametrize("flags", [(), pytest.param(("-O",), marks=pytest.mark.slow)], ids=["plain", "optimised"])
+"""`python -O` leaves out every assert, pymunk's own among them. To do all of it twice takes its time."""
 
 
 def endure(code: str, flags: tuple[str, ...] = (), timeout: float = 60.0) -> Any:

@@ -1,11 +1,11 @@
 """Crowds: what takes pymunk minutes, or for ever, if it is let. Each ends in a reason, or in a few seconds."""
 
 import pytest
-from ordeal import HEAVY, WAYS, endure
+from ordeal import WAYS, endure
 
 
-@HEAVY
-@pytest.mark.parametrize("count", [1_000, 1_000_000])
+@WAYS
+@pytest.mark.parametrize("count", [1_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
 def test_balls_in_one_spot_are_refused(count: int, flags: tuple[str, ...]) -> None:
     code = f"""
 grid = {{"origin": [0, 0], "columns": 1000, "rows": {count} // 1000, "spacing": [0, 0], "radius": 1}}
@@ -33,7 +33,7 @@ say([outcome(attempt, count) for count in (1_000, 3_000, 1_000_000)])
     assert endure(code, flags) == ["done", "SceneError", "SceneError"]
 
 
-@HEAVY
+@WAYS
 def test_crowd_hidden_behind_a_giant_is_refused(flags: tuple[str, ...]) -> None:
     """A giant makes all balls its neighbours, of which there are too many to look at every pair."""
     code = """
@@ -112,7 +112,7 @@ say([len(simulation.retired), bool(frame.present.any()), bool(frame.velocity.any
     assert endure(code, flags) == [100_000, False, False, True]
 
 
-@HEAVY
+@WAYS
 def test_forty_thousand_balls_in_a_sorted_line_are_added(flags: tuple[str, ...]) -> None:
     """In that order pymunk's tree takes half a minute for them; shuffled, a second or two."""
     code = """
@@ -125,7 +125,7 @@ say(len(simulation.frame().position))
     assert endure(code, flags) == 40_000
 
 
-@HEAVY
+@WAYS
 @pytest.mark.parametrize("shape", ["line", "spiral"])
 def test_wall_of_a_hundred_thousand_points_is_added(shape: str, flags: tuple[str, ...]) -> None:
     """As a line it is sorted, which pymunk's tree takes minutes for unless it is shuffled."""
@@ -165,7 +165,8 @@ say(outcome(from_document, things[{kind!r}]))
     assert endure(code, flags) == "SceneError"
 
 
-@HEAVY
+@pytest.mark.slow
+@WAYS
 def test_too_many_points_too_many_bodies_and_too_many_surfaces_are_refused(flags: tuple[str, ...]) -> None:
     code = """
 line = [[k * 0.001, 0] for k in range(100_001)]

@@ -1,7 +1,7 @@
 """Hostile solids, joints and forces: they run, diverge with a reason, or are refused; the process lives."""
 
 import pytest
-from ordeal import HEAVY, WAYS, endure
+from ordeal import WAYS, endure
 
 CASES: dict[str, tuple[str, str]] = {
     "a pin of a body to itself": ('dict(ball=two, joint=[dict(kind="pin", between=["a", "a"])])', "SceneError"),
@@ -195,7 +195,7 @@ say(found)
 """
 
 
-@HEAVY
+@WAYS
 def test_extreme_solids_and_joints_end_as_they_should(flags: tuple[str, ...]) -> None:
     cases = ", ".join(f"{name!r}: lambda: {document}" for name, (document, _) in CASES.items())
     code = SCENES + f"\nsay({{name: ends(make()) for name, make in {{{cases}}}.items()}})\n"

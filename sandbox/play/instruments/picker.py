@@ -47,6 +47,10 @@ class Card:
         scene = self.found.scene if self.found else None
         return scene.about if scene is not None else ""
 
+    def is_called(self, text: str) -> bool:
+        """Tell whether a text is its name, with or without its folder, or its title."""
+        return text.casefold() in (self.name.casefold(), self.name.rpartition("/")[2].casefold(), self.title.casefold())
+
     def fits(self, words: Sequence[str]) -> bool:
         """Tell whether all words are found in what it says."""
         text = f"{self.name} {self.title} {self.about}".casefold()
@@ -76,9 +80,10 @@ class Picker:
 
     @property
     def shown(self) -> list[Card]:
-        """The cards that fit what was typed."""
+        """The cards that fit what was typed; those that are called so come first."""
         words = self.typed.casefold().split()
-        return [card for card in self.cards if card.fits(words)]
+        fitting = [card for card in self.cards if card.fits(words)]
+        return sorted(fitting, key=lambda card: not card.is_called(self.typed))
 
     def handle(self, event: pygame.event.Event) -> Path | None:
         """Take an event in, and return the file of the scene that it chooses, if it does."""

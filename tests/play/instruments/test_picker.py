@@ -110,6 +110,14 @@ def test_typing_filters_by_title_and_about(files: list[tuple[str, Path]]) -> Non
     assert len(picker.shown) == len(files)
 
 
+@pytest.mark.parametrize("text", ["s1", "Mine/S1", "scene 1"])
+def test_scene_that_is_called_as_typed_comes_first(files: list[tuple[str, Path]], text: str) -> None:
+    picker = drawn([files[10], files[11], files[1]])
+    typed(picker, text)
+    assert [card.title for card in picker.shown] == ["Scene 1", "Scene 10", "Scene 11"]
+    assert picker.handle(key(pygame.K_RETURN)) == files[1][1]
+
+
 def test_enter_chooses_nothing_where_nothing_fits(files: list[tuple[str, Path]]) -> None:
     picker = drawn(files)
     typed(picker, "teapot")
