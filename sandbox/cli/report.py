@@ -85,7 +85,9 @@ def command(
                 click.echo(f"{k + 1}/{len(read)} {name}", err=True)
             try:
                 found = compare(scene, names, why=why)
-                weighed = tradeoff(scene, names, patience=patience).document(name) if patience else None
+                weighed = (
+                    tradeoff(scene, names, patience=patience, truth=found.best).document(name) if patience else None
+                )
             except (TooLargeError, SceneError) as error:
                 status = 1
                 click.echo(f"{name}: {error}", err=True)

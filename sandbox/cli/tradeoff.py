@@ -10,7 +10,8 @@ from sandbox.cli.output import make_folder, require_folder, require_picture, wri
 from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
 from sandbox.cli.telling import telling
 from sandbox.cli.tradeoff_table import print_tradeoff
-from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.engines.registry import ENGINES, UnknownEngineError, engine_named
+from sandbox.measure.compare import compare
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.tradeoff.aim import UnknownMetricError, require_aim
 from sandbox.measure.tradeoff.metrics import METRICS
@@ -167,7 +168,9 @@ def _kept(
             from sandbox.report.page.tradeoff_page import write_tradeoff
 
             write_json(document, out / "tradeoff.json")
-            write_tradeoff(document, out / "report.html")
+            engines = [name for name in ENGINES if any(point.engine == name for point in found.points)]
+            replayed = None if found.interrupted else compare(found.scene, engines, truth=found.best)
+            write_tradeoff(document, out / "report.html", replayed)
             _say(f"written: {out}", silent)
     except OSError as error:
         faults.append(Fault("--out" if plot is None else "--plot", None, "", f"{error.filename}: {error.strerror}"))

@@ -168,6 +168,9 @@ def test_folder_gets_the_document(tmp_path: Path, capfd: pytest.CaptureFixture[s
     _, document, err = json_of(capfd, "tradeoff", written(tmp_path), *FEW, "--tolerance", "1", "--out", str(out))
     assert err == []
     assert document_of((out / "tradeoff.json").read_text(encoding="utf-8")) == document
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Error against cost" in page
+    assert "<canvas" in page
 
 
 def interrupted_after(count: int, monkeypatch: pytest.MonkeyPatch) -> None:

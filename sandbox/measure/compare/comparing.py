@@ -37,6 +37,7 @@ def compare(
     *,
     tolerance: float | None = None,
     why: bool = False,
+    truth: Truth | None = None,
     told: Told | None = None,
     **settings: Any,
 ) -> Comparison:
@@ -51,6 +52,7 @@ def compare(
         tolerance: of positions, m: beyond it a run has diverged from the truth. By default 1 % of the radius of
             the smallest ball that moves, or of the half width of what is thinner.
         why: rerun each engine that is off with one knob changed at a time, and say which one matters.
+        truth: of this scene, its frames and the tolerance, where it is known already.
         told: who is told what is being done.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
@@ -71,8 +73,9 @@ def compare(
     require_memory(scene, wanted, len(scene.bodies) * (len(names) + 3))
 
     say = told or _silent
-    say("the truth")
-    truth = truth_of(scene, wanted, tolerance)
+    if truth is None:
+        say("the truth")
+        truth = truth_of(scene, wanted, tolerance)
     rows, runs = [], {}
     for name in names:
         say(name)

@@ -6,7 +6,7 @@ from typing import Any
 
 from sandbox.engines.registry import ENGINES, engine_named
 from sandbox.measure.compare.comparing import usual_tolerance
-from sandbox.measure.compare.truth import truth_of
+from sandbox.measure.compare.truth import Truth, truth_of
 from sandbox.measure.recorder import require_memory
 from sandbox.measure.seeds import is_random, seeded
 from sandbox.measure.tradeoff.aim import Aim, aim_at, metric_named, require_aim
@@ -50,6 +50,7 @@ def tradeoff(
     patience: float = PATIENCE,
     repeats: int = REPEATS,
     most: int = POINTS,
+    truth: Truth | None = None,
     told: Told | None = None,
     **settings: Any,
 ) -> Tradeoff:
@@ -68,6 +69,7 @@ def tradeoff(
         patience: s that the search may take.
         repeats: how often what is near the front is timed.
         most: how many settings are tried.
+        truth: of this scene and its frames, as close as the tolerance asks for, where it is known already.
         told: who is told what is being done.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
@@ -90,7 +92,7 @@ def tradeoff(
     say("the truth")
     known, fresh = _seeds(scene, seeds)
     close = _closeness(scene, metric, tolerance)
-    judges = _judges(scene, base, close, known, zoom)
+    judges = _judges(scene, base, close, known, zoom, truth)
     aim = aim_at(judges[0], metric, tolerance, budget, fps)._replace(step=max(base.dt, LONGER / fps))
     space = Space(scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps)
     hurry = None if aim.hurry is None else aim.hurry * scene.world.duration
@@ -157,12 +159,20 @@ def _closeness(scene: Scene, metric: str | None, tolerance: float | None) -> flo
     return close
 
 
-def _judges(scene: Scene, base: Settings, close: float, seeds: Sequence[int], zoom: float | None) -> list[Judge]:
-    """Return a judge for each seed."""
+def _judges(
+    scene: Scene,
+    base: Settings,
+    close: float,
+    seeds: Sequence[int],
+    zoom: float | None,
+    known: Truth | None = None,
+) -> list[Judge]:
+    """Return a judge for each seed; the truth of the scene's own may be known."""
     found = []
     for seed in seeds:
-        own = scene if seed == scene.world.seed else seeded(scene, seed)
-        truth = truth_of(own, base, close)
+        same = seed == scene.world.seed
+        own = scene if same else seeded(scene, seed)
+        truth = known if same and known is not None else truth_of(own, base, close)
         found.append(Judge(own, truth, zoom_of(own, truth) if zoom is None else zoom))
     return found
 

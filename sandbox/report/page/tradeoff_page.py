@@ -35,7 +35,8 @@ def tradeoff_page(document: Document, comparison: Comparison | None = None) -> P
     """
     sections = [Section("Error against cost", weighed(document, "trade"), lead=POINTS), *details(document)]
     if comparison is not None and comparison.trajectories:
-        sections.append(Section("Replay", linked_plots(comparison, "plot"), lead=HOW))
+        how = f"Each engine with the scene's own settings. {HOW}"
+        sections.append(Section("Replay", linked_plots(comparison, "plot"), lead=how))
     lead = joined(answers(document), tag("p", truth_of(document), class_="soft"))
     title = document.get("title") or str(document.get("scene") or "Untitled scene")
     return Page(title, "Trade-off", sections, lead, document.get("versions") or {}, document.get("machine") or {})

@@ -247,3 +247,17 @@ def test_whoever_asks_is_told_what_is_done() -> None:
     told: list[str] = []
     compare(load(find("ball")), ["pymunk"], why=True, told=told.append)
     assert told == ["the truth", "pymunk", "pymunk: why"]
+
+
+def test_truth_that_is_known_is_not_sought_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = truth_of(BOUNCE, BOUNCE.solver, 1e-3)
+
+    def sought(*_: Any) -> None:
+        raise AssertionError("the truth is known")
+
+    monkeypatch.setattr("sandbox.measure.compare.comparing.truth_of", sought)
+    monkeypatch.setattr("sandbox.measure.tradeoff.weighing.truth_of", sought)
+    judged = compare(BOUNCE, ("pymunk",), truth=known)
+    assert judged.best is known
+    weighed = sandbox.tradeoff(BOUNCE, ("pymunk",), truth=known, most=1, repeats=1)
+    assert weighed.points[0].error == judged.rows[0].score.max_position
