@@ -9,13 +9,17 @@ from sandbox.measure.compare.closed import as_run
 from sandbox.measure.compare.horizon import NUDGE, agree_until, nudged
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.compare.refined import refined
+from sandbox.measure.forecast.events import event_warnings
 from sandbox.measure.run import run
+from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
 PATIENCE = 120.0
 """s that `exact` may take; longer, and the refined truth is used."""
+DOUBTFUL = 10.0
+"""s that it may take where the forecast is that it will give up: what has not come to rest by then may get there."""
 
 TruthKind = Literal["closed_form", "exact", "refined"]
 
@@ -58,8 +62,9 @@ def truth_of(scene: Scene, settings: Settings, tolerance: float) -> Truth | None
     note = ""
     exact = ENGINES.get("exact")
     if exact is not None and not exact.missing(scene, bare(settings)):
+        doubtful = next(event_warnings(scene, meetings(scene)), None) is not None
         try:
-            found = patient_run(scene, "exact", bare(settings), PATIENCE)
+            found = patient_run(scene, "exact", bare(settings), DOUBTFUL if doubtful else PATIENCE)
         except TookTooLongError as error:
             note = f"; exact was {error}"
         else:
