@@ -144,11 +144,15 @@ def execute(
             if done is not None:
                 done(outcome)
             return outcome
+        audit = audit or bool(outcome.trajectory.info.get("audited"))  # what was known stays known
     trajectory = run(job.scene, job.engine, actions=job.actions, audit=audit, account=account, progress=progress)
     with uninterrupted():
         path = store.file(store.add(trajectory, number)) if store is not None else None
         if found is not None and path is not None:
-            trajectory.save(path)
+            try:
+                trajectory.save(path)
+            except OSError as error:
+                raise StoreError(f"{path}: {error.strerror or error}") from None
         outcome = Outcome(job, number, trajectory, path, repeated=False)
         if done is not None:
             done(outcome)

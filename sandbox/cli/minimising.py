@@ -1,6 +1,7 @@
 """`sandbox compare --minimise`: who parts, the file that the smallest scene goes into, and what is said of it."""
 
 import json
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -153,7 +154,9 @@ def _sentence(found: Minimised, asked: Disagreement) -> str:
 
 def _text(scene: str, found: Minimised, asked: Disagreement, path: Path) -> str:
     """Return the scene's text, its first lines saying what it shows and how to see it."""
-    again = f"sandbox compare {path.name} --engines {','.join(asked.engines)} --tolerance {asked.tolerance!r}"
+    again = (
+        f"sandbox compare {shlex.quote(path.name)} --engines {','.join(asked.engines)} --tolerance {asked.tolerance!r}"
+    )
     lines = f"{_sentence(found, asked)}.", f"{_counted(found).capitalize()}, of {Path(scene).name}.", f"See: {again}"
     shown = ("".join(letter if letter.isprintable() else " " for letter in line) for line in lines)
     words = {"title": f"{found.scene.title or Path(scene).stem}, minimised"[-200:], "about": lines[0]}

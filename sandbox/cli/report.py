@@ -1,5 +1,6 @@
 """`sandbox report`: one page over many scenes, each compared on every engine."""
 
+import math
 from pathlib import Path
 
 import click
@@ -62,6 +63,8 @@ def command(
             path = paths_of([name])[0][1]
             require_scene(name, path)
             read.append((name, load(path, overrides)))
+    if not math.isfinite(patience):
+        faults.append(Fault("--patience", None, "", f"{patience} s; it is finite"))
     if not read and not faults:
         faults.append(Fault("SCENES", None, "", "no benchmark scenes ship here; name some"))
     if not faults:
@@ -85,9 +88,7 @@ def command(
                 click.echo(f"{k + 1}/{len(read)} {name}", err=True)
             try:
                 found = compare(scene, names, why=why)
-                weighed = (
-                    tradeoff(scene, names, patience=patience, truth=found.best).document(name) if patience else None
-                )
+                weighed = tradeoff(scene, names, patience=patience, truth=found.best) if patience else None
             except (TooLargeError, SceneError) as error:
                 status = 1
                 click.echo(f"{name}: {error}", err=True)
@@ -97,8 +98,11 @@ def command(
                 )
                 continue
             with uninterrupted():
-                overview.add(SceneReport(name, found, tradeoff=weighed))
-            told.append({**found.document(name), "status": "ok", "reason": None, "tradeoff": weighed})
+                document = None if weighed is None else weighed.document(name)
+                overview.add(SceneReport(name, found, tradeoff=document))
+                told.append({**found.document(name), "status": "ok", "reason": None, "tradeoff": document})
+            if weighed is not None and weighed.interrupted:
+                raise KeyboardInterrupt
     except KeyboardInterrupt:
         status = 130
         click.echo(f"interrupted: {len(told)} of {len(read)} scenes are finished and kept", err=True)

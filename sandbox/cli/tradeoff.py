@@ -158,12 +158,14 @@ def _kept(
             engine = found.within_tolerance.point.engine
             if engine != USUAL:
                 _say(f"run it with --engine {engine}", silent)
+    asked = "--plot"
     try:
         if plot is not None:
             from sandbox.report.work_precision import plot_tradeoff
 
             plot_tradeoff(document, plot)
             _say(f"written: {plot}", silent)
+        asked = "--out"
         if out is not None:
             from sandbox.report.page.tradeoff_page import write_tradeoff
 
@@ -173,7 +175,7 @@ def _kept(
             write_tradeoff(document, out / "report.html", replayed)
             _say(f"written: {out}", silent)
     except OSError as error:
-        faults.append(Fault("--out" if plot is None else "--plot", None, "", f"{error.filename}: {error.strerror}"))
+        faults.append(Fault(asked, None, "", f"{error.filename}: {error.strerror}"))
     for fault in faults:
         click.echo(str(fault), err=True)
     return 2 if faults else 0

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.contract import Simulation
-from sandbox.engines.succession import total_energy
+from sandbox.engines.energy import total_energy
 
 
 @contextmanager

@@ -1,11 +1,18 @@
 """Energy: what the bodies of a running scene have in one state."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.potential import Potential
 from sandbox.trajectory import FloatArray, Frame
+
+if TYPE_CHECKING:
+    from sandbox.engines.contract import Simulation
 
 
 def energy_of(
@@ -38,3 +45,11 @@ def energy_of(
                 state = frame.position[None], frame.angle[None], frame.present[None]
                 potential += float(stored.at(np.asarray([frame.time]), *state)[0])
         return kinetic, potential, kinetic + potential
+
+
+def total_energy(simulation: Simulation) -> float:
+    """Return the energy of the present state, J."""
+    scene, broken = simulation.scene, simulation.broken
+    breaks = np.full(len(scene.links), np.inf)
+    breaks[list(broken)] = list(broken.values())
+    return energy_of(simulation.frame(), simulation.bodies, scene.world.gravity, scene, breaks)[2]

@@ -3,11 +3,9 @@
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-import numpy as np
-
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.contract import Simulation
-from sandbox.engines.energy import energy_of
+from sandbox.engines.energy import total_energy
 
 
 class Succession:
@@ -51,11 +49,3 @@ class Succession:
         work = present.account()[Cause.ACTIONS] - before
         self._past.enter(Cause.DRIVES, work)
         self._past.enter(Cause.ACTIONS, -work)
-
-
-def total_energy(simulation: Simulation) -> float:
-    """Return the energy of the present state, J."""
-    scene, broken = simulation.scene, simulation.broken
-    breaks = np.full(len(scene.links), np.inf)
-    breaks[list(broken)] = list(broken.values())
-    return energy_of(simulation.frame(), simulation.bodies, scene.world.gravity, scene, breaks)[2]

@@ -10,9 +10,9 @@ from sandbox.action import Action, ActionError, Spawn, actions_to_json, in_order
 from sandbox.engines.account import Cause
 from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
+from sandbox.engines.energy import total_energy
 from sandbox.engines.registry import engine_named
 from sandbox.engines.relay import start
-from sandbox.engines.succession import total_energy
 from sandbox.measure.audit import Audit
 from sandbox.measure.energy import energies
 from sandbox.measure.joint_error import joint_error

@@ -26,7 +26,7 @@ MEANINGS: dict[Word, str] = {
     "failed": "failed",
 }
 NOT_RUN = "#ffffff"
-ROW, COLUMN = 0.24, 0.62  # inches of a field
+ROW = 0.24  # inches of a field
 
 
 def plot_extremes(result: Extremes, folder: str | Path) -> tuple[Path, ...]:

@@ -112,3 +112,14 @@ def test_damaged_arrays_are_a_fault_of_the_store(tmp_path: Path) -> None:
         path.unlink()
         assert not execute(JOB, store).repeated
         assert len(store.rows()) == 1
+
+
+def test_ledger_made_later_keeps_the_audit_that_was_stored(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    execute(JOB, store)
+    again = execute(JOB, store, audit=False, account=True)
+    assert not again.repeated
+    assert again.trajectory.missed_contacts == 0  # nothing meets; None where it was not looked for
+    found = execute(JOB, store, audit=False, account=True)
+    assert (found.repeated, found.trajectory.missed_contacts, len(found.trajectory.energy)) == (True, 0, 11)
+    store.close()

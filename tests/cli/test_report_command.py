@@ -94,3 +94,11 @@ def test_out_that_cannot_be_written_is_status_2(tmp_path: Path, capfd: pytest.Ca
 def test_out_is_asked_for(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert call(["report", written(tmp_path)]) == 2
     assert "--out" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("seconds", ["inf", "nan"])
+def test_patience_without_end_is_a_fault(tmp_path: Path, capfd: pytest.CaptureFixture[str], seconds: str) -> None:
+    status, _, err = lines_of(
+        capfd, "report", *scenes(tmp_path), "--patience", seconds, "--out", str(tmp_path / "r.html")
+    )
+    assert (status, err) == (2, [f"--patience: {seconds} s; it is finite"])

@@ -200,6 +200,19 @@ def test_interrupt_keeps_what_was_tried(
     assert Path(scene).read_text(encoding="utf-8") == DROP
 
 
+def test_interrupt_while_it_is_timed_keeps_what_was_tried(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sandbox.measure.tradeoff.weighing.costs", interrupted)
+    status, document, err = json_of(capfd, "tradeoff", written(tmp_path), *FEW, "--tolerance", "0.01")
+    assert (status, err) == (130, [f"interrupted: {len(document['points'])} settings are tried and kept"])
+    assert document["interrupted"]
+    assert document["within_tolerance"]["error"] <= 0.01
+
+
 def test_interrupt_before_anything_is_tried_is_told(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

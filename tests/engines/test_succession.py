@@ -6,8 +6,8 @@ import pytest
 
 from sandbox.action import Launch, Pull, Switch
 from sandbox.engines.account import Cause
+from sandbox.engines.energy import total_energy
 from sandbox.engines.relay import Relay, start
-from sandbox.engines.succession import total_energy
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
 

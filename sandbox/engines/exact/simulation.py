@@ -11,6 +11,7 @@ from sandbox.engines.account import Account, Cause
 from sandbox.engines.acting import perform
 from sandbox.engines.booked import booked
 from sandbox.engines.compiling import COMPILING
+from sandbox.engines.contact_log import MAX_ROWS
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.exact.advance import (
     DONE,
@@ -55,7 +56,6 @@ from sandbox.engines.exact.predict import predict
 from sandbox.engines.exact.support import freed, knocked
 from sandbox.engines.exact.troupe import Troupe
 from sandbox.engines.kernel import tell_if_slow
-from sandbox.engines.ledger import MAX_ROWS
 from sandbox.engines.limits import BEYOND
 from sandbox.engines.running import Running
 from sandbox.scene.bodies import Bodies

@@ -9,9 +9,9 @@ from sandbox.action import Action
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.acting import perform
 from sandbox.engines.booked import booked
+from sandbox.engines.contact_log import ContactLog
 from sandbox.engines.contract import Divergence, Observer
 from sandbox.engines.expiry import Expiry
-from sandbox.engines.ledger import ContactLedger
 from sandbox.engines.native.books import Books
 from sandbox.engines.native.population import Population
 from sandbox.engines.running import Running
@@ -35,7 +35,7 @@ class NativeSimulation(Running):
     def __init__(self, scene: Scene, settings: Settings) -> None:
         super().__init__(settings)
         self._population = Population(scene, settings)
-        self._ledger: ContactLedger | None = None
+        self._ledger: ContactLog | None = None
         self._observer: Observer | None = None
         self._books: Books | None = None
         self._retired: dict[int, float] = {}
@@ -152,7 +152,7 @@ class NativeSimulation(Running):
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
             meeting = self._population.meeting
-            self._ledger = ContactLedger(len(self._population.scene.fixed), meeting.joints)
+            self._ledger = ContactLog(len(self._population.scene.fixed), meeting.joints)
             self._record(self.time)
         return self._ledger.take()
 

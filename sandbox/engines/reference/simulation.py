@@ -7,9 +7,9 @@ import numpy as np
 from sandbox.action import Action, ActionError, Spawn
 from sandbox.engines.account import Cause
 from sandbox.engines.acting import perform
+from sandbox.engines.contact_log import ContactLog
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.kernel import tell_if_slow
-from sandbox.engines.ledger import ContactLedger
 from sandbox.engines.limits import BEYOND
 from sandbox.engines.reference.detection import DETECTIONS
 from sandbox.engines.reference.engine import BALLS_ALONE
@@ -37,7 +37,7 @@ class ReferenceSimulation(Running):
         self._roster = Roster(scene, settings.h)
         self._stage = Stage(self._roster, settings)
         self._advance = DETECTIONS[settings.detection]
-        self._ledger: ContactLedger | None = None
+        self._ledger: ContactLog | None = None
         self._observer: Observer | None = None
         tell_if_slow(len(scene.bodies))
 
@@ -166,7 +166,7 @@ class ReferenceSimulation(Running):
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
-            self._ledger = ContactLedger(len(self._roster.scene.fixed), joints=True)
+            self._ledger = ContactLog(len(self._roster.scene.fixed), joints=True)
             self._stage.witness = self._witness
             now = self._stage.overlaps(self._stage.x)
             self._ledger.record(self.time, _touching(now, np.zeros((now.size, 2))))

@@ -109,21 +109,30 @@ def changes(before: Stored, now: Sequence[Limit], tolerance: float = TOLERANCE) 
 
 def _harder(limit: Limit, old: Mapping[str, Any], tolerance: float) -> int:
     """Return 1 where it goes farther now, −1 where less far, 0 where it is as it was."""
-    then, now = old["limit"], limit.limit
-    if then is None or now is None:
-        return (then is None and now is not None) - (now is None and then is not None)
-    if math.isclose(then, now, rel_tol=SLACK * tolerance) or abs(then - now) <= (1.0 if limit.unit in WHOLE else 0.0):
-        return _unbroken(limit.first_failure, old["first_failure"])
-    # Which way is harder, the axis tells: towards its last level.
     from sandbox.measure.extremes.axes import AXES
 
-    axis = AXES.get(limit.axis)
+    then, now, axis = old["limit"], limit.limit, AXES.get(limit.axis)
+    slack = 1.0 if axis is not None and axis.scale == "whole" else 0.0
+    if then is None or now is None:
+        return (then is None and now is not None) - (now is None and then is not None)
+    if math.isclose(then, now, rel_tol=SLACK * tolerance) or abs(then - now) <= slack:
+        return _unbroken(limit.first_failure, old["first_failure"])
+    # Which way is harder, the axis tells: towards its last level.
     rising = axis is None or axis.levels[-1] >= axis.levels[0]
+    if _may_agree(_between(now, limit.first_failure, rising), _between(then, old["first_failure"], rising)):
+        return 0
     return 1 if (now > then) == rising else -1
 
 
-WHOLE = ("boxes", "links", "balls")
-"""Units that are counted: one more or less is within the tolerance."""
+def _between(limit: float, failure: float | None, rising: bool) -> tuple[float, float]:
+    """Return between what a boundary lies, the lower first; what never failed has one beyond all levels."""
+    beyond = failure if failure is not None else math.inf if rising else -math.inf
+    return min(limit, beyond), max(limit, beyond)
+
+
+def _may_agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Tell whether one boundary may lie in both ranges: what was looked at level by level is known no better."""
+    return max(one[0], other[0]) < min(one[1], other[1])
 
 
 def _unbroken(now: float | None, then: float | None) -> int:

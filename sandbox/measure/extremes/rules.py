@@ -183,7 +183,3 @@ RULES: dict[str, Rule] = {
     "settles": settles,
 }
 """In the order in which they are looked at: the first that is broken is told."""
-
-OTHERS = ("work", "truth", "repeat", "process")
-"""What else can be broken: the engine gives up, the answer is of no use, it differs when repeated, or the process
-died, hung, or ran out of memory."""

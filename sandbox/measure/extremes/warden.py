@@ -62,7 +62,8 @@ class Warden:
         """
         process = self._running()
         assert process.stdin is not None
-        self._complaints.truncate(0)
+        self._complaints.seek(0)
+        self._complaints.truncate()
         line = json.dumps({"task": task.document(), "seconds": self._seconds})
         try:
             process.stdin.write(line + "\n")

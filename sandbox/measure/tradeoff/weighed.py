@@ -64,6 +64,7 @@ class Tradeoff:
     untried: int
     """variants left out, as they would have taken too long"""
     machine: Mapping[str, Any]
+    versions: Mapping[str, str]
     interrupted: bool = False
     """by the user: what was tried till then is here, with the times of the runs that were scored"""
 
@@ -129,4 +130,5 @@ class Tradeoff:
             "untried": self.untried,
             "interrupted": self.interrupted,
             "machine": dict(self.machine),
+            "versions": dict(self.versions),
         }

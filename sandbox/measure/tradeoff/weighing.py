@@ -93,45 +93,56 @@ def tradeoff(
     known, fresh = _seeds(scene, seeds)
     close = _closeness(scene, metric, tolerance)
     judges = _judges(scene, base, close, known, zoom, truth)
+    if metric is not None and metric_named(metric).unit == "px" and tolerance and tolerance / judges[0].zoom < close:
+        close = tolerance / judges[0].zoom
+        judges = _judges(scene, base, close, known, judges[0].zoom)
     aim = aim_at(judges[0], metric, tolerance, budget, fps)._replace(step=max(base.dt, LONGER / fps))
     space = Space(scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps)
     hurry = None if aim.hurry is None else aim.hurry * scene.world.duration
     search = Search(space, judges, aim.metric.name, aim.tolerance, hurry, patience, most, say)
     trials = search.run()
 
-    if search.interrupted:  # what is known is told at once
-        repeats, fresh = 0, ()
-    say("timing")
-    points = [*_timed(trials, space, aim, repeats, patience), *_refused(scene, names, base)]
-    trial_of = {id(point): trial for point, trial in zip(points, trials, strict=False)}  # the refused have none
-    again = _again(space, trial_of, aim, lambda: _judges(scene, base, close, fresh, judges[0].zoom), patience)
-    say("held to its word")
-    within = cheapest(points, aim, fresh, again)
-    splits: list[Split] = []
-    cheaper: list[Proposal] = []
+    def weighed(repeats: int, fresh: tuple[int, ...]) -> Tradeoff:
+        """Time and answer; with no repeats what is known is told at once."""
+        say("timing")
+        points = [*_timed(trials, space, aim, repeats, patience), *_refused(scene, names, base)]
+        trial_of = {id(point): trial for point, trial in zip(points, trials, strict=False)}  # the refused have none
+        again = _again(space, trial_of, aim, lambda: _judges(scene, base, close, fresh, judges[0].zoom), patience)
+        say("held to its word")
+        within = cheapest(points, aim, fresh, again)
+        splits: list[Split] = []
+        cheaper: list[Proposal] = []
+        if repeats:
+            say("where the error comes from, and what a cheaper model would do")
+            splits = _splits(judges[0], space, patience)
+            cheaper = _proposals(judges, aim, within.point if within else None, space, patience)
+        return Tradeoff(
+            scene,
+            judges[0].truth,
+            aim.metric,
+            judges[0].zoom,
+            tuple(points),
+            tuple(pareto([p for p in points if p.usable], lambda p: p.cost or 0.0, lambda p: p.error or 0.0)),
+            tuple(splits),
+            tuple(cheaper),
+            aim.tolerance,
+            budget,
+            fps,
+            within,
+            best(points, aim, fresh, again),
+            known,
+            len(search.untried - set(search.trials)),
+            machine(),
+            versions(),
+            interrupted=not repeats,
+        )
+
     if not search.interrupted:
-        say("where the error comes from, and what a cheaper model would do")
-        splits = _splits(judges[0], space, patience)
-        cheaper = _proposals(judges, aim, within.point if within else None, space, patience)
-    return Tradeoff(
-        scene,
-        judges[0].truth,
-        aim.metric,
-        judges[0].zoom,
-        tuple(points),
-        tuple(pareto([p for p in points if p.usable], lambda p: p.cost or 0.0, lambda p: p.error or 0.0)),
-        tuple(splits),
-        tuple(cheaper),
-        aim.tolerance,
-        budget,
-        fps,
-        within,
-        best(points, aim, fresh, again),
-        known,
-        len(search.untried - set(search.trials)),
-        {**machine(), **versions()},
-        search.interrupted,
-    )
+        try:
+            return weighed(repeats, fresh)
+        except KeyboardInterrupt:
+            say("interrupted")
+    return weighed(0, ())
 
 
 def _require_sense(seeds: int, zoom: float | None, patience: float, repeats: int, most: int) -> None:
@@ -168,12 +179,13 @@ def _judges(
     known: Truth | None = None,
 ) -> list[Judge]:
     """Return a judge for each seed; the truth of the scene's own may be known."""
-    found = []
+    found: list[Judge] = []
     for seed in seeds:
         same = seed == scene.world.seed
         own = scene if same else seeded(scene, seed)
         truth = known if same and known is not None else truth_of(own, base, close)
-        found.append(Judge(own, truth, zoom_of(own, truth) if zoom is None else zoom))
+        zoom = zoom_of(own, truth) if zoom is None else zoom  # the first one's for all: pixels are pixels
+        found.append(Judge(own, truth, zoom))
     return found
 
 

@@ -12,16 +12,15 @@ PARTS = (("model", "model"), ("time_step", "time step"), ("solver", "solver"), (
 WIDTH, HEIGHT = 320.0, 14.0
 
 
-def split_bars(rows: Sequence[Document], unit: str) -> Markup:
+def split_bars(rows: Sequence[Document]) -> Markup:
     """Return a bar an engine, as long for a small error as for a large one: the shares are what it shows.
 
     Args:
-        rows: each with `engine`, `total`, `model`, `time_step`, `solver` and `left`; unknown parts are None.
-        unit: of the errors.
+        rows: each with `engine`, `total`, `model`, `time_step`, `solver` and `left`, in m; unknown parts are None.
+            What is left at the finest step is the model's where that is known.
     """
-    ending = f", {unit}" if unit else ""
-    columns = [Column("engine"), Column("shares"), Column(f"error{ending}", True)]
-    columns += [Column(f"{words}{ending}", True) for _, words in PARTS]
+    columns = [Column("engine"), Column("shares"), Column("error, m", True)]
+    columns += [Column(f"{words}, m", True) for _, words in PARTS]
     cells = [
         [engine_name(row["engine"]), _bar(row), number(row["total"]), *(number(row.get(key)) for key, _ in PARTS)]
         for row in rows
@@ -32,6 +31,8 @@ def split_bars(rows: Sequence[Document], unit: str) -> Markup:
 
 def _bar(row: Document) -> Markup:
     parts = {key: max(float(row.get(key) or 0.0), 0.0) for key, _ in PARTS}
+    if row.get("model") is not None:
+        parts["left"] = 0.0
     whole = sum(parts.values())
     x, bars, told = 0.0, [], []
     for key, words in PARTS:

@@ -117,7 +117,7 @@ def details(document: Document) -> list[Section]:
             "What would be left with no time step at all is the model's; what more iterations would take away "
             "is the solver's; the rest is the time step's."
         )
-        found.append(Section("What the error consists of", split_bars(document["split"], unit), lead=lead))
+        found.append(Section("What the error consists of", split_bars(document["split"]), lead=lead))
     if document.get("proposals"):
         found.append(Section("Cheaper models", _proposals(document["proposals"], unit)))
     others = _points_table(points, document, "All points")

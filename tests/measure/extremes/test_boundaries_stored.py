@@ -13,7 +13,10 @@ from sandbox.measure.extremes.boundary import Limit
 NOW = Limit("speed", "pymunk", "pymunk", {}, 1.0, 1.01, "passed the wall", "through")
 
 
-def before(limit: float | None, first: float | None = 9.0, axis: str = "speed") -> list[dict[str, Any]]:
+def before(limit: float | None, first: float | None = -1.0, axis: str = "speed") -> list[dict[str, Any]]:
+    """Return a boundary as it was stored; by default what failed first was 1 % beyond."""
+    if first == -1.0:
+        first = 9.0 if limit is None else 1.01 * limit
     return [{"axis": axis, "setup": "pymunk", "limit": limit, "first_failure": first}]
 
 
@@ -28,11 +31,17 @@ def before(limit: float | None, first: float | None = 9.0, axis: str = "speed") 
         (before(None), replace(NOW, limit=None), None),
         (before(1.0, None), NOW, True),
         (before(1.0), replace(NOW, first_failure=None), False),
-        (before(10.0, axis="iterations"), replace(NOW, axis="iterations", limit=20.0), True),  # fewer are harder
-        (before(20.0, axis="iterations"), replace(NOW, axis="iterations", limit=10.0), False),
+        (before(10.0, 9.0, "iterations"), replace(NOW, axis="iterations", limit=20.0, first_failure=19.0), True),
+        (before(20.0, 19.0, "iterations"), replace(NOW, axis="iterations", limit=10.0, first_failure=9.0), False),
         (before(10.0, axis="stack"), replace(NOW, axis="stack", unit="boxes", limit=9.0), None),  # one more or less
         (before(10.0, axis="stack"), replace(NOW, axis="stack", unit="boxes", limit=8.0), True),
         (before(5.0, axis="chain"), NOW, None),  # not in both
+        # Looked at level by level, it is known no better than between two of them.
+        (before(1.7, 1.72), replace(NOW, first_failure=2.0), None),
+        (before(59.0, 60.0, "stack"), replace(NOW, axis="stack", limit=20.0, first_failure=None), None),
+        (before(1.7, 1.72), replace(NOW, first_failure=1.69), True),
+        (before(100.0, None), replace(NOW, limit=80.0, first_failure=90.0), True),
+        (before(20.0, None, "iterations"), replace(NOW, axis="iterations", limit=10.0, first_failure=None), None),
     ],
 )
 def test_what_has_moved_is_told(old: list[dict[str, Any]], now: Limit, worse: bool | None) -> None:

@@ -1,4 +1,4 @@
-"""ContactLedger: one row for each contact, from what a fixed-step engine finds anew after every substep.
+"""ContactLog: one row for each contact, from what a fixed-step engine finds anew after every substep.
 
 Vectors are complex numbers, x + iy, until they leave.
 """
@@ -14,7 +14,7 @@ MAX_ROWS = 20_000_000
 """Rows kept before a run is stopped: 1.4 GB."""
 
 
-class ContactLedger:
+class ContactLog:
     """Contacts since the last `take`. One that lasts is one row, its impulse summed."""
 
     def __init__(self, things: int, joints: bool) -> None:
