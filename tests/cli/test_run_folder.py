@@ -172,7 +172,7 @@ def test_interrupt_keeps_what_is_finished(flags: str, tmp_path: Path) -> None:
         out, err = command.communicate(timeout=120)
     finally:
         command.kill()
-    assert command.returncode == 130
+    assert command.returncode == 130, err
 
     with Store(folder) as store:
         rows = store.rows()

@@ -58,7 +58,7 @@ class Disagreement:
 
         Args:
             scene: what to run, with its own settings.
-            patience: s that it may take altogether, looked at within each run.
+            patience: s that the engines' runs may take altogether; a truth that is sought has limits of its own.
 
         Raises:
             TookTooLongError: it took longer.
