@@ -3,9 +3,11 @@
 import pytest
 from ordeal import WAYS, endure
 
+pytestmark = pytest.mark.slow  # crowds take their time
+
 
 @WAYS
-@pytest.mark.parametrize("count", [1_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1_000, 1_000_000])
 def test_balls_in_one_spot_are_refused(count: int, flags: tuple[str, ...]) -> None:
     code = f"""
 grid = {{"origin": [0, 0], "columns": 1000, "rows": {count} // 1000, "spacing": [0, 0], "radius": 1}}
@@ -165,7 +167,6 @@ say(outcome(from_document, things[{kind!r}]))
     assert endure(code, flags) == "SceneError"
 
 
-@pytest.mark.slow
 @WAYS
 def test_too_many_points_too_many_bodies_and_too_many_surfaces_are_refused(flags: tuple[str, ...]) -> None:
     code = """
