@@ -12,10 +12,11 @@ from typing import Self
 
 from pydantic import ValidationError
 
-from sandbox.action import Action, ActionError, Force, Launch, Pull, Remove, SetParameter, Spawn, Switch, Throttle
+from sandbox.action import Action, ActionError, Launch, Pull, SetParameter, Spawn, Switch
 from sandbox.engines.account import Cause
 from sandbox.engines.checkpoint import Checkpoint
 from sandbox.engines.contract import Divergence, Exhaustion, Observer, Refusal
+from sandbox.engines.lasting import Lasting
 from sandbox.engines.launch import launched
 from sandbox.engines.leg import Leg, begun
 from sandbox.engines.pull import Pulls
@@ -51,8 +52,7 @@ class Relay:
         self._broken: dict[int, float] = {}
         self._work: Counter[str] = Counter()
         self._pulls = Pulls()
-        self._forces: dict[str, Force] = {}
-        self._throttles: dict[str, Throttle] = {}
+        self._lasting = Lasting()
         self._kept: list[Contacts] | None = None  # of earlier legs, since the last call; none before the first
         self._observer: Observer | None = None
         self._books = Succession()
@@ -69,8 +69,8 @@ class Relay:
             steps=self._leg.steps,
             retired=dict(self.retired),
             broken=dict(self.broken),
-            forces=self._acting(),
-            throttles=dict(self._throttles),
+            forces=self._acting().forces,
+            throttles=self._lasting.throttles,
             pulls=self._pulls.pulls,
         )
 
@@ -87,11 +87,11 @@ class Relay:
         """
         relay = cls.__new__(cls)
         relay.engine, relay.wanted = point.engine, point.wanted
-        lasting: list[Force | Throttle] = [*point.forces.values(), *point.throttles.values()]
+        relay._lasting = Lasting(point.forces, point.throttles)
+        lasting = relay._lasting.actions()
         relay._leg = begun(point.scene, point.engine, point.wanted, point.bodies, point.frame, lasting, point.broken)
         relay._leg.origin, relay._leg.steps = point.origin, point.steps
         relay._retired, relay._broken, relay._work = dict(point.retired), dict(point.broken), Counter()
-        relay._forces, relay._throttles = dict(point.forces), dict(point.throttles)
         relay._kept, relay._observer, relay._books, relay._pulls = None, None, Succession(), Pulls(point.pulls)
         return relay
 
@@ -197,13 +197,8 @@ class Relay:
                 self._spawn(action)
             case _:
                 self._leg.simulation.apply(action)
-                if isinstance(action, Force):
-                    self._forces[action.body] = action
-                elif isinstance(action, Throttle):
-                    self._throttles[action.thrust] = action
-                elif isinstance(action, Remove):
-                    self._forces.pop(action.body, None)
-                elif isinstance(action, SetParameter):
+                self._lasting.note(action)
+                if isinstance(action, SetParameter):
                     self._leg.bodies = replace(self._leg.bodies, elements=self._leg.simulation.bodies.elements)
 
     def _spawn(self, action: Spawn) -> None:
@@ -238,8 +233,7 @@ class Relay:
             ActionError: the engine cannot go on from it. Nothing has changed then.
         """
         try:
-            lasting: list[Force | Throttle] = [*self._acting().values(), *self._throttles.values()]
-            broken = dict(self.broken)
+            lasting, broken = self._acting().actions(), dict(self.broken)
             leg = begun(self.scene, engine, wanted, bodies, frame, lasting, broken)
         except (Refusal, UnknownEngineError) as refusal:
             raise ActionError(str(refusal)) from None
@@ -263,12 +257,12 @@ class Relay:
         if self._observer is not None:
             self._leg.watched_by(self._observer)
 
-    def _acting(self) -> dict[str, Force]:
-        """Return the steady forces on bodies that are there; on who has left they have ended."""
-        if self._forces:
-            present = dict(zip(self.bodies.names, self.frame().present.tolist(), strict=True))
-            self._forces = {name: force for name, force in self._forces.items() if present[name]}
-        return dict(self._forces)
+    def _acting(self) -> Lasting:
+        """Return what acts on bodies that are there; on who has left it has ended."""
+        if self._lasting.forces:
+            present = zip(self.bodies.names, self.frame().present.tolist(), strict=True)
+            self._lasting.leave(name for name, there in present if not there)
+        return self._lasting
 
     def frame(self) -> Frame:
         """Return the present state."""

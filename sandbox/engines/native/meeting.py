@@ -6,7 +6,6 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.limits import BEYOND, FARTHEST
-from sandbox.engines.native.drag import acceleration
 from sandbox.engines.native.field import Field
 from sandbox.engines.native.ground import Ground, shuffled
 from sandbox.engines.native.member import Member
@@ -20,6 +19,7 @@ from sandbox.engines.native.space import (
     gravity_of,
     new_space,
 )
+from sandbox.engines.native.steady import Steady
 from sandbox.engines.native.tethers import Tethers
 from sandbox.engines.touching import NOTHING, Touching
 from sandbox.scene.bodies import Bodies
@@ -51,7 +51,7 @@ class MeetingBodies:
         self._points: PointReader | None = None
         self.field = Field(scene)
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
-        self.steady: dict[int, tuple[FloatArray, float]] = {}  # N and N·m, by the number of the body
+        self.steady = Steady()
         self._moving = 0
         self._state: tuple[IntArray, FloatArray] | None = None
 
@@ -136,7 +136,7 @@ class MeetingBodies:
             self._moving -= member.moves
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
             del self._named[self._name_of.pop(number)]  # in place: the field looks into it
-            self.steady.pop(number, None)
+            self.steady.drop(number)
         self._reader.members_changed()
         self._state = None
 
@@ -197,18 +197,9 @@ class MeetingBodies:
         """Set what pymunk forgets after each step: the drag on all bodies, the steady forces on some."""
         world = self._scene.world
         if world.linear_drag > 0 or world.quadratic_drag > 0:
-            numbers, state = self._read()
-            mass = np.asarray([self._members[n].body.mass for n in numbers.tolist()])[:, None]
-            push = np.zeros((len(numbers), 2))
-            for row, number in enumerate(numbers.tolist()):
-                if number in self.steady:
-                    push[row] = self.steady[number][0] * (1.0 / mass[row])
-            self._reader.push(mass * acceleration(world, state[:, 3:5], push, self._settings.h))
+            self.steady.apply_with_drag(self._members, self._reader, self._read(), world, self._settings.h)
         else:
-            for number, (force, _) in self.steady.items():
-                self._members[number].body.force = float(force[0]), float(force[1])
-        for number, (_, torque) in self.steady.items():
-            self._members[number].body.torque = torque
+            self.steady.apply(self._members)
 
     def _read(self) -> tuple[IntArray, FloatArray]:
         if self._state is None:
@@ -282,10 +273,7 @@ class MeetingBodies:
 
     def push(self, number: int, force: FloatArray, torque: float) -> None:
         """Let a steady force (N) and torque (N·m) act on a body from now on."""
-        if force.any() or torque:
-            self.steady[number] = force, torque
-        else:
-            self.steady.pop(number, None)
+        self.steady.push(number, force, torque)
 
     def set_position(self, number: int, position: FloatArray) -> None:
         """Put a body somewhere, m."""

@@ -1,6 +1,5 @@
 """Live: a session with all that runs beside it, driven by real time."""
 
-from collections.abc import Iterator
 from time import perf_counter
 
 from sandbox.action import Action, ActionError, Launch
@@ -11,6 +10,7 @@ from sandbox.play.footage.film import Film
 from sandbox.play.picking import overlapping
 from sandbox.play.running.between import between
 from sandbox.play.running.company import Company
+from sandbox.play.running.journey import Journey
 from sandbox.play.running.pace import Pace
 from sandbox.play.running.session import Session, WrongWayError
 from sandbox.play.running.switching import switch
@@ -23,8 +23,6 @@ from sandbox.trajectory import Contacts, Frame
 LEAST, MOST = 0.012, 0.03
 """s of each picture that steps may take: as much as all else takes, within these bounds. Where they need more, the
 scene is slower than asked."""
-SLICE = 0.04
-"""s of each picture that the way to another step may take"""
 
 
 class Live:
@@ -41,8 +39,7 @@ class Live:
         self.session = session
         self.pace = Pace()
         self.company = Company(session, ghost)
-        self._seeking: Iterator[float] | None = None
-        self._share_done, self._target, self._worked = 0.0, 0, 0.0
+        self._journey, self._worked = Journey(), 0.0
         self._contacts, self._since = session.contacts(), session.settings.dt
         self._seed = session.scene.world.seed
         self._told_end = False
@@ -85,7 +82,7 @@ class Live:
     @property
     def busy(self) -> str | None:
         """What it is doing instead of playing."""
-        return None if self._seeking is None else f"replaying {self._share_done:.0%}"
+        return f"replaying {self._journey.share:.0%}" if self._journey.under_way else None
 
     @property
     def between_steps(self) -> float:
@@ -94,7 +91,7 @@ class Live:
 
     def go_on(self, elapsed: float, paused: bool) -> None:
         """Let real time pass, s: make the steps it is enough for, or some of the way to where we are going."""
-        if self._seeking is not None:
+        if self._journey.under_way:
             self._go_there()
             return
         if paused or self.session.ended is not None:
@@ -121,8 +118,8 @@ class Live:
     def step(self) -> None:
         """Make one step."""
         self.pace.rest()
-        if self._seeking is not None:
-            self.seek(self._target + 1)
+        if self._journey.under_way:
+            self.seek(self._journey.target + 1)
             return
         self._advance(1, None)
         self.session.rest()
@@ -177,17 +174,15 @@ class Live:
         return told
 
     def _check_there(self) -> None:
-        if self._seeking is not None:
+        if self._journey.under_way:
             raise ActionError("wait until the way back is done")
 
     def seek(self, step: int) -> None:
         """Set out for another step. It is reached in parts, one a picture; meanwhile what is known nearest is seen."""
         self.pace.rest()
-        self._share_done = 0.0
         self._told_end = False
-        self._target = max(step, 0)
-        self._peek = self.session.history.closest(self._target)
-        self._seeking = self.session.seek(self._target)
+        self._peek = self.session.history.closest(max(step, 0))
+        self._journey.set_out(self.session, max(step, 0))
         self._go_there()
 
     def _begin(self, anew: bool = False) -> None:
@@ -197,12 +192,12 @@ class Live:
 
     def arrive(self) -> None:
         """Go the rest of the way to where we are going, however long it takes."""
-        while self._seeking is not None:
+        while self._journey.under_way:
             self._go_there()
 
     def back(self) -> None:
         """Set out for the step before."""
-        present = self.session.step_number if self._seeking is None else self._target
+        present = self._journey.target if self._journey.under_way else self.session.step_number
         if present > 0:
             self.seek(present - 1)
 
@@ -233,13 +228,7 @@ class Live:
         return self.session.history.mark_times
 
     def _go_there(self) -> None:
-        until = perf_counter() + SLICE
-        while self._seeking is not None and perf_counter() < until:
-            try:
-                self._share_done = next(self._seeking)
-            except StopIteration:
-                self._seeking = None
-        if self._seeking is None:
+        if self._journey.go():
             self._peek = None
             self.session.rest()
             self._begin()

@@ -11,6 +11,7 @@ from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Spa
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
 from sandbox.play.footage.film import Film
+from sandbox.play.running import journey
 from sandbox.play.running import live as module
 from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
@@ -158,7 +159,7 @@ def test_scrub_shows_bodies_that_have_not_come_yet() -> None:
 
 
 def test_on_the_way_nothing_can_be_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "SLICE", -1.0)  # no part of the way at once
+    monkeypatch.setattr(journey, "SLICE", -1.0)  # no part of the way at once
     show = live("gas")
     for _ in range(100):
         show.step()
@@ -172,7 +173,7 @@ def test_on_the_way_nothing_can_be_done(monkeypatch: pytest.MonkeyPatch) -> None
         show.back()  # is not heard
     show.seek(20)  # another one before the first is done
     show.seek(99)
-    monkeypatch.setattr(module, "SLICE", 1e9)
+    monkeypatch.setattr(journey, "SLICE", 1e9)
     show.go_on(1.0, paused=False)
     assert show.busy is None
     assert show.step_number == 99

@@ -1,0 +1,67 @@
+"""Steady: forces and torques that act on bodies in a space until they are taken back; pymunk forgets its own."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from sandbox.engines.native.drag import acceleration
+from sandbox.engines.native.member import Member
+from sandbox.engines.native.reader import Reader
+from sandbox.scene.model import World
+from sandbox.trajectory import FloatArray, IntArray
+
+
+class Steady:
+    """A force (N) and a torque (N·m) by the number of the body."""
+
+    def __init__(self) -> None:
+        self._of: dict[int, tuple[FloatArray, float]] = {}
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._of)
+
+    def items(self) -> list[tuple[int, tuple[FloatArray, float]]]:
+        """Return number, and force and torque, of each body that has some."""
+        return list(self._of.items())
+
+    def push(self, number: int, force: FloatArray, torque: float) -> None:
+        """Let a force and a torque act on a body from now on."""
+        if force.any() or torque:
+            self._of[number] = force, torque
+        else:
+            self.drop(number)
+
+    def drop(self, number: int) -> None:
+        """Let nothing act on a body any more."""
+        self._of.pop(number, None)
+
+    def apply(self, members: Mapping[int, Member]) -> None:
+        """Set forces and torques for the next step, where there is no drag."""
+        for number, (force, _) in self._of.items():
+            members[number].body.force = float(force[0]), float(force[1])
+        self._twist(members)
+
+    def apply_with_drag(
+        self, members: Mapping[int, Member], reader: Reader, state: tuple[IntArray, FloatArray], world: World, h: float
+    ) -> None:
+        """Set forces and torques for the next step of h, s, where all bodies are dragged.
+
+        Args:
+            members: by number.
+            reader: of the space, which takes forces on all bodies at once.
+            state: their numbers, and position, angle, velocity, spin.
+            world: gives drag and wind.
+            h: of the step.
+        """
+        numbers, figures = state
+        mass = np.asarray([members[n].body.mass for n in numbers.tolist()])[:, None]
+        push = np.zeros((len(numbers), 2))
+        for row, number in enumerate(numbers.tolist()):
+            if number in self._of:
+                push[row] = self._of[number][0] * (1.0 / mass[row])
+        reader.push(mass * acceleration(world, figures[:, 3:5], push, h))
+        self._twist(members)
+
+    def _twist(self, members: Mapping[int, Member]) -> None:
+        for number, (_, torque) in self._of.items():
+            members[number].body.torque = torque
