@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
+from sandbox.scene.cue import Stroke
 from sandbox.scene.model import Ball, Box, Capsule, Compound, Polygon, Single
 from sandbox.scene.part import MAX_SPEED, Name, Part, Point, Velocity
 
@@ -142,6 +143,13 @@ class Throttle(Timed):
     """share of its force, from now on"""
 
 
+class Strike(Timed, Stroke):
+    """Strike a ball on a floor with a cue: it has the velocity and the spin of the stroke, whatever it had before."""
+
+    kind: Literal["strike"] = "strike"
+    ball: Name
+
+
 class Switch(Timed):
     """Go on with another engine, or with other settings, from the state as it is."""
 
@@ -153,7 +161,7 @@ class Switch(Timed):
 
 
 Action = Annotated[
-    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Throttle | Switch,
+    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Throttle | Strike | Switch,
     Field(discriminator="kind"),
 ]
 

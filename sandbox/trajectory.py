@@ -18,7 +18,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
-LATER = frozenset({"broken_time", "energy", "account"})
+LATER = frozenset({"broken_time", "energy", "account", "spin"})
 """Arrays of a trajectory that those stored by earlier versions lack."""
 
 
@@ -38,18 +38,29 @@ class Frame:
     """(N,) rad/s"""
     present: BoolArray
     """(N,) false once removed or retired: the body then stays where it was, with no velocity"""
+    roll: FloatArray | None = None
+    """(N, 2) rad/s, about x and y, of spheres on a floor; none where nothing rolls"""
 
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""
-        for array in (self.position, self.velocity, self.angle, self.angular_velocity, self.present):
+        for array in self._arrays():
             array.flags.writeable = False
+
+    @property
+    def spin(self) -> FloatArray | None:
+        """(N, 3) rad/s, right-handed, z up, of spheres on a floor; none where nothing rolls."""
+        return None if self.roll is None else np.column_stack((self.roll, self.angular_velocity))
 
     def state_hash(self) -> str:
         """Return a SHA-256 of time and every body's state, bit for bit."""
         digest = hashlib.sha256(np.float64(self.time).tobytes())
-        for array in (self.position, self.velocity, self.angle, self.angular_velocity, self.present):
+        for array in self._arrays():
             digest.update(array.tobytes())
         return digest.hexdigest()
+
+    def _arrays(self) -> tuple[npt.NDArray[Any], ...]:
+        arrays = (self.position, self.velocity, self.angle, self.angular_velocity, self.present)
+        return arrays if self.roll is None else (*arrays, self.roll)
 
 
 class ContactEvent(NamedTuple):
@@ -121,7 +132,7 @@ class Trajectory:
     contact_time: FloatArray
     """(C,) s"""
     contact_pair: IntArray
-    """(C, 2) body numbers; −1 − k for the k-th fixed thing: planes, walls, posts"""
+    """(C, 2) body numbers; −1 − k for the k-th fixed thing: planes, walls, posts, pockets"""
     contact_point: FloatArray
     """(C, 2) m"""
     contact_normal: FloatArray
@@ -140,6 +151,8 @@ class Trajectory:
     """(T,) J, of all bodies, under the gravity of each time; empty where no account was kept"""
     account: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     """(T, K) J, what each cause, as in info's `causes`, has brought by then; empty where no account was kept"""
+    spin: FloatArray = field(default_factory=lambda: np.empty((0, 0, 3)))
+    """(T, N, 3) rad/s, right-handed, z up, of spheres on a floor; empty where nothing rolls"""
     info: Mapping[str, Any] = field(default_factory=dict)
     """What was run and how it went: scene (as a document), engine, settings, actions, seed, status, reason, steps,
     seconds, work, energy_start, energy_end, joint_error (the largest, as a part of a length; None without joints),
@@ -190,12 +203,15 @@ class Trajectory:
         keys = ["time", "position", "velocity", "angle", "angular_velocity"]
         if len(self.energy):
             keys += ["energy", "account"]
+        if len(self.spin):
+            keys.append("spin")
         return replace(self, **{key: getattr(self, key)[frames] for key in keys})
 
     def save(self, path: str | Path) -> Path:
         """Write the arrays as one compressed `.npz`, to a temporary name first: never half a file."""
         path = Path(path)
-        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "info"}
+        without = {"info"} if len(self.spin) else {"info", "spin"}
+        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in without}
         arrays["info"] = np.asarray(json.dumps(dict(self.info), ensure_ascii=False))
         with whole(path) as temporary, temporary.open("xb") as stream:
             np.savez_compressed(stream, **arrays)

@@ -34,6 +34,7 @@ def trajectory(frames: int = 4, bodies: int = 3, contacts: int = 2, **info: Any)
         retired_time=np.array([math.nan] * bodies),
         missed_time=draw(1),
         missed_pair=np.array([[0, 1]]),
+        spin=draw((frames, bodies, 3)),
         info={"status": "ok", "reason": None, "audited": True, **info},
     )
 

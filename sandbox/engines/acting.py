@@ -18,6 +18,7 @@ from sandbox.action import (
     Remove,
     SetParameter,
     Spawn,
+    Strike,
     Switch,
     Throttle,
     is_settable,
@@ -26,6 +27,7 @@ from sandbox.action import (
 from sandbox.scene.address import AddressError, assign
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.crosscheck import MAX_SURFACES, crosscheck
+from sandbox.scene.cue import MISCUE, miscues, struck
 from sandbox.scene.document import to_document
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import from_document
@@ -62,6 +64,9 @@ class Cast(Protocol):
 
     def set_spin(self, number: int, spin: float) -> None:
         """Give a body an angular velocity, rad/s."""
+
+    def set_roll(self, number: int, roll: tuple[float, float]) -> None:
+        """Give a sphere on a floor an angular velocity about x and y, rad/s."""
 
     def push(self, number: int, force: FloatArray, torque: float) -> None:
         """Let a steady force, N, and torque, N·m, act on a body from now on.
@@ -123,6 +128,8 @@ def perform(action: Action, cast: Cast) -> int | None:
             _set(action, cast)
         case Throttle():
             cast.throttle(_thrust_number(action.thrust, cast.scene), action.level)
+        case Strike():
+            _strike(action, cast)
         case Pull() | Launch() | Switch():
             raise ActionError(f"{action!r} is nothing that an engine does by itself; sandbox.start gives one that can")
         case _:
@@ -205,6 +212,18 @@ def _move(action: Move, cast: Cast) -> None:
         cast.set_velocity(number, np.asarray(action.velocity))
 
 
+def _strike(action: Strike, cast: Cast) -> None:
+    number = _mover(action.ball, cast)
+    if cast.scene.surface is None or not cast.bodies.round[number]:
+        raise ActionError(f"{action.ball!r} cannot be struck; a cue strikes balls on a [surface]")
+    if miscues(action):
+        raise ActionError(f"the tip slips: side and height are together at most {MISCUE:g} of the radius off")
+    velocity, spin = struck(action, float(cast.bodies.mass[number]), float(cast.bodies.radius[number]))
+    cast.set_velocity(number, np.asarray(velocity))
+    cast.set_spin(number, spin[2])
+    cast.set_roll(number, spin[:2])
+
+
 def _thrust_number(name: str, scene: Scene) -> int:
     names = [thrust.name or default_name("thrust", k) for k, thrust in enumerate(scene.thrusts)]
     if name not in names:
@@ -231,7 +250,8 @@ def _spawn(action: Spawn, cast: Cast) -> None:
 def alone_in(scene: Scene, single: Single) -> Scene:
     """Return a scene of one body in the surroundings of another."""
     kinds = {Ball: "balls", Box: "boxes", Capsule: "capsules", Polygon: "polygons", Compound: "compounds"}
-    surroundings = {"world": scene.world, "materials": scene.materials, "pairs": scene.pairs}
+    keys = ("world", "surface", "contact_models", "materials", "pairs")
+    surroundings = {key: getattr(scene, key) for key in keys}
     return Scene.model_validate(surroundings).model_copy(update={kinds[type(single)]: (single,)})
 
 

@@ -35,10 +35,12 @@ class Checkpoint:
 def cast(bodies: Bodies, frame: Frame) -> Bodies:
     """Return the bodies that are there, in the state of a frame."""
     there = np.flatnonzero(frame.present)
+    some = bodies.some(there)
     return replace(
-        bodies.some(there),
+        some,
         position=frame.position[there],
         velocity=frame.velocity[there],
         angle=frame.angle[there],
         angular_velocity=frame.angular_velocity[there],
+        roll=some.roll if frame.roll is None else frame.roll[there],
     )

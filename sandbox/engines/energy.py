@@ -37,6 +37,8 @@ def energy_of(
     with np.errstate(over="ignore", invalid="ignore"):  # a diverged state squares to infinity
         squared = np.einsum("nk,nk->n", frame.velocity[counts], frame.velocity[counts])
         kinetic = 0.5 * float(mass @ squared + moment @ np.square(frame.angular_velocity[counts]))
+        if frame.roll is not None:
+            kinetic += 0.5 * float(moment @ np.square(frame.roll[counts]).sum(axis=1))
         potential = -float(mass @ (frame.position[counts] @ np.asarray(gravity)))
         if scene is not None:
             known = bodies if count == len(bodies) else bodies.some(np.arange(count))

@@ -40,7 +40,10 @@ def launched(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tupl
         born, lifetime = bodies.born.copy(), bodies.lifetime.copy()
         born[those], lifetime[those] = frame.time, layout.lifetime
         bodies = replace(bodies, born=born, lifetime=lifetime)
-    return Frame(time=frame.time, present=frame.present | those, **columns), bodies, those
+    roll = frame.roll
+    if roll is not None:  # what a generator makes does not roll yet
+        roll = np.where(those[:, None], 0.0, roll)
+    return Frame(time=frame.time, present=frame.present | those, roll=roll, **columns), bodies, those
 
 
 def _first(scene: Scene, generator: Mover) -> int:

@@ -91,7 +91,11 @@ class Leg:
         ):
             whole[self.numbers] = own
         present[self.numbers] = frame.present
-        return Frame(self.time, position, velocity, angle, spin, present)
+        roll = None
+        if frame.roll is not None:
+            roll = np.zeros((count, 2))
+            roll[self.numbers] = frame.roll
+        return Frame(self.time, position, velocity, angle, spin, present, roll)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call."""
@@ -172,5 +176,7 @@ def begun(
     numbers = None if frame.present.all() else np.flatnonzero(frame.present)
     columns = ("position", "velocity", "angle", "angular_velocity")
     everyone = replace(bodies, **{column: getattr(frame, column) for column in columns})
+    if frame.roll is not None:
+        everyone = replace(everyone, roll=frame.roll)
     whole = scene.holding(everyone, scene.links, frame.time)
     return Leg(simulation, bodies, frame, numbers, frame.time, whole=whole)

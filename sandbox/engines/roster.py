@@ -35,6 +35,8 @@ class Roster:
         self.velocity: FloatArray = bodies.velocity.copy()
         self.angle: FloatArray = bodies.angle.copy()
         self.angular_velocity: FloatArray = bodies.angular_velocity.copy()
+        self.roll: FloatArray = bodies.roll.copy()
+        """(N, 2) rad/s, of spheres on a floor, about x and y"""
         self.present: BoolArray = np.ones(len(bodies), dtype=np.bool_)
         self.force: FloatArray = np.zeros((len(bodies), 2))
         """(N, 2) N, steady, by actions"""
@@ -113,6 +115,10 @@ class Roster:
         """Give a body an angular velocity, rad/s."""
         self.angular_velocity[number] = spin
 
+    def set_roll(self, number: int, roll: tuple[float, float]) -> None:
+        """Give a sphere on a floor an angular velocity about x and y, rad/s."""
+        self.roll[number] = roll
+
     def push(self, number: int, force: FloatArray, torque: float) -> None:
         """Let a steady force (N) and torque (N·m) act on a body from now on."""
         self.force[number], self.torque[number] = force, torque
@@ -147,6 +153,7 @@ class Roster:
         meet = derived(self.scene, bodies)
         self.position = np.vstack((self.position, bodies.position[-1:]))
         self.velocity = np.vstack((self.velocity, bodies.velocity[-1:]))
+        self.roll = np.vstack((self.roll, bodies.roll[-1:]))
         self.angle = np.append(self.angle, bodies.angle[-1])
         self.angular_velocity = np.append(self.angular_velocity, bodies.angular_velocity[-1])
         self.present = np.append(self.present, True)
@@ -158,7 +165,7 @@ class Roster:
     def take_out(self, numbers: IntArray, time: float) -> None:
         """Remove bodies at a time, s. They stay where they are in the arrays, with no velocity."""
         self.present[numbers] = False
-        self.velocity[numbers], self.angular_velocity[numbers] = 0.0, 0.0
+        self.velocity[numbers], self.angular_velocity[numbers], self.roll[numbers] = 0.0, 0.0, 0.0
         self.force[numbers], self.torque[numbers] = 0.0, 0.0
         self._retired |= dict.fromkeys(numbers.tolist(), time)
         self._assume(self.scene, self.bodies, self.meet)

@@ -105,6 +105,8 @@ class Recorder:
         # A body that is not there yet is nan.
         self.position, self.velocity = (np.full((kept, bodies, 2), np.nan) for _ in range(2))
         self.angle, self.angular_velocity = (np.full((kept, bodies), np.nan) for _ in range(2))
+        self.spin: FloatArray | None = None
+        """(T, N, 3) rad/s, where the first frame says that something rolls"""
         self._books = books
         self._energy: FloatArray = np.empty(kept if books else 0)
         self._account: FloatArray = np.empty((kept, causes) if books else (0, 0))
@@ -129,6 +131,11 @@ class Recorder:
         self.time[k] = time
         self.position[k, :n], self.velocity[k, :n] = frame.position, frame.velocity
         self.angle[k, :n], self.angular_velocity[k, :n] = frame.angle, frame.angular_velocity
+        spin = frame.spin
+        if spin is not None:
+            if self.spin is None:
+                self.spin = np.full((*self.angle.shape, 3), np.nan)
+            self.spin[k, :n] = spin
         if self._books is not None:
             self._energy[k], self._account[k] = self._books()
         self._count += 1
@@ -138,4 +145,5 @@ class Recorder:
         names = ("position", "velocity", "angle", "angular_velocity")
         kept = {name: getattr(self, name)[: self._count, :bodies] for name in names}
         books = {"energy": self._energy[: self._count], "account": self._account[: self._count]}
-        return {"time": self.time[: self._count], **kept, **books}
+        spin = np.empty((0, 0, 3)) if self.spin is None else self.spin[: self._count, :bodies]
+        return {"time": self.time[: self._count], "spin": spin, **kept, **books}

@@ -168,6 +168,7 @@ def _trajectory(
         broken_time=broken_time,
         energy=frames["energy"],
         account=frames["account"],
+        spin=frames.get("spin", np.empty((0, 0, 3))),
         info=info,
     )
 

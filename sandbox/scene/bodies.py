@@ -10,7 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from sandbox.scene.discs import Disc
+from sandbox.scene.cue import Stroke, struck
+from sandbox.scene.discs import Ball, Disc
+from sandbox.scene.floor import Spin
 from sandbox.scene.layout import NOBODY, Layout
 from sandbox.scene.layouts import layout_of
 from sandbox.scene.model import Scene, default_name
@@ -20,7 +22,10 @@ from sandbox.scene.shapes import Shapes, form_of, shapes_of
 from sandbox.scene.surfaced import Mover, Single
 
 STATE = ("position", "velocity", "angle", "angular_velocity", "fixed")
-COLUMNS = (*STATE, "radius", "core", "thin", "mass", "moment", "group", "born", "lifetime")
+COLUMNS = (*STATE, "radius", "core", "thin", "mass", "moment", "group", "born", "lifetime", "roll")
+
+OF_SPHERE = 0.8
+"""of the moment of inertia of a disc, ½ m r²: ⅖ m r²"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +59,14 @@ class Bodies:
     """(N,) s, when its life began"""
     lifetime: FloatArray
     """(N,) s, after which it is gone; inf for ever"""
+    roll: FloatArray
+    """(N, 2) rad/s, of spheres on a floor, about x and y; about z it is `angular_velocity`"""
     element: IntArray
     """(N,) index into `elements`"""
     elements: tuple[Mover, ...]
     """What the bodies look like and are made of, in scene order."""
+    spheres: bool = False
+    """whether balls are spheres, as on a floor, and not discs"""
 
     def __len__(self) -> int:
         return len(self.names)
@@ -74,16 +83,18 @@ class Bodies:
 
     def joined_by(self, single: Single, name: str) -> "Bodies":
         """Return these bodies and one more, which gets the next number."""
-        more = _joined([name], (single,), [_singles([single])])
+        more = _joined([name], (single,), [_singles([single])], self.spheres)
         both = {key: np.concatenate((getattr(self, key), getattr(more, key))) for key in COLUMNS}
         element = np.append(self.element, len(self.elements))
-        return Bodies(names=(*self.names, name), element=element, elements=(*self.elements, single), **both)
+        elements = (*self.elements, single)
+        return Bodies(names=(*self.names, name), element=element, elements=elements, spheres=self.spheres, **both)
 
     def some(self, which: IntArray) -> "Bodies":
         """Return some of them, numbered anew."""
         names = self.names if len(which) == len(self) else tuple(self.names[n] for n in which.tolist())
         columns = {key: getattr(self, key)[which] for key in COLUMNS}
-        return Bodies(names=names, element=self.element[which], elements=self.elements, **columns)
+        element = self.element[which]
+        return Bodies(names=names, element=element, elements=self.elements, spheres=self.spheres, **columns)
 
 
 def expand(scene: Scene) -> Bodies:
@@ -105,7 +116,18 @@ def expand(scene: Scene) -> Bodies:
             layout, stem = layout_of(each, scene.world.seed, k, scene.world.gravity), each.name or default_name(kind, k)
             layouts.append(layout)
             names += [f"{stem}-{ending}" for ending in layout.endings or range(1, len(layout) + 1)]
-    return _joined(names, scene.elements, layouts)
+    bodies = _joined(names, scene.elements, layouts, scene.surface is not None)
+    for shot in scene.shots:
+        if shot.ball in names:
+            strike(bodies, names.index(shot.ball), shot)
+    return bodies
+
+
+def strike(bodies: Bodies, number: int, stroke: Stroke) -> None:
+    """Give a sphere the velocity and spin of a stroke, in place."""
+    velocity, spin = struck(stroke, float(bodies.mass[number]), float(bodies.radius[number]))
+    bodies.velocity[number] = velocity
+    bodies.roll[number], bodies.angular_velocity[number] = spin[:2], spin[2]
 
 
 def centre_of(single: Single) -> Point:
@@ -119,19 +141,27 @@ def centre_of(single: Single) -> Point:
 
 def _singles(singles: list[Single]) -> Layout:
     """Lay out bodies that each are an element of their own."""
-    spins = [0.0 if each.fixed else each.angular_velocity for each in singles]
+    spins = [(0.0, 0.0, 0.0) if each.fixed else _spin(each) for each in singles]
     return Layout(
         position=_rows([centre_of(each) for each in singles]),
         velocity=_rows([(0.0, 0.0) if each.fixed else each.velocity for each in singles]),
         angle=np.asarray([each.angle for each in singles], dtype=np.float64),
-        angular_velocity=np.asarray(spins, dtype=np.float64),
+        angular_velocity=np.asarray([spin[2] for spin in spins], dtype=np.float64),
         fixed=np.asarray([each.fixed for each in singles], dtype=np.bool_),
         element=np.arange(len(singles)),
         elements=len(singles),
+        roll=_rows([spin[:2] for spin in spins]),
     )
 
 
-def _joined(names: list[str], elements: tuple[Mover, ...], layouts: list[Layout]) -> Bodies:
+def _spin(single: Single) -> Spin:
+    """Return how a body starts to turn, rad/s."""
+    if isinstance(single, Ball) and single.spin is not None:
+        return single.spin
+    return 0.0, 0.0, single.angular_velocity
+
+
+def _joined(names: list[str], elements: tuple[Mover, ...], layouts: list[Layout], spheres: bool) -> Bodies:
     """Put layouts one after the other; each has as many of the elements as its bodies are numbered by."""
     layouts = [*layouts, NOBODY]
     used = np.cumsum([0, *(each.elements for each in layouts)])
@@ -139,7 +169,9 @@ def _joined(names: list[str], elements: tuple[Mover, ...], layouts: list[Layout]
     alone = np.cumsum([each.alone for each in layouts])
     group = [np.full(len(each), number if each.alone else 0) for each, number in zip(layouts, alone, strict=True)]
     lives = [np.full(len(each), np.inf) if each.lifetime is None else each.lifetime for each in layouts]
+    rolls = [np.zeros((len(each), 2)) if each.roll is None else each.roll for each in layouts]
     forms = [form_of(each) for each in elements]
+    of_sphere = [OF_SPHERE if spheres and isinstance(each, Disc) else 1.0 for each in elements]
 
     def of_form(values: list[float]) -> FloatArray:
         return np.asarray(np.asarray(values, dtype=np.float64)[element])
@@ -151,12 +183,14 @@ def _joined(names: list[str], elements: tuple[Mover, ...], layouts: list[Layout]
         core=of_form([form.core for form in forms]),
         thin=of_form([form.thin for form in forms]),
         mass=of_form([form.mass for form in forms]),
-        moment=of_form([form.moment for form in forms]),
+        moment=of_form([form.moment * share for form, share in zip(forms, of_sphere, strict=True)]),
         group=np.concatenate(group),
         born=np.zeros(len(names)),
         lifetime=np.concatenate(lives),
+        roll=np.concatenate(rolls),
         element=element,
         elements=elements,
+        spheres=spheres,
     )
 
 

@@ -10,6 +10,7 @@ from sandbox.scene.bodies import Bodies
 from sandbox.scene.claimed import claimed
 from sandbox.scene.elements import elements_of
 from sandbox.scene.faults import Location
+from sandbox.scene.floored import floored
 from sandbox.scene.generated import generated, tied
 from sandbox.scene.generators import GeneratorError
 from sandbox.scene.model import Mover, Scene, Single, Surfaced
@@ -43,6 +44,7 @@ def crosscheck(scene: Scene) -> list[Found]:
         *_states(scene, bodies),
         *starts(scene, bodies, _elements(scene), _owners(scene)),
         *claimed(scene, bodies),
+        *floored(scene, bodies),
     ]
     found += [*attachments(scene, bodies), *tied(scene, bodies)]
     return found if materials else [*found, *_surfaces(scene, bodies)]
@@ -159,7 +161,8 @@ def _names(scene: Scene, bodies: Bodies) -> Iterator[Found]:
             twice.add(owners[element][0])
             yield (*owners[element][0], "name"), _taken(name)
         seen.add(name)
-    for name, (location, _) in zip(scene.fixed_names, _things(scene), strict=True):
+    pockets = [("pocket", k) for k in range(len(scene.pockets))]
+    for name, location in zip(scene.fixed_names, [*(w for w, _ in _things(scene)), *pockets], strict=True):
         if name in seen:
             yield (*location, "name"), _taken(name)
         seen.add(name)

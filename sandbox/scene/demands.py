@@ -41,6 +41,9 @@ class Demand(StrEnum):
     THRUST = "thrust"
     BOUNDS = "bounds"
     LIFETIMES = "lifetimes"
+    SURFACE = "surface"
+    SPIN = "spin"
+    POCKETS = "pockets"
 
 
 BALLS = frozenset(
@@ -140,6 +143,7 @@ def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
         yield demand, most > 0, why if touch else "nothing can meet"
 
     yield from _joints(scene)
+    yield from _floor(scene)
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     mortal = int(np.isfinite(bodies.lifetime).sum())
     yield Demand.LIFETIMES, mortal > 0, _count(mortal, "body lives for a time", "bodies live for a time", "all stay")
@@ -151,6 +155,19 @@ def _joints(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
         yield demand, count > 0, f"{count:,}" if count else "none"
     for demand, things in ((Demand.ATTRACTION, scene.attractions), (Demand.THRUST, scene.thrusts)):
         yield demand, bool(things), f"{len(things):,}" if things else "none"
+
+
+def _floor(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
+    floor, models = scene.surface, scene.contact_models
+    rubs = floor is not None and floor.rubs
+    why = "no [surface]" if floor is None else "the surface rubs nowhere"
+    if floor is not None and rubs:
+        figures = (floor.sliding_friction, floor.rolling_friction, floor.spinning_friction)
+        why = "friction: sliding {:g}, rolling {:g}, spinning {:g}".format(*figures)
+    yield Demand.SURFACE, rubs, why
+    rolls = floor is not None and (floor.sliding_friction > 0 or models.spins or bool(scene.bodies.roll.any()))
+    yield Demand.SPIN, rolls, "spheres turn about three axes" if rolls else "nothing turns but about z"
+    yield Demand.POCKETS, bool(scene.pockets), f"{len(scene.pockets):,}" if scene.pockets else "none"
 
 
 def _count(n: int, one: str, many: str, none: str) -> str:

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from sandbox.scene.floor import Spin
 from sandbox.scene.part import MAX_BODIES, Colour, Coordinate, Point, Radius, Velocity
 from sandbox.scene.surfaced import Collides, Mover, Single
 
@@ -18,7 +19,10 @@ class Disc(Mover):
 
 
 class Ball(Disc, Single):
-    """One ball."""
+    """One ball; on a `[surface]` a sphere, I = ⅖ m r²."""
+
+    spin: Spin | None = None
+    """of a ball on a `[surface]`, instead of `angular_velocity`"""
 
 
 class Grid(Disc):

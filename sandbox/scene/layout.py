@@ -30,6 +30,8 @@ class Layout:
     """They pass through each other."""
     elements: int = 1
     """how many elements the mover has"""
+    roll: FloatArray | None = None
+    """(n, 2) rad/s, of spheres on a floor, about x and y; none where nothing rolls"""
     lifetime: FloatArray | None = None
     """(n,) s, how long each is there; none where all are for ever"""
 

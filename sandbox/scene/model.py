@@ -4,13 +4,15 @@ The model holds the file as it was written: generators are not expanded, mixing 
 `bodies.py` numbers what moves, `demands.py` derives the physics that is needed.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
+from sandbox.scene.cue import Shot
 from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
+from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
 from sandbox.scene.part import Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
@@ -26,13 +28,15 @@ if TYPE_CHECKING:
     from sandbox.scene.links import Links
 
 __all__ = [
-    "Attraction", "Ball", "Box", "Capsule", "Cloth", "Collides", "Compound", "Disc", "Emitter", "Generator", "Grid",
-    "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene",
-    "Single", "Stack", "Surfaced", "Thrust", "Wall", "World", "default_name",
+    "Attraction", "Ball", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc", "Emitter",
+    "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Pocket", "Polygon", "Post",
+    "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust", "Wall", "World",
+    "default_name",
 ]  # fmt: skip
 
 Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
 Drag = Annotated[float, Field(ge=0, le=1e9)]
+Height = Annotated[float, Field(gt=0, le=1e9)]
 
 
 class World(Part):
@@ -87,6 +91,8 @@ class Wall(Surfaced):
     """full thickness, m"""
     closed: bool = False
     """Join the last point to the first."""
+    height: Height | None = None
+    """of the nose above a floor, m"""
 
 
 class Post(Surfaced):
@@ -94,6 +100,8 @@ class Post(Surfaced):
 
     position: Point
     radius: Radius
+    height: Height | None = None
+    """of the nose above a floor, m"""
 
 
 class Play(Part):
@@ -118,11 +126,14 @@ class Scene(Part):
     world: World = Field(default_factory=World)
     solver: Settings = Field(default_factory=Settings)
     play: Play = Field(default_factory=Play)
+    surface: Floor | None = None
+    contact_models: ContactModels = Field(default_factory=ContactModels)
     materials: tuple[Material, ...] = Field((), alias="material")
     pairs: tuple[Pair, ...] = Field((), alias="pair")
     planes: tuple[Plane, ...] = Field((), alias="plane")
     walls: tuple[Wall, ...] = Field((), alias="wall")
     posts: tuple[Post, ...] = Field((), alias="post")
+    pockets: tuple[Pocket, ...] = Field((), alias="pocket")
     balls: tuple[Ball, ...] = Field((), alias="ball")
     grids: tuple[Grid, ...] = Field((), alias="grid")
     scatters: tuple[Scatter, ...] = Field((), alias="scatter")
@@ -138,6 +149,7 @@ class Scene(Part):
     joints: tuple[Joint, ...] = Field((), alias="joint")
     attractions: tuple[Attraction, ...] = Field((), alias="attraction")
     thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
+    shots: tuple[Shot, ...] = Field((), alias="shot")
 
     @cached_property
     def bodies(self) -> "Bodies":
@@ -205,16 +217,20 @@ class Scene(Part):
 
     @property
     def fixed(self) -> tuple[Plane | Wall | Post, ...]:
-        """The fixed things, in the order of their numbers: planes, walls, posts."""
+        """The solid fixed things, in the order of their numbers: planes, walls, posts. Pockets come after them."""
         return self.planes + self.walls + self.posts
 
     @cached_property
     def fixed_names(self) -> tuple[str, ...]:
-        """A name for each fixed thing; one without a name is called by its kind and place in the file."""
+        """A name for each fixed thing, pockets last; one without a name is called by its kind and place in the file."""
+        kinds: dict[str, Sequence[Surfaced | Pocket]] = {
+            "plane": self.planes,
+            "wall": self.walls,
+            "post": self.posts,
+            "pocket": self.pockets,
+        }
         return tuple(
-            thing.name or default_name(kind, k)
-            for kind, things in (("plane", self.planes), ("wall", self.walls), ("post", self.posts))
-            for k, thing in enumerate(things)
+            thing.name or default_name(kind, k) for kind, things in kinds.items() for k, thing in enumerate(things)
         )
 
 

@@ -105,6 +105,15 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.THRUST, False, {"ball": [BALL]}, "none"),
     (Demand.LIFETIMES, True, {"emitter": [SPARKS]}, "3 bodies live for a time"),
     (Demand.LIFETIMES, False, {"ball": [BALL]}, "all stay"),
+    (Demand.SURFACE, True, {"surface": {"sliding_friction": 0.2}, "ball": [BALL]}, "sliding 0.2"),
+    (Demand.SURFACE, False, {"surface": {}, "ball": [BALL]}, "rubs nowhere"),
+    (Demand.SURFACE, False, {"ball": [BALL]}, "no [surface]"),
+    (Demand.SPIN, True, {"surface": {"sliding_friction": 0.2}, "ball": [BALL]}, "three axes"),
+    (Demand.SPIN, True, {"surface": {}, "contact_models": {"ball_ball": "frictional"}, "ball": [BALL]}, "three axes"),
+    (Demand.SPIN, True, {"surface": {}, "ball": [{**BALL, "spin": [1, 0, 0]}]}, "three axes"),
+    (Demand.SPIN, False, {"surface": {"rolling_friction": 0.1}, "ball": [{**BALL, "spin": [0, 0, 1]}]}, "but about z"),
+    (Demand.POCKETS, True, {"ball": [BALL], "pocket": [{"position": [9, 9], "radius": 1}]}, "1"),
+    (Demand.POCKETS, False, {"ball": [BALL]}, "none"),
 ]
 
 

@@ -147,6 +147,14 @@ class Population:
         """Give a body an angular velocity, rad/s."""
         self._home(number).set_spin(number, spin)
 
+    def set_roll(self, number: int, roll: tuple[float, float]) -> None:  # noqa: ARG002, all casts are asked alike
+        """Refuse: pymunk's bodies turn about one axis.
+
+        Raises:
+            ActionError: always.
+        """
+        raise ActionError(f"pymunk does not model the spin of {self.bodies.names[number]!r}")
+
     def push(self, number: int, force: FloatArray, torque: float) -> None:
         """Let a steady force (N) and torque (N·m) act on a body from now on."""
         half = self._home(number)

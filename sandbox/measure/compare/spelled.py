@@ -109,7 +109,7 @@ def _numbers(scene: Scene) -> list[list[int]]:
 
 def _fixed_names(scene: Scene) -> list[tuple[str, int, str]]:
     places = [(kind, k) for kind in FIXED for k in range(len(getattr(scene, f"{kind}s")))]
-    return [(kind, k, name) for (kind, k), name in zip(places, scene.fixed_names, strict=True)]
+    return [(kind, k, name) for (kind, k), name in zip(places, scene.fixed_names, strict=False)]
 
 
 def _is_single_bodies(mover: Mover) -> bool:

@@ -78,7 +78,7 @@ def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
             k = int(np.argmin(reach / speeds))
         found.append(Passage(bodies.names[movers[k]], thing, float(speeds[k]), float(reach[k])))
 
-    for thing, name in zip(scene.fixed, scene.fixed_names, strict=True):
+    for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):
         worst(half + _half_depth(thing), speed, name)
     among = meet_each_other(bodies)[movers]
     fixed = np.flatnonzero(bodies.fixed & meet.touches)

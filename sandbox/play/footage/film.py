@@ -90,7 +90,8 @@ class Film:
 
         velocity, spin = between(run.velocity), between(run.angular_velocity)
         velocity[gone], spin[gone] = 0.0, 0.0
-        return Frame(time, between(run.position), velocity, between(run.angle), spin, present)
+        roll = between(run.spin)[:, :2] if len(run.spin) else None
+        return Frame(time, between(run.position), velocity, between(run.angle), spin, present, roll)
 
     def _steady(self, k: int, after: int, span: float) -> BoolArray:
         """Tell who moves from one frame to the next as bodies do: neither retired between them nor put elsewhere."""

@@ -197,8 +197,7 @@ def _nudged(point: Checkpoint) -> Checkpoint | None:
     place = position[able[0]]
     position[able[0]] = place + np.maximum(NUDGE * np.sqrt(0.5), ULPS * np.spacing(np.abs(place)))
     frame = point.frame
-    moved = Frame(frame.time, position, frame.velocity, frame.angle, frame.angular_velocity, frame.present)
-    return replace(point, frame=moved)
+    return replace(point, frame=replace(frame, position=position))
 
 
 def follows(action: Action) -> Action | None:

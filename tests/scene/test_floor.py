@@ -1,0 +1,92 @@
+"""Floors: `[surface]`, spins, noses, pockets and shots of a scene file."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sandbox.scene.cue import Stroke, struck
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import dumps, from_document, loads
+
+MASS, RADIUS = 0.170097, 0.028575
+BALL: dict[str, Any] = {"name": "cue", "position": [0, 0], "radius": RADIUS, "mass": MASS}
+CUSHION = {"points": [[1, -1], [1, 1]], "height": 0.037}
+TABLE: dict[str, Any] = {"surface": {"sliding_friction": 0.2}, "ball": [BALL], "wall": [CUSHION]}
+
+
+def test_balls_on_a_floor_are_spheres() -> None:
+    on, off = (from_document({**more, "ball": [BALL]}) for more in ({"surface": {}}, {}))
+    # ⅖ m r² against ½ m r²; the last digit may be rounded otherwise
+    assert on.bodies.moment[0] == pytest.approx(0.4 * MASS * RADIUS**2, rel=1e-15)
+    assert off.bodies.moment[0] == pytest.approx(0.5 * MASS * RADIUS**2, rel=1e-15)
+
+
+def test_spin_is_kept_in_the_bodies_and_in_the_file() -> None:
+    scene = from_document({**TABLE, "ball": [{**BALL, "spin": [1.0, 2.0, 3.0]}]})
+    assert scene.bodies.roll.tolist() == [[1.0, 2.0]]
+    assert scene.bodies.angular_velocity.tolist() == [3.0]
+    assert loads(dumps(scene)) == scene
+
+
+def test_pockets_are_numbered_after_everything_solid() -> None:
+    pocket = {"position": [1, 1], "radius": 0.1}
+    scene = from_document({**TABLE, "pocket": [pocket, {**pocket, "name": "left"}], "post": [pocket]})
+    assert scene.fixed_names == ("wall-1", "post-1", "pocket-1", "left")
+    assert len(scene.fixed) == 2
+
+
+@pytest.mark.parametrize(
+    ("document", "path", "words"),
+    [
+        ({"ball": [{**BALL, "spin": [1, 0, 0]}]}, "ball.cue.spin", "[surface]"),
+        ({**TABLE, "ball": [{**BALL, "spin": [1, 0, 0], "angular_velocity": 1}]}, "angular_velocity", "both"),
+        ({**TABLE, "ball": [{**BALL, "spin": [1, 0, 0], "fixed": True}]}, "spin", "never moves"),
+        ({"ball": [BALL], "contact_models": {"cushion": "simple"}}, "contact_models.cushion", "[surface]"),
+        ({"ball": [BALL], "wall": [CUSHION]}, "height", "[surface]"),
+        ({**TABLE, "wall": [{**CUSHION, "height": 0.06}]}, "height", "passes over"),
+        (
+            {**TABLE, "contact_models": {"cushion": "han2005"}, "post": [{"position": [5, 5], "radius": 1}]},
+            "post",
+            "nose",
+        ),
+        ({"ball": [BALL], "shot": [{"aim": 0, "speed": 1}]}, "shot", "[surface]"),
+        ({**TABLE, "shot": [{"aim": 0, "speed": 1, "ball": "eight"}]}, "ball", "no body is named 'eight'"),
+        ({**TABLE, "shot": [{"aim": 0, "speed": 1}, {"aim": 1, "speed": 1}]}, "ball", "second shot"),
+        ({**TABLE, "shot": [{"aim": 0, "speed": 1, "side": 0.4, "height": -0.4}]}, "side", "slips"),
+        ({**TABLE, "shot": [{"aim": 0, "speed": 1, "side": 0.6}]}, "side", "0.5"),
+        ({**TABLE, "pocket": [{"name": "cue", "position": [9, 9], "radius": 1}]}, "pocket", "unique"),
+    ],
+)
+def test_what_only_a_floor_has_is_checked(document: dict[str, Any], path: str, words: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        from_document(document)
+    assert any(path in fault.path and words in fault.message for fault in caught.value.faults), str(caught.value)
+
+
+def test_shot_starts_the_ball_that_it_names() -> None:
+    scene = from_document({**TABLE, "shot": [{"aim": 0.5 * math.pi, "speed": 2.0, "height": 0.3}]})
+    velocity, spin = scene.bodies.velocity[0], scene.bodies.roll[0]
+    assert velocity[1] > 0.0
+    assert abs(velocity[0]) < 1e-15 * velocity[1]  # cos(π/2) in doubles
+    assert spin[0] < 0.0  # follow, as natural roll: ω = (−v_y, v_x) / R
+
+
+@pytest.mark.parametrize("side", [-0.4, 0.0, 0.25])
+@pytest.mark.parametrize("height", [-0.3, 0.0, 0.28])
+def test_stroke_keeps_energy_and_momentum_of_ball_and_cue(side: float, height: float) -> None:
+    """The tip is elastic and sticks: cue and ball together lose neither, but for the squirt that is added to it."""
+    cue, speed = 0.55, 3.0
+    velocity, spin = struck(Stroke(aim=0.3, speed=speed, side=side, height=height, cue_mass=cue), MASS, RADIUS)
+    ball = math.hypot(*velocity)
+    after = speed - MASS * ball / cue
+    moving = 0.5 * MASS * ball**2 + 0.2 * MASS * RADIUS**2 * float(np.dot(spin, spin))
+    assert moving + 0.5 * cue * after**2 == pytest.approx(0.5 * cue * speed**2, rel=1e-12)  # rounding
+
+
+def test_side_sends_the_ball_off_and_spins_it() -> None:
+    right, left = (struck(Stroke(aim=0.0, speed=1.0, side=a), MASS, RADIUS) for a in (0.3, -0.3))
+    assert right[0][1] > 0.0 > left[0][1]  # struck on its right it squirts to the left
+    assert right[1][2] > 0.0 > left[1][2]  # and turns anti-clockwise
+    assert right[0] == pytest.approx((left[0][0], -left[0][1]))
