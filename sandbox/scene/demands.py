@@ -64,6 +64,9 @@ BALLS = frozenset(
 )
 """All that a scene of balls and fixed things can demand. Engines list what they have: a new demand is nobody's yet."""
 
+FLOOR = frozenset({Demand.SURFACE, Demand.SPIN, Demand.POCKETS})
+"""What only spheres on a floor demand."""
+
 OF_LINKS = {
     LinkKind.ROD: Demand.RODS,
     LinkKind.PIVOT: Demand.PIVOTS,

@@ -1,15 +1,17 @@
 """ExactEngine: what event-driven simulation can model. Light until started."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sandbox.scene.demands import BALLS, Demand, unmodelled
+from sandbox.scene.demands import BALLS, FLOOR, Demand, demands, unmodelled
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
 if TYPE_CHECKING:
+    from sandbox.engines.exact.rolling.simulation import RollingSimulation
     from sandbox.engines.exact.simulation import ExactSimulation
 
 STEPS = ("integrator", "detection", "response", "broad_phase", "joints", "stretch")
@@ -33,7 +35,7 @@ class ExactEngine:
 
     name: str = "exact"
     about: str = "event-driven: closed-form motion between events, next events from stable roots"
-    capabilities: frozenset[Demand] = BALLS - {Demand.DRAG}
+    capabilities: frozenset[Demand] = BALLS - {Demand.DRAG} | FLOOR
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that it lacks."""
@@ -45,6 +47,7 @@ class ExactEngine:
                 lacks.append(f"{key} {stated!r} is not a choice it has (it {why}; leave it out)")
         if settings.half_kick:
             lacks.append("half_kick is not a choice it has (it takes no steps; leave it out)")
+        lacks += _of_floors(scene)
         overlap = _overlap(scene)
         return (*lacks, overlap) if overlap else tuple(lacks)
 
@@ -52,7 +55,7 @@ class ExactEngine:
         """Return the settings: it has no choices to fill in."""
         return settings
 
-    def start(self, scene: Scene, settings: Settings | None = None) -> "ExactSimulation":
+    def start(self, scene: Scene, settings: Settings | None = None) -> "ExactSimulation | RollingSimulation":
         """Set a scene up.
 
         Raises:
@@ -65,19 +68,42 @@ class ExactEngine:
         missing = self.missing(scene, settings)
         if missing:
             raise Refusal(self.name, missing, ())
+        if on_floor(scene):
+            from sandbox.engines.exact.rolling.simulation import RollingSimulation
+
+            return RollingSimulation(scene, settings)
         return ExactSimulation(scene, settings)
+
+
+def on_floor(scene: Scene) -> bool:
+    """Tell whether a scene has what only balls on a floor have; of one that asks for nothing of it, they are discs."""
+    return bool(demands(scene) & FLOOR)
+
+
+def _of_floors(scene: Scene) -> Iterator[str]:
+    """Say what a scene on a floor has for which there is no closed form here."""
+    if not on_floor(scene):
+        return
+    if scene.world.gravity != (0.0, 0.0):
+        yield "it does not model world.gravity in the plane of a floor: what slides then goes no parabola"
+    bodies = scene.bodies
+    radii = set(bodies.radius[np.asarray([e.collides == "all" for e in bodies.elements])[bodies.element]].tolist())
+    if scene.surface is not None and len(radii) > 1:
+        yield "it does not model spheres of different radii that meet on a floor: their normal is not level"
 
 
 def _overlap(scene: Scene) -> str | None:
     """Say which two overlap at the start, or None."""
     from sandbox.engines.exact.overlap import overlapping_balls, overlapping_things, told
     from sandbox.engines.fixtures import fixtures_of
+    from sandbox.engines.floor.pockets import caught
 
     bodies = scene.bodies
     if not bodies.round.any():
         return None
     kinds = np.asarray([element.collides for element in bodies.elements])[bodies.element]
-    to_all, to_fixed = (kinds == "all") & bodies.round, (kinds == "fixed") & bodies.round
+    there = bodies.round & (caught(scene, bodies.position) < 0)  # what lies in a pocket meets nothing
+    to_all, to_fixed = (kinds == "all") & there, (kinds == "fixed") & there
     pair = overlapping_balls(bodies.position, bodies.radius, to_all, to_fixed, bodies.fixed)
     if pair is not None:
         return told(bodies.names[pair[0]], bodies.names[pair[1]], pair[2])

@@ -4,6 +4,7 @@ import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.engines.exact.overlap import allowed, overlapping_things, told
+from sandbox.engines.floor.pockets import caught
 from sandbox.engines.roster import ALL, FIXED, MEETS, NOTHING, Roster
 from sandbox.scene.model import Ball, Scene, Single
 from sandbox.trajectory import BoolArray, FloatArray
@@ -99,6 +100,9 @@ class Troupe(Roster):
         if kind == NOTHING:
             return
         still = self.bodies.fixed
+        if caught(self.scene, position[None, :])[0] >= 0:
+            return
+        others = others & (caught(self.scene, self.position) < 0)  # what lies in a pocket meets nothing
         meet = others & (self.meets == ALL) & ~still if kind == ALL else np.zeros_like(others)
         meet |= others & (self.meets == FIXED) & ~still if fixed and kind == ALL else False
         meet |= others & (self.meets == ALL) & still & (not fixed)

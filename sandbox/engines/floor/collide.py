@@ -13,7 +13,6 @@ ELASTIC, FRICTIONAL = range(2)
 SIMPLE, HAN2005 = range(2)
 """Models of ball and cushion."""
 
-Three = tuple[float, float, float]
 Five = tuple[float, float, float, float, float]
 """v_x, v_y, m/s; ω_x, ω_y, ω_z, rad/s"""
 

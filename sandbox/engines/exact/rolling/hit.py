@@ -1,0 +1,170 @@
+"""Hit: what happens when a rolling ball meets another, a cushion, a jaw or a pocket."""
+
+import math
+
+from sandbox.engines.exact.rolling.approach import PRESS
+from sandbox.engines.exact.rolling.board import (
+    ALONG_X,
+    ALONG_Y,
+    AT_X,
+    AT_Y,
+    AX,
+    AY,
+    BALL,
+    BALLS_AS,
+    BY_CAPTURE,
+    COAT,
+    CUSHIONS_AS,
+    GAVE_X,
+    GAVE_Y,
+    HIGH,
+    KNOB,
+    KX,
+    KY,
+    LIGHTNESS,
+    LINE,
+    MASS,
+    NOSE,
+    NX,
+    NY,
+    POCKET,
+    RADIUS,
+    REACH,
+    RECORDING,
+    ROWS,
+    SURFACE,
+    THING,
+    VX,
+    VY,
+    Board,
+    X,
+    Y,
+)
+from sandbox.engines.exact.rolling.book import book_hit, book_hop, changed
+from sandbox.engines.exact.rolling.motion import give, go_on, motion_of, set_off
+from sandbox.engines.floor.collide import meet, rebound
+from sandbox.engines.floor.phase import CAPTURED
+from sandbox.engines.kernel import bare_kernel as kernel
+
+CUT = 1e-3
+"""m/s: hits that are slower lose nothing, so that cascades in clusters end."""
+
+HOP = 5e-4
+"""m/s, with which what presses on is sent off at least: so it hops instead of hitting ever faster. Between balls that
+brings up to m·HOP²/4 each time, some 1e-8 J, and a way of 1e-7 m."""
+
+
+@kernel
+def log(
+    board: Board, kind: int, a: int, b: int, x: float, y: float, nx: float, ny: float, jx: float, jy: float
+) -> None:
+    """Write an event down."""
+    row = board.counts[ROWS]
+    line, what = board.log[row], board.log_what[row]
+    line[AT_X], line[AT_Y], line[ALONG_X], line[ALONG_Y], line[GAVE_X], line[GAVE_Y] = x, y, nx, ny, jx, jy
+    what[0], what[1], what[2] = kind, a, b
+    board.counts[ROWS] += 1
+
+
+@kernel
+def hit_ball(board: Board, i: int, k: int) -> None:
+    """Let two balls, brought to one time, hit each other."""
+    state, tags = board.state, board.tags
+    dx, dy = state[k, X] - state[i, X], state[k, Y] - state[i, Y]
+    distance = math.sqrt(dx * dx + dy * dy)
+    nx, ny = dx / distance, dy / distance
+    li, lk = state[i, LIGHTNESS], state[k, LIGHTNESS]
+    before_x, before_y = state[i, VX], state[i, VY]
+    closing = (state[i, VX] - state[k, VX]) * nx + (state[i, VY] - state[k, VY]) * ny
+    if closing > 0.0:
+        restitution = board.coefficients[0, tags[i, SURFACE], tags[k, SURFACE]] if closing > CUT else 1.0
+        mine, theirs = motion_of(state, i), motion_of(state, k)
+        a, b = meet(board.counts[BALLS_AS], restitution, mine, theirs, (li, lk), state[i, RADIUS], nx, ny)
+        give(state, i, a)
+        give(state, k, b)
+        book_hit(board, i, mine, k, theirs, nx, ny)
+    set_off(board, i)
+    set_off(board, k)
+    parting = (state[k, VX] - state[i, VX]) * nx + (state[k, VY] - state[i, VY]) * ny
+    pressed = (state[i, AX] - state[k, AX]) * nx + (state[i, AY] - state[k, AY]) * ny
+    if parting < HOP and pressed > 2.0 * PRESS:
+        push = (HOP - parting) / (li + lk)
+        book_hop(board, push, parting, HOP)
+        state[i, VX] -= push * li * nx
+        state[i, VY] -= push * li * ny
+        state[k, VX] += push * lk * nx
+        state[k, VY] += push * lk * ny
+        set_off(board, i)
+        set_off(board, k)
+    if board.counts[RECORDING] != 0:
+        mass, reach = state[i, MASS], state[i, RADIUS]
+        jx, jy = mass * (before_x - state[i, VX]), mass * (before_y - state[i, VY])
+        x, y = state[i, X] + reach * nx, state[i, Y] + reach * ny
+        if i < k:
+            log(board, BALL, i, k, x, y, nx, ny, jx, jy)
+        else:
+            log(board, BALL, k, i, x, y, -nx, -ny, -jx, -jy)
+
+
+@kernel
+def hit_line(board: Board, i: int, k: int) -> None:
+    """Let a ball hit a plane or the side of a wall."""
+    line = board.lines[k]
+    hit_cushion(board, i, LINE, board.line_tags[k, THING], board.line_tags[k, COAT], -line[NX], -line[NY], line[NOSE])
+
+
+@kernel
+def hit_knob(board: Board, i: int, k: int) -> None:
+    """Let a ball hit a post or the end of a wall."""
+    knob = board.knobs[k]
+    dx, dy = knob[KX] - board.state[i, X], knob[KY] - board.state[i, Y]
+    distance = math.sqrt(dx * dx + dy * dy)
+    hit_cushion(
+        board, i, KNOB, board.knob_tags[k, THING], board.knob_tags[k, COAT], dx / distance, dy / distance, knob[HIGH]
+    )
+
+
+@kernel
+def hit_cushion(board: Board, i: int, kind: int, thing: int, coat: int, nx: float, ny: float, nose: float) -> None:
+    """Let a ball hit what is fixed; n points into it. What has no nose is hit at the ball's centre."""
+    state, surface = board.state, board.tags[i, SURFACE]
+    before_x, before_y, radius = state[i, VX], state[i, VY], state[i, RADIUS]
+    height = nose if nose > 0.0 else radius
+    closing = before_x * nx + before_y * ny
+    if closing > 0.0:
+        restitution = board.coefficients[0, surface, coat] if closing > CUT else 1.0
+        friction = board.coefficients[1, surface, coat]
+        before = motion_of(state, i)
+        give(state, i, rebound(board.counts[CUSHIONS_AS], restitution, friction, before, radius, height, nx, ny))
+        still = state[i, VX] * nx + state[i, VY] * ny
+        if still > 0.0:  # a nose far above the centre leaves it some of its way: the ball stays below it
+            state[i, VX] -= still * nx
+            state[i, VY] -= still * ny
+        book_hit(board, i, before, -1, before, nx, ny)
+    set_off(board, i)
+    parting = -(state[i, VX] * nx + state[i, VY] * ny)
+    if parting < HOP and state[i, AX] * nx + state[i, AY] * ny > 2.0 * PRESS:
+        book_hop(board, (HOP - parting) * state[i, MASS], parting, HOP)
+        state[i, VX] -= (HOP - parting) * nx
+        state[i, VY] -= (HOP - parting) * ny
+        set_off(board, i)
+    if board.counts[RECORDING] != 0:
+        mass = state[i, MASS]
+        jx, jy = mass * (before_x - state[i, VX]), mass * (before_y - state[i, VY])
+        log(board, kind, i, -1 - thing, state[i, X] + radius * nx, state[i, Y] + radius * ny, nx, ny, jx, jy)
+
+
+@kernel
+def capture(board: Board, i: int, k: int, solid: int) -> None:
+    """Let a ball fall into a pocket, at whose centre it then lies; `solid` is how many fixed things are none."""
+    state, hole = board.state, board.pockets[k]
+    x, y, vx, vy, mass = state[i, X], state[i, Y], state[i, VX], state[i, VY], state[i, MASS]
+    state[i, X], state[i, Y] = hole[KX], hole[KY]
+    before = motion_of(state, i)
+    give(state, i, (0.0, 0.0, 0.0, 0.0, 0.0))
+    along, across = changed(board, i, before, 1.0, 0.0)
+    board.world[BY_CAPTURE] += along + across
+    go_on(board, i, CAPTURED)
+    if board.counts[RECORDING] != 0:
+        nx, ny = (hole[KX] - x) / hole[REACH], (hole[KY] - y) / hole[REACH]
+        log(board, POCKET, i, -1 - solid - k, x, y, nx, ny, mass * vx, mass * vy)
