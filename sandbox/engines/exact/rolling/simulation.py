@@ -86,6 +86,11 @@ class RollingSimulation(Running):
         return self._troupe.retired
 
     @property
+    def board(self) -> Board:
+        """All that its kernels read and write."""
+        return self._board
+
+    @property
     def work(self) -> Mapping[str, int]:
         """What was done so far: events, predictions, and at how many others and fixed things these looked."""
         counts = self._board.counts

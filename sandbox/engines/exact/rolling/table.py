@@ -1,0 +1,214 @@
+"""Table: a scene on a floor, made ready once, for shots by the thousand.
+
+    table = Table(load("scenes/billiards/9-ball.toml"))
+    outcome = table.shoot(Stroke(aim=1.57, speed=6.0))
+
+A shot is one call of a kernel; a fan of them is one for each thread.
+"""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from sandbox.engines.contract import Exhaustion, Refusal
+from sandbox.engines.exact.engine import ExactEngine, on_floor
+from sandbox.engines.exact.rolling.board import LIMIT, PHASE, RECORDING, ROWS, STEPS, TRACING, VX, WZ, Board, X, Y
+from sandbox.engines.exact.rolling.outcome import Outcome
+from sandbox.engines.exact.rolling.play import DONE, FULL, TOO_MANY
+from sandbox.engines.exact.rolling.record import too_many, with_paths, with_room
+from sandbox.engines.exact.rolling.shoot import UNSTRUCK, shoot, shoot_many
+from sandbox.engines.exact.rolling.simulation import RollingSimulation
+from sandbox.scene.cue import Stroke, struck
+from sandbox.scene.model import Scene
+from sandbox.trajectory import FloatArray, IntArray
+
+UNTIL = 120.0
+"""s: a shot takes no longer, whatever the floor."""
+
+MOST_EVENTS = 2_000_000
+"""of a shot"""
+
+ROOM = 512
+"""Events that there is room for at first."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fan:
+    """M shots of N balls from one state."""
+
+    position: FloatArray
+    """(M, N, 2) m, where the balls came to rest"""
+    pocket: IntArray
+    """(M, N) into which pocket each fell, −1 for none"""
+    duration: FloatArray
+    """(M,) s, until the last event"""
+    events: IntArray
+    """(M,) how many there were"""
+    complete: FloatArray
+    """(M,) whether everything came to rest"""
+
+
+class Table:
+    """A scene on a floor as it stands; its own shots and velocities count as its state before the first stroke."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Make a scene ready.
+
+        Raises:
+            Refusal: the exact engine lacks something, or the scene has no floor.
+        """
+        engine = ExactEngine()
+        missing = engine.missing(scene, scene.solver)
+        if not missing and not on_floor(scene):
+            missing = ("shots are played on a floor; give the scene a [surface]",)
+        if missing:
+            raise Refusal(engine.name, missing, ())
+        self.scene = scene
+        self.names = scene.bodies.names
+        self._number = {name: k for k, name in enumerate(self.names)}
+        simulation = RollingSimulation(scene, scene.solver)
+        board = with_room(simulation.board, ROOM)
+        board.counts[RECORDING], board.counts[LIMIT] = 1, MOST_EVENTS
+        self._board = board
+        self._state, self._tags = board.state.copy(), board.tags.copy()
+        self._motion = np.zeros(5)
+        self._mass, self._radius = scene.bodies.mass.tolist(), scene.bodies.radius.tolist()
+
+    @property
+    def position(self) -> FloatArray:
+        """(N, 2) m, where the balls stand before a shot."""
+        return self._state[:, X : Y + 1].copy()
+
+    def shoot(
+        self, stroke: Stroke | None = None, ball: str = "cue", *, until: float = UNTIL, ways: bool = False
+    ) -> Outcome:
+        """Play a shot until everything rests; the table itself stays as it is.
+
+        Args:
+            stroke: how the ball is struck; none lets the balls go on as they stand.
+            ball: which.
+            until: s, when to stop at the latest.
+            ways: keep the ways of all balls too.
+
+        Raises:
+            KeyError: no ball has that name.
+            Exhaustion: more events than `MOST_EVENTS`.
+        """
+        number = UNSTRUCK
+        if stroke is not None:
+            number = self._number[ball]
+            velocity, spin = struck(stroke, self._mass[number], self._radius[number])
+            self._motion[:] = (*velocity, *spin)
+        return self._play(number, self._motion, until, ways)
+
+    def send(
+        self,
+        velocity: tuple[float, float],
+        spin: tuple[float, float, float],
+        ball: str = "cue",
+        *,
+        until: float = UNTIL,
+    ) -> Outcome:
+        """Play a shot from the velocity, m/s, and the spin, rad/s, that a ball has right after its stroke.
+
+        Raises:
+            KeyError: no ball has that name.
+            Exhaustion: as `shoot`.
+        """
+        self._motion[:] = (*velocity, *spin)
+        return self._play(self._number[ball], self._motion, until, False)
+
+    def fan(self, strokes: Sequence[Stroke], ball: str = "cue", *, threads: int = 1, until: float = UNTIL) -> Fan:
+        """Play many shots from where the balls stand, each for itself, on several threads.
+
+        Raises:
+            KeyError: no ball has that name.
+        """
+        number = self._number[ball]
+        figures = self._mass[number], self._radius[number]
+        motions = np.empty((len(strokes), 5))
+        for k, stroke in enumerate(strokes):
+            velocity, spin = struck(stroke, *figures)
+            motions[k] = (*velocity, *spin)
+        return self.fan_of(motions, ball, threads=threads, until=until)
+
+    def fan_of(self, motions: FloatArray, ball: str = "cue", *, threads: int = 1, until: float = UNTIL) -> Fan:
+        """Play many shots as `fan` does, from the velocity and spin of the ball after each stroke, (M, 5)."""
+        count, balls = len(motions), len(self.names)
+        numbers = np.full(count, self._number[ball], dtype=np.int64)
+        rest, pocket = np.empty((count, balls, 2)), np.empty((count, balls), np.int64)
+        ends, events, status = np.empty(count), np.empty(count, np.int64), np.empty(count, np.int64)
+
+        def part(low: int, high: int) -> None:
+            some = slice(low, high)
+            shoot_many(
+                self._own(), self._state, self._tags, numbers[some], motions[some], until,
+                rest[some], pocket[some], ends[some], events[some], status[some],
+            )  # fmt: skip
+
+        bounds = np.linspace(0, count, min(max(threads, 1), max(count, 1)) + 1).astype(int).tolist()
+        parts = list(zip(bounds[:-1], bounds[1:], strict=True))
+        if len(parts) == 1:
+            part(*parts[0])
+        else:
+            with ThreadPoolExecutor(len(parts)) as pool:
+                list(pool.map(lambda each: part(*each), parts))
+        return Fan(rest, pocket, ends, events, status == DONE)
+
+    def with_balls(self, position: dict[str, tuple[float, float]]) -> Self:
+        """Return a table with balls at rest elsewhere, m; those that are not named stay."""
+        other = self._copy()
+        for name, place in position.items():
+            number = self._number[name]
+            other._state[number, X : Y + 1] = place
+            other._state[number, VX : WZ + 1] = 0.0
+            other._tags[number, PHASE] = 0
+        return other
+
+    def after(self, outcome: Outcome) -> Self:
+        """Return the table as a shot has left it."""
+        other = self._copy()
+        other._state[:] = outcome.state
+        other._state[:, 0] = 0.0
+        other._tags[:, PHASE] = outcome.phase
+        return other
+
+    def _copy(self) -> Self:
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other._state, other._tags = self._state.copy(), self._tags.copy()
+        return other
+
+    def _own(self) -> Board:
+        """Return a board for another thread, which logs nothing."""
+        own = {key: value.copy() for key, value in self._board._asdict().items() if isinstance(value, np.ndarray)}
+        own["counts"][RECORDING] = 0
+        return self._board._replace(**own)
+
+    def _play(self, number: int, motion: FloatArray, until: float, ways: bool) -> Outcome:
+        board = self._board
+        board.counts[TRACING] = ways
+        while (status := shoot(board, self._state, self._tags, number, motion, until)) == FULL:
+            if ways and board.counts[STEPS] + 2 > len(board.path):
+                board = with_paths(board, max(2 * len(board.path), 4 * len(self.names), ROOM))
+            else:
+                board = with_room(board, 2 * len(board.log))
+            self._board = board
+        if status == TOO_MANY:
+            raise Exhaustion(too_many(board, self.names, self.scene.fixed_names))
+        rows, steps = int(board.counts[ROWS]), int(board.counts[STEPS])
+        return Outcome(
+            self.names,
+            self.scene.fixed_names,
+            board.log[:rows].copy(),
+            board.log_what[:rows].copy(),
+            board.state.copy(),
+            board.tags[:, PHASE].copy(),
+            status == DONE and math.isfinite(until),
+            board.path[:steps].copy() if ways else None,
+            board.path_what[:steps, 0].copy() if ways else None,
+        )
