@@ -59,11 +59,16 @@ def main() -> int:
     if unknown or arguments.repeats < 1:
         parser.error(f"no bench {', '.join(sorted(unknown))}" if unknown else "--repeats is 1 or more")
 
-    rows = []
+    rows, skipped = [], []
     if not arguments.json:
         print(f"{datetime.now(UTC):%Y-%m-%d}", *(f"{k} {v}" for k, v in {**machine(), **versions()}.items()), sep=" · ")
     for bench in BENCHES:
         if arguments.names and bench.name not in arguments.names:
+            continue
+        if bench.missing and (reason := bench.missing()):
+            skipped.append({"name": bench.name, "reason": reason})
+            if not arguments.json:
+                print(f"{bench.name:<16} left out: {reason}", flush=True)
             continue
         row = measure(bench, arguments.repeats)
         rows.append(row)
@@ -71,7 +76,8 @@ def main() -> int:
             print(told(row), flush=True)
     if arguments.json:
         date = f"{datetime.now(UTC):%Y-%m-%d}"
-        print(json.dumps({"machine": {**machine(), "date": date}, "versions": versions(), "rows": rows}))
+        told_of = {"machine": {**machine(), "date": date}, "versions": versions(), "rows": rows}
+        print(json.dumps({**told_of, "skipped": skipped} if skipped else told_of))
     return 0
 
 

@@ -24,6 +24,8 @@ class Bench(NamedTuple):
     """Ours is what exceeds the peer, not its whole."""
     rate: bool = False
     """Ours and the peer return how much they did in a second; the target is what ours must reach."""
+    missing: Callable[[], str | None] | None = None
+    """Says why the peer is not to be had, where it may not be; the row is then left out, and that is told."""
 
 
 SPARKS = ("world.duration=1.0", "solver.record_every=1")

@@ -1,0 +1,223 @@
+"""Pooltool's world from a scene of ours, so that both play the same shot on the same table with the same models.
+
+Needs `pooltool-billiards`, which writes into the home folder: set `HOME` and `NUMBA_CACHE_DIR` before this is imported.
+Nothing of that package is changed on the disk; `correct` exchanges what is at fault while it runs.
+"""
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+import pooltool as pt
+from pooltool import constants
+from pooltool.objects.table.components import (
+    CircularCushionSegment,
+    CushionDirection,
+    CushionSegments,
+    LinearCushionSegment,
+    Pocket,
+)
+from pooltool.physics.engine import PhysicsEngine
+from pooltool.physics.resolve.ball_ball import FrictionalInelastic, FrictionlessElastic
+from pooltool.physics.resolve.ball_ball.core import CoreBallBallCollision
+from pooltool.physics.resolve.ball_ball.friction import AlciatoreBallBallFriction
+from pooltool.physics.resolve.ball_cushion import Han2005Circular, Han2005Linear, UnrealisticCircular, UnrealisticLinear
+from pooltool.physics.resolve.ball_pocket import CanonicalBallPocket
+from pooltool.physics.resolve.resolver import Resolver
+from pooltool.physics.resolve.stick_ball.instantaneous_point import InstantaneousPoint
+from pooltool.physics.resolve.transition import CanonicalTransition
+from pooltool.ptmath.roots import quartic
+
+Document = dict[str, Any]
+
+NEGLIGIBLE = 1e-24
+"""m²/s⁴, the square of an acceleration between two balls that moves them by 1e-10 m in ten seconds."""
+
+PATCHES = (
+    "no relative acceleration: the quadratic is solved where the quartic's leading coefficient vanishes",
+    "friction between balls is Coulomb's, mu (1 + e)/2 v_n, instead of mu e v_n",
+    "resolve_continually_touching off",
+)
+
+_plain_quartic = quartic.solve
+
+
+@numba.njit(cache=False)
+def _roots(a: float, b: float, c: float, d: float, e: float) -> np.ndarray:
+    """Return the four roots; of a quadratic its two, and −1, which counts as past, in place of the others."""
+    if abs(a) > NEGLIGIBLE:
+        return _plain_quartic(a, b, c, d, e)
+    found = np.full(4, complex(-1.0, 0.0))
+    inside = d * d - 4.0 * c * e
+    if c > 0.0 and inside >= 0.0:
+        q = -0.5 * (d + math.copysign(math.sqrt(inside), d))
+        found[0] = complex(q / c, 0.0)
+        if q != 0.0:
+            found[1] = complex(e / q, 0.0)
+    return found
+
+
+def correct(spacer: float) -> None:
+    """Put right what is at fault, before the first shot of the process; `spacer` is what parts bodies that met, m."""
+    quartic.solve = _roots
+    constants.MIN_DIST = spacer
+    CoreBallBallCollision.resolve_continually_touching = lambda self, ball1, ball2: (ball1, ball2)  # noqa: ARG005
+
+
+class Coulomb(AlciatoreBallBallFriction):
+    """A coefficient that makes of pooltool's impulse μ·e·v_n Coulomb's μ(1 + e)/2·v_n, its slip condition with it."""
+
+    def calculate_friction(self, ball1: pt.Ball, ball2: pt.Ball) -> float:
+        """Return μ(1 + e)/(2e)."""
+        e = (ball1.params.e_b + ball2.params.e_b) / 2.0
+        return super().calculate_friction(ball1, ball2) * (1.0 + e) / (2.0 * e)
+
+
+class Smooth(AlciatoreBallBallFriction):
+    """Balls that do not rub."""
+
+    def calculate_friction(self, ball1: pt.Ball, ball2: pt.Ball) -> float:  # noqa: ARG002
+        """Return 0."""
+        return 0.0
+
+
+def engine(document: Document, coulomb: bool = True) -> PhysicsEngine:
+    """Return pooltool's physics with the models that a scene names; `coulomb` off leaves its own law of friction."""
+    models = document["contact_models"]
+    if models["ball_ball"] == "frictional":
+        between = FrictionalInelastic(friction=Coulomb() if coulomb else AlciatoreBallBallFriction())
+    elif _restitution(document) == 1.0:
+        between = FrictionlessElastic()
+    else:
+        between = FrictionalInelastic(friction=Smooth())
+    if models["cushion"] == "han2005":
+        straight, round_ = Han2005Linear(), Han2005Circular()
+    else:
+        straight = UnrealisticLinear(restitution=True)
+        round_ = UnrealisticCircular(restitution=True)
+    return PhysicsEngine(
+        resolver=Resolver(
+            ball_ball=between,
+            ball_linear_cushion=straight,
+            ball_circular_cushion=round_,
+            ball_pocket=CanonicalBallPocket(),
+            stick_ball=InstantaneousPoint(),
+            transition=CanonicalTransition(),
+        )
+    )
+
+
+def _restitution(document: Document) -> float:
+    """Return that of two balls, which all share."""
+    (pair,) = document["pair"]
+    return float(pair["restitution"])
+
+
+def system(document: Document) -> pt.System:
+    """Return pooltool's balls and table as a scene's are right after the strike."""
+    floor = document["surface"]
+    rail = next((m for m in document["material"] if m["name"] == "rail"), {"restitution": 0.85, "friction": 0.2})
+    balls = {}
+    for ball in document["ball"]:
+        radius = ball["radius"]
+        made = pt.Ball.create(
+            ball["name"],
+            xy=ball["position"],
+            m=ball["mass"],
+            R=radius,
+            u_s=floor["sliding_friction"],
+            u_r=floor["rolling_friction"],
+            u_sp_proportionality=floor["spinning_friction"] / radius,
+            e_b=_restitution(document),
+            e_c=rail["restitution"],
+            f_c=rail["friction"],
+            g=floor["gravity"],
+        )
+        velocity, spin = ball.get("velocity", [0.0, 0.0]), ball.get("spin", [0.0, 0.0, 0.0])
+        made.state.rvw[1, :2], made.state.rvw[2] = velocity, spin
+        made.state.s = motion(velocity, spin, radius)
+        balls[ball["name"]] = made
+    return pt.System(cue=pt.Cue(cue_ball_id=document["ball"][0]["name"]), table=_table(document), balls=balls)
+
+
+def motion(velocity: list[float], spin: list[float], radius: float) -> int:
+    """Return pooltool's number of the state that follows from a ball's figures."""
+    slip = math.hypot(velocity[0] - radius * spin[1], velocity[1] + radius * spin[0])
+    if slip > 1e-9:
+        return constants.sliding
+    if any(velocity):
+        return constants.rolling
+    return constants.spinning if spin[2] else constants.stationary
+
+
+def _table(document: Document) -> pt.Table:
+    """Return the table of walls with two points, posts and pockets.
+
+    Walls are met from one side alone, as in pooltool's own tables, or it would be slower: from that of the table's
+    middle, or of the pocket where one is near.
+    """
+    walls = document.get("wall", [])
+    ends = np.array([wall["points"] for wall in walls]).reshape(-1, 2)
+    middle = (ends.min(axis=0) + ends.max(axis=0)) / 2.0 if len(ends) else np.zeros(2)
+    linear = {}
+    for wall in walls:
+        (ax, ay), (bx, by) = wall["points"]
+        made = LinearCushionSegment(
+            wall["name"], p1=np.array([ax, ay, wall["height"]]), p2=np.array([bx, by, wall["height"]])
+        )
+        centre = (made.p1 + made.p2)[:2] / 2.0
+        near = [
+            p["position"] for p in document.get("pocket", []) if math.dist(p["position"], centre) < 2.0 * p["radius"]
+        ]
+        x, y = near[0] if near else middle
+        side = made.lx * x + made.ly * y + made.l0
+        facing = CushionDirection.BOTH
+        if abs(side) > 1e-9:  # else it is the only wall, met from where the ball comes
+            facing = CushionDirection.SIDE1 if side < 0.0 else CushionDirection.SIDE2
+        linear[wall["name"]] = LinearCushionSegment(wall["name"], p1=made.p1, p2=made.p2, direction=facing)
+    circular = {
+        post["name"]: CircularCushionSegment(
+            post["name"], center=np.array([*post["position"], post["height"]]), radius=post["radius"]
+        )
+        for post in document.get("post", [])
+    }
+    pockets = {
+        pocket["name"]: Pocket(pocket["name"], center=np.array([*pocket["position"], 0.0]), radius=pocket["radius"])
+        for pocket in document.get("pocket", [])
+    }
+    kind = pt.TableType.POCKET if pockets else pt.TableType.BILLIARD
+    return pt.Table(
+        cushion_segments=CushionSegments(linear=linear, circular=circular), pockets=pockets, table_type=kind
+    )
+
+
+def furniture(name: str) -> Document:
+    """Return the walls, posts and pockets of one of pooltool's own tables as a scene has them."""
+    table = pt.Table.prebuilt(pt.objects.TableName[name])
+    cushions = table.cushion_segments
+    return {
+        "wall": [
+            {
+                "name": f"cushion {key}",
+                "points": [part.p1[:2].tolist(), part.p2[:2].tolist()],
+                "height": float(part.height),
+                "material": "rail",
+            }
+            for key, part in cushions.linear.items()
+        ],
+        "post": [
+            {
+                "name": f"jaw {key}",
+                "position": part.center[:2].tolist(),
+                "radius": float(part.radius),
+                "height": float(part.height),
+                "material": "rail",
+            }
+            for key, part in cushions.circular.items()
+        ],
+        "pocket": [
+            {"name": f"pocket {key}", "position": part.center[:2].tolist(), "radius": float(part.radius)}
+            for key, part in table.pockets.items()
+        ],
+    }
