@@ -130,7 +130,7 @@ def evaluate(
     """Write down how every ball moves at a time; their rows stay as they are."""
     state = board.state
     for i in range(len(state)):
-        if state[i, LIGHTNESS] == 0.0 or board.tags[i, PHASE] == CAPTURED:
+        if state[i, LIGHTNESS] == 0.0:
             continue
         dt = t - state[i, T]
         ax, ay = state[i, AX], state[i, AY]

@@ -84,9 +84,8 @@ class Outcome:
     @property
     def events(self) -> list[Event]:
         """What happened, in order."""
-        rows = zip(
-            self.log[:, EVENT_TIME].tolist(), self.what.tolist(), self.log[:, AT_X : AT_X + 2].tolist(), strict=True
-        )
+        columns = self.log[:, EVENT_TIME], self.what, self.log[:, AT_X : AT_X + 2]
+        rows = zip(*(column.tolist() for column in columns), strict=True)
         made = []
         for time, (kind, ball, other), (x, y) in rows:
             if kind == PHASE_ENDS:
@@ -128,4 +127,4 @@ class Outcome:
             parts.append(leg[X : Y + 1] + (leg[VX : VY + 1] + 0.5 * leg[VX + 2 : VY + 3] * share) * share)
         parts.append(self.position[number][None])
         points = np.concatenate(parts)
-        return points[np.append(True, np.any(np.diff(points, axis=0) != 0.0, axis=1))]
+        return np.asarray(points[np.append(True, np.any(np.diff(points, axis=0) != 0.0, axis=1))])

@@ -9,7 +9,9 @@ A shot is one call of a kernel; a fan of them is one for each thread.
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -112,6 +114,7 @@ class Table:
         ball: str = "cue",
         *,
         until: float = UNTIL,
+        ways: bool = False,
     ) -> Outcome:
         """Play a shot from the velocity, m/s, and the spin, rad/s, that a ball has right after its stroke.
 
@@ -120,7 +123,7 @@ class Table:
             Exhaustion: as `shoot`.
         """
         self._motion[:] = (*velocity, *spin)
-        return self._play(self._number[ball], self._motion, until, False)
+        return self._play(self._number[ball], self._motion, until, ways)
 
     def fan(self, strokes: Sequence[Stroke], ball: str = "cue", *, threads: int = 1, until: float = UNTIL) -> Fan:
         """Play many shots from where the balls stand, each for itself, on several threads.
@@ -151,7 +154,7 @@ class Table:
             )  # fmt: skip
 
         bounds = np.linspace(0, count, min(max(threads, 1), max(count, 1)) + 1).astype(int).tolist()
-        parts = list(zip(bounds[:-1], bounds[1:], strict=True))
+        parts = list(pairwise(bounds))
         if len(parts) == 1:
             part(*parts[0])
         else:
@@ -185,9 +188,9 @@ class Table:
 
     def _own(self) -> Board:
         """Return a board for another thread, which logs nothing."""
-        own = {key: value.copy() for key, value in self._board._asdict().items() if isinstance(value, np.ndarray)}
-        own["counts"][RECORDING] = 0
-        return self._board._replace(**own)
+        own: Board = deepcopy(self._board)
+        own.counts[RECORDING] = own.counts[TRACING] = 0
+        return own
 
     def _play(self, number: int, motion: FloatArray, until: float, ways: bool) -> Outcome:
         board = self._board
