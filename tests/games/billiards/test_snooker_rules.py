@@ -1,0 +1,314 @@
+"""Snooker: every foul, every ending, every change of turn."""
+
+from dataclasses import replace
+
+import pytest
+from shot_by_hand import fallen, played
+
+from sandbox.games.billiards.rules.happening import GameError
+from sandbox.games.billiards.rules.snooker import Snooker, SnookerState, remaining
+from sandbox.games.billiards.rules.snooker_balls import COLOURS, REDS, VALUES
+from sandbox.games.billiards.rules.verdict import Lie
+
+RULES = Snooker()
+START = RULES.start()
+PLAY = replace(START, opening=False, in_hand=None)
+COLOUR = replace(PLAY, on="colour", table=(*REDS[1:], *COLOURS), scores=(1, 0))
+ORDER = replace(PLAY, on="yellow", table=COLOURS)
+BLACK = replace(PLAY, on="black", table=("black",))
+SNOOKERED = Lie(snookered=True)
+
+
+def test_start_is_in_the_d_with_reds_on_and_147_to_be_made() -> None:
+    assert START.in_hand == "in the D"
+    assert RULES.legal_targets(START) == set(REDS)
+    assert remaining(START) == 147
+
+
+def test_red_scores_one_stays_down_and_a_colour_is_next() -> None:
+    verdict = played(RULES, START, "cue hits red-1", "red-1 in left")
+    assert verdict.goes_on
+    assert verdict.points == (1, 0)
+    assert (verdict.state.on, verdict.state.run) == ("colour", 1)
+    assert RULES.legal_targets(verdict.state) == set(COLOURS)
+    assert "red-1" not in verdict.state.table
+
+
+def test_each_red_of_a_stroke_scores() -> None:
+    assert played(RULES, PLAY, "cue hits red-1", "red-1 in left", "red-2 in right").points == (2, 0)
+
+
+@pytest.mark.parametrize("colour", COLOURS)
+def test_colour_scores_its_value_comes_back_and_red_is_next(colour: str) -> None:
+    verdict = played(RULES, COLOUR, f"cue hits {colour}", f"{colour} in left", ball=colour)
+    assert verdict.points == (VALUES[colour], 0)
+    assert (verdict.state.on, verdict.goes_on) == ("red", True)
+    assert [each.spots[0] for each in verdict.respot] == [colour]
+    assert verdict.state.table == COLOUR.table
+
+
+def test_spots_that_are_taken_give_way_to_the_highest() -> None:
+    (verdict,) = played(RULES, COLOUR, "cue hits blue", "blue in left", ball="blue").respot
+    assert verdict.spots == ("blue", "black", "pink", "brown", "green", "yellow")
+
+
+def test_colour_that_is_touched_is_nominated_by_that() -> None:
+    assert played(RULES, COLOUR, "cue hits pink", "pink in left").points == (6, 0)
+
+
+def test_last_red_has_its_colour_back_then_the_yellow_is_on() -> None:
+    state = replace(PLAY, table=("red-9", *COLOURS))
+    state = played(RULES, state, "cue hits red-9", "red-9 in left").state
+    verdict = played(RULES, state, "cue hits black", "black in left", ball="black")
+    assert [each.ball for each in verdict.respot] == ["black"]
+    assert (verdict.state.on, verdict.state.table) == ("yellow", COLOURS)
+
+
+def test_last_red_and_no_colour_has_the_yellow_on() -> None:
+    state = replace(COLOUR, table=COLOURS)
+    verdict = played(RULES, state, "cue hits black", ball="black")
+    assert (verdict.state.turn, verdict.state.on) == (1, "yellow")
+
+
+def test_colours_in_order_stay_down() -> None:
+    verdict = played(RULES, ORDER, "cue hits yellow", "yellow in left")
+    assert (verdict.state.on, verdict.respot) == ("green", ())
+    assert RULES.legal_targets(verdict.state) == {"green"}
+
+
+def test_stroke_without_a_ball_passes_and_is_no_foul_off_the_cushions() -> None:
+    verdict = played(RULES, PLAY, "cue hits red-1")
+    assert not verdict.fouls
+    assert (verdict.state.turn, verdict.state.on, verdict.state.run) == (1, "red", 0)
+
+
+def test_missed_colour_passes_with_red_on() -> None:
+    verdict = played(RULES, COLOUR, "cue hits pink", ball="pink")
+    assert (verdict.state.turn, verdict.state.on) == (1, "red")
+
+
+FOULS = [
+    (PLAY, {}, ("cue hits red-1", "cue in left"), 4, "the cue ball fell"),
+    (PLAY, {}, ("cue at rail",), 4, "the cue ball touched no ball"),
+    (PLAY, {}, ("cue hits yellow",), 4, "the yellow was touched first"),
+    (PLAY, {}, ("cue hits black",), 7, "the black was touched first"),
+    (PLAY, {}, ("cue hits red-1", "pink in left"), 6, "the pink fell and was not on"),
+    (PLAY, {}, (("cue hits red-1", "cue hits blue"),), 5, "the red-1 and the blue was touched first"),
+    (COLOUR, {"ball": "pink"}, ("cue at rail",), 6, "the cue ball touched no ball"),
+    (COLOUR, {"ball": "pink"}, ("cue hits red-2",), 6, "the red-2 was touched first"),
+    (COLOUR, {"ball": "green"}, ("cue hits green", "red-2 in left"), 4, "the red-2 fell and was not on"),
+    (COLOUR, {"ball": "green"}, ("cue hits black",), 7, "the black was touched first"),
+    (COLOUR, {"ball": "green"}, (("cue hits green", "cue hits pink"),), 6, "the green and the pink was touched first"),
+    (COLOUR, {}, ("cue hits red-2",), 7, "the red-2 was touched first"),
+    (COLOUR, {}, (), 7, "the cue ball touched no ball"),
+    (ORDER, {}, ("cue hits green",), 4, "the green was touched first"),
+    (ORDER, {}, ("cue hits yellow", "blue in left"), 5, "the blue fell and was not on"),
+]
+
+
+@pytest.mark.parametrize(("state", "call", "lines", "penalty", "why"), FOULS)
+def test_foul_scores_for_the_other(
+    state: SnookerState, call: dict[str, str], lines: tuple[str, ...], penalty: int, why: str
+) -> None:
+    verdict = played(RULES, state, *lines, **call)
+    assert verdict.fouls == (why,)
+    assert verdict.points == (0, penalty)
+    assert verdict.state.scores == (state.scores[0], penalty)
+    assert verdict.state.turn == 1
+    assert verdict.state.on in ("red", "yellow")
+    assert verdict.state.decisions == ("play", "pass")
+
+
+def test_several_fouls_of_a_stroke_count_once_by_the_dearest() -> None:
+    verdict = played(RULES, PLAY, "cue hits yellow", "black in left", "cue in left")
+    assert len(verdict.fouls) == 3
+    assert verdict.points == (0, 7)
+    assert verdict.state.in_hand == "in the D"
+
+
+def test_foul_scores_nothing_keeps_reds_down_and_brings_colours_back_the_highest_first() -> None:
+    verdict = played(RULES, PLAY, "cue hits red-1", "red-1 in left", "blue in left", "black in right")
+    assert verdict.state.scores == (0, 7)
+    assert [each.ball for each in verdict.respot] == ["black", "blue"]
+    assert verdict.state.table == (*REDS[1:], *COLOURS)
+
+
+def test_colour_on_that_falls_on_a_foul_comes_back() -> None:
+    verdict = played(RULES, ORDER, "cue hits yellow", "yellow in left", "cue in left")
+    assert verdict.state.on == "yellow"
+    assert [each.ball for each in verdict.respot] == ["yellow"]
+
+
+def test_red_cannot_be_nominated() -> None:
+    with pytest.raises(GameError, match="'red-2' cannot be called now"):
+        played(RULES, COLOUR, ball="red-2")
+    with pytest.raises(GameError, match="'pink' cannot be called now"):
+        played(RULES, PLAY, ball="pink")
+
+
+def test_offender_may_be_made_to_play_again_without_a_free_ball() -> None:
+    state = RULES.settle(played(RULES, PLAY).state, SNOOKERED).state
+    assert state.free
+    again = RULES.decide(state, "pass").state
+    assert (again.turn, again.free) == (0, False)
+    assert not RULES.settle(again, SNOOKERED).state.free
+
+
+def test_free_ball_is_had_after_a_foul_alone() -> None:
+    fair = played(RULES, PLAY, "cue hits red-1").state
+    assert not RULES.settle(fair, SNOOKERED).state.free
+    foul = played(RULES, PLAY).state
+    assert not RULES.settle(foul, Lie()).state.free
+    free = RULES.settle(foul, SNOOKERED).state
+    assert RULES.choices(free).balls == COLOURS
+    assert RULES.legal_targets(free) == set(PLAY.table)
+
+
+FREE = replace(PLAY, free=True)
+FREE_YELLOW = replace(ORDER, free=True)
+
+
+def test_free_ball_counts_as_a_red_and_comes_back() -> None:
+    verdict = played(RULES, FREE, "cue hits blue", "blue in left", ball="blue")
+    assert verdict.points == (1, 0)
+    assert [each.ball for each in verdict.respot] == ["blue"]
+    assert (verdict.state.on, verdict.state.free) == ("colour", False)
+
+
+def test_free_ball_and_red_both_score() -> None:
+    assert played(RULES, FREE, "cue hits blue", "blue in left", "red-1 in left", ball="blue").points == (2, 0)
+
+
+def test_free_ball_in_the_order_counts_as_the_ball_on_which_stays_on() -> None:
+    verdict = played(RULES, FREE_YELLOW, "cue hits black", "black in left", ball="black")
+    assert verdict.points == (2, 0)
+    assert (verdict.state.on, verdict.state.table) == ("yellow", COLOURS)
+
+
+def test_free_ball_and_colour_on_score_once_and_the_colour_stays_down() -> None:
+    verdict = played(RULES, FREE_YELLOW, "cue hits black", "black in left", "yellow in left", ball="black")
+    assert verdict.points == (2, 0)
+    assert verdict.state.on == "green"
+    assert [each.ball for each in verdict.respot] == ["black"]
+
+
+def test_free_ball_by_which_the_ball_on_falls_is_fair() -> None:
+    assert played(RULES, FREE_YELLOW, "cue hits black", "yellow in left", ball="black").points == (2, 0)
+
+
+def test_free_ball_must_be_touched_first_or_with_a_ball_on() -> None:
+    missed = played(RULES, FREE, "cue hits red-1", ball="blue")
+    assert missed.points == (0, 4)
+    both = played(RULES, FREE, ("cue hits red-1", "cue hits blue"), ball="blue")
+    assert not both.fouls
+
+
+def test_free_ball_may_be_left_alone() -> None:
+    assert played(RULES, FREE, "cue hits red-1", "red-1 in left").points == (1, 0)
+    assert played(RULES, FREE, "cue hits blue").points == (0, 5)
+
+
+def test_free_ball_that_snookers_is_foul_but_for_pink_and_black() -> None:
+    state = played(RULES, FREE, "cue hits blue", ball="blue").state
+    verdict = RULES.settle(state, Lie(snookered=True, by=("blue",)))
+    assert verdict.points == (0, 4)
+    assert verdict.state.free
+    assert verdict.state.decisions == ("play", "pass")
+    assert not RULES.settle(state, Lie(snookered=True, by=("pink",))).fouls
+    last = replace(PLAY, on="pink", table=("pink", "black"), free=True)
+    state = played(RULES, last, "cue hits black", ball="black").state
+    assert not RULES.settle(state, Lie(snookered=True, by=("black",))).fouls
+
+
+def test_touching_ball_on_counts_as_played() -> None:
+    red = RULES.settle(PLAY, Lie(touching=("red-1",))).state
+    assert not played(RULES, red).fouls
+    assert not played(RULES, red, "cue hits black").fouls
+    pink = RULES.settle(COLOUR, Lie(touching=("pink",))).state
+    assert not played(RULES, pink, ball="pink").fouls
+    assert not played(RULES, pink).fouls
+    assert not played(RULES, pink, "cue hits blue", "blue in left").fouls
+    assert played(RULES, pink, ball="blue").fouls
+
+
+def test_touching_ball_not_on_does_not() -> None:
+    assert played(RULES, RULES.settle(PLAY, Lie(touching=("pink",))).state).fouls
+
+
+MISS = replace(RULES.start(misses=True), opening=False, in_hand=None)
+
+
+def test_miss_may_be_played_again_from_where_it_was_and_the_points_stay() -> None:
+    state = replace(MISS, on="colour", table=COLOUR.table, scores=(8, 0), run=8)
+    verdict = played(RULES, state, "cue hits red-2", "red-2 in left", ball="pink")
+    assert verdict.state.decisions == ("play", "pass", "restore")
+    back = RULES.decide(verdict.state, "restore")
+    assert back.restore
+    assert back.state == replace(state, scores=(8, 6))
+
+
+def test_miss_is_none_without_the_rule_or_where_the_ball_on_was_hit() -> None:
+    assert "restore" not in played(RULES, PLAY, "cue at rail").state.decisions
+    assert "restore" not in played(RULES, MISS, "cue hits red-1", "cue in left").state.decisions
+
+
+@pytest.mark.parametrize(("scores", "offered"), [((0, 27), True), ((0, 28), False), ((20, 0), True), ((28, 0), False)])
+def test_miss_is_none_where_points_of_fouls_are_needed(scores: tuple[int, int], offered: bool) -> None:
+    state = replace(MISS, on="yellow", table=COLOURS, scores=scores)
+    # 27 are left: at 27 behind no foul was needed before, but the 4 of this one are 31 behind.
+    offered = offered and abs(scores[0] - scores[1] - 4) <= 27
+    assert ("restore" in played(RULES, state).state.decisions) == offered
+
+
+def test_black_alone_ends_with_the_first_score() -> None:
+    verdict = played(RULES, replace(BLACK, scores=(10, 12)), "cue hits black", "black in left")
+    assert verdict.points == (7, 0)
+    assert (verdict.state.over, verdict.state.winner) == (True, 0)
+
+
+def test_black_alone_ends_with_the_first_foul() -> None:
+    verdict = played(RULES, replace(BLACK, scores=(20, 12)), "cue hits black", "cue in left")
+    assert (verdict.state.over, verdict.state.winner, verdict.state.scores) == (True, 0, (20, 19))
+
+
+def test_black_alone_that_stays_up_passes_the_turn() -> None:
+    verdict = played(RULES, replace(BLACK, scores=(20, 18)), "cue hits black")
+    assert not verdict.state.over
+    assert (verdict.state.turn, verdict.state.on) == (1, "black")
+
+
+@pytest.mark.parametrize("lines", [("cue hits black", "black in left"), ("cue in left",)])
+def test_level_scores_spot_the_black_and_the_next_score_or_foul_ends(lines: tuple[str, ...]) -> None:
+    scores = (5, 12) if "black in left" in lines else (12, 5)
+    verdict = played(RULES, replace(BLACK, scores=scores), *lines)
+    state = verdict.state
+    assert not state.over
+    assert [each.ball for each in verdict.respot] == ["black"]
+    assert (state.table, state.in_hand, state.decisions) == (("black",), "in the D", ("play", "pass"))
+    first = RULES.decide(state, "pass").state
+    assert first.turn == 0
+    assert played(RULES, first, "cue hits black", "black in left").state.winner == 0
+    assert played(RULES, first).state.winner == 1
+
+
+def test_frame_may_be_claimed_with_more_than_a_black_between() -> None:
+    state = replace(PLAY, on="pink", table=("pink", "black"))
+    near, far = (
+        played(RULES, replace(state, scores=(each, 10)), "cue hits pink", "pink in left").state for each in (11, 12)
+    )
+    assert near.decisions == ()
+    assert far.decisions == ("play", "claim")
+    over = RULES.decide(far, "claim").state
+    assert (over.over, over.winner) == (True, 0)
+
+
+def test_who_plays_alone_makes_147_and_gives_no_points_away() -> None:
+    state = RULES.start(players=1)
+    foul = played(RULES, state)
+    assert (foul.state.scores, foul.state.turn, foul.state.decisions) == ((0,), 0, ())
+    for red in REDS:
+        state = played(RULES, state, f"cue hits {red}", *fallen([red])).state
+        state = played(RULES, state, "cue hits black", *fallen(["black"]), ball="black").state
+    for colour in COLOURS:
+        state = played(RULES, state, f"cue hits {colour}", *fallen([colour])).state
+    assert (state.over, state.winner, state.scores) == (True, 0, (147,))
