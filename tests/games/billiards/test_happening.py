@@ -45,7 +45,7 @@ def test_call_that_cannot_be_made_is_refused_with_all_that_is_wrong() -> None:
 
 
 def test_games_go_by_name() -> None:
-    for name, rules in RULES.items():
+    for name in RULES:
         assert rules_named(name).name == name
     with pytest.raises(GameError, match="no game 'chess'; games: 8-ball"):
         rules_named("chess")

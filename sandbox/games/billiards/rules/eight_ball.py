@@ -11,8 +11,8 @@ from typing import Literal
 from sandbox.games.billiards.rules.call import Call, Choices, Decision
 from sandbox.games.billiards.rules.happening import Shot
 from sandbox.games.billiards.rules.pool import at_foot, broke, scratch, standard
-from sandbox.games.billiards.rules.rules import Rules, counted
-from sandbox.games.billiards.rules.state import State
+from sandbox.games.billiards.rules.rules import Rules
+from sandbox.games.billiards.rules.state import State, counted
 from sandbox.games.billiards.rules.verdict import Verdict, player
 
 Group = Literal["solids", "stripes"]

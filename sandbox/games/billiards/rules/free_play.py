@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from sandbox.games.billiards.rules.call import Call, Decision
 from sandbox.games.billiards.rules.eight_ball import BALLS
 from sandbox.games.billiards.rules.happening import Shot
-from sandbox.games.billiards.rules.rules import Rules, counted
-from sandbox.games.billiards.rules.state import State
+from sandbox.games.billiards.rules.rules import Rules
+from sandbox.games.billiards.rules.state import State, counted
 from sandbox.games.billiards.rules.verdict import Verdict, player
 
 

@@ -86,3 +86,8 @@ def touched_by(cue: str, each: Happening) -> str | None:
     if each.kind != "ball" or cue not in (each.ball, each.other) or each.ball == each.other:
         return None
     return each.other if each.ball == cue else each.ball
+
+
+def named_first(shot: Shot) -> str:
+    """Return what the cue ball touched first as the beginning of a sentence."""
+    return f"the {' and the '.join(shot.first)} {'was' if len(shot.first) == 1 else 'were'}"

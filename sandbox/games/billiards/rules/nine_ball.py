@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from sandbox.games.billiards.rules.call import Call, Choices, Decision
 from sandbox.games.billiards.rules.happening import Shot
 from sandbox.games.billiards.rules.pool import at_foot, broke, no_rail, scratch, wrong_ball
-from sandbox.games.billiards.rules.rules import Rules, counted
-from sandbox.games.billiards.rules.state import State
+from sandbox.games.billiards.rules.rules import Rules
+from sandbox.games.billiards.rules.state import State, counted
 from sandbox.games.billiards.rules.verdict import Verdict, player
 
 NINE = "9"

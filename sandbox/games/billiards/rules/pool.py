@@ -1,6 +1,6 @@
 """What 8-ball and 9-ball share: standard fouls (WPA 6), and the break."""
 
-from sandbox.games.billiards.rules.happening import Shot
+from sandbox.games.billiards.rules.happening import Shot, named_first
 from sandbox.games.billiards.rules.verdict import Respot
 
 DRIVEN = 4
@@ -17,7 +17,7 @@ def wrong_ball(shot: Shot, targets: frozenset[str]) -> list[str]:
     if not shot.first:
         return ["the cue ball touched no ball"]
     if targets.isdisjoint(shot.first):
-        return [f"the {' and the '.join(shot.first)} was touched first; {_of(targets)} was on"]
+        return [f"{named_first(shot)} touched first; {_of(targets)} was on"]
     return []
 
 

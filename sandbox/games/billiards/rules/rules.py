@@ -3,11 +3,14 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, Generic
+
+from pydantic import TypeAdapter, ValidationError
 
 from sandbox.games.billiards.rules.call import Call, Choices, Decision
 from sandbox.games.billiards.rules.happening import GameError, Happening, Shot, read
-from sandbox.games.billiards.rules.state import S, restored
+from sandbox.games.billiards.rules.state import S
 from sandbox.games.billiards.rules.verdict import Lie, Verdict
 
 
@@ -68,13 +71,26 @@ class Rules(ABC, Generic[S]):
         """Return the state with what follows from how the balls lie now, called after each shot and each spotting."""
         return Verdict(state)
 
+    def document(self, state: S) -> dict[str, Any]:
+        """Return a state as a JSON object."""
+        plain: dict[str, Any] = self._adapter.dump_python(state, mode="json")
+        return plain
+
     def restored(self, plain: Any) -> S:
-        """Return the state of a JSON object.
+        """Return the state of a JSON object, the inverse of `document`.
 
         Raises:
-            GameError: it is not a state of this game.
+            GameError: it is not a state of this game, with all that is wrong.
         """
-        return restored(self.kind, plain)
+        try:
+            return self._adapter.validate_python(plain)
+        except ValidationError as error:
+            lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
+            raise GameError("\n".join(lines)) from None
+
+    @cached_property
+    def _adapter(self) -> TypeAdapter[S]:
+        return TypeAdapter(self.kind)
 
     @abstractmethod
     def _judge(self, state: S, call: Call, shot: Shot) -> Verdict[S]: ...
@@ -89,14 +105,3 @@ class Rules(ABC, Generic[S]):
     def _others(self, state: S, cue: str) -> tuple[str, ...]:
         """Return the balls on the table that are not struck."""
         return tuple(ball for ball in (*state.table, *self.cue_balls) if ball != cue)
-
-
-def counted(players: int) -> int:
-    """Return how many play.
-
-    Raises:
-        GameError: neither one nor two.
-    """
-    if players not in (1, 2):
-        raise GameError(f"{players} cannot play; one or two can")
-    return players

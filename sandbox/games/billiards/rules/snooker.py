@@ -1,8 +1,8 @@
 """Snooker (WPBSA 3): a red, a colour, a red …, then the colours in order.
 
 Who plays alone scores what is made; the points of fouls go to nobody. A miss is called, where the frame is played with
-it, of every first touch that was wrong, unless a player needed points of fouls before or after (Foul and a Miss); whether the
-attempt was good is for nobody here to say.
+it, of every first touch that was wrong, unless a player needed points of fouls before or after (Foul and a Miss);
+whether the attempt was good is for nobody here to say.
 """
 
 from dataclasses import dataclass, replace
@@ -10,10 +10,10 @@ from typing import Literal
 
 from sandbox.games.billiards.rules.call import Call, Choices, Decision
 from sandbox.games.billiards.rules.happening import Shot
-from sandbox.games.billiards.rules.rules import Rules, counted
+from sandbox.games.billiards.rules.rules import Rules
 from sandbox.games.billiards.rules.snooker_balls import BALLS, LEAST, VALUES, colours, reds, respots, value
 from sandbox.games.billiards.rules.snooker_stroke import Stroke, stroke
-from sandbox.games.billiards.rules.state import State
+from sandbox.games.billiards.rules.state import State, counted
 from sandbox.games.billiards.rules.verdict import Lie, Verdict, player
 
 On = Literal["red", "colour", "yellow", "green", "brown", "blue", "pink", "black"]

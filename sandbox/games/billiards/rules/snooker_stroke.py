@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from sandbox.games.billiards.rules.happening import Shot
+from sandbox.games.billiards.rules.happening import Shot, named_first
 from sandbox.games.billiards.rules.snooker_balls import COLOURS, LEAST, VALUES, colours, reds, value
 
 
@@ -29,8 +29,8 @@ class Stroke:
     def hit(self) -> bool:
         """Whether the first touch was right.
 
-        Away from a ball on that touches the cue ball it counts as played (Touching Ball). A free ball is to be touched first, or
-        at one time with a ball on (Snookered after a Foul).
+        Away from a ball on that touches the cue ball it counts as played (Touching Ball). A free ball is to be touched
+        first, or at one time with a ball on (Snookered after a Foul).
         """
         if self.free is None and not self.on.isdisjoint(self.touching):
             return True
@@ -53,7 +53,7 @@ class Stroke:
                 found.append((least, "the cue ball touched no ball"))
             else:
                 most = max(least, *(self.value(ball) for ball in shot.first))
-                found.append((most, f"the {' and the '.join(shot.first)} was touched first"))
+                found.append((most, f"{named_first(shot)} touched first"))
         found += [
             (max(least, self.value(ball)), f"the {ball} fell and was not on")
             for ball in shot.down

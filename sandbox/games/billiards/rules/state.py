@@ -1,9 +1,9 @@
-"""State: where a frame stands, as a frozen value and as a JSON document."""
+"""State: where a frame stands, as a frozen value."""
 
 from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from typing import ClassVar, Literal, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ConfigDict
 
 from sandbox.games.billiards.rules.call import Decision
 from sandbox.games.billiards.rules.happening import GameError
@@ -13,7 +13,13 @@ Place = Literal["anywhere", "behind the head string", "in the D"]
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """What every game keeps."""
+    """What every game keeps.
+
+    Raises:
+        GameError: neither one nor two play, or it is nobody's turn.
+    """
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
 
     players: int
     """1 or 2"""
@@ -31,6 +37,11 @@ class State:
     over: bool = False
     winner: int | None = None
     """nobody's where it is a draw, or where one who plays alone has lost"""
+
+    def __post_init__(self) -> None:
+        counted(self.players)
+        if not 0 <= self.turn < self.players == len(self.scores):
+            raise GameError(f"turn {self.turn}, with {len(self.scores)} scores, is not that of {self.players} players")
 
     @property
     def other(self) -> int:
@@ -51,23 +62,15 @@ class State:
         return tuple(ball for ball in self.table if ball not in balls)
 
 
-S = TypeVar("S", bound=State)
-
-
-def document(state: State) -> dict[str, Any]:
-    """Return a state as a JSON object."""
-    plain: dict[str, Any] = TypeAdapter(type(state)).dump_python(state, mode="json")
-    return plain
-
-
-def restored(kind: type[S], plain: Any) -> S:
-    """Return the state of a JSON object, the inverse of `document`.
+def counted(players: int) -> int:
+    """Return how many play.
 
     Raises:
-        GameError: it is not a state of that game.
+        GameError: neither one nor two.
     """
-    try:
-        return TypeAdapter(kind).validate_python(plain)
-    except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
-        raise GameError("\n".join(lines)) from None
+    if players not in (1, 2):
+        raise GameError(f"{players} cannot play; one or two can")
+    return players
+
+
+S = TypeVar("S", bound=State)
