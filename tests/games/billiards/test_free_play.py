@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+import pytest
 from shot_by_hand import played
 
 from sandbox.games.billiards.rules.free_play import ALWAYS, FreePlay
+from sandbox.games.billiards.rules.happening import GameError
 
 RULES = FreePlay()
 START = RULES.start()
@@ -37,6 +39,15 @@ def test_clear_table_ends_for_who_made_most() -> None:
     over = played(RULES, state, "cue hits 3", "3 in left").state
     assert (over.over, over.winner) == (True, 0)
     assert played(RULES, replace(state, scores=(2, 3)), "cue hits 3", "3 in left").state.winner is None
+
+
+def test_any_table_will_do() -> None:
+    state = RULES.start(balls=("yellow", "red"), cue="white")
+    assert RULES.cue_ball(state) == "white"
+    verdict = played(RULES, state, "white hits red", "white at rail")
+    assert RULES.decide(verdict.state, "rerack").state == replace(state, turn=1)
+    with pytest.raises(GameError, match="'red'"):
+        RULES.start(balls=("yellow", "red"), cue="red")
 
 
 def test_table_without_other_balls_goes_on_for_ever() -> None:

@@ -39,7 +39,7 @@ class Choices:
     pocket: bool = False
     """whether a pocket may be called"""
     needed: bool = False
-    """whether a ball or pocket must be called for a shot to count"""
+    """whether a pocket must be, for a ball to count"""
     safety: bool = False
     push_out: bool = False
 

@@ -66,7 +66,7 @@ class Carom(Rules[CaromState]):
         """Return both other balls; on the opening shot the red (UMB 23)."""
         if state.over:
             return frozenset()
-        return frozenset((RED,) if state.opening else self._others(state, self.cue_ball(state)))
+        return frozenset((RED,) if state.opening else state.without((self.cue_ball(state),)))
 
     def settle(self, state: CaromState, lie: Lie) -> Verdict[CaromState]:
         """Return the state with the balls that touch: the player may have them spotted, or play away (UMB 27)."""
@@ -75,9 +75,6 @@ class Carom(Rules[CaromState]):
         decisions: tuple[Decision, ...] = ("play", "spot") if lie.touching else ()
         told = (f"the cue ball touches the {' and the '.join(lie.touching)}",) if lie.touching else ()
         return Verdict(replace(state, touching=lie.touching, decisions=decisions), messages=told)
-
-    def _others(self, state: CaromState, cue: str) -> tuple[str, ...]:
-        return tuple(ball for ball in state.table if ball != cue)
 
     def _decide(self, state: CaromState, decision: Decision) -> Verdict[CaromState]:
         after = replace(state, touching=())

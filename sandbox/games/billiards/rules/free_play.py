@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from sandbox.games.billiards.rules.call import Call, Decision
 from sandbox.games.billiards.rules.eight_ball import BALLS
-from sandbox.games.billiards.rules.happening import Shot
+from sandbox.games.billiards.rules.happening import GameError, Shot
 from sandbox.games.billiards.rules.rules import Rules
 from sandbox.games.billiards.rules.state import State, counted
 from sandbox.games.billiards.rules.verdict import Verdict, player
@@ -16,6 +16,8 @@ class FreeState(State):
 
     rack: tuple[str, ...]
     """the object balls at the start"""
+    cue: str
+    """the ball that is struck"""
 
 
 ALWAYS: tuple[Decision, ...] = ("play", "in hand", "rerack")
@@ -28,15 +30,27 @@ class FreePlay(Rules[FreeState]):
     rack = "8-ball"
     kind = FreeState
 
-    def start(self, players: int = 2, balls: tuple[str, ...] = BALLS) -> FreeState:
+    def start(self, players: int = 2, balls: tuple[str, ...] = BALLS, cue: str = "cue") -> FreeState:
         """Return the state before the first shot.
 
         Args:
             players: 1 or 2.
-            balls: the object balls, of any rack.
+            balls: the object balls, of any rack; on a table without pockets they are never made.
+            cue: the ball that both strike.
+
+        Raises:
+            GameError: neither one nor two play, or the cue ball is one of the others.
         """
         scores = (0,) * counted(players)
-        return FreeState(players=players, scores=scores, table=balls, rack=balls, in_hand="anywhere", decisions=ALWAYS)
+        if cue in balls:
+            raise GameError(f"{cue!r} cannot be both struck and made")
+        return FreeState(
+            players=players, scores=scores, table=balls, rack=balls, cue=cue, in_hand="anywhere", decisions=ALWAYS
+        )
+
+    def cue_ball(self, state: FreeState) -> str:
+        """Return the ball that is struck."""
+        return state.cue
 
     def legal_targets(self, state: FreeState) -> frozenset[str]:
         """Return every ball."""
@@ -66,5 +80,5 @@ class FreePlay(Rules[FreeState]):
 
     def _decide(self, state: FreeState, decision: Decision) -> Verdict[FreeState]:
         if decision == "rerack":
-            return Verdict(replace(self.start(state.players, state.rack), turn=state.turn), rerack=True)
+            return Verdict(replace(self.start(state.players, state.rack, state.cue), turn=state.turn), rerack=True)
         return Verdict(replace(state, in_hand="anywhere" if decision == "in hand" else state.in_hand, decisions=ALWAYS))

@@ -54,7 +54,8 @@ class Rules(ABC, Generic[S]):
             raise GameError("the frame is over")
         self.choices(state).check(call)
         cue = self.cue_ball(state)
-        return self._judge(replace(state, decisions=()), call, read(happenings, cue, self._others(state, cue)))
+        shot = read(happenings, cue, state.without((cue,)))
+        return self._judge(replace(state, decisions=()), call, shot)
 
     def decide(self, state: S, decision: Decision) -> Verdict[S]:
         """Return what a decision leads to.
@@ -101,7 +102,3 @@ class Rules(ABC, Generic[S]):
         if decision == "in hand":
             return Verdict(replace(state, in_hand="anywhere"))
         return Verdict(state)
-
-    def _others(self, state: S, cue: str) -> tuple[str, ...]:
-        """Return the balls on the table that are not struck."""
-        return tuple(ball for ball in (*state.table, *self.cue_balls) if ball != cue)

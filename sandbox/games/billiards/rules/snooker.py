@@ -78,7 +78,7 @@ class Snooker(Rules[SnookerState]):
             return base
         on = balls_on(state)
         named = tuple(ball for ball in state.table if (ball in on) != state.free)
-        return replace(base, balls=named, needed=state.on == "colour")
+        return replace(base, balls=named)
 
     def settle(self, state: SnookerState, lie: Lie) -> Verdict[SnookerState]:
         """Return the state with what touches, and a free ball or a foul where the player is snookered.
@@ -153,7 +153,7 @@ class Snooker(Rules[SnookerState]):
         )
         messages = (told, "a miss: it may be played again from where it was") if missed else (told,)
         colours_down = tuple(ball for ball in down if ball in VALUES)
-        return Verdict(_claimable(after), why, gained, respot=respots(colours_down), messages=messages)
+        return Verdict(after, why, gained, respot=respots(colours_down), messages=messages)
 
     def _decide(self, state: SnookerState, decision: Decision) -> Verdict[SnookerState]:
         after = replace(state, before=None)
@@ -197,7 +197,7 @@ def _claimable(state: SnookerState) -> SnookerState:
         return state
     if state.scores[state.turn] - state.scores[state.other] <= VALUES["black"]:
         return state
-    return replace(state, decisions=(*(state.decisions or ("play",)), "claim"))
+    return replace(state, decisions=("play", "claim"))
 
 
 def _ended(state: SnookerState) -> Verdict[SnookerState]:
