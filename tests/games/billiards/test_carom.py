@@ -63,7 +63,9 @@ def test_opening_shot_must_touch_the_red_first() -> None:
     verdict = played(THREE, START, "white hits yellow", RAIL, RAIL, RAIL, "white hits red")
     assert verdict.fouls == ("the opening shot must touch the red first",)
     assert (verdict.state.turn, verdict.state.scores) == (1, (0, 0))
-    assert played(THREE, START, *MADE).goes_on
+    made = played(THREE, START, *MADE)
+    assert made.goes_on
+    assert not made.state.opening
 
 
 def test_run_counts_the_points_of_a_turn() -> None:

@@ -19,6 +19,8 @@ ALONE = RULES.start(players=1)
 
 def test_break_may_touch_any_ball() -> None:
     assert RULES.legal_targets(START) == set(START.table)
+    assert RULES.choices(START).balls == ()
+    assert not RULES.choices(START).pocket
 
 
 def test_break_that_makes_a_ball_goes_on_and_leaves_the_table_open() -> None:
@@ -65,6 +67,7 @@ def test_break_that_misses_all_may_be_taken_in_hand() -> None:
     assert verdict.fouls == ("the cue ball touched no ball",)
     assert verdict.state.decisions == ("play", "rerack", "rerack and pass", "in hand")
     assert RULES.decide(verdict.state, "in hand").state.in_hand == "behind the head string"
+    assert RULES.decide(verdict.state, "play").state.in_hand is None
 
 
 def test_eight_on_the_break_is_spotted_or_racked_anew_by_the_breaker() -> None:

@@ -15,6 +15,7 @@ START = RULES.start()
 def test_ball_goes_on_and_none_passes() -> None:
     assert played(RULES, START, "cue hits 3", "3 in left").state.turn == 0
     assert played(RULES, START, "cue hits 3").state.turn == 1
+    assert not played(RULES, START).state.opening
     assert RULES.legal_targets(START) == set(START.table)
 
 

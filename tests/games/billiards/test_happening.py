@@ -24,6 +24,15 @@ def test_cushions_before_the_touch_drive_no_ball() -> None:
     assert read(shot("cue hits 1", "cue at rail", "2 in corner"), "cue", TABLE).driven == {"cue", "2"}
 
 
+def test_cushion_at_the_time_of_the_touch_drives_a_ball() -> None:
+    assert read(shot(("1 at rail", "cue hits 1")), "cue", TABLE).driven == {"1"}
+
+
+def test_ball_touches_itself_never_and_cushions_are_no_balls() -> None:
+    seen = read(shot("cue hits cue", "cue at 1", "2 hits 3"), "cue", TABLE)
+    assert seen.first == ()
+
+
 def test_ball_that_fell_is_told_once_with_its_pocket() -> None:
     seen = read(shot("cue hits 1", "1 in left", "1 in right", "cue in left"), "cue", TABLE)
     assert seen.down == ("1",)

@@ -24,6 +24,7 @@ def test_break_that_makes_a_ball_goes_on_and_may_push_out() -> None:
     verdict = played(RULES, START, "cue hits 1", "5 in left")
     assert verdict.goes_on
     assert verdict.points == (1, 0)
+    assert not verdict.state.opening
     assert RULES.choices(verdict.state).push_out
 
 
@@ -70,6 +71,7 @@ def test_nine_on_a_foul_is_spotted() -> None:
 def test_other_balls_stay_down_on_a_foul_and_count_for_nobody() -> None:
     verdict = played(RULES, PLAY, "cue hits 2", "2 in left")
     assert "2" not in verdict.state.table
+    assert verdict.respot == ()
     assert verdict.state.scores == (0, 0)
 
 

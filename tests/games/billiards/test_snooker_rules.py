@@ -23,13 +23,15 @@ def test_start_is_in_the_d_with_reds_on_and_147_to_be_made() -> None:
     assert START.in_hand == "in the D"
     assert RULES.legal_targets(START) == set(REDS)
     assert remaining(START) == 147
+    assert not START.misses
+    assert not RULES.settle(START, SNOOKERED).state.free
 
 
 def test_red_scores_one_stays_down_and_a_colour_is_next() -> None:
     verdict = played(RULES, START, "cue hits red-1", "red-1 in left")
     assert verdict.goes_on
     assert verdict.points == (1, 0)
-    assert (verdict.state.on, verdict.state.run) == ("colour", 1)
+    assert (verdict.state.on, verdict.state.run, verdict.state.opening) == ("colour", 1, False)
     assert RULES.legal_targets(verdict.state) == set(COLOURS)
     assert "red-1" not in verdict.state.table
 
@@ -146,95 +148,6 @@ def test_red_cannot_be_nominated() -> None:
         played(RULES, PLAY, ball="pink")
 
 
-def test_offender_may_be_made_to_play_again_without_a_free_ball() -> None:
-    state = RULES.settle(played(RULES, PLAY).state, SNOOKERED).state
-    assert state.free
-    again = RULES.decide(state, "pass").state
-    assert (again.turn, again.free) == (0, False)
-    assert not RULES.settle(again, SNOOKERED).state.free
-
-
-def test_free_ball_is_had_after_a_foul_alone() -> None:
-    fair = played(RULES, PLAY, "cue hits red-1").state
-    assert not RULES.settle(fair, SNOOKERED).state.free
-    foul = played(RULES, PLAY).state
-    assert not RULES.settle(foul, Lie()).state.free
-    free = RULES.settle(foul, SNOOKERED).state
-    assert RULES.choices(free).balls == COLOURS
-    assert RULES.legal_targets(free) == set(PLAY.table)
-
-
-FREE = replace(PLAY, free=True)
-FREE_YELLOW = replace(ORDER, free=True)
-
-
-def test_free_ball_counts_as_a_red_and_comes_back() -> None:
-    verdict = played(RULES, FREE, "cue hits blue", "blue in left", ball="blue")
-    assert verdict.points == (1, 0)
-    assert [each.ball for each in verdict.respot] == ["blue"]
-    assert (verdict.state.on, verdict.state.free) == ("colour", False)
-
-
-def test_free_ball_and_red_both_score() -> None:
-    assert played(RULES, FREE, "cue hits blue", "blue in left", "red-1 in left", ball="blue").points == (2, 0)
-
-
-def test_free_ball_in_the_order_counts_as_the_ball_on_which_stays_on() -> None:
-    verdict = played(RULES, FREE_YELLOW, "cue hits black", "black in left", ball="black")
-    assert verdict.points == (2, 0)
-    assert (verdict.state.on, verdict.state.table) == ("yellow", COLOURS)
-
-
-def test_free_ball_and_colour_on_score_once_and_the_colour_stays_down() -> None:
-    verdict = played(RULES, FREE_YELLOW, "cue hits black", "black in left", "yellow in left", ball="black")
-    assert verdict.points == (2, 0)
-    assert verdict.state.on == "green"
-    assert [each.ball for each in verdict.respot] == ["black"]
-
-
-def test_free_ball_by_which_the_ball_on_falls_is_fair() -> None:
-    assert played(RULES, FREE_YELLOW, "cue hits black", "yellow in left", ball="black").points == (2, 0)
-
-
-def test_free_ball_must_be_touched_first_or_with_a_ball_on() -> None:
-    missed = played(RULES, FREE, "cue hits red-1", ball="blue")
-    assert missed.points == (0, 4)
-    both = played(RULES, FREE, ("cue hits red-1", "cue hits blue"), ball="blue")
-    assert not both.fouls
-
-
-def test_free_ball_may_be_left_alone() -> None:
-    assert played(RULES, FREE, "cue hits red-1", "red-1 in left").points == (1, 0)
-    assert played(RULES, FREE, "cue hits blue").points == (0, 5)
-
-
-def test_free_ball_that_snookers_is_foul_but_for_pink_and_black() -> None:
-    state = played(RULES, FREE, "cue hits blue", ball="blue").state
-    verdict = RULES.settle(state, Lie(snookered=True, by=("blue",)))
-    assert verdict.points == (0, 4)
-    assert verdict.state.free
-    assert verdict.state.decisions == ("play", "pass")
-    assert not RULES.settle(state, Lie(snookered=True, by=("pink",))).fouls
-    last = replace(PLAY, on="pink", table=("pink", "black"), free=True)
-    state = played(RULES, last, "cue hits black", ball="black").state
-    assert not RULES.settle(state, Lie(snookered=True, by=("black",))).fouls
-
-
-def test_touching_ball_on_counts_as_played() -> None:
-    red = RULES.settle(PLAY, Lie(touching=("red-1",))).state
-    assert not played(RULES, red).fouls
-    assert not played(RULES, red, "cue hits black").fouls
-    pink = RULES.settle(COLOUR, Lie(touching=("pink",))).state
-    assert not played(RULES, pink, ball="pink").fouls
-    assert not played(RULES, pink).fouls
-    assert not played(RULES, pink, "cue hits blue", "blue in left").fouls
-    assert played(RULES, pink, ball="blue").fouls
-
-
-def test_touching_ball_not_on_does_not() -> None:
-    assert played(RULES, RULES.settle(PLAY, Lie(touching=("pink",))).state).fouls
-
-
 MISS = replace(RULES.start(misses=True), opening=False, in_hand=None)
 
 
@@ -284,6 +197,7 @@ def test_level_scores_spot_the_black_and_the_next_score_or_foul_ends(lines: tupl
     assert not state.over
     assert [each.ball for each in verdict.respot] == ["black"]
     assert (state.table, state.in_hand, state.decisions) == (("black",), "in the D", ("play", "pass"))
+    assert not state.fouled
     first = RULES.decide(state, "pass").state
     assert first.turn == 0
     assert played(RULES, first, "cue hits black", "black in left").state.winner == 0
@@ -299,6 +213,7 @@ def test_frame_may_be_claimed_with_more_than_a_black_between() -> None:
     assert far.decisions == ("play", "claim")
     over = RULES.decide(far, "claim").state
     assert (over.over, over.winner) == (True, 0)
+    assert RULES.choices(replace(over, free=True)).balls == ()
 
 
 def test_who_plays_alone_makes_147_and_gives_no_points_away() -> None:

@@ -99,6 +99,4 @@ class Rules(ABC, Generic[S]):
     def _decide(self, state: S, decision: Decision) -> Verdict[S]:
         if decision == "pass":
             return Verdict(replace(state, turn=state.other))
-        if decision == "in hand":
-            return Verdict(replace(state, in_hand="anywhere"))
         return Verdict(state)

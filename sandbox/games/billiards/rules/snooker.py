@@ -90,7 +90,7 @@ class Snooker(Rules[SnookerState]):
         if state.over or not lie.snookered:
             return Verdict(after)
         if state.freed is not None and state.freed in lie.by and set(state.table) != {"pink", "black"}:
-            penalty = max(LEAST, value(min(balls_on(state), key=value)))
+            penalty = max(LEAST, VALUES.get(state.on, 1))
             why = f"the free ball, {state.freed}, snookers"
             points = tuple(penalty * (each == state.turn) for each in range(state.players))
             scores = state.scored(state.turn if state.players == 2 else None, penalty)
