@@ -1,0 +1,1 @@
+"""Games: their rules, which read what happened and know no engine."""

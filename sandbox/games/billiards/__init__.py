@@ -1,0 +1,1 @@
+"""Billiards: pool, carom and snooker."""

@@ -1,0 +1,140 @@
+"""Carom: three-cushion and straight rail (UMB): touch both other balls, for a point and another shot.
+
+A miss is no foul: it ends the turn. Who began and comes to the distance first has the other play one last turn from the
+starting position, so that both have had as many; who draws level shares the frame.
+"""
+
+from dataclasses import dataclass, replace
+
+from sandbox.games.billiards.rules.call import Call, Decision
+from sandbox.games.billiards.rules.happening import GameError, Shot, touched_by
+from sandbox.games.billiards.rules.rules import Rules
+from sandbox.games.billiards.rules.state import State, counted
+from sandbox.games.billiards.rules.verdict import Lie, Respot, Verdict, player
+
+RED = "red"
+WHITES = ("white", "yellow")
+BALLS = (*WHITES, RED)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaromState(State):
+    """A score is the number of caroms. `table` names all three balls."""
+
+    distance: int
+    """points to be made"""
+    innings: tuple[int, ...]
+    """turns that each player has ended"""
+    run: int = 0
+    """points of this turn so far"""
+    touching: tuple[str, ...] = ()
+    """balls that lie against the cue ball"""
+    last: bool = False
+    """whether this is the turn with which the frame ends"""
+
+
+class Carom(Rules[CaromState]):
+    """A game of caroms."""
+
+    rack = "carom"
+    cue_balls = WHITES
+    kind = CaromState
+
+    def __init__(self, name: str, cushions: int, distance: int) -> None:
+        """Make a game.
+
+        Args:
+            name: of the game.
+            cushions: how many times the cue ball must have come to one before it touches the second ball.
+            distance: points to be made, where a frame states none.
+        """
+        self.name, self.cushions, self.distance = name, cushions, distance
+
+    def start(self, players: int = 2, distance: int | None = None) -> CaromState:
+        """Return the state before the opening shot.
+
+        Raises:
+            GameError: neither one nor two play, or the distance is less than a point.
+        """
+        points = self.distance if distance is None else distance
+        if points < 1:
+            raise GameError(f"a distance of {points} is none; at least 1")
+        none = (0,) * counted(players)
+        return CaromState(players=players, scores=none, innings=none, table=BALLS, distance=points)
+
+    def legal_targets(self, state: CaromState) -> frozenset[str]:
+        """Return both other balls; on the opening shot the red (UMB 23)."""
+        if state.over:
+            return frozenset()
+        return frozenset((RED,) if state.opening else state.without((self.cue_ball(state),)))
+
+    def settle(self, state: CaromState, lie: Lie) -> Verdict[CaromState]:
+        """Return the state with the balls that touch: the player may have them spotted, or play away (UMB 27)."""
+        if state.over:
+            return Verdict(state)
+        decisions: tuple[Decision, ...] = ("play", "spot") if lie.touching else ()
+        told = (f"the cue ball touches the {' and the '.join(lie.touching)}",) if lie.touching else ()
+        return Verdict(replace(state, touching=lie.touching, decisions=decisions), messages=told)
+
+    def _decide(self, state: CaromState, decision: Decision) -> Verdict[CaromState]:
+        after = replace(state, touching=())
+        if decision != "spot":
+            return Verdict(after)
+        if self.cushions == 0:  # in straight rail all three go back
+            return Verdict(replace(after, opening=True), rerack=True)
+        # UMB 83: the red to the foot spot, the cue ball to the head, the other to the centre; where the third ball is
+        # in the way, to the spot that would be the third ball's.
+        cue = self.cue_ball(state)
+        spots = {RED: "foot", cue: "head", next(ball for ball in WHITES if ball != cue): "centre"}
+        lifted = [ball for ball in BALLS if ball == cue or ball in state.touching]
+        rest = tuple(spots[ball] for ball in BALLS if ball not in lifted)
+        return Verdict(after, respot=tuple(Respot(ball, (spots[ball], *rest)) for ball in lifted))
+
+    def _judge(self, state: CaromState, call: Call, shot: Shot) -> Verdict[CaromState]:  # noqa: ARG002
+        if any(each.kind == "pocket" for each in shot.happenings):
+            raise GameError("a carom table has no pockets")
+        after = replace(state, opening=False, touching=())
+        if state.opening and shot.first and RED not in shot.first:
+            fouls = ("the opening shot must touch the red first",)
+            return self._ended(after, fouls)
+        if not self._made(shot):
+            return self._ended(after, ())
+        after = replace(after, scores=state.scored(state.turn, 1), run=state.run + 1)
+        points = tuple(int(each == state.turn) for each in range(state.players))
+        if after.scores[state.turn] >= state.distance:
+            told = f"{player(state.turn)} has made {state.distance}"
+            verdict = self._ended(replace(after, last=after.last or state.turn == state.players - 1), (), full=True)
+            return replace(verdict, points=points, messages=(told, *verdict.messages))
+        return Verdict(after, points=points, goes_on=True)
+
+    def _made(self, shot: Shot) -> bool:
+        """Tell whether the cue ball touched both, with its cushions before the second; one cushion counts each time."""
+        touched: set[str] = set()
+        cushions = 0
+        for each in shot.happenings:
+            if each.kind == "cushion" and each.ball == shot.cue:
+                cushions += 1
+            ball = touched_by(shot.cue, each)
+            if ball is not None and ball not in touched:
+                touched.add(ball)
+                if len(touched) == 2:
+                    return cushions >= self.cushions
+        return False
+
+    def _ended(self, state: CaromState, fouls: tuple[str, ...], full: bool = False) -> Verdict[CaromState]:
+        """Return what the end of a turn leads to: the other's, the last, or none."""
+        none = (0,) * state.players
+        told = tuple(f"foul: {each}" for each in fouls)
+        innings = tuple(count + (each == state.turn) for each, count in enumerate(state.innings))
+        after = replace(state, innings=innings, run=0)
+        if state.last:
+            top = max(state.scores)
+            winner = state.scores.index(top) if state.scores.count(top) == 1 else None
+            ends = f"{player(winner)} wins" if winner is not None else "the frame is drawn"
+            over = replace(after, over=True, winner=winner)
+            return Verdict(over, fouls, none, messages=(*told, ends))
+        after = replace(after, turn=state.other, last=full, opening=full)
+        if not full:
+            return Verdict(after, fouls, none, messages=told)
+        ends = f"{player(state.other)} has a last turn, from the starting position"
+        return Verdict(after, fouls, none, rerack=True, messages=(*told, ends))

@@ -1,0 +1,212 @@
+"""Snooker (WPBSA 3): a red, a colour, a red …, then the colours in order.
+
+Who plays alone scores what is made; the points of fouls go to nobody. A miss is called, where the frame is played with
+it, of every first touch that was wrong, unless a player needed points of fouls before or after (Foul and a Miss);
+whether the attempt was good is for nobody here to say.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from sandbox.games.billiards.rules.call import Call, Choices, Decision
+from sandbox.games.billiards.rules.happening import Shot
+from sandbox.games.billiards.rules.rules import Rules
+from sandbox.games.billiards.rules.snooker_balls import BALLS, LEAST, VALUES, colours, reds, respots, value
+from sandbox.games.billiards.rules.snooker_stroke import Stroke, stroke
+from sandbox.games.billiards.rules.state import State, counted
+from sandbox.games.billiards.rules.verdict import Lie, Verdict, player
+
+On = Literal["red", "colour", "yellow", "green", "brown", "blue", "pink", "black"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SnookerState(State):
+    """Where a frame of snooker stands."""
+
+    on: On = "red"
+    """`colour` is any, after a red"""
+    run: int = 0
+    """points of this turn so far: the break"""
+    misses: bool = False
+    """whether the frame is played with the miss"""
+    fouled: bool = False
+    """whether the last stroke was foul"""
+    free: bool = False
+    """whether any ball may be nominated as a ball on"""
+    freed: str | None = None
+    """the free ball of the last stroke, if nothing fell"""
+    touching: tuple[str, ...] = ()
+    """balls that lie against the cue ball"""
+    before: "SnookerState | None" = None
+    """the state to which a miss can be taken back"""
+
+
+def remaining(state: SnookerState) -> int:
+    """Return the points that can still be made, without fouls and free balls: a black goes with each red."""
+    black = VALUES["black"]
+    left = sum(value(ball) for ball in colours(state.table)) + (1 + black) * len(reds(state.table))
+    return left + (black if state.on == "colour" else 0)
+
+
+class Snooker(Rules[SnookerState]):
+    """Snooker."""
+
+    name = "snooker"
+    rack = "snooker"
+    kind = SnookerState
+
+    def start(self, players: int = 2, misses: bool = False) -> SnookerState:
+        """Return the state before the first stroke.
+
+        Args:
+            players: 1 or 2.
+            misses: whether a miss may be played again.
+        """
+        scores = (0,) * counted(players)
+        return SnookerState(players=players, scores=scores, table=BALLS, in_hand="in the D", misses=misses)
+
+    def legal_targets(self, state: SnookerState) -> frozenset[str]:
+        """Return the balls on; all, where any may be nominated as a free ball."""
+        if state.over:
+            return frozenset()
+        return frozenset(state.table) if state.free else balls_on(state)
+
+    def choices(self, state: SnookerState) -> Choices:
+        """Return what may be decided, and what may be nominated."""
+        base = super().choices(state)
+        if state.over or not (state.free or state.on == "colour"):
+            return base
+        on = balls_on(state)
+        named = tuple(ball for ball in state.table if (ball in on) != state.free)
+        return replace(base, balls=named)
+
+    def settle(self, state: SnookerState, lie: Lie) -> Verdict[SnookerState]:
+        """Return the state with what touches, and a free ball or a foul where the player is snookered.
+
+        After a foul that leaves a snooker any ball is free; to snooker by the free ball itself is foul, unless
+        pink and black alone are left.
+        """
+        after = replace(state, touching=lie.touching, freed=None)
+        if state.over or not lie.snookered:
+            return Verdict(after)
+        if state.freed is not None and state.freed in lie.by and set(state.table) != {"pink", "black"}:
+            penalty = max(LEAST, VALUES.get(state.on, 1))
+            why = f"the free ball, {state.freed}, snookers"
+            points = tuple(penalty * (each == state.turn) for each in range(state.players))
+            scores = state.scored(state.turn if state.players == 2 else None, penalty)
+            after = replace(after, scores=scores, fouled=True, free=True, decisions=_answers(state, False))
+            told = (f"foul: {why}; {penalty} points", "free ball")
+            return Verdict(after, (why,), points if state.players == 2 else (0,), messages=told)
+        if not state.fouled:
+            return Verdict(after)
+        return Verdict(replace(after, free=True), messages=("free ball",))
+
+    def _judge(self, state: SnookerState, call: Call, shot: Shot) -> Verdict[SnookerState]:
+        played = stroke(shot, state.on, state.table, call.ball, state.free, state.touching)
+        clean = replace(
+            state,
+            opening=False,
+            in_hand="in the D" if shot.scratched else None,
+            fouled=False,
+            free=False,
+            freed=None,
+            touching=(),
+            before=None,
+        )
+        fouls = played.fouls
+        return self._foul(state, clean, played, fouls) if fouls else self._fair(clean, played)
+
+    def _fair(self, state: SnookerState, played: Stroke) -> Verdict[SnookerState]:
+        """Return what a fair stroke leads to."""
+        down, points = played.shot.down, played.points
+        last = state.on not in ("red", "colour")
+        gone = tuple(ball for ball in down if ball not in VALUES or (last and ball == state.on))
+        back = tuple(ball for ball in down if ball not in gone)
+        table = state.without(gone)
+        gained = tuple(points * (each == state.turn) for each in range(state.players))
+        after = replace(state, table=table, scores=state.scored(state.turn, points), run=state.run + points)
+        if not points:
+            after = replace(after, turn=state.other, on=_next(table), run=0, freed=played.free)
+            return Verdict(_claimable(after), points=gained)
+        if not table:
+            return replace(_ended(after), points=gained)
+        after = replace(after, on="colour" if state.on == "red" else _next(table))
+        return Verdict(_claimable(after), points=gained, respot=respots(back), goes_on=True)
+
+    def _foul(
+        self, state: SnookerState, clean: SnookerState, played: Stroke, fouls: tuple[tuple[int, str], ...]
+    ) -> Verdict[SnookerState]:
+        """Return what a foul leads to: its dearest part counts, reds stay down, colours come back (Fouls)."""
+        penalty, down = max(fouls)[0], played.shot.down
+        why = tuple(each for _, each in fouls)
+        table = state.without(reds(down))
+        after = replace(clean, table=table, scores=state.scored(state.opponent, penalty), run=0, fouled=True)
+        gained = tuple(penalty * (each == state.opponent) for each in range(state.players))
+        told = f"foul: {why[0]}; {penalty} points"
+        if state.table == ("black",):  # End of Frame: the first score or foul ends the frame
+            ended = _ended(after)
+            return replace(ended, fouls=why, points=gained, messages=(told, *ended.messages))
+        after = replace(after, turn=state.other, on=_next(table))
+        missed = state.misses and not played.hit and not _needed(state) and not _needed(after)
+        after = replace(
+            after, decisions=_answers(after, missed), before=replace(state, before=None) if missed else None
+        )
+        messages = (told, "a miss: it may be played again from where it was") if missed else (told,)
+        colours_down = tuple(ball for ball in down if ball in VALUES)
+        return Verdict(after, why, gained, respot=respots(colours_down), messages=messages)
+
+    def _decide(self, state: SnookerState, decision: Decision) -> Verdict[SnookerState]:
+        after = replace(state, before=None)
+        if decision == "pass":  # a free ball is void where the offender plays again
+            return Verdict(replace(after, turn=state.other, free=False, fouled=False))
+        if decision == "restore" and state.before is not None:
+            return Verdict(replace(state.before, scores=state.scores), restore=True)
+        if decision == "claim":
+            return Verdict(replace(after, over=True, winner=state.turn), messages=(f"{player(state.turn)} wins",))
+        return Verdict(after)
+
+
+def balls_on(state: SnookerState) -> frozenset[str]:
+    """Return the balls on, without a free ball."""
+    if state.on == "red":
+        return frozenset(reds(state.table))
+    return frozenset(colours(state.table) if state.on == "colour" else (state.on,))
+
+
+def _next(table: tuple[str, ...]) -> On:
+    """Return what is on for one who comes to the table: red, else the lowest colour."""
+    left: tuple[On, ...] = ("yellow", "green", "brown", "blue", "pink", "black")
+    return "red" if reds(table) else next(ball for ball in left if ball in table)
+
+
+def _answers(state: SnookerState, missed: bool) -> tuple[Decision, ...]:
+    """Return what the other may answer to a foul."""
+    if state.players == 1:
+        return ()
+    return ("play", "pass", "restore") if missed else ("play", "pass")
+
+
+def _needed(state: SnookerState) -> bool:
+    """Tell whether somebody needs points of fouls to draw level."""
+    return max(state.scores) - min(state.scores) > remaining(state)
+
+
+def _claimable(state: SnookerState) -> SnookerState:
+    """Return the state with the choice to claim: the black alone is left, and the player leads by more than it."""
+    if state.table != ("black",) or state.players == 1:
+        return state
+    if state.scores[state.turn] - state.scores[state.other] <= VALUES["black"]:
+        return state
+    return replace(state, decisions=("play", "claim"))
+
+
+def _ended(state: SnookerState) -> Verdict[SnookerState]:
+    """Return the end; with level scores the black is spotted, and the other player says who plays at it."""
+    if state.players == 2 and state.scores[0] == state.scores[1]:
+        after = replace(
+            state, table=("black",), on="black", turn=state.other, in_hand="in the D", run=0, decisions=("play", "pass")
+        )
+        after = replace(after, fouled=False)
+        return Verdict(after, respot=respots(("black",)), messages=("level: the black is spotted",))
+    winner = state.scores.index(max(state.scores))
+    return Verdict(replace(state, over=True, winner=winner), messages=(f"{player(winner)} wins",))

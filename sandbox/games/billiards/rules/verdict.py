@@ -1,0 +1,53 @@
+"""Verdict: what came of a shot."""
+
+from dataclasses import dataclass
+from typing import Generic
+
+from sandbox.games.billiards.rules.state import S
+
+
+@dataclass(frozen=True)
+class Respot:
+    """A ball to be put back: on the first of its spots that is free, else as near to the first as it can be."""
+
+    ball: str
+    spots: tuple[str, ...]
+    """`foot`, `head`, `centre`; in snooker the colours' own, by their names"""
+
+
+@dataclass(frozen=True)
+class Verdict(Generic[S]):
+    """A new state, why it is so, and what is to be done at the table."""
+
+    state: S
+    fouls: tuple[str, ...] = ()
+    """why it was foul, in plain words; none where it was fair"""
+    points: tuple[int, ...] = ()
+    """what each player gained; none where nothing was played"""
+    respot: tuple[Respot, ...] = ()
+    """in the order in which they are put back"""
+    rerack: bool = False
+    """all balls go to where the game begins"""
+    restore: bool = False
+    """all balls go back to where they were before the last shot"""
+    goes_on: bool = False
+    """whether the one who shot shoots again by right"""
+    messages: tuple[str, ...] = ()
+    """lines for the players"""
+
+
+@dataclass(frozen=True)
+class Lie:
+    """How the balls lie, once all are at rest and spotted; for a cue ball in hand, what its best place would give."""
+
+    touching: tuple[str, ...] = ()
+    """object balls that the cue ball of the player to shoot touches"""
+    snookered: bool = False
+    """whether no legal target touches or can be hit straight at both its edges, for balls that are no targets"""
+    by: tuple[str, ...] = ()
+    """the nearest of the balls in the way, if it is one for all targets"""
+
+
+def player(number: int) -> str:
+    """Return what a player is called."""
+    return f"player {number + 1}"

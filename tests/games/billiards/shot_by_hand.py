@@ -1,0 +1,27 @@
+"""Shots written out: `cue hits 1`, `1 at rail`, `1 in corner`, one after the other; a tuple is at one time."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from sandbox.games.billiards.rules.call import Call
+from sandbox.games.billiards.rules.happening import Happening
+from sandbox.games.billiards.rules.rules import Rules
+from sandbox.games.billiards.rules.verdict import Verdict
+
+KINDS = {"hits": "ball", "at": "cushion", "in": "pocket"}
+
+
+def shot(*lines: str | tuple[str, ...]) -> tuple[Happening, ...]:
+    return tuple(
+        Happening(float(time), ball, KINDS[verb], other)
+        for time, line in enumerate(lines)
+        for ball, verb, other in (each.split() for each in ([line] if isinstance(line, str) else line))
+    )
+
+
+def played(rules: Rules[Any], state: Any, *lines: str | tuple[str, ...], **call: Any) -> Verdict[Any]:
+    return rules.judge(state, Call(**call), shot(*lines))
+
+
+def fallen(balls: Iterable[str]) -> tuple[str, ...]:
+    return tuple(f"{ball} in corner" for ball in balls)

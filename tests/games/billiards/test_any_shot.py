@@ -1,0 +1,147 @@
+"""Every game, whatever happens: nothing raises, what is kept stays sound, a frame ends."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sandbox.games.billiards.rules.call import Call
+from sandbox.games.billiards.rules.happening import GameError, Happening
+from sandbox.games.billiards.rules.registry import RULES
+from sandbox.games.billiards.rules.rules import Rules
+from sandbox.games.billiards.rules.snooker import SnookerState, remaining
+from sandbox.games.billiards.rules.verdict import Lie, Verdict
+
+POCKETS = ("left", "right")
+CAROM = ("three-cushion", "straight-rail")
+
+number = st.integers(0, 40)
+event = st.tuples(st.sampled_from(("ball", "ball", "cushion", "pocket", "pocket")), number, number)
+turns = st.lists(
+    st.tuples(st.lists(event, max_size=6), number, st.booleans(), number),
+    min_size=1,
+    max_size=25,
+)
+
+
+def happenings(rules: Rules[Any], state: Any, events: list[tuple[str, int, int]]) -> tuple[Happening, ...]:
+    """Events of balls that are there; a cue ball that touches what is on is as likely as anything else."""
+    cue = rules.cue_ball(state)
+    balls = (cue, *(ball for ball in state.table if ball != cue))
+    targets = sorted(rules.legal_targets(state))
+    told: list[Happening] = []
+    for time, (kind, a, b) in enumerate(events):
+        if kind == "ball":
+            pair = (cue, targets[b % len(targets)]) if a % 2 else (balls[a % len(balls)], balls[b % len(balls)])
+            told.append(Happening(time - a % 2, pair[0], "ball", pair[1]))
+        elif kind == "pocket" and rules.name not in CAROM:
+            told.append(Happening(time, balls[a % len(balls)], "pocket", POCKETS[b % 2]))
+        else:
+            told.append(Happening(time, balls[a % len(balls)], "cushion", "rail"))
+    return tuple(told)
+
+
+def call_of(rules: Rules[Any], state: Any, pick: int) -> Call:
+    asked = rules.choices(state)
+    ball = (None, *asked.balls)[pick % (len(asked.balls) + 1)]
+    pocket = (None, *POCKETS)[pick % 3] if asked.pocket else None
+    return Call(ball, pocket, safety=asked.safety and pick % 7 == 0, push_out=asked.push_out and pick % 2 == 0)
+
+
+def is_sound(rules: Rules[Any], state: Any) -> None:
+    start = rules.start(state.players)
+    assert len(state.scores) == state.players
+    assert min(state.scores) >= 0
+    assert 0 <= state.turn < state.players
+    assert state.winner is None or (state.over and 0 <= state.winner < state.players)
+    assert [ball for ball in start.table if ball in state.table] == list(state.table)
+    targets = rules.legal_targets(state)
+    assert targets <= set(state.table)
+    assert bool(targets) != state.over
+    assert state.over or state.decisions[:1] in ((), ("play",))
+    assert rules.restored(json.loads(json.dumps(rules.document(state)))) == state
+
+
+def follows(rules: Rules[Any], before: Any, verdict: Verdict[Any]) -> None:
+    """What one shot may do."""
+    after = verdict.state
+    gained = tuple(now - then for now, then in zip(after.scores, before.scores, strict=True))
+    assert verdict.points == gained
+    assert min(gained) >= 0
+    assert set(after.table) <= set(before.table)
+    assert {each.ball for each in verdict.respot} <= set(after.table)
+    assert verdict.goes_on <= (after.turn == before.turn and not after.over)
+    if isinstance(after, SnookerState) and not before.free:  # a free ball brings a colour with it, as a red does
+        level = "level: the black is spotted" in verdict.messages
+        assert level or remaining(after) <= remaining(before)
+
+
+@pytest.mark.parametrize("players", [1, 2])
+@pytest.mark.parametrize("name", RULES)
+@settings(max_examples=60, deadline=None)
+@given(turns=turns, misses=st.booleans())
+def test_any_shots_leave_a_sound_state(name: str, players: int, turns: list[Any], misses: bool) -> None:
+    rules = RULES[name]
+    state = rules.start(players)
+    if isinstance(state, SnookerState):
+        state = replace(state, misses=misses, table=state.table[10:])  # few reds, so that the colours are reached
+    for events, pick, snookered, choice in turns:
+        offered = rules.choices(state).decisions
+        if offered and choice % 3:
+            state = rules.decide(state, offered[choice % len(offered)]).state
+            is_sound(rules, state)
+            if state.over:
+                break
+        shot, call = happenings(rules, state, events), call_of(rules, state, pick)
+        verdict = rules.judge(state, call, shot)
+        assert rules.judge(state, call, shot) == verdict  # nothing but the state is remembered
+        is_sound(rules, verdict.state)
+        follows(rules, state, verdict)
+        state = verdict.state
+        if state.over:
+            break
+        cue = rules.cue_ball(state)
+        near = tuple(ball for ball in state.table if ball != cue)[: choice % 2]
+        state = rules.settle(state, Lie(near, snookered, near)).state
+        is_sound(rules, state)
+
+
+@pytest.mark.parametrize("players", [1, 2])
+@pytest.mark.parametrize("name", RULES)
+@settings(max_examples=20, deadline=None)
+@given(mistakes=st.lists(st.integers(0, 2), max_size=12))
+def test_frame_of_players_who_make_what_is_on_ends(name: str, players: int, mistakes: list[int]) -> None:
+    """Each shot makes what is on, but for some that miss, scratch or touch nothing."""
+    rules = RULES[name]
+    state = rules.start(players)
+    balls = 2 * len(state.table) + 110  # a colour with each red; the distances of carom
+    for turn in range(len(mistakes) + balls):
+        cue, target = rules.cue_ball(state), min(rules.legal_targets(state), key=len)
+        touch = Happening(0.0, cue, "ball", target)
+        lines = [touch]
+        if name in CAROM:
+            third = next(ball for ball in state.table if ball not in (cue, target))
+            lines += [Happening(1.0, cue, "cushion", "rail")] * 3 + [Happening(2.0, cue, "ball", third)]
+        else:
+            lines.append(Happening(1.0, target, "pocket", "left"))
+        if turn < len(mistakes):
+            scratch = Happening(1.0, cue, "pocket", "left")
+            lines = [[], [touch], [touch, *([] if name in CAROM else [scratch])]][mistakes[turn]]
+        asked = rules.choices(state)
+        call = Call(target if target in asked.balls else None, "left" if asked.pocket else None)
+        state = rules.judge(state, call, lines).state
+        if state.over:
+            break
+    assert state.over
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_what_is_no_state_is_refused(name: str) -> None:
+    rules = RULES[name]
+    good = rules.document(rules.start())
+    for bad in ({}, [], {**good, "turn": "who"}, {**good, "turn": 2}, {**good, "more": 1}):
+        with pytest.raises(GameError):
+            rules.restored(bad)

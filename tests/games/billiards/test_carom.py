@@ -1,0 +1,134 @@
+"""Three-cushion and straight rail: caroms, turns, the opening shot, the last turn, balls that touch."""
+
+from dataclasses import replace
+
+import pytest
+from shot_by_hand import played
+
+from sandbox.games.billiards.rules.carom import Carom
+from sandbox.games.billiards.rules.happening import GameError
+from sandbox.games.billiards.rules.registry import RULES
+from sandbox.games.billiards.rules.verdict import Lie
+
+THREE, STRAIGHT = (RULES[name] for name in ("three-cushion", "straight-rail"))
+assert isinstance(THREE, Carom)
+START = THREE.start(distance=2)
+PLAY = replace(START, opening=False)
+RAIL = "white at rail"
+MADE = ("white hits red", RAIL, RAIL, RAIL, "white hits yellow")
+
+
+@pytest.mark.parametrize("before", range(4))
+def test_three_cushions_before_the_second_ball_in_any_order_score(before: int) -> None:
+    lines = (*[RAIL] * before, "white hits red", *[RAIL] * (3 - before), "white hits yellow")
+    verdict = played(THREE, PLAY, *lines)
+    assert verdict.goes_on
+    assert verdict.points == (1, 0)
+    assert verdict.state.turn == 0
+
+
+MISSES = {
+    "two cushions": ("white hits red", RAIL, RAIL, "white hits yellow", RAIL),
+    "one ball": ("white hits red", RAIL, RAIL, RAIL, "white hits red"),
+    "no ball": (RAIL, RAIL, RAIL),
+    "cushions of another ball": ("white hits red", RAIL, RAIL, "red at rail", "white hits yellow"),
+    "balls that meet without the cue ball": ("white hits red", RAIL, RAIL, RAIL, "red hits yellow"),
+}
+
+
+@pytest.mark.parametrize("why", MISSES)
+def test_miss_passes_the_turn_without_a_foul(why: str) -> None:
+    verdict = played(THREE, PLAY, *MISSES[why])
+    assert not verdict.fouls
+    assert verdict.points == (0, 0)
+    assert (verdict.state.turn, verdict.state.innings) == (1, (1, 0))
+
+
+def test_players_strike_their_own_balls() -> None:
+    other = played(THREE, PLAY).state
+    assert (THREE.cue_ball(PLAY), THREE.cue_ball(other)) == ("white", "yellow")
+    assert THREE.legal_targets(other) == {"white", "red"}
+    scored = played(THREE, other, "yellow hits red", *["yellow at rail"] * 3, "yellow hits white")
+    assert scored.points == (0, 1)
+
+
+def test_straight_rail_needs_no_cushion() -> None:
+    state = replace(STRAIGHT.start(), opening=False)
+    assert played(STRAIGHT, state, "white hits red", "white hits yellow").goes_on
+    assert not played(STRAIGHT, state, "white hits red", "red hits yellow").goes_on
+
+
+def test_opening_shot_must_touch_the_red_first() -> None:
+    assert THREE.legal_targets(START) == {"red"}
+    verdict = played(THREE, START, "white hits yellow", RAIL, RAIL, RAIL, "white hits red")
+    assert verdict.fouls == ("the opening shot must touch the red first",)
+    assert (verdict.state.turn, verdict.state.scores) == (1, (0, 0))
+    made = played(THREE, START, *MADE)
+    assert made.goes_on
+    assert not made.state.opening
+
+
+def test_run_counts_the_points_of_a_turn() -> None:
+    state = replace(PLAY, distance=9)
+    state = played(THREE, played(THREE, state, *MADE).state, *MADE).state
+    assert state.run == 2
+    assert played(THREE, state).state.run == 0
+
+
+def test_who_began_and_is_full_leaves_the_other_a_last_turn() -> None:
+    verdict = played(THREE, replace(PLAY, scores=(1, 1)), *MADE)
+    state = verdict.state
+    assert not state.over
+    assert verdict.rerack
+    assert (state.turn, state.last, state.opening, state.innings) == (1, True, True, (1, 0))
+    lost = played(THREE, state).state
+    assert (lost.over, lost.winner) == (True, 0)
+    level = played(THREE, state, "yellow hits red", *["yellow at rail"] * 3, "yellow hits white").state
+    assert (level.over, level.winner, level.scores) == (True, None, (2, 2))
+
+
+def test_who_is_second_and_full_wins_at_once() -> None:
+    state = replace(PLAY, turn=1, scores=(1, 1), innings=(1, 0))
+    over = played(THREE, state, "yellow hits red", *["yellow at rail"] * 3, "yellow hits white").state
+    assert (over.over, over.winner) == (True, 1)
+
+
+def test_who_plays_alone_ends_at_the_distance() -> None:
+    state = replace(THREE.start(players=1, distance=1), opening=False)
+    missed = played(THREE, state).state
+    assert (missed.turn, missed.innings) == (0, (1,))
+    over = played(THREE, missed, *MADE).state
+    assert (over.over, over.winner, over.innings) == (True, 0, (2,))
+
+
+def test_touching_balls_may_be_spotted_each_on_its_own() -> None:
+    state = THREE.settle(PLAY, Lie(touching=("red",))).state
+    assert THREE.choices(state).decisions == ("play", "spot")
+    spotted = THREE.decide(state, "spot")
+    assert [(each.ball, each.spots) for each in spotted.respot] == [
+        ("white", ("head", "centre")),
+        ("red", ("foot", "centre")),
+    ]
+    assert not spotted.rerack
+    assert spotted.state == PLAY
+    assert THREE.decide(state, "play").state == PLAY
+
+
+def test_touching_balls_of_the_second_player_and_all_three() -> None:
+    state = THREE.settle(replace(PLAY, turn=1), Lie(touching=("white", "red"))).state
+    spots = {each.ball: each.spots for each in THREE.decide(state, "spot").respot}
+    assert spots == {"white": ("centre",), "yellow": ("head",), "red": ("foot",)}
+
+
+def test_touching_balls_of_straight_rail_all_go_back_and_the_red_is_first() -> None:
+    state = STRAIGHT.settle(replace(STRAIGHT.start(), opening=False), Lie(touching=("red",))).state
+    verdict = STRAIGHT.decide(state, "spot")
+    assert verdict.rerack
+    assert verdict.state.opening
+
+
+def test_what_no_carom_table_has_is_refused() -> None:
+    with pytest.raises(GameError, match="pockets"):
+        played(THREE, PLAY, "red in left")
+    with pytest.raises(GameError, match="distance"):
+        THREE.start(distance=0)

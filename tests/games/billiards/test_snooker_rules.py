@@ -1,0 +1,228 @@
+"""Snooker: every foul, every ending, every change of turn."""
+
+from dataclasses import replace
+
+import pytest
+from shot_by_hand import fallen, played
+
+from sandbox.games.billiards.rules.happening import GameError
+from sandbox.games.billiards.rules.snooker import Snooker, SnookerState, remaining
+from sandbox.games.billiards.rules.snooker_balls import COLOURS, REDS, VALUES
+from sandbox.games.billiards.rules.verdict import Lie
+
+RULES = Snooker()
+START = RULES.start()
+PLAY = replace(START, opening=False, in_hand=None)
+COLOUR = replace(PLAY, on="colour", table=(*REDS[1:], *COLOURS), scores=(1, 0))
+ORDER = replace(PLAY, on="yellow", table=COLOURS)
+BLACK = replace(PLAY, on="black", table=("black",))
+SNOOKERED = Lie(snookered=True)
+
+
+def test_start_is_in_the_d_with_reds_on_and_147_to_be_made() -> None:
+    assert START.in_hand == "in the D"
+    assert RULES.legal_targets(START) == set(REDS)
+    assert remaining(START) == 147
+    assert not START.misses
+    assert not RULES.settle(START, SNOOKERED).state.free
+
+
+def test_red_scores_one_stays_down_and_a_colour_is_next() -> None:
+    verdict = played(RULES, START, "cue hits red-1", "red-1 in left")
+    assert verdict.goes_on
+    assert verdict.points == (1, 0)
+    assert (verdict.state.on, verdict.state.run, verdict.state.opening) == ("colour", 1, False)
+    assert RULES.legal_targets(verdict.state) == set(COLOURS)
+    assert "red-1" not in verdict.state.table
+
+
+def test_each_red_of_a_stroke_scores() -> None:
+    assert played(RULES, PLAY, "cue hits red-1", "red-1 in left", "red-2 in right").points == (2, 0)
+
+
+@pytest.mark.parametrize("colour", COLOURS)
+def test_colour_scores_its_value_comes_back_and_red_is_next(colour: str) -> None:
+    verdict = played(RULES, COLOUR, f"cue hits {colour}", f"{colour} in left", ball=colour)
+    assert verdict.points == (VALUES[colour], 0)
+    assert (verdict.state.on, verdict.goes_on) == ("red", True)
+    assert [each.spots[0] for each in verdict.respot] == [colour]
+    assert verdict.state.table == COLOUR.table
+
+
+def test_spots_that_are_taken_give_way_to_the_highest() -> None:
+    (verdict,) = played(RULES, COLOUR, "cue hits blue", "blue in left", ball="blue").respot
+    assert verdict.spots == ("blue", "black", "pink", "brown", "green", "yellow")
+
+
+def test_colour_that_is_touched_is_nominated_by_that() -> None:
+    assert played(RULES, COLOUR, "cue hits pink", "pink in left").points == (6, 0)
+
+
+def test_last_red_has_its_colour_back_then_the_yellow_is_on() -> None:
+    state = replace(PLAY, table=("red-9", *COLOURS))
+    state = played(RULES, state, "cue hits red-9", "red-9 in left").state
+    verdict = played(RULES, state, "cue hits black", "black in left", ball="black")
+    assert [each.ball for each in verdict.respot] == ["black"]
+    assert (verdict.state.on, verdict.state.table) == ("yellow", COLOURS)
+
+
+def test_last_red_and_no_colour_has_the_yellow_on() -> None:
+    state = replace(COLOUR, table=COLOURS)
+    verdict = played(RULES, state, "cue hits black", ball="black")
+    assert (verdict.state.turn, verdict.state.on) == (1, "yellow")
+
+
+def test_colours_in_order_stay_down() -> None:
+    verdict = played(RULES, ORDER, "cue hits yellow", "yellow in left")
+    assert (verdict.state.on, verdict.respot) == ("green", ())
+    assert RULES.legal_targets(verdict.state) == {"green"}
+
+
+def test_stroke_without_a_ball_passes_and_is_no_foul_off_the_cushions() -> None:
+    verdict = played(RULES, PLAY, "cue hits red-1")
+    assert not verdict.fouls
+    assert (verdict.state.turn, verdict.state.on, verdict.state.run) == (1, "red", 0)
+
+
+def test_missed_colour_passes_with_red_on() -> None:
+    verdict = played(RULES, COLOUR, "cue hits pink", ball="pink")
+    assert (verdict.state.turn, verdict.state.on) == (1, "red")
+
+
+FOULS = [
+    (PLAY, {}, ("cue hits red-1", "cue in left"), 4, "the cue ball fell"),
+    (PLAY, {}, ("cue at rail",), 4, "the cue ball touched no ball"),
+    (PLAY, {}, ("cue hits yellow",), 4, "the yellow was touched first"),
+    (PLAY, {}, ("cue hits black",), 7, "the black was touched first"),
+    (PLAY, {}, ("cue hits red-1", "pink in left"), 6, "the pink fell and was not on"),
+    (PLAY, {}, (("cue hits red-1", "cue hits blue"),), 5, "the red-1 and the blue were touched first"),
+    (COLOUR, {"ball": "pink"}, ("cue at rail",), 6, "the cue ball touched no ball"),
+    (COLOUR, {"ball": "pink"}, ("cue hits red-2",), 6, "the red-2 was touched first"),
+    (COLOUR, {"ball": "green"}, ("cue hits green", "red-2 in left"), 4, "the red-2 fell and was not on"),
+    (COLOUR, {"ball": "green"}, ("cue hits black",), 7, "the black was touched first"),
+    (COLOUR, {"ball": "green"}, (("cue hits green", "cue hits pink"),), 6, "the green and the pink were touched first"),
+    (COLOUR, {}, ("cue hits red-2",), 7, "the red-2 was touched first"),
+    (COLOUR, {}, (), 7, "the cue ball touched no ball"),
+    (ORDER, {}, ("cue hits green",), 4, "the green was touched first"),
+    (ORDER, {}, ("cue hits yellow", "blue in left"), 5, "the blue fell and was not on"),
+]
+
+
+@pytest.mark.parametrize(("state", "call", "lines", "penalty", "why"), FOULS)
+def test_foul_scores_for_the_other(
+    state: SnookerState, call: dict[str, str], lines: tuple[str, ...], penalty: int, why: str
+) -> None:
+    verdict = played(RULES, state, *lines, **call)
+    assert verdict.fouls == (why,)
+    assert verdict.points == (0, penalty)
+    assert verdict.state.scores == (state.scores[0], penalty)
+    assert verdict.state.turn == 1
+    assert verdict.state.on in ("red", "yellow")
+    assert verdict.state.decisions == ("play", "pass")
+
+
+def test_several_fouls_of_a_stroke_count_once_by_the_dearest() -> None:
+    verdict = played(RULES, PLAY, "cue hits yellow", "black in left", "cue in left")
+    assert len(verdict.fouls) == 3
+    assert verdict.points == (0, 7)
+    assert verdict.state.in_hand == "in the D"
+
+
+def test_foul_scores_nothing_keeps_reds_down_and_brings_colours_back_the_highest_first() -> None:
+    verdict = played(RULES, PLAY, "cue hits red-1", "red-1 in left", "blue in left", "black in right")
+    assert verdict.state.scores == (0, 7)
+    assert [each.ball for each in verdict.respot] == ["black", "blue"]
+    assert verdict.state.table == (*REDS[1:], *COLOURS)
+
+
+def test_colour_on_that_falls_on_a_foul_comes_back() -> None:
+    verdict = played(RULES, ORDER, "cue hits yellow", "yellow in left", "cue in left")
+    assert verdict.state.on == "yellow"
+    assert [each.ball for each in verdict.respot] == ["yellow"]
+
+
+def test_red_cannot_be_nominated() -> None:
+    with pytest.raises(GameError, match="'red-2' cannot be called now"):
+        played(RULES, COLOUR, ball="red-2")
+    with pytest.raises(GameError, match="'pink' cannot be called now"):
+        played(RULES, PLAY, ball="pink")
+
+
+MISS = replace(RULES.start(misses=True), opening=False, in_hand=None)
+
+
+def test_miss_may_be_played_again_from_where_it_was_and_the_points_stay() -> None:
+    state = replace(MISS, on="colour", table=COLOUR.table, scores=(8, 0), run=8)
+    verdict = played(RULES, state, "cue hits red-2", "red-2 in left", ball="pink")
+    assert verdict.state.decisions == ("play", "pass", "restore")
+    back = RULES.decide(verdict.state, "restore")
+    assert back.restore
+    assert back.state == replace(state, scores=(8, 6))
+
+
+def test_miss_is_none_without_the_rule_or_where_the_ball_on_was_hit() -> None:
+    assert "restore" not in played(RULES, PLAY, "cue at rail").state.decisions
+    assert "restore" not in played(RULES, MISS, "cue hits red-1", "cue in left").state.decisions
+
+
+# 27 are left, and the foul costs 4: who is 24 behind needs more for it, who is 28 behind needed them before.
+@pytest.mark.parametrize(("scores", "offered"), [((0, 23), True), ((0, 24), False), ((27, 0), True), ((28, 0), False)])
+def test_miss_is_none_where_points_of_fouls_are_needed(scores: tuple[int, int], offered: bool) -> None:
+    state = replace(MISS, on="yellow", table=COLOURS, scores=scores)
+    assert ("restore" in played(RULES, state).state.decisions) == offered
+
+
+def test_black_alone_ends_with_the_first_score() -> None:
+    verdict = played(RULES, replace(BLACK, scores=(10, 12)), "cue hits black", "black in left")
+    assert verdict.points == (7, 0)
+    assert (verdict.state.over, verdict.state.winner) == (True, 0)
+
+
+def test_black_alone_ends_with_the_first_foul() -> None:
+    verdict = played(RULES, replace(BLACK, scores=(20, 12)), "cue hits black", "cue in left")
+    assert (verdict.state.over, verdict.state.winner, verdict.state.scores) == (True, 0, (20, 19))
+
+
+def test_black_alone_that_stays_up_passes_the_turn() -> None:
+    verdict = played(RULES, replace(BLACK, scores=(20, 18)), "cue hits black")
+    assert not verdict.state.over
+    assert (verdict.state.turn, verdict.state.on) == (1, "black")
+
+
+@pytest.mark.parametrize("lines", [("cue hits black", "black in left"), ("cue in left",)])
+def test_level_scores_spot_the_black_and_the_next_score_or_foul_ends(lines: tuple[str, ...]) -> None:
+    scores = (5, 12) if "black in left" in lines else (12, 5)
+    verdict = played(RULES, replace(BLACK, scores=scores), *lines)
+    state = verdict.state
+    assert not state.over
+    assert [each.ball for each in verdict.respot] == ["black"]
+    assert (state.table, state.in_hand, state.decisions) == (("black",), "in the D", ("play", "pass"))
+    assert not state.fouled
+    first = RULES.decide(state, "pass").state
+    assert first.turn == 0
+    assert played(RULES, first, "cue hits black", "black in left").state.winner == 0
+    assert played(RULES, first).state.winner == 1
+
+
+def test_frame_may_be_claimed_with_more_than_a_black_between() -> None:
+    state = replace(PLAY, on="pink", table=("pink", "black"))
+    near, far = (
+        played(RULES, replace(state, scores=(each, 10)), "cue hits pink", "pink in left").state for each in (11, 12)
+    )
+    assert near.decisions == ()
+    assert far.decisions == ("play", "claim")
+    over = RULES.decide(far, "claim").state
+    assert (over.over, over.winner) == (True, 0)
+    assert RULES.choices(replace(over, free=True)).balls == ()
+
+
+def test_who_plays_alone_makes_147_and_gives_no_points_away() -> None:
+    state = RULES.start(players=1)
+    foul = played(RULES, state)
+    assert (foul.state.scores, foul.state.turn, foul.state.decisions) == ((0,), 0, ())
+    for red in REDS:
+        state = played(RULES, state, f"cue hits {red}", *fallen([red])).state
+        state = played(RULES, state, "cue hits black", *fallen(["black"]), ball="black").state
+    for colour in COLOURS:
+        state = played(RULES, state, f"cue hits {colour}", *fallen([colour])).state
+    assert (state.over, state.winner, state.scores) == (True, 0, (147,))
