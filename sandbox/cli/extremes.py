@@ -17,7 +17,7 @@ from sandbox.measure.extremes.axes import AXES, PAIRS
 from sandbox.measure.extremes.axis import Axis
 from sandbox.measure.extremes.boundaries import Change, StoredError, changes, read
 from sandbox.measure.extremes.checking import check_overrides
-from sandbox.measure.extremes.matrix import MEMORY, SECONDS, Progress, Told
+from sandbox.measure.extremes.matrix import MEMORY, SECONDS, Progress, Watch
 from sandbox.measure.extremes.warden import WorkerError
 from sandbox.scene.faults import Fault
 
@@ -161,7 +161,7 @@ def _write(result: Extremes, document: dict[str, object], out: Path) -> None:
 
 
 @contextmanager
-def _telling(silent: bool) -> Iterator[Told | None]:
+def _telling(silent: bool) -> Iterator[Watch | None]:
     """Yield who is told how far it is: a bar on a terminal, nobody elsewhere."""
     if silent or not sys.stderr.isatty():
         yield None
