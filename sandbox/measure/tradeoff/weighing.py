@@ -14,7 +14,7 @@ from sandbox.measure.tradeoff.aim import Aim, aim_at, metric_named, require_aim
 from sandbox.measure.tradeoff.cost import Cost, costs
 from sandbox.measure.tradeoff.front import outdone, pareto
 from sandbox.measure.tradeoff.judge import Judge, zoom_of
-from sandbox.measure.tradeoff.picking import FRESH, LONGER, Again, best, cheapest
+from sandbox.measure.tradeoff.picking import FRESH, LONGER, Again, cheapest, closest
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.proposals import Proposal, proposals
 from sandbox.measure.tradeoff.search import SLOW, Search
@@ -130,7 +130,7 @@ def tradeoff(
             budget,
             fps,
             within,
-            best(points, aim, fresh, again),
+            closest(points, aim, fresh, again),
             known,
             len(search.untried - set(search.trials)),
             machine(),
