@@ -4,6 +4,7 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -15,9 +16,9 @@ from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.extremes import Extremes, Plan, extremes
 from sandbox.measure.extremes.axes import AXES, PAIRS
 from sandbox.measure.extremes.axis import Axis
-from sandbox.measure.extremes.boundaries import Change, StoredError, changes, read
 from sandbox.measure.extremes.checking import check_overrides
 from sandbox.measure.extremes.matrix import MEMORY, SECONDS, Progress, Watch
+from sandbox.measure.extremes.stored import Change, StoredError, changes, read
 from sandbox.measure.extremes.warden import WorkerError
 from sandbox.scene.faults import Fault
 
@@ -90,7 +91,7 @@ def command(
     both = tuple(pair for pair in PAIRS if pair.case.name in cases) if pairs and not quick else ()
     plan = Plan(chosen, both, names, overrides, quick, timeout, memory)
     if workers is not None:
-        plan = Plan(chosen, both, names, overrides, quick, timeout, memory, workers)
+        plan = replace(plan, workers=workers)
     try:
         with _telling(quiet or as_json) as told:
             result = extremes(plan, told)
