@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 import pytest
-from trials_by_hand import DROP, scene_of
+from runs_by_hand import DROP, SWING, scene_of
 
 import sandbox
 from sandbox.engines.registry import ENGINES, UnknownEngineError
@@ -42,25 +42,6 @@ spacing = [3.0, 1.0]
 radius = 0.5
 velocity_jitter = 1.0
 restitution = 0.5
-"""
-JOINED = """
-[world]
-gravity = [0.0, -10.0]
-duration = 0.2
-[solver]
-dt = 0.02
-[[ball]]
-name = "hook"
-position = [0.0, 0.0]
-radius = 0.1
-fixed = true
-[[ball]]
-name = "bob"
-position = [1.0, 0.0]
-radius = 0.1
-[[joint]]
-kind = "rod"
-between = ["hook", "bob"]
 """
 
 
@@ -117,7 +98,7 @@ def test_scene_without_chances_has_one_seed() -> None:
 
 
 def test_refused_engine_is_a_point_that_says_why() -> None:
-    found = weighed(scene_of(JOINED), "pymunk", "exact", most=2)
+    found = weighed(scene_of(SWING), "pymunk", "exact", most=2)
     (refused,) = [point for point in found.points if point.engine == "exact"]
     assert refused.status == "refused"
     assert "rod" in (refused.reason or "")
@@ -125,7 +106,7 @@ def test_refused_engine_is_a_point_that_says_why() -> None:
 
 
 def test_nobody_able_is_an_answer_too() -> None:
-    found = weighed(scene_of(JOINED), "exact")
+    found = weighed(scene_of(SWING), "exact")
     assert [point.status for point in found.points] == ["refused"]
     assert (found.pareto, found.within_tolerance) == ((), None)
     assert "none of the 1" in found.answers()[0]
