@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sandbox.batch.interrupt import uninterrupted
 from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError, run_id
 from sandbox.engines.registry import engine_named
+from sandbox.interrupt import heeded, uninterrupted
 from sandbox.measure.finite import finite
 from sandbox.measure.ledger import ledger_of
 from sandbox.measure.run import Progress, run
@@ -102,6 +102,7 @@ class Outcome:
         }
 
 
+@heeded()
 def execute(
     job: Job,
     store: Store | None = None,

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import click
 
-from sandbox.batch.interrupt import uninterrupted
 from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
 from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.interrupt import uninterrupted
 from sandbox.measure.compare import compare
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.tradeoff import tradeoff
