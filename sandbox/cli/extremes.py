@@ -10,9 +10,9 @@ from pathlib import Path
 import click
 
 from sandbox.cli.extremes_table import print_extremes
+from sandbox.cli.naming import engines_in, names_in
 from sandbox.cli.output import make_folder, require_folder, write_json
-from sandbox.cli.reading import fault_rows, gathering, print_json
-from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.cli.reading import gathering, print_json, refused
 from sandbox.measure.extremes import Extremes, Plan, extremes
 from sandbox.measure.extremes.axes import AXES, PAIRS
 from sandbox.measure.extremes.axis import Axis
@@ -63,10 +63,7 @@ def command(
     """
     faults: list[Fault] = []
     chosen = _axes(axes, faults)
-    names = None if engines is None else tuple(dict.fromkeys(name.strip() for name in engines.split(",")))
-    for name in names or ():
-        with gathering(faults, "--engine", (UnknownEngineError,)):
-            engine_named(name)
+    names = engines_in(engines, faults)
     stored = None
     if against is not None:
         with gathering(faults, "--against", (StoredError,)):
@@ -81,15 +78,11 @@ def command(
         with gathering(faults):
             make_folder(out)
     if faults:
-        for fault in faults:
-            click.echo(str(fault), err=True)
-        if as_json:
-            print_json({"cells": [], "limits": [], "faults": fault_rows(faults)})
-        return 2
+        return refused(faults, as_json, cells=[], limits=[])
 
     cases = {axis.case.name for axis in chosen}
     both = tuple(pair for pair in PAIRS if pair.case.name in cases) if pairs and not quick else ()
-    plan = Plan(chosen, both, names, overrides, quick, timeout, memory)
+    plan = Plan(chosen, both, None if names is None else tuple(names), overrides, quick, timeout, memory)
     if workers is not None:
         plan = replace(plan, workers=workers)
     try:
@@ -104,7 +97,7 @@ def command(
 def _axes(text: str | None, faults: list[Fault]) -> tuple[Axis, ...]:
     if text is None:
         return tuple(AXES.values())
-    names = list(dict.fromkeys(name.strip() for name in text.split(",")))
+    names = names_in(text)
     faults += [
         Fault("--axes", None, "", f"no axis {name!r}; axes: {', '.join(AXES)}") for name in names if name not in AXES
     ]
