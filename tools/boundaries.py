@@ -14,8 +14,8 @@ from pathlib import Path
 
 from sandbox.measure.extremes import Plan, extremes
 from sandbox.measure.extremes.axes import AXES
-from sandbox.measure.extremes.boundaries import changes, read, store
 from sandbox.measure.extremes.matrix import SECONDS, Progress
+from sandbox.measure.extremes.stored import changes, read, store
 
 STORED = Path(__file__).resolve().parent / "boundaries.json"
 

@@ -1,15 +1,15 @@
 """Outcomes: runs made, or found in the store, and the row that tells of each."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sandbox.batch.interrupt import uninterrupted
 from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError, run_id
 from sandbox.engines.registry import engine_named
+from sandbox.interrupt import heeded, uninterrupted
+from sandbox.measure.finite import finite
 from sandbox.measure.ledger import ledger_of
 from sandbox.measure.run import Progress, run
 from sandbox.measure.versions import versions
@@ -54,14 +54,14 @@ class Outcome:
             "set": dict(self.job.point),
             "status": run.status,
             "reason": run.reason,
-            "seconds": _number(seconds),
+            "seconds": finite(seconds),
             "steps": steps,
-            "steps_per_second": _number(steps / seconds if seconds else None),
+            "steps_per_second": finite(steps / seconds if seconds else None),
             "work": info.get("work", {}),
-            "realtime_factor": _number(simulated / seconds if seconds else None),
-            "energy_start": _number(info["energy_start"]),
-            "energy_end": _number(info["energy_end"]),
-            "joint_error": _number(info.get("joint_error")),
+            "realtime_factor": finite(simulated / seconds if seconds else None),
+            "energy_start": finite(info["energy_start"]),
+            "energy_end": finite(info["energy_end"]),
+            "joint_error": finite(info.get("joint_error")),
             "broken_joints": info.get("broken", 0),
             "contacts": len(run.contact_time),
             "missed_contacts": run.missed_contacts,
@@ -93,19 +93,16 @@ class Outcome:
         )
         return {
             name: {
-                "position": [_number(x) for x in position],
-                "velocity": [_number(v) for v in velocity],
-                "angle": _number(angle),
-                "angular_velocity": _number(spin),
+                "position": [finite(x) for x in position],
+                "velocity": [finite(v) for v in velocity],
+                "angle": finite(angle),
+                "angular_velocity": finite(spin),
             }
             for name, position, velocity, angle, spin in columns
         }
 
 
-def _number(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None
-
-
+@heeded()
 def execute(
     job: Job,
     store: Store | None = None,

@@ -268,15 +268,15 @@ def _row(trajectory: Trajectory, run: str) -> StoredRun:
         reason=trajectory.reason,
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         steps=info["steps"],
-        seconds=_number(info["seconds"]),
-        energy_start=_number(info["energy_start"]),
-        energy_end=_number(info["energy_end"]),
+        seconds=_known(info["seconds"]),
+        energy_start=_known(info["energy_start"]),
+        energy_end=_known(info["energy_end"]),
         contacts=len(trajectory.contact_time),
         missed_contacts=trajectory.missed_contacts,
         path=f"{run}.npz",
     )
 
 
-def _number(value: float | None) -> float | None:
-    """Return a number, or None for what SQL has no number for."""
+def _known(value: float | None) -> float | None:
+    """Return a number, infinite or not, or None for what SQL has no number for."""
     return None if value is None or math.isnan(value) else float(value)

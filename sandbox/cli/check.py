@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from sandbox.cli.reading import fault_rows, paths_of, print_json, require_scene
+from sandbox.cli.reading import fault_rows, path_of, print_json
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.forecast import at_most, largest_safe_dt, notes, warnings
 from sandbox.scene.demands import JOINTS, Item, bill
@@ -28,9 +28,7 @@ def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, 
     status = 0
     for name in scenes:
         try:
-            path = paths_of([name])[0][1]
-            require_scene(name, path)
-            scene = load(path, overrides)
+            scene = load(path_of(name), overrides)
         except SceneError as error:
             status = 2
             documents.append(_faulty(name, error))

@@ -6,10 +6,10 @@ import click
 
 from sandbox.cli.comparison_table import print_comparison
 from sandbox.cli.minimising import faults_of, minimised
+from sandbox.cli.naming import engines_in
 from sandbox.cli.output import make_folder, require_folder, write_json
-from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
+from sandbox.cli.reading import gathering, path_of, print_json, refused
 from sandbox.cli.telling import telling
-from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.compare import Comparison, compare
 from sandbox.measure.recorder import TooLargeError
 from sandbox.scene.faults import Fault
@@ -56,15 +56,11 @@ def command(
 ) -> int:
     """Run a scene on several engines and score each against the best known truth. SCENE is a file or a shipped one."""
     faults: list[Fault] = []
-    names = None if engines is None else list(dict.fromkeys(name.strip() for name in engines.split(",")))
-    for name in names or ():
-        with gathering(faults, "--engine", (UnknownEngineError,)):
-            engine_named(name)
+    names = engines_in(engines, faults)
     read: Scene | None = None
     path = ""
     with gathering(faults):
-        path = paths_of([scene])[0][1]
-        require_scene(scene, path)
+        path = path_of(scene)
         read = load(path, overrides)
     with gathering(faults, "--tolerance", (ValueError,)):
         if tolerance == float("inf") or tolerance != tolerance:
@@ -86,11 +82,7 @@ def command(
         with gathering(faults, scene, (TooLargeError,)), telling(quiet or as_json) as told:
             comparison = compare(read, names, tolerance=tolerance, why=why, told=told)
     if comparison is None:
-        for fault in faults:
-            click.echo(str(fault), err=True)
-        if as_json:
-            print_json({"scene": scene, "truth": None, "engines": [], "faults": fault_rows(faults)})
-        return 2
+        return refused(faults, as_json, scene=scene, truth=None, engines=[])
 
     status = 0
     for row in comparison.rows:

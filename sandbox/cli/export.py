@@ -12,7 +12,7 @@ import click
 import numpy as np
 
 from sandbox.cli.exporting import TABLES, Options, check_options, check_times
-from sandbox.cli.reading import fault_rows, gathering, print_json
+from sandbox.cli.reading import fault_rows, gathering, print_json, refused
 from sandbox.cli.stored import find_run, read_run
 from sandbox.measure.run import Progress
 from sandbox.recording import Recording
@@ -51,7 +51,7 @@ def command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
         with gathering(faults):
             check_times(options, end)
     if source is None or faults:
-        return _refuse(run, faults, as_json)
+        return refused(faults, as_json, run=run, files=[])
 
     files: list[dict[str, Any]] = []
     status = 0
@@ -75,14 +75,6 @@ def command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
             count = f"{file['rows']:,} rows" if "rows" in file else f"{file['frames']:,} frames"
             click.echo(f"written: {file['path']} ({count.removesuffix('s') if count[:2] == '1 ' else count})")
     return 2 if faults else status
-
-
-def _refuse(run: str, faults: list[Fault], as_json: bool) -> int:
-    for fault in faults:
-        click.echo(str(fault), err=True)
-    if as_json:
-        print_json({"run": run, "files": [], "faults": fault_rows(faults)})
-    return 2
 
 
 def _trajectory(run: str, source: Trajectory | Recording, told: "Told") -> tuple[int, Trajectory]:

@@ -4,20 +4,21 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from sandbox.cli.extremes_table import print_extremes
+from sandbox.cli.naming import engines_in, names_in
 from sandbox.cli.output import make_folder, require_folder, write_json
-from sandbox.cli.reading import fault_rows, gathering, print_json
-from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.cli.reading import gathering, print_json, refused
 from sandbox.measure.extremes import Extremes, Plan, extremes
 from sandbox.measure.extremes.axes import AXES, PAIRS
 from sandbox.measure.extremes.axis import Axis
-from sandbox.measure.extremes.boundaries import Change, StoredError, changes, read
 from sandbox.measure.extremes.checking import check_overrides
-from sandbox.measure.extremes.matrix import MEMORY, SECONDS, Progress, Told
+from sandbox.measure.extremes.matrix import MEMORY, SECONDS, Progress, Watch
+from sandbox.measure.extremes.stored import Change, StoredError, changes, read
 from sandbox.measure.extremes.warden import WorkerError
 from sandbox.scene.faults import Fault
 
@@ -62,10 +63,7 @@ def command(
     """
     faults: list[Fault] = []
     chosen = _axes(axes, faults)
-    names = None if engines is None else tuple(dict.fromkeys(name.strip() for name in engines.split(",")))
-    for name in names or ():
-        with gathering(faults, "--engine", (UnknownEngineError,)):
-            engine_named(name)
+    names = engines_in(engines, faults)
     stored = None
     if against is not None:
         with gathering(faults, "--against", (StoredError,)):
@@ -80,17 +78,13 @@ def command(
         with gathering(faults):
             make_folder(out)
     if faults:
-        for fault in faults:
-            click.echo(str(fault), err=True)
-        if as_json:
-            print_json({"cells": [], "limits": [], "faults": fault_rows(faults)})
-        return 2
+        return refused(faults, as_json, cells=[], limits=[])
 
     cases = {axis.case.name for axis in chosen}
     both = tuple(pair for pair in PAIRS if pair.case.name in cases) if pairs and not quick else ()
-    plan = Plan(chosen, both, names, overrides, quick, timeout, memory)
+    plan = Plan(chosen, both, None if names is None else tuple(names), overrides, quick, timeout, memory)
     if workers is not None:
-        plan = Plan(chosen, both, names, overrides, quick, timeout, memory, workers)
+        plan = replace(plan, workers=workers)
     try:
         with _telling(quiet or as_json) as told:
             result = extremes(plan, told)
@@ -103,7 +97,7 @@ def command(
 def _axes(text: str | None, faults: list[Fault]) -> tuple[Axis, ...]:
     if text is None:
         return tuple(AXES.values())
-    names = list(dict.fromkeys(name.strip() for name in text.split(",")))
+    names = names_in(text)
     faults += [
         Fault("--axes", None, "", f"no axis {name!r}; axes: {', '.join(AXES)}") for name in names if name not in AXES
     ]
@@ -161,7 +155,7 @@ def _write(result: Extremes, document: dict[str, object], out: Path) -> None:
 
 
 @contextmanager
-def _telling(silent: bool) -> Iterator[Told | None]:
+def _telling(silent: bool) -> Iterator[Watch | None]:
     """Yield who is told how far it is: a bar on a terminal, nobody elsewhere."""
     if silent or not sys.stderr.isatty():
         yield None

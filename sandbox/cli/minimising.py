@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from sandbox.measure.compare import Comparison
-from sandbox.measure.compare.comparing import Told
 from sandbox.measure.compare.disagreement import Disagreement
 from sandbox.measure.compare.minimise import Minimised, minimise
 from sandbox.measure.compare.patience import TookTooLongError
+from sandbox.measure.told import Told
 from sandbox.scene.faults import Fault
 from sandbox.scene.file import dumps
 from sandbox.whole import whole

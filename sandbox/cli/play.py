@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from sandbox.cli.reading import gathering, paths_of, require_scene
+from sandbox.cli.reading import gathering, path_of, refused
 from sandbox.cli.showing import show_stage, window_options
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import UnknownEngineError, able, engine_named
@@ -26,8 +26,7 @@ def command(scene: str | None, engine: str, overrides: tuple[str, ...], **window
     path: Path | None = None
     with gathering(faults):
         if scene is not None:
-            path = Path(paths_of([scene])[0][1])
-            require_scene(scene, str(path))
+            path = Path(path_of(scene))
             found = load(path, overrides)
             missing = engine_named(engine).missing(found, found.solver) if not faults else ()
             if missing:
@@ -36,9 +35,7 @@ def command(scene: str | None, engine: str, overrides: tuple[str, ...], **window
         elif overrides:
             raise SceneError([Fault("--set", None, "", "sets values of a scene; name the scene too")])
     if faults:
-        for fault in faults:
-            click.echo(str(fault), err=True)
-        return 2
+        return refused(faults)
 
     from sandbox.play.stage import Stage
 

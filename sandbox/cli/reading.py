@@ -28,15 +28,18 @@ def paths_of(names: Sequence[str]) -> list[tuple[str, str]]:
     return found
 
 
-def require_scene(name: str, path: str) -> None:
-    """Make sure by a file's ending that it is to be a scene, not what `sandbox replay` shows.
+def path_of(name: str) -> str:
+    """Return the file of what is to be a scene, by its ending, not what `sandbox replay` shows.
 
     Raises:
-        SceneError: it is a recorded session or a stored run; the fault names the command for it.
+        SceneError: the name is no file's nor a shipped scene's, or it is a recorded session or a stored run; the fault
+            names the command for it.
     """
+    path = paths_of([name])[0][1]
     for ending, what in ((".json", "a recorded session"), (".npz", "a stored run")):
         if path.lower().endswith(ending):
             raise SceneError([Fault(name, None, "", f"is {what}, no scene; `sandbox replay {name}` shows it")])
+    return path
 
 
 @contextmanager
@@ -59,6 +62,21 @@ def gathering(faults: list[Fault], place: str = "", also: tuple[type[Exception],
 def fault_rows(faults: Sequence[Fault]) -> list[dict[str, Any]]:
     """Return faults as JSON objects."""
     return [{"file": f.file, "line": f.line, "path": f.path, "message": f.message} for f in faults]
+
+
+def refused(faults: Sequence[Fault], as_json: bool = False, **empty: Any) -> int:
+    """Tell all that is wrong, a line each, and return the exit status.
+
+    Args:
+        faults: what is wrong.
+        as_json: also print a document.
+        empty: what else is in it.
+    """
+    for fault in faults:
+        click.echo(str(fault), err=True)
+    if as_json:
+        print_json({**empty, "faults": fault_rows(faults)})
+    return 2
 
 
 def print_json(document: Any) -> None:

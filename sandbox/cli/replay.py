@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sandbox.cli.reading import gathering
+from sandbox.cli.reading import gathering, refused
 from sandbox.cli.showing import show_stage, window_options
 from sandbox.cli.stored import find_run, read_run
 from sandbox.engines.contract import Refusal
@@ -46,9 +46,7 @@ def command(run: str, engine: str | None, **window: Any) -> int:
             click.echo(f"{run}: {refusal}", err=True)
             return 1
     if source is None or show is None:
-        for fault in faults:
-            click.echo(str(fault), err=True)
-        return 2
+        return refused(faults)
 
     from sandbox.play.stage import Stage
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import click
 
-from sandbox.batch.interrupt import uninterrupted
-from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
-from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.cli.naming import engines_in
+from sandbox.cli.reading import gathering, path_of, print_json, refused
+from sandbox.interrupt import uninterrupted
 from sandbox.measure.compare import compare
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.tradeoff import tradeoff
@@ -53,16 +53,11 @@ def command(
 ) -> int:
     """Compare many scenes and write one page that needs no network. SCENES: files or shipped; else all benchmarks."""
     faults: list[Fault] = []
-    names = None if engines is None else list(dict.fromkeys(name.strip() for name in engines.split(",")))
-    for name in names or ():
-        with gathering(faults, "--engine", (UnknownEngineError,)):
-            engine_named(name)
+    names = engines_in(engines, faults)
     read: list[tuple[str, Scene]] = []
     for name in scenes or [scene.name for scene in shipped() if scene.name.startswith(USUAL)]:
         with gathering(faults):
-            path = paths_of([name])[0][1]
-            require_scene(name, path)
-            read.append((name, load(path, overrides)))
+            read.append((name, load(path_of(name), overrides)))
     if not math.isfinite(patience):
         faults.append(Fault("--patience", None, "", f"{patience} s; it is finite"))
     if not read and not faults:
@@ -71,11 +66,7 @@ def command(
         with gathering(faults):
             out = _page_path(out)
     if faults:
-        for fault in faults:
-            click.echo(str(fault), err=True)
-        if as_json:
-            print_json({"scenes": [], "page": None, "faults": fault_rows(faults)})
-        return 2
+        return refused(faults, as_json, scenes=[], page=None)
 
     from sandbox.report.page.document import write_page
     from sandbox.report.page.overview import Overview, SceneReport

@@ -12,10 +12,10 @@ from sandbox.batch.outcome import Outcome, execute
 from sandbox.batch.plan import Job, parse_sweep, plan
 from sandbox.batch.store import Store, StoreError
 from sandbox.cli.ledger_table import print_ledgers
+from sandbox.cli.naming import engines_in
 from sandbox.cli.output import require_picture
-from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json
+from sandbox.cli.reading import gathering, paths_of, print_json, refused
 from sandbox.cli.table import Row, print_runs
-from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.recorder import TooLargeError, require_memory
 from sandbox.measure.run import Progress
 from sandbox.measure.seeds import same_chances
@@ -61,10 +61,7 @@ def command(
     SCENES are files, names of shipped scenes, or sessions that the window has recorded (.json).
     """
     faults: list[Fault] = []
-    names = None if engines is None else list(dict.fromkeys(name.strip() for name in engines.split(",")))
-    for name in names or ():
-        with gathering(faults, "--engine", (UnknownEngineError,)):
-            engine_named(name)
+    names = engines_in(engines, faults)
     found: list[tuple[str, str]] = []
     for scene in scenes:
         with gathering(faults):
@@ -86,11 +83,7 @@ def command(
         with gathering(faults, "--out", (StoreError,)):
             store = Store(out)
     if faults:
-        for fault in faults:
-            click.echo(str(fault), err=True)
-        if as_json:
-            print_json({"runs": [], "faults": fault_rows(faults)})
-        return 2
+        return refused(faults, as_json, runs=[])
 
     if not quiet:
         _tell_if_nothing_is_random(jobs)

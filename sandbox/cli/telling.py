@@ -1,11 +1,10 @@
 """Telling what is being done, while it is done."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
-Told = Callable[[str], None]
-"""Called with what is being done now."""
+from sandbox.measure.told import Told
 
 
 @contextmanager

@@ -6,11 +6,12 @@ from pathlib import Path
 import click
 
 from sandbox.batch.plan import USUAL
+from sandbox.cli.naming import engines_in
 from sandbox.cli.output import make_folder, require_folder, require_picture, write_json
-from sandbox.cli.reading import fault_rows, gathering, paths_of, print_json, require_scene
+from sandbox.cli.reading import gathering, path_of, print_json, refused
 from sandbox.cli.telling import telling
 from sandbox.cli.tradeoff_table import print_tradeoff
-from sandbox.engines.registry import ENGINES, UnknownEngineError, engine_named
+from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare import compare
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.tradeoff.aim import UnknownMetricError, require_aim
@@ -67,10 +68,7 @@ def command(
 ) -> int:
     """Measure error against cost over engines and settings. SCENE is a file or a shipped one."""
     faults: list[Fault] = []
-    names = None if engines is None else list(dict.fromkeys(name.strip() for name in engines.split(",")))
-    for name in names or ():
-        with gathering(faults, "--engine", (UnknownEngineError,)):
-            engine_named(name)
+    names = engines_in(engines, faults)
     with gathering(faults, "--metric", (UnknownMetricError,)):
         require_aim(metric, None, None, USUAL_FPS)
     for flag, figures in (
@@ -86,8 +84,7 @@ def command(
     read: Scene | None = None
     path = scene
     with gathering(faults):
-        path = paths_of([scene])[0][1]
-        require_scene(scene, path)
+        path = path_of(scene)
         read = load(path, overrides)
     if write and overrides:
         faults.append(Fault("--write", None, "", "the file lacks what --set changes; leave one of the two out"))
@@ -119,13 +116,8 @@ def command(
                 told=told,
             )
     if found is None:
-        for fault in faults:
-            click.echo(str(fault), err=True)
-        if as_json:
-            empty: dict[str, object] = {"truth": None, "metric": metric, "points": [], "pareto": []}
-            nothing = {"within_tolerance": None, "within_budget": None, "faults": fault_rows(faults)}
-            print_json({"scene": scene, **empty, **nothing})
-        return 2
+        picks = {"within_tolerance": None, "within_budget": None}
+        return refused(faults, as_json, scene=scene, truth=None, metric=metric, points=[], pareto=[], **picks)
     document = found.document(scene)
     if as_json:
         print_json(document)

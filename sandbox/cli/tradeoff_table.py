@@ -7,7 +7,7 @@ import click
 
 from sandbox.cli.table import WIDE
 from sandbox.measure.tradeoff.figure import figure
-from sandbox.measure.tradeoff.picking import called, written
+from sandbox.measure.tradeoff.picking import called, shown
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.split import Split
 from sandbox.measure.tradeoff.weighed import Tradeoff
@@ -69,7 +69,7 @@ def _cells(point: Point) -> list[str]:
     assert point.error is not None and point.cost is not None and point.cost_median is not None
     steps = {"dt", "substeps", "iterations"}
     words = ", ".join(
-        f"no {key}" if value is None else f"{key} {written(value)}"
+        f"no {key}" if value is None else f"{key} {shown(value)}"
         for key, value in point.changes.items()
         if key not in steps
     )

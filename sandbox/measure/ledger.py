@@ -13,6 +13,7 @@ import numpy as np
 
 from sandbox.engines.account import Cause
 from sandbox.measure.energy import energies
+from sandbox.measure.finite import finite
 from sandbox.measure.run import run
 from sandbox.scene.model import Scene
 from sandbox.trajectory import FloatArray, Trajectory
@@ -54,14 +55,14 @@ class Ledger:
 
     def document(self) -> dict[str, Any]:
         """Return what it comes to at the end, as one JSON object; figures that are not finite are null."""
-        sums = {name: _number(self.entries[-1, k]) for k, name in enumerate(self.causes)}
+        sums = {name: finite(value) for name, value in zip(self.causes, self.entries[-1].tolist(), strict=True)}
         return {
-            "start": _number(self.total[0]),
+            "start": finite(float(self.total[0])),
             "causes": sums,
-            "end": _number(self.total[-1]),
-            "residual": _number(self.residual[-1]),
-            "scale": _number(self.scale),
-            "closes_to": _number(self.closes_to),
+            "end": finite(float(self.total[-1])),
+            "residual": finite(float(self.residual[-1])),
+            "scale": finite(self.scale),
+            "closes_to": finite(self.closes_to),
         }
 
 
@@ -102,7 +103,3 @@ def ledger_of(trajectory: Trajectory, scene: Scene) -> Ledger:
     scale = max(motion, turnover, HARDLY * float(np.abs(trajectory.energy).max()))
     causes = tuple(str(name) for name in trajectory.info["causes"])
     return Ledger(trajectory.time, trajectory.energy, causes, trajectory.account, scale)
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -13,6 +13,7 @@ from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
 from sandbox.engines.energy import total_energy
 from sandbox.engines.registry import engine_named
 from sandbox.engines.relay import start
+from sandbox.interrupt import heeded
 from sandbox.measure.audit import Audit
 from sandbox.measure.energy import energies
 from sandbox.measure.joint_error import joint_error
@@ -32,6 +33,7 @@ Progress = Callable[[float], None]
 REPORT_EVERY = 0.1  # s
 
 
+@heeded()
 def run(
     scene: Scene,
     engine: str = "pymunk",
@@ -63,6 +65,7 @@ def run(
         UnknownEngineError: no engine has that name.
         TooLargeError: the frames would not fit into memory, or the steps are more than a run may have.
         pydantic.ValidationError: a setting is wrong.
+        KeyboardInterrupt: Ctrl-C was pressed, whatever the library that it fell into made of it.
     """
     chosen = engine_named(engine)
     wanted = scene.solver.replace(**settings) if settings else scene.solver

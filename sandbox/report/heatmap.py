@@ -12,19 +12,13 @@ from matplotlib.patches import Patch
 from sandbox.measure.extremes import Cell, Extremes
 from sandbox.measure.extremes.axis import Axis, Pair
 from sandbox.measure.extremes.boundary import Limit
-from sandbox.measure.extremes.cell import WORDS, Word
+from sandbox.measure.extremes.cell import MEANINGS, WORDS, Word
 from sandbox.report.figure_file import write_figure
 
 COLOURS: dict[Word, str] = {"exact": "#0072b2", "degraded": "#8cc6ec", "refused": "#dcdcdc", "failed": "#d55e00"}
 """Of M. Okabe and K. Ito 2008, which those who see few colours tell apart too; the mark says it once more."""
 MARKS: dict[Word, str] = {"exact": "E", "degraded": "d", "refused": "–", "failed": "×"}
 INKS: dict[Word, str] = {"exact": "white", "degraded": "#222222", "refused": "#777777", "failed": "white"}
-MEANINGS: dict[Word, str] = {
-    "exact": "exact, within 1e-6",
-    "degraded": "degraded: keeps every rule",
-    "refused": "refused, with the reason",
-    "failed": "failed",
-}
 NOT_RUN = "#ffffff"
 ROW = 0.24  # inches of a field
 
@@ -169,5 +163,5 @@ def _fields(panel: Axes, cells: dict[tuple[int, int], Cell], rows: int, columns:
 
 
 def _legend(figure: Figure, top: float) -> None:
-    patches = [Patch(color=COLOURS[word], label=f"{MARKS[word]}  {MEANINGS[word]}") for word in WORDS]
+    patches = [Patch(color=COLOURS[word], label=f"{MARKS[word]}  {word}: {MEANINGS[word]}") for word in WORDS]
     figure.legend(handles=patches, loc="upper left", bbox_to_anchor=(0.005, top), ncols=4, frameon=False, fontsize=9)

@@ -1,48 +1,22 @@
 """The account of pymunk: it closes to rounding, obeys the laws of what it names, and leaves no trace on the run."""
 
-from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import accounts
 import numpy as np
 import pytest
 
 import sandbox
-from sandbox.action import Action, Force, Impulse, Move, Remove, SetParameter, Spawn
+from sandbox.action import Force, Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.account import Cause
-from sandbox.engines.registry import start
-from sandbox.engines.succession import total_energy
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
 
 SCENES = Path(__file__).parents[2] / "scenes"
-CLOSES = 1e-11  # rounding of a few hundred sums, of energies that are up to 1e4 times those in motion
-
-Timed = Sequence[tuple[int, Action]]
-
-
-def kept(scene: Scene, steps: int, actions: Timed = (), part: float | None = None) -> Mapping[Cause, float]:
-    """Run a scene with an account and a twin without one; return the account, which closes."""
-    simulation, twin = start(scene, "pymunk"), start(scene, "pymunk")
-    assert not any(simulation.account().values())
-    began = total_energy(simulation)
-    seen = [began]
-    for k in range(steps):
-        for at, action in actions:
-            if at == k:
-                simulation.apply(action)
-                twin.apply(action)
-        simulation.step()
-        twin.step()
-        seen.append(total_energy(simulation))
-    if part is not None:
-        simulation.finish(part)
-        twin.finish(part)
-    assert simulation.state_hash() == twin.state_hash()
-    account = simulation.account()
-    scale = max(np.abs(seen).max(), np.ptp(seen), max(map(abs, account.values())))
-    assert total_energy(simulation) - began == pytest.approx(sum(account.values()), abs=CLOSES * scale)
-    return account
+# Rounding of a few hundred sums, of energies that are up to 1e4 times those in motion
+kept = partial(accounts.kept, engine="pymunk", closes=1e-11)
 
 
 def document(gravity: float = -10.0, substeps: int = 1, **more: Any) -> Scene:
@@ -173,7 +147,7 @@ def test_elastic_gas_has_no_friction() -> None:
     assert account[Cause.RESTITUTION] == pytest.approx(0.0, abs=1e-12 * 78.5)  # rounding, of the gas's energy
 
 
-ACTIONS: Timed = [
+ACTIONS: accounts.Timed = [
     (5, Impulse(time=0, body="a", impulse=(1.0, 0.5), angular=0.1)),
     (10, Force(time=0, body="b", force=(0.5, 0.0), torque=0.01)),
     (20, Spawn(time=0, ball={"name": "n", "position": (0.5, 0.6), "radius": 0.1, "mass": 2.0, "velocity": (1.0, 2.0)})),

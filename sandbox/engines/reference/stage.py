@@ -15,7 +15,7 @@ import numpy as np
 
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.reference.ball_finder import BallFinder
-from sandbox.engines.reference.bookkeeper import Bookkeeper, Idle
+from sandbox.engines.reference.books import Bookkeeper, Idle
 from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.impulses import approach, remembered, solve_overlaps, solve_velocities
 from sandbox.engines.reference.integrators import INTEGRATORS

@@ -1,7 +1,7 @@
 """Comparing: one scene on several engines, each run, timed and scored."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,12 +16,10 @@ from sandbox.measure.compare.truth import Truth, truth_of
 from sandbox.measure.compare.why import turned, verdict
 from sandbox.measure.recorder import require_memory
 from sandbox.measure.run import run
+from sandbox.measure.told import Told, nobody
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
-
-Told = Callable[[str], None]
-"""Called with what is being done now."""
 
 TOLERANCE = 0.01
 """The share of the smallest radius, or half width, of what moves that is the tolerance where none is given."""
@@ -72,7 +70,7 @@ def compare(
     # All runs are held at once: the engines', the truth, and while it is sought, two more.
     require_memory(scene, wanted, len(scene.bodies) * (len(names) + 3))
 
-    say = told or _silent
+    say = told or nobody
     if truth is None:
         say("the truth")
         truth = truth_of(scene, wanted, tolerance)
@@ -142,7 +140,3 @@ def _explained(scene: Scene, row: Row, settings: Settings, truth: Truth) -> Row:
     assert before is not None
     tried = turned(scene, row.engine, settings, truth.trajectory, truth.trusted_until, before)
     return replace(row, why=tried, verdict=verdict(row.engine, tried, before))
-
-
-def _silent(_: str) -> None:
-    pass

@@ -1,6 +1,5 @@
 """Comparison: what came of holding engines against the truth, as frozen values and as a JSON document."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +8,7 @@ from sandbox.measure.compare.alignment import Event
 from sandbox.measure.compare.errors import Score
 from sandbox.measure.compare.truth import Truth
 from sandbox.measure.compare.why import Knob
+from sandbox.measure.finite import finite
 from sandbox.scene.model import Scene
 from sandbox.trajectory import Trajectory
 
@@ -73,7 +73,7 @@ class Row:
             "status": self.status,
             "reason": self.reason,
             "settings": dict(self.settings),
-            **{key: _number(value) for key, value in figures.items()},
+            **{key: finite(value) for key, value in figures.items()},
             "energy_against": self.energy_against,
             "events": [_event(event) for event in events[:MOST_EVENTS]],
             "missed": [_event(e) for e in [e for e in events if e.kind == "missed"][:MOST_EVENTS]],
@@ -144,11 +144,7 @@ def _event(event: Event) -> dict[str, Any]:
         "time": event.time,
         "engine_time": event.engine_time,
         "delta_time": event.delta_time,
-        "delta_position": _number(event.delta_position),
-        "delta_impulse": _number(event.delta_impulse),
+        "delta_position": finite(event.delta_position),
+        "delta_impulse": finite(event.delta_impulse),
         "lasting": event.lasting,
     }
-
-
-def _number(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None

@@ -10,7 +10,7 @@ shows the disagreement.
 """
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -21,6 +21,7 @@ from sandbox.measure.compare.patience import TookTooLongError
 from sandbox.measure.compare.simpler import fewer, optional, rounded, shorter, unused, without_keys
 from sandbox.measure.compare.spelled import BONDS, FIXED, Document, Spelled, spelled
 from sandbox.measure.recorder import TooLargeError
+from sandbox.measure.told import Told, nobody
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import dumps, from_document, loads
 from sandbox.scene.model import Scene
@@ -32,9 +33,6 @@ PATIENCE = 300.0
 
 SOONEST = 0.8
 """The share of the time at which the scene given parts, before which a smaller one parts for another reason."""
-
-Told = Callable[[str], None]
-"""Called with what is being done now."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def minimise(
     counts = (len(scene.bodies), len(scene.fixed))
     if parting is None:
         return Minimised(scene, None, (counts[0],) * 2, (counts[1],) * 2, 1, None)
-    search = Search(disagreement, scene, parting, most_runs, began + patience, told or _silent)
+    search = Search(disagreement, scene, parting, most_runs, began + patience, told or nobody)
     ended = search.go()
     found = search.scene
     return Minimised(
@@ -220,7 +218,3 @@ def _with(document: Document, kind: str, k: int, key: str, value: Any) -> Docume
     """Return a document with one value changed."""
     tables = [{**table, key: value} if n == k else table for n, table in enumerate(document[kind])]
     return {**document, kind: tables}
-
-
-def _silent(_: str) -> None:
-    pass

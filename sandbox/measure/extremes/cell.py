@@ -7,6 +7,12 @@ from typing import Any, Literal, Self
 Word = Literal["exact", "degraded", "refused", "failed"]
 
 WORDS: tuple[Word, ...] = ("exact", "degraded", "refused", "failed")
+MEANINGS: dict[Word, str] = {
+    "exact": "within 1e-6 of what is known",
+    "degraded": "off, but breaks no rule",
+    "refused": "declined beforehand, with a reason",
+    "failed": "broke a rule, or is of no use",
+}
 PASSED = ("exact", "degraded")
 
 

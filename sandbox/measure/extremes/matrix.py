@@ -102,12 +102,12 @@ class Progress:
     """what was finished last"""
 
 
-Told = Callable[[Progress], None]
+Watch = Callable[[Progress], None]
 Job = Callable[[Ask, Callable[[Cell], None]], Limit | None]
 Message = Cell | tuple[Limit | None, str] | BaseException
 
 
-def extremes(plan: Plan, told: Told | None = None) -> Extremes:
+def extremes(plan: Plan, told: Watch | None = None) -> Extremes:
     """Run a plan; Ctrl-C ends it early, with what is finished.
 
     Raises:
@@ -160,7 +160,7 @@ class _Results:
     interrupted: bool = False
 
 
-def _gather(jobs: list[tuple[str, Job]], plan: Plan, told: Told | None) -> _Results:
+def _gather(jobs: list[tuple[str, Job]], plan: Plan, told: Watch | None) -> _Results:
     """Do all jobs in as many threads as there are workers; each thread has a warden, and waits for it."""
     waiting: SimpleQueue[tuple[str, Job]] = SimpleQueue()
     for each in jobs:

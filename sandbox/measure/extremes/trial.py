@@ -44,7 +44,7 @@ def attempt(task: Task) -> Outcome:
     if missing:
         return Outcome("refused", "; ".join(missing), predicted=predicted, solver=settings.model_dump(mode="json"))
     resolved = engine.resolve(scene, settings)
-    told = {"predicted": predicted, "solver": resolved.model_dump(mode="json")}
+    solver = resolved.model_dump(mode="json")
     try:
         done = run(scene, task.engine, audit=False, **settings.model_dump())
         outcome = judge(Evidence(case, scene, resolved, done))
@@ -53,10 +53,10 @@ def attempt(task: Task) -> Outcome:
             if again.info["state_hash"] != done.info["state_hash"]:
                 outcome = Outcome("failed", "the same run again ended in another state", "repeat")
     except TooLargeError as error:
-        return Outcome("refused", str(error), **told)  # type: ignore[arg-type]  # told is of mixed types
+        return Outcome("refused", str(error), predicted=predicted, solver=solver)
     except MemoryError:
         outcome = Outcome("failed", "ran out of memory", "process")
-    return replace(outcome, seconds=perf_counter() - began, **told)  # type: ignore[arg-type]  # as above
+    return replace(outcome, predicted=predicted, solver=solver, seconds=perf_counter() - began)
 
 
 def _settings(scene: Scene, task: Task) -> Settings:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.registry import start
+from sandbox.interrupt import heeded
 from sandbox.measure.compare.patience import working
 from sandbox.measure.schedule import schedule
 from sandbox.scene.model import Scene
@@ -28,6 +29,7 @@ class Cost(NamedTuple):
         return cls(min(seconds) * scale, statistics.median(seconds) * scale, len(seconds))
 
 
+@heeded()
 def seconds_of(scene: Scene, engine: str, settings: Settings) -> float | None:
     """Step a scene from start to end as a game does, reading every frame, and return the seconds that took.
 

@@ -105,13 +105,13 @@ def drift(run: Trajectory, judge: Judge) -> float | None:
     return float(strayed(run)[judge.still].max())
 
 
-def missed_contacts(run: Trajectory, judge: Judge) -> float | None:  # noqa: ARG001, as all metrics are called
+def missed_contacts(run: Trajectory, _: Judge) -> float | None:
     """Return how many contacts the engine never saw, by sweeping its own steps."""
     count = run.missed_contacts
     return None if count is None else float(count)
 
 
-def passes(run: Trajectory, judge: Judge) -> float | None:  # noqa: ARG001, as above
+def passes(run: Trajectory, _: Judge) -> float | None:
     """Return the share of all meetings that were passed through unseen: 0.1 is 1 bullet in 10. None without any."""
     missed = run.missed_contacts
     if missed is None or not missed + len(run.contact_time):

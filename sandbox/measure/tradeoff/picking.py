@@ -28,7 +28,7 @@ def cheapest(points: Sequence[Point], aim: Aim, fresh: Sequence[int], again: Aga
     return None
 
 
-def best(points: Sequence[Point], aim: Aim, fresh: Sequence[int], again: Again) -> Pick | None:
+def closest(points: Sequence[Point], aim: Aim, fresh: Sequence[int], again: Again) -> Pick | None:
     """Return the point of the least error whose every frame is within the budget, the cheapest of equals; or None."""
     if aim.budget is None:
         return None
@@ -56,14 +56,14 @@ def told(point: Point, aim: Aim, fresh: float | None) -> str:
 
 def called(point: Point) -> str:
     """Name an engine and what its settings change: `reference with integrator = rk4`."""
-    changes = ", ".join(f"{key} = {written(value)}" for key, value in point.changes.items() if value is not None)
+    changes = ", ".join(f"{key} = {shown(value)}" for key, value in point.changes.items() if value is not None)
     dropped = ", ".join(key for key, value in point.changes.items() if value is None)
     parts = [f"{word} {what}" for word, what in (("with", changes), ("without", dropped)) if what]
     return " ".join([point.engine, *parts]) if parts else f"{point.engine} as the scene has it"
 
 
-def written(value: object) -> str:
-    """Write a setting's value as a scene file has it."""
+def shown(value: object) -> str:
+    """Write a setting's value as a scene file has it, with no more than 6 digits."""
     if isinstance(value, bool):
         return str(value).lower()
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,10 +1,10 @@
 """Point: one setting of one engine, with its error and its cost."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from sandbox.measure.finite import finite
 from sandbox.scene.settings import Settings
 
 
@@ -41,27 +41,22 @@ class Point:
             "engine": self.engine,
             "settings": self.settings.model_dump(mode="json"),
             "changes": dict(self.changes),
-            "error": number(self.error),
-            "cost_ms_per_second": number(self.cost),
-            "cost_median_ms_per_second": number(self.cost_median),
+            "error": finite(self.error),
+            "cost_ms_per_second": finite(self.cost),
+            "cost_median_ms_per_second": finite(self.cost_median),
             "repeats": self.repeats,
             "status": self.status,
             "reason": self.reason,
-            "metrics": {name: number(value) for name, value in self.metrics.items()},
+            "metrics": {name: finite(value) for name, value in self.metrics.items()},
             "work": dict(self.work),
         }
 
     @property
     def usable(self) -> bool:
         """Whether it has both figures, and these are finite, so that it can be weighed."""
-        return self.status == "ok" and number(self.error) is not None and number(self.cost) is not None
+        return self.status == "ok" and finite(self.error) is not None and finite(self.cost) is not None
 
     def frame(self, fps: float) -> float:
         """Return what the dearest frame of a game takes, ms: one step where dt is longer than a frame. It is usable."""
         assert self.cost_median is not None
         return self.cost_median * max(1.0 / fps, self.settings.dt)
-
-
-def number(value: float | None) -> float | None:
-    """Return a figure as JSON can have it: None where it is not finite."""
-    return value if value is not None and math.isfinite(value) else None

@@ -7,11 +7,12 @@ last the smallest number of substeps and of iterations that still meets the tole
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import cycle
 
 from sandbox.measure.compare.patience import working
+from sandbox.measure.told import Told
 from sandbox.measure.tradeoff.front import outdone
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.trial import Trial, tried
@@ -36,8 +37,6 @@ LITTLE = 0.95
 """What leaves more than this share of the error of something cheaper is not gone on from."""
 LEAST = 1.0
 """s that an engine's own settings may always take."""
-
-Told = Callable[[str], None]
 
 
 @dataclass

@@ -14,8 +14,8 @@ from pydantic import ValidationError
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.errors import errors
 from sandbox.measure.compare.patience import TookTooLongError, patient_run, working
+from sandbox.measure.finite import finite
 from sandbox.measure.tradeoff.judge import Judge
-from sandbox.measure.tradeoff.point import number
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
@@ -48,7 +48,7 @@ class Split:
         """Return it as a JSON object."""
         figures = ("total", "solver", "time_step", "model", "left")
         own = {"engine": self.engine, "settings": self.settings.model_dump(mode="json")}
-        return {**own, **{key: number(getattr(self, key)) for key in figures}, "finest": self.finest}
+        return {**own, **{key: finite(getattr(self, key)) for key in figures}, "finest": self.finest}
 
 
 def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split | None:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from sandbox.measure.compare.truth import Truth
+from sandbox.measure.finite import finite
 from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.metrics import Metric
-from sandbox.measure.tradeoff.point import Point, number
+from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.proposals import Proposal
 from sandbox.measure.tradeoff.split import Split
 from sandbox.scene.model import Scene
@@ -30,7 +31,7 @@ class Pick:
         more = {
             "sentence": self.sentence,
             "fresh_seeds": list(self.fresh_seeds),
-            "fresh_error": number(self.fresh_error),
+            "fresh_error": finite(self.fresh_error),
         }
         return {**self.point.document(), **more}
 

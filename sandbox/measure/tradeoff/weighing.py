@@ -9,14 +9,15 @@ from sandbox.measure.compare.comparing import usual_tolerance
 from sandbox.measure.compare.truth import Truth, truth_of
 from sandbox.measure.recorder import require_memory
 from sandbox.measure.seeds import is_random, seeded
+from sandbox.measure.told import Told, nobody
 from sandbox.measure.tradeoff.aim import Aim, aim_at, metric_named, require_aim
 from sandbox.measure.tradeoff.cost import Cost, costs
 from sandbox.measure.tradeoff.front import outdone, pareto
 from sandbox.measure.tradeoff.judge import Judge, zoom_of
-from sandbox.measure.tradeoff.picking import FRESH, LONGER, Again, best, cheapest
+from sandbox.measure.tradeoff.picking import FRESH, LONGER, Again, cheapest, closest
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.proposals import Proposal, proposals
-from sandbox.measure.tradeoff.search import SLOW, Search, Told
+from sandbox.measure.tradeoff.search import SLOW, Search
 from sandbox.measure.tradeoff.split import Split, split
 from sandbox.measure.tradeoff.trial import Trial, tried
 from sandbox.measure.tradeoff.variant import Space, Variant
@@ -87,7 +88,7 @@ def tradeoff(
     require_aim(metric, tolerance, budget, fps)
     base = scene.solver.replace(**settings) if settings else scene.solver
     require_memory(scene, base, 4 * len(scene.bodies))
-    say = told or _silent
+    say = told or nobody
 
     say("the truth")
     known, fresh = _seeds(scene, seeds)
@@ -129,7 +130,7 @@ def tradeoff(
             budget,
             fps,
             within,
-            best(points, aim, fresh, again),
+            closest(points, aim, fresh, again),
             known,
             len(search.untried - set(search.trials)),
             machine(),
@@ -272,7 +273,3 @@ def _proposals(judges: Sequence[Judge], aim: Aim, pick: Point | None, space: Spa
     engine = space.engines[0] if pick is None else pick.engine
     chosen = space.own(engine) if pick is None else pick.asked
     return proposals(judges, aim.metric.name, aim.tolerance, engine, chosen, SLOW * patience)
-
-
-def _silent(_: str) -> None:
-    pass

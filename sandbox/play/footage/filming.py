@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from sandbox.batch.interrupt import uninterrupted
+from sandbox.interrupt import uninterrupted
 from sandbox.play.camera import Camera
 from sandbox.play.footage.capture import Recorder, recorder_for, save
 from sandbox.play.footage.film import Film, moments

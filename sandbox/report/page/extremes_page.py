@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sandbox.measure.versions import machine, versions
+from sandbox.measure.extremes.cell import MEANINGS, Word
 from sandbox.report.page.document import Page, Section, write_page
 from sandbox.report.page.markup import Child, Markup, joined, tag
 from sandbox.report.page.tables import Column, table
@@ -14,17 +14,11 @@ from sandbox.report.page.wording import NONE, number, plural
 Document = Mapping[str, Any]
 """What `sandbox extremes --json` prints."""
 
-SIGNS: dict[str, tuple[str, Shade]] = {
+SIGNS: dict[Word, tuple[str, Shade]] = {
     "exact": ("✓", "good"),
     "degraded": ("~", "fair"),
     "refused": ("–", "none"),
     "failed": ("✕", "bad"),
-}
-MEANING = {
-    "exact": "as right as can be told",
-    "degraded": "off, but within every bound",
-    "refused": "declined beforehand, with a reason",
-    "failed": "broke a bound: the cell says which",
 }
 
 
@@ -42,23 +36,23 @@ def extremes_page(document: Document) -> Page:
     cells: Sequence[Document] = document["cells"]
     verdicts = [cell["verdict"] for cell in cells]
     counts = [f"{verdicts.count(word):,} {word}" for word in SIGNS if word in verdicts]
-    keys = [tag("li", badge(f"{sign} {word}", shade), " ", MEANING[word]) for word, (sign, shade) in SIGNS.items()]
+    keys = [tag("li", badge(f"{sign} {word}", shade), " ", MEANINGS[word]) for word, (sign, shade) in SIGNS.items()]
     lead = joined(tag("p", f"{plural(len(cells), 'cell')}: {', '.join(counts)}."), tag("ul", *keys, class_="keys"))
     axes = dict.fromkeys(str(cell["axis"]) for cell in cells)
     heats = [joined(tag("h3", axis.replace("_", " ")), _heat(axis, cells)) for axis in axes]
     sections = [Section("Axis by axis", joined(*heats), lead="Point at a cell for its reason.")]
-    if document.get("limits"):
+    if document["limits"]:
         lead_ = "The last level that passed, and the first that failed; found by halving the interval between them."
         sections.append(Section("Limits", _limits(document["limits"]), lead=lead_))
-    if document.get("predictions"):
+    if document["predictions"]:
         sections.append(Section("Forecasts", _forecasts(document["predictions"]), lead=FORECASTS))
     return Page(
         "How far each engine goes",
         "Extremes",
         sections,
         lead,
-        document.get("versions") or versions(),
-        document.get("machine") or machine(),
+        document["versions"],
+        document["machine"],
     )
 
 
@@ -71,11 +65,11 @@ FORECASTS = (
 def _heat(axis: str, cells: Sequence[Document]) -> Markup:
     """Return the table of an axis: a row an engine and setup, a column a level."""
     mine = [cell for cell in cells if cell["axis"] == axis]
-    levels = sorted(dict.fromkeys(_level(cell) for cell in mine))
-    rows: dict[tuple[str, str], dict[tuple[float, ...], Document]] = {}
+    levels = sorted({float(cell["level"]) for cell in mine})
+    rows: dict[tuple[str, str], dict[float, Document]] = {}
     for cell in mine:
-        rows.setdefault((cell["engine"], _setup(cell)), {})[_level(cell)] = cell
-    head = tag("tr", tag("th", "engine", scope="col"), *(tag("th", _told(level), scope="col") for level in levels))
+        rows.setdefault((cell["engine"], _setup(cell)), {})[float(cell["level"])] = cell
+    head = tag("tr", tag("th", "engine", scope="col"), *(tag("th", number(level, 4), scope="col") for level in levels))
     body = [
         tag(
             "tr",
@@ -92,9 +86,9 @@ def _heat(axis: str, cells: Sequence[Document]) -> Markup:
 def _cell(cell: Document | None) -> Markup:
     if cell is None:
         return tag("td", "", class_="cell")
-    word = str(cell["verdict"])
-    sign, _ = SIGNS.get(word, (word, "none"))
-    about = f"{word}: {cell['reason']}" if cell.get("reason") else word
+    word: Word = cell["verdict"]
+    sign, _ = SIGNS[word]
+    about = f"{word}: {cell['reason']}"
     return tag(
         "td",
         tag("span", sign, aria_hidden="true"),
@@ -104,21 +98,9 @@ def _cell(cell: Document | None) -> Markup:
     )
 
 
-def _level(cell: Document) -> tuple[float, ...]:
-    level = cell["level"]
-    return tuple(float(each) for each in level) if isinstance(level, list | tuple) else (float(level),)
-
-
-def _told(level: tuple[float, ...]) -> str:
-    return " × ".join(number(each, 4) for each in level)
-
-
 def _setup(cell: Document) -> str:
     """Return what is set besides the axis, in a few words."""
-    if cell.get("setup"):
-        return "" if cell["setup"] == cell["engine"] else str(cell["setup"]).removeprefix(f"{cell['engine']}, ")
-    changed = [f"{key} {value}" for key, value in (cell.get("settings") or {}).items()]
-    return ", ".join(changed).replace("_", " ")
+    return "" if cell["setup"] == cell["engine"] else str(cell["setup"]).removeprefix(f"{cell['engine']}, ")
 
 
 def _limits(rows: Sequence[Document]) -> Markup:
@@ -134,23 +116,16 @@ def _limits(rows: Sequence[Document]) -> Markup:
             str(row["axis"]).replace("_", " "),
             engine_name(row["engine"]),
             _setup(row) or "as they are",
-            _limit(row.get("limit")),
-            _limit(row.get("first_failure")),
+            number(row["limit"], 4),
+            number(row["first_failure"], 4),
         ]
         for row in rows
     ]
     return table(columns, cells, "Limits")
 
 
-def _limit(value: object) -> str:
-    if isinstance(value, int | float):
-        return number(float(value), 4)
-    return NONE if value is None else str(value)
-
-
-def _forecasts(predictions: Document | Sequence[Document]) -> Markup:
-    """Return a row a kind of warning. A single object stands for all kinds together."""
-    rows = [predictions] if isinstance(predictions, Mapping) else predictions
+def _forecasts(predictions: Sequence[Document]) -> Markup:
+    """Return a row a kind of warning."""
     columns = (
         Column("warning"),
         Column("precision", True),
@@ -161,12 +136,12 @@ def _forecasts(predictions: Document | Sequence[Document]) -> Markup:
     )
     cells: list[list[Child]] = [
         [
-            str(row.get("kind", "all")).replace("_", " "),
-            _percent(row.get("precision")),
-            _percent(row.get("recall")),
-            *(number(row.get(key)) for key in ("true_positives", "false_positives", "false_negatives")),
+            str(row["kind"]).replace("_", " "),
+            _percent(row["precision"]),
+            _percent(row["recall"]),
+            *(number(row[key]) for key in ("true_positives", "false_positives", "false_negatives")),
         ]
-        for row in rows
+        for row in predictions
     ]
     return table(columns, cells, "Forecasts")
 

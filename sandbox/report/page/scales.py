@@ -9,7 +9,8 @@ from sandbox.report.page.wording import MINUS, number, power_of
 
 STILL = 1e-6
 """An axis spans at least this share of its values: rounding is not blown up to full height."""
-
+NOTHING = 1e-200
+"""Values no farther from 0 are as good as 0: shares of them may be too small for a number."""
 
 STEPS = (1, 2, 5)
 """What ticks are multiples of, times a power of ten."""
@@ -55,7 +56,7 @@ class Linear:
     def around(cls, low: float, high: float, room: float = 0.05) -> "Linear":
         """Return a scale that holds two values with some room beside them, as a share of their distance."""
         short = STILL * max(abs(low), abs(high)) - (high - low)
-        if high == low == 0.0:
+        if max(abs(low), abs(high)) <= NOTHING:
             short = 1.0
         if short > 0.0:
             low, high = low - 0.5 * short, high + 0.5 * short

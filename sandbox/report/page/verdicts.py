@@ -56,7 +56,7 @@ def badge_of(row: Row, tolerance: float) -> Markup:
     return badge(*verdict_of(row, tolerance), about=row.reason)
 
 
-KEY = (
+KEY: tuple[tuple[str, Shade, str], ...] = (
     ("right", "good", "off by no more than a millionth of the tolerance"),
     ("within", "good", "within the tolerance for as long as the truth is trusted"),
     ("off from", "fair", "further off than the tolerance from that time on; red beyond ten times"),
@@ -68,4 +68,4 @@ KEY = (
 
 def key() -> Markup:
     """Return what the badges mean."""
-    return tag("dl", *(joined(tag("dt", badge(word, shade)), tag("dd", about)) for word, shade, about in KEY))  # type: ignore[arg-type]
+    return tag("dl", *(joined(tag("dt", badge(word, shade)), tag("dd", about)) for word, shade, about in KEY))

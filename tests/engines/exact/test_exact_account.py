@@ -1,50 +1,24 @@
 """The account of the exact engine: it closes to rounding, obeys closed forms, and leaves no trace on the run."""
 
-from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import accounts
 import numpy as np
 import pytest
 
 import sandbox
-from sandbox.action import Action, Impulse, Move, Remove, SetParameter, Spawn
+from sandbox.action import Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.account import Cause
 from sandbox.engines.registry import start
-from sandbox.engines.succession import total_energy
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
 
 SCENES = Path(__file__).parents[3] / "scenes"
 G = 10.0
-CLOSES = 1e-12  # rounding of thousands of sums; a thousandth of what is promised
-
-Timed = Sequence[tuple[int, Action]]
-
-
-def kept(scene: Scene, steps: int, actions: Timed = (), part: float | None = None) -> Mapping[Cause, float]:
-    """Run a scene with an account and a twin without one; return the account, which closes."""
-    simulation, twin = start(scene, "exact"), start(scene, "exact")
-    assert not any(simulation.account().values())
-    began = total_energy(simulation)
-    seen = [began]
-    for k in range(steps):
-        for at, action in actions:
-            if at == k:
-                simulation.apply(action)
-                twin.apply(action)
-        simulation.step()
-        twin.step()
-        simulation.account()  # slides are booked in as many pieces as it is asked for
-        seen.append(total_energy(simulation))
-    if part is not None:
-        simulation.finish(part)
-        twin.finish(part)
-    assert simulation.state_hash() == twin.state_hash()
-    account = simulation.account()
-    scale = max(np.abs(seen).max(), max(map(abs, account.values())))
-    assert total_energy(simulation) - began == pytest.approx(sum(account.values()), abs=CLOSES * scale)
-    return account
+# Rounding of thousands of sums; a thousandth of what is promised
+kept = partial(accounts.kept, engine="exact", closes=1e-12)
 
 
 def scene_of(*balls: dict[str, Any], e: float = 0.5, mu: float = 0.0, slope: float = 0.0, g: float = G) -> Scene:
@@ -127,7 +101,7 @@ def test_elastic_gas_of_the_exact_engine_has_no_friction() -> None:
     assert account[Cause.RESTITUTION] == pytest.approx(0.0, abs=1e-13 * 78.5)  # rounding, of the gas's energy
 
 
-ACTIONS: Timed = [
+ACTIONS: accounts.Timed = [
     (5, Impulse(time=0, body="a", impulse=(1.0, 0.5), angular=0.1)),
     (20, Spawn(time=0, ball={"name": "n", "position": (0.5, 3.0), "radius": 0.1, "mass": 2.0, "velocity": (1.0, 2.0)})),
     (30, Remove(time=0, body="c")),

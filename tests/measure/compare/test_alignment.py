@@ -4,9 +4,9 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
-from by_hand import run_of, scene_of
 from hypothesis import given
 from hypothesis import strategies as st
+from runs_by_hand import run_of, scene_of
 
 from sandbox.measure.compare.alignment import aligned, matched
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from by_hand import run_of, scene_of
+from runs_by_hand import run_of, scene_of
 
 from sandbox.measure.compare.errors import errors
 from sandbox.measure.compare.runs import common_frames
@@ -16,7 +16,7 @@ def test_known_offset_is_the_error() -> None:
     position, velocity = truth.position.copy(), truth.velocity.copy()
     position[:, 0] += (3.0, 4.0)  # 5 m away; the other ball is where it should be
     velocity[:, 1, 0] += 2.0
-    found = errors(run_of(SCENE, position, velocity), truth, MOVING)
+    found = errors(run_of(SCENE, position, velocity=velocity), truth, MOVING)
     score = found.until(2.0)
     assert score.max_position == pytest.approx(5.0, rel=1e-15)  # one rounding of hypot
     assert score.rms_position == pytest.approx(5.0 / np.sqrt(2.0), rel=1e-14)  # a sum of 21 equal squares

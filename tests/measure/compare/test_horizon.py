@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from by_hand import run_of, scene_of
+from runs_by_hand import run_of, scene_of
 
 from sandbox.measure.compare.horizon import NUDGE, agree_until, nudged
 from sandbox.measure.compare.truth import truth_of

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from by_hand import scene_of
+from runs_by_hand import scene_of
 
 from sandbox.measure import run as running
 from sandbox.measure.compare.patience import TookTooLongError, patient_run

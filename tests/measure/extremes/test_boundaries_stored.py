@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from sandbox.measure.extremes.boundaries import StoredError, changes, read
 from sandbox.measure.extremes.boundary import Limit
+from sandbox.measure.extremes.stored import StoredError, changes, read
 
 NOW = Limit("speed", "pymunk", "pymunk", {}, 1.0, 1.01, "passed the wall", "through")
 

@@ -4,7 +4,7 @@ import math
 from types import SimpleNamespace
 
 import pytest
-from trials_by_hand import DROP, scene_of
+from runs_by_hand import DROP, scene_of
 
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.measure.tradeoff import cost as module

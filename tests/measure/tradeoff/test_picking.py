@@ -7,7 +7,7 @@ from trials_by_hand import point_of
 
 from sandbox.measure.tradeoff.aim import Aim
 from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.measure.tradeoff.picking import best, called, cheapest
+from sandbox.measure.tradeoff.picking import called, cheapest, closest
 from sandbox.measure.tradeoff.point import Point
 
 AIM = Aim(METRICS["max_position"], 0.01, 0.5, 60.0)
@@ -47,26 +47,26 @@ def test_what_has_no_figures_is_not_picked() -> None:
     useless = [point_of(1.0, None), point_of(1.0, math.nan), point_of(1.0, math.inf)]
     assert not any(point.usable for point in useless)
     assert cheapest(useless, AIM, (), never) is None
-    assert best(useless, AIM, (), never) is None
+    assert closest(useless, AIM, (), never) is None
 
 
 def test_best_within_the_budget_is_the_most_right() -> None:
-    found = best(POINTS, AIM, (), never)  # 0.5 ms a frame, 60 a second: 30 ms per simulated second
+    found = closest(POINTS, AIM, (), never)  # 0.5 ms a frame, 60 a second: 30 ms per simulated second
     assert found is not None
     assert found.point == POINTS[2]
-    assert best(POINTS, AIM._replace(budget=0.01), (), never) is None
-    assert best(POINTS, AIM._replace(budget=None), (), never) is None
+    assert closest(POINTS, AIM._replace(budget=0.01), (), never) is None
+    assert closest(POINTS, AIM._replace(budget=None), (), never) is None
 
 
 def test_cheapest_of_those_equally_right_is_best() -> None:
-    found = best([point_of(9.0, 0.0), point_of(3.0, 0.0)], AIM, (), never)
+    found = closest([point_of(9.0, 0.0), point_of(3.0, 0.0)], AIM, (), never)
     assert found is not None
     assert found.point.cost == 3.0
 
 
 def test_step_longer_than_a_frame_has_to_fit_into_one() -> None:
     """20 ms a second in steps of 0.1 s is 2 ms in the frame that the step falls into."""
-    found = best([point_of(20.0, 0.0, dt=0.1), point_of(20.0, 0.5, dt=0.01)], AIM, (), never)
+    found = closest([point_of(20.0, 0.0, dt=0.1), point_of(20.0, 0.5, dt=0.01)], AIM, (), never)
     assert found is not None
     assert found.point.settings.dt == 0.01
 
@@ -75,7 +75,7 @@ def test_step_longer_than_is_wanted_is_not_recommended() -> None:
     points = [point_of(1.0, 0.0, dt=0.04), point_of(9.0, 0.0, dt=0.02)]
     for pick in (
         cheapest(points, AIM._replace(step=0.02), (), never),
-        best(points, AIM._replace(step=0.02), (), never),
+        closest(points, AIM._replace(step=0.02), (), never),
     ):
         assert pick is not None
         assert pick.point.settings.dt == 0.02

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from trials_by_hand import DROP, scene_of
+from runs_by_hand import DROP, scene_of
 
 from sandbox.measure.compare.truth import truth_of
 from sandbox.measure.tradeoff import proposals as module
@@ -13,21 +13,8 @@ from sandbox.scene.demands import Demand, demands
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
-APART = """
-[world]
-gravity = [0.0, -10.0]
-duration = 0.4
-[solver]
-dt = 0.02
-[[plane]]
-name = "ground"
-point = [0.0, 0.0]
-normal = [0.0, 1.0]
-[[ball]]
-name = "a"
-position = [0.0, 0.6]
-radius = 0.5
-restitution = 0.5
+LOW = DROP.replace("position = [0.0, 1.0]", "position = [0.0, 0.6]")
+APART = f"""{LOW}
 [[ball]]
 name = "b"
 position = [3.0, 0.6]

@@ -5,7 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import pytest
-from trials_by_hand import DROP, judge_of, scene_of
+from runs_by_hand import DROP, scene_of
+from trials_by_hand import judge_of
 
 from sandbox.measure.tradeoff import search as module
 from sandbox.measure.tradeoff.judge import Judge

@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from trials_by_hand import judge_of, scene_of
+from runs_by_hand import scene_of
+from trials_by_hand import judge_of
 
 from sandbox.measure.compare.truth import Truth, truth_of
 from sandbox.measure.tradeoff.judge import Judge

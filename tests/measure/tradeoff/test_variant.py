@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from trials_by_hand import BALLS, DROP, scene_of
+from runs_by_hand import BALLS, DROP, SWING, scene_of
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.runs import common_frames
@@ -17,25 +17,6 @@ from sandbox.scene.settings import Settings
 
 FINER = st.sampled_from([Fraction(2) ** k for k in range(-4, 9)])
 ENGINE = ("pymunk", "exact", "reference")
-ROPE = """
-[world]
-gravity = [0.0, -10.0]
-duration = 0.4
-[solver]
-dt = 0.02
-[[ball]]
-name = "held"
-position = [0.0, 0.0]
-radius = 0.1
-fixed = true
-[[ball]]
-name = "bob"
-position = [1.0, 0.0]
-radius = 0.1
-[[joint]]
-kind = "rod"
-between = ["held", "bob"]
-"""
 
 
 def space_of(text: str = DROP, **settings: object) -> Space:
@@ -82,7 +63,7 @@ def test_all_frames_of_a_run_are_found_in_the_truth(engine: str, every: int) -> 
         assert np.all(np.diff(its) > 0)
 
 
-@pytest.mark.parametrize(("text", "engine"), [(DROP, "pymunk"), (DROP, "exact"), (ROPE, "reference")])
+@pytest.mark.parametrize(("text", "engine"), [(DROP, "pymunk"), (DROP, "exact"), (SWING, "reference")])
 def test_engines_take_every_variant_that_is_near(text: str, engine: str) -> None:
     space = space_of(text)
     for variant in around(space, engine, rounds=1) - set(space.starts()):
@@ -92,7 +73,7 @@ def test_engines_take_every_variant_that_is_near(text: str, engine: str) -> None
         assert 0.4 / space.settings(variant).dt >= FEWEST_STEPS
 
 
-@pytest.mark.parametrize(("text", "engine"), [(ROPE, "pymunk"), (DROP, "reference")])
+@pytest.mark.parametrize(("text", "engine"), [(SWING, "pymunk"), (DROP, "reference")])
 def test_no_two_variants_are_the_same(text: str, engine: str) -> None:
     space = space_of(text)
     found = around(space, engine)
@@ -132,7 +113,7 @@ def test_what_cannot_matter_is_not_turned() -> None:
     assert {variant.iterations for variant in around(space, "reference", rounds=1)} == {10}
     single = space_of()
     assert not single.iterates  # one ball on one plane: the first pass is right
-    assert space_of(ROPE).iterates
+    assert space_of(SWING).iterates
     assert space_of(BALLS).iterates
 
 

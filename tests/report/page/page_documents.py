@@ -1,6 +1,21 @@
 """What pages are made of in tests: a scene, a trade-off, extremes; all with texts that would do harm if they could."""
 
+from dataclasses import replace
 from typing import Any
+
+from sandbox.measure.compare.truth import Truth
+from sandbox.measure.extremes import Extremes, Plan
+from sandbox.measure.extremes.axes import AXES
+from sandbox.measure.extremes.boundary import Limit
+from sandbox.measure.extremes.cell import Cell, Outcome
+from sandbox.measure.run import run
+from sandbox.measure.tradeoff.metrics import METRICS
+from sandbox.measure.tradeoff.point import Point
+from sandbox.measure.tradeoff.proposals import Proposal
+from sandbox.measure.tradeoff.split import Split
+from sandbox.measure.tradeoff.weighed import Pick, Tradeoff
+from sandbox.scene.file import loads
+from sandbox.scene.settings import Settings
 
 HOSTILE = """</script><img src="x" onerror="window.harm=1">'"&amp;"""
 """Ends a script, and starts one of its own."""
@@ -38,84 +53,74 @@ restitution = 0.5
 """
 
 
-def settings(dt: float, **more: Any) -> dict[str, Any]:
-    """Return settings as a document has them."""
-    return {"dt": dt, "substeps": 1, "iterations": 10, "slop": None, "half_kick": False, "record_every": 1, **more}
-
-
-def point(engine: str, dt: float, error: float | None, cost: float | None, **more: Any) -> dict[str, Any]:
+def point(engine: str, dt: float, error: float | None, cost: float | None, **settings: Any) -> Point:
     """Return a point of a trade-off."""
-    return {
-        "engine": engine,
-        "settings": settings(dt, integrator=more.pop("integrator", None)),
-        "changes": {"dt": dt},
-        "error": error,
-        "cost_ms_per_second": cost,
-        "cost_median_ms_per_second": cost,
-        "repeats": 3,
-        "status": "ok",
-        "reason": None,
-        "metrics": {"max_position": error, "energy": 0.25},
-        "work": {"substeps": round(1.0 / dt)},
-        **more,
+    chosen, work = Settings(dt=dt, **settings), {"substeps": round(1.0 / dt)}
+    metrics = {"max_position": error, "energy": 0.25}
+    return Point(engine, chosen, chosen, {"dt": dt}, "ok", None, metrics, error, cost, cost, 3, work)
+
+
+def weighed(points: tuple[Point, ...], **more: Any) -> Tradeoff:
+    """Return a trade-off of points; all else is nothing, but for what is given."""
+    scene = loads(SCENE, "hostile.toml")
+    rest = {
+        "best": None,
+        "metric": METRICS["max_position"],
+        "zoom": 100.0,
+        "pareto": (),
+        "splits": (),
+        "proposals": (),
+        "tolerance": 0.02,
+        "budget": 0.5,
+        "fps": 60.0,
+        "within_tolerance": None,
+        "within_budget": None,
+        "seeds": (0,),
+        "untried": 0,
+        "machine": {"cpu": "a <processor>", "cores": 2},
+        "versions": {"python": "3"},
     }
+    return Tradeoff(scene=scene, points=points, **{**rest, **more})
 
 
 def tradeoff_document() -> dict[str, Any]:
     """Return a trade-off of two engines, with a failure and a method of its own."""
-    points = [
+    points = (
         point("pymunk", 0.01, 0.1, 2.0),
         point("pymunk", 0.001, 0.01, 20.0),
-        point("pymunk", 0.1, None, None, status="diverged", reason=HOSTILE),
+        replace(point("pymunk", 0.1, None, None), status="diverged", reason=HOSTILE),
         point("reference", 0.01, 0.05, 5.0),
         point("reference", 0.01, 0.001, 8.0, integrator="velocity_verlet"),
         point("exact", 0.01, 0.0, 30.0),
-    ]
-    parts = {"total": 0.1, "model": 0.02, "time_step": 0.07, "solver": 0.01, "left": 0.0}
-    return {
-        "scene": "scene.toml",
-        "title": HOSTILE,
-        "truth": "closed_form",
-        "truth_about": "formulas",
-        "trusted_until": 1.0,
-        "metric": "max_position",
-        "unit": "m",
-        "points": points,
-        "pareto": [points[0], points[3], points[4], points[5]],
-        "floors": {"pymunk": 0.005},
-        "split": [{"engine": "pymunk", "settings": settings(0.01), **parts}],
-        "proposals": [
-            {
-                "what": "closed form",
-                "engine": None,
-                "error": 0.0,
-                "cost_ms_per_second": 0.1,
-                "ratio": 0.05,
-                "sentence": HOSTILE,
-            }
-        ],
-        "tolerance": 0.02,
-        "budget": 0.5,
-        "fps": 60.0,
-        "within_tolerance": points[4],
-        "within_budget": None,
-        "answers": [f"cheapest: {HOSTILE}"],
-        "machine": {"cpu": "a <processor>", "cores": 2},
-        "versions": {"python": "3"},
-    }
+    )
+    scene = loads(SCENE, "hostile.toml")
+    found = weighed(
+        points,
+        best=Truth("closed_form", "formulas", run(scene, "exact"), 1.0),
+        pareto=(points[0], points[3], points[4], points[5]),
+        splits=(Split("pymunk", Settings(), 0.1, 0.01, 0.085, 0.005, 0.005, 16),),
+        proposals=(Proposal("closed form", None, 0.0, 0.1, 0.05, HOSTILE),),
+        within_tolerance=Pick(points[4], HOSTILE, (), None),
+    )
+    return found.document("scene.toml")
 
 
 def extremes_document() -> dict[str, Any]:
-    """Return extremes of one axis and a pair of axes."""
-    verdicts = ("exact", "degraded", "refused", "failed")
-    row = {"axis": "time_step", "engine": "pymunk", "settings": {"substeps": 4}, "reason": HOSTILE}
-    pair = {"axis": "time_step × mass_ratio", "engine": "exact", "settings": {}, "reason": "broke", "verdict": "failed"}
-    counts = {"true_positives": 3, "false_positives": 1, "false_negatives": 0, "true_negatives": 9}
-    return {
-        "cells": [
-            *({**row, "level": 10.0**k, "verdict": verdict} for k, verdict in enumerate(verdicts)),
-            {**pair, "level": [1.0, 100.0]},
-        ],
-        "limits": [{**row, "limit": 10.0, "first_failure": 1000.0}],
-        "predictions": [{"kind": "tunnelling", "precision": 0.75, "recall": 1.0, **counts}],
-    }
+    """Return extremes of an axis: every verdict, and one of four warnings a false alarm."""
+    axis, changes = AXES["dt"], {"substeps": 4}
+    failed = Outcome("failed", HOSTILE, min(axis.blamed), predicted=("tunnelling",))
+    outcomes = (
+        Outcome("exact", "right"),
+        Outcome("refused", HOSTILE),
+        Outcome("degraded", "off", predicted=("tunnelling",)),
+        failed,
+        failed,
+        failed,
+    )
+    setup = "pymunk, 4 substeps"
+    cells = tuple(
+        Cell(axis.name, level, "pymunk", setup, changes, outcome)
+        for level, outcome in zip(axis.levels, outcomes, strict=False)
+    )
+    limit = Limit(axis.name, "pymunk", setup, changes, axis.levels[2], axis.levels[3], HOSTILE)
+    return Extremes(Plan((axis,), ()), cells, (), (limit,), (), 1.0).document()

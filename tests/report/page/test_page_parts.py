@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
-from page_documents import HOSTILE, extremes_document, tradeoff_document
+from page_documents import HOSTILE, extremes_document, tradeoff_document, weighed
 
+from sandbox.measure.extremes import Extremes, Plan
 from sandbox.report.page.document import Page, Section, write_page
 from sandbox.report.page.extremes_page import extremes_page
 from sandbox.report.page.markup import Markup, data, escaped, joined, tag
@@ -97,6 +98,8 @@ def test_shares_are_per_cent_or_about_nothing() -> None:
 
 
 @given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))
+@example(5e-324, 5e-324)  # the smallest numbers there are
+@example(0.0, 5e-324)
 def test_linear_scale_holds_its_values_with_ticks_that_ascend(a: float, b: float) -> None:
     low, high = min(a, b), max(a, b)
     scale = Linear.around(low, high)
@@ -156,18 +159,8 @@ def test_page_is_written_whole_with_a_policy_that_names_its_parts(tmp_path: Path
 
 
 def test_tradeoff_of_nothing_and_extremes_of_nothing_are_pages() -> None:
-    empty = {
-        **tradeoff_document(),
-        "points": [],
-        "pareto": [],
-        "split": [],
-        "proposals": [],
-        "answers": [],
-        "floors": {},
-    }
-    empty |= {"within_tolerance": None, "truth": None}
-    assert "0 points" in tradeoff_page(empty).html()
-    assert "0 cells" in extremes_page({"cells": [], "limits": [], "predictions": None}).html()
+    assert "0 points" in tradeoff_page(weighed(()).document()).html()
+    assert "0 cells" in extremes_page(Extremes(Plan((), ()), (), (), (), (), 0.0).document()).html()
 
 
 def test_every_point_of_a_trade_off_is_drawn_failures_as_crosses() -> None:

@@ -1,4 +1,4 @@
-"""Boundaries: limits as they are stored, and what has become of them since."""
+"""Stored: boundaries as a file keeps them, and what has become of them since."""
 
 import json
 import math

@@ -1,0 +1,51 @@
+"""Accounts of energy that have to close, whoever keeps them."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+
+from sandbox.action import Action
+from sandbox.engines.account import Cause
+from sandbox.engines.energy import total_energy
+from sandbox.engines.registry import start
+from sandbox.scene.model import Scene
+
+Timed = Sequence[tuple[int, Action]]
+"""What is done, and before which step."""
+
+
+def kept(
+    scene: Scene, steps: int, actions: Timed = (), part: float | None = None, *, engine: str, closes: float
+) -> Mapping[Cause, float]:
+    """Run a scene with an account and a twin without one, which end alike; return the account, which closes.
+
+    Args:
+        scene: what is run.
+        steps: how many.
+        actions: what is done meanwhile.
+        part: of a last step, where there is one.
+        engine: on what.
+        closes: to what share of the largest energy.
+    """
+    simulation, twin = start(scene, engine), start(scene, engine)
+    assert not any(simulation.account().values())
+    began = total_energy(simulation)
+    seen = [began]
+    for k in range(steps):
+        for at, action in actions:
+            if at == k:
+                simulation.apply(action)
+                twin.apply(action)
+        simulation.step()
+        twin.step()
+        simulation.account()  # the exact engine books a slide in as many pieces as it is asked for
+        seen.append(total_energy(simulation))
+    if part is not None:
+        simulation.finish(part)
+        twin.finish(part)
+    assert simulation.state_hash() == twin.state_hash()
+    account = simulation.account()
+    scale = max(np.abs(seen).max(), max(map(abs, account.values())))
+    assert total_energy(simulation) - began == pytest.approx(sum(account.values()), abs=closes * scale)
+    return account

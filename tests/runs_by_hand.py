@@ -1,0 +1,122 @@
+"""Runs made by hand: frames and contacts as a test wants them, and the scenes that they are of."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from sandbox.measure.compare.runs import frames_as_run
+from sandbox.scene.file import loads
+from sandbox.scene.model import Scene
+from sandbox.trajectory import Contacts, FloatArray, Trajectory
+
+BALLS = """
+[world]
+gravity = [0.0, -10.0]
+duration = 2.0
+[solver]
+dt = 0.1
+[[plane]]
+name = "ground"
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+[[ball]]
+name = "a"
+position = [0.0, 5.0]
+radius = 0.5
+[[ball]]
+name = "b"
+position = [3.0, 5.0]
+radius = 0.5
+[[ball]]
+name = "still"
+position = [9.0, 5.0]
+radius = 0.5
+fixed = true
+"""
+"""Two balls that move and one that does not, high above the ground; 21 frames."""
+
+DROP = """
+[world]
+gravity = [0.0, -10.0]
+duration = 0.4
+[solver]
+dt = 0.02
+[[plane]]
+name = "ground"
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+[[ball]]
+name = "a"
+position = [0.0, 1.0]
+radius = 0.5
+restitution = 0.5
+"""
+"""Half a metre above the ground, which is reached after 0.316 s. It has a closed form."""
+
+SWING = """
+[world]
+gravity = [0.0, -10.0]
+duration = 0.4
+[solver]
+dt = 0.02
+[[ball]]
+name = "hook"
+position = [0.0, 0.0]
+radius = 0.1
+fixed = true
+[[ball]]
+name = "bob"
+position = [1.0, 0.0]
+radius = 0.1
+[[joint]]
+kind = "rod"
+between = ["hook", "bob"]
+"""
+"""A ball on a rod, level with what it hangs on."""
+
+Row = tuple[float, tuple[int, int]] | tuple[float, tuple[int, int], float]
+"""Time and pair of a contact, and its impulse along y, by default 0."""
+
+
+def scene_of(text: str = BALLS) -> Scene:
+    """Read a scene."""
+    return loads(text)
+
+
+def run_of(
+    scene: Scene,
+    position: FloatArray | None = None,
+    *,
+    time: FloatArray | None = None,
+    velocity: FloatArray | None = None,
+    contacts: Sequence[Row] = (),
+    retired: Sequence[float] | None = None,
+    **info: Any,
+) -> Trajectory:
+    """Make a run in which nothing moves, but for what is given.
+
+    Args:
+        scene: of what.
+        position: (T, N, 2) m.
+        time: (T,) s, by default every step.
+        velocity: (T, N, 2) m/s.
+        contacts: in the order of time.
+        retired: (N,) s.
+        info: what differs in the run's `info`.
+    """
+    dt = scene.solver.dt
+    when = np.arange(round(scene.world.duration / dt) + 1) * dt if time is None else time
+    at = np.repeat(scene.bodies.position[None], len(when), axis=0) if position is None else position
+    rows = Contacts(
+        np.asarray([row[0] for row in contacts], dtype=np.float64),
+        np.asarray([row[1] for row in contacts], dtype=np.int64).reshape(-1, 2),
+        np.zeros((len(contacts), 2)),
+        np.tile([0.0, -1.0], (len(contacts), 1)),
+        np.asarray([[0.0, row[2] if len(row) > 2 else 0.0] for row in contacts]).reshape(-1, 2),
+    )
+    state = (at, np.zeros_like(at) if velocity is None else velocity, np.zeros(at.shape[:2]), np.zeros(at.shape[1]))
+    gone = np.full(len(scene.bodies), np.nan) if retired is None else np.asarray(retired)
+    run = frames_as_run(scene, scene.solver, when, state, rows, gone)
+    run.info.update(info)  # type: ignore[attr-defined] # it is a dict
+    return run
