@@ -13,12 +13,14 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sandbox.engines.exact.rolling.table import Table
     from sandbox.engines.registry import ENGINES
     from sandbox.engines.relay import start
     from sandbox.measure.compare import compare
     from sandbox.measure.run import run
     from sandbox.measure.tradeoff import tradeoff
     from sandbox.recording import Recording
+    from sandbox.scene.cue import Stroke
     from sandbox.scene.demands import demands
     from sandbox.scene.faults import Fault, SceneError
     from sandbox.scene.file import dumps, load, loads
@@ -35,6 +37,8 @@ __all__ = [
     "Scene",
     "SceneError",
     "Settings",
+    "Stroke",
+    "Table",
     "Trajectory",
     "compare",
     "demands",
@@ -55,6 +59,8 @@ _HOMES = {
     "Scene": "sandbox.scene.model",
     "SceneError": "sandbox.scene.faults",
     "Settings": "sandbox.scene.settings",
+    "Stroke": "sandbox.scene.cue",
+    "Table": "sandbox.engines.exact.rolling.table",
     "Trajectory": "sandbox.trajectory",
     "compare": "sandbox.measure.compare",
     "demands": "sandbox.scene.demands",

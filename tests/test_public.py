@@ -17,6 +17,8 @@ NAMES = [
     "Scene",
     "SceneError",
     "Settings",
+    "Stroke",
+    "Table",
     "Trajectory",
     "compare",
     "demands",

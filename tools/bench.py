@@ -86,7 +86,7 @@ def told(row: dict[str, object]) -> str:
     verdict = {None: "", True: ", met", False: ", MISSED"}[row["met"]]
     rate = str(row["unit"]).endswith("/s")
     goal = "" if row["target"] is None else f"   target {'>=' if rate else '<='} {row['target']:.3g}{verdict}"
-    figure = f"{row['ours']:.3f} s above" if row["unit"] == "s above" else f"{row['ratio']:.3f} ×"
+    figure = f"{row['ours']:.3f} s above" if row["unit"] == "s above" else f"{row['ratio']:.3g} ×"
     if rate:
         figure = f"{row['ours']:.3g} /s"
     unit = str(row["unit"]).split()[0]

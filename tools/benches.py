@@ -6,8 +6,11 @@ from typing import NamedTuple
 import connected
 import drawing
 import peers
+import pooltool_shots
 from turning import turns
-from workloads import Timed, command, events, flying, running, scene, staged, stepping
+from workloads import Timed, command, events, fanning, flying, running, scene, shooting, staged, stepping
+
+from sandbox.scene.file import load
 
 
 class Bench(NamedTuple):
@@ -241,6 +244,35 @@ BENCHES = (
         lambda: drawing.particles_by_array(scene("particles/fireworks_100k", *SPARKS), 150),
         300.0,
         "frames/s",
+        rate=True,
+    ),
+    *(
+        Bench(
+            f"shot-{name.replace('_', '-')}",
+            "a full shot to rest, events kept, exact engine / the same shot by pooltool as it is installed",
+            lambda name=name: shooting(load(pooltool_shots.path(name))),
+            lambda name=name: pooltool_shots.peer(name),
+            1.0 / (100.0 if name == "three_cushions" else 300.0),
+            missing=pooltool_shots.missing,
+        )
+        for name in pooltool_shots.NAMES
+    ),
+    *(
+        Bench(
+            f"shot-{name.replace('_', '-')}-corrected",
+            "the same / by pooltool with touching balls and degenerate quartics corrected",
+            lambda name=name: shooting(load(pooltool_shots.path(name))),
+            lambda name=name: pooltool_shots.peer(name, corrected=True),
+            missing=pooltool_shots.missing,
+        )
+        for name in pooltool_shots.NAMES
+    ),
+    Bench(
+        "shots-threads",
+        "9-ball breaks a second, a fan of them on two threads / on one",
+        lambda: fanning(load(pooltool_shots.path("nine_ball_break")), 2000, 2),
+        lambda: fanning(load(pooltool_shots.path("nine_ball_break")), 2000, 1),
+        unit="shots/s",
         rate=True,
     ),
 )

@@ -5,8 +5,10 @@ import sys
 import time
 from collections.abc import Callable
 
+import numpy as np
 import peers
 
+import sandbox
 from sandbox.engines.reference.engine import ReferenceEngine
 from sandbox.engines.reference.stage import Stage
 from sandbox.engines.registry import start
@@ -35,6 +37,26 @@ def scene(name: str, *overrides: str) -> Scene:
 def running(which: Scene, audit: bool = True) -> Timed:
     """Time a whole recorded run."""
     return lambda: timed(lambda: run(which, audit=audit))
+
+
+def shooting(which: Scene, shots: int = 20) -> Timed:
+    """Time a whole shot to rest, its events kept, through the public interface; the mean of some."""
+    table = sandbox.Table(which)
+
+    def go() -> None:
+        for _ in range(shots):
+            table.shoot()
+
+    return lambda: timed(go) / shots
+
+
+def fanning(which: Scene, shots: int, threads: int) -> Timed:
+    """Return how many shots a second a fan plays: each a little stronger than the one before."""
+    table = sandbox.Table(which)
+    cue = which.bodies.names.index("cue")
+    motion = (*which.bodies.velocity[cue], *which.bodies.roll[cue], which.bodies.angular_velocity[cue])
+    motions = np.multiply.outer(np.linspace(0.9, 1.1, shots), motion)
+    return lambda: shots / timed(lambda: table.fan_of(motions, threads=threads))
 
 
 def stepping(
