@@ -25,9 +25,9 @@ STEPS = 60
 @kernel
 def leave(rate: float, half: float) -> float:
     """Return when who touches is back: at once where it closes or is pressed, infinity where it never is."""
-    if rate < -CRAWL or (rate <= CRAWL and half < -PRESS):
+    if rate < -CRAWL or (rate <= 0.0 and half < -PRESS):
         return 0.0
-    return rate / -half if rate > CRAWL and half < 0.0 else math.inf
+    return rate / -half if rate > 0.0 and half < 0.0 else math.inf
 
 
 @kernel

@@ -51,6 +51,10 @@ EVENT_TIME, AT_X, AT_Y, ALONG_X, ALONG_Y, GAVE_X, GAVE_Y, EVENT_WIDTH = range(8)
 """Columns of `log`: time, place, normal, impulse given by the first to the second."""
 
 
+WITHIN = 1e-12
+"""m: a wall that ends where a post begins ends on its rim, but for rounding."""
+
+
 class Board(NamedTuple):
     """N balls, L lines (planes, and each wall segment's two sides), K knobs (posts, segments' ends), P pockets."""
 
@@ -109,6 +113,7 @@ def board_of(roster: Roster) -> Board:
     plain = arena_of(roster)
     heights = _heights(scene)
     knobs = np.column_stack((plain.knobs, heights[plain.knob_tags[:, 0]] if len(plain.knobs) else np.empty((0,))))
+    bare = exposed(knobs)
     lines = plain.flats.copy()
     lines[:, NOSE] = heights[plain.flat_tags[:, 0]]
     state = np.zeros((number, WIDTH))
@@ -133,8 +138,8 @@ def board_of(roster: Roster) -> Board:
         coefficients=np.empty((2, 0, 0)),
         lines=lines,
         line_tags=plain.flat_tags[:, :2].copy(),
-        knobs=np.ascontiguousarray(knobs),
-        knob_tags=plain.knob_tags.copy(),
+        knobs=np.ascontiguousarray(knobs[bare]),
+        knob_tags=plain.knob_tags[bare],
         pockets=np.asarray([[*p.position, p.radius] for p in scene.pockets], dtype=np.float64).reshape(-1, 3),
         figures=figures_of(scene.surface),
         world=np.zeros(BY_PHANTOM + 1),
@@ -165,6 +170,16 @@ def renewed(board: Board, roster: Roster) -> Board:
     for things in (board.line_tags, board.knob_tags):
         things[:, COAT] = roster.fixed_surface[things[:, THING]]
     return board._replace(coefficients=np.stack((roster.restitution, roster.friction)))
+
+
+def exposed(knobs: FloatArray) -> IntArray:
+    """Return which of K knobs (K, 4) can be touched at all: none that lies within another, and one of those alike."""
+    kept: list[int] = []
+    for k in np.argsort(-knobs[:, REACH], kind="stable").tolist():
+        apart = np.hypot(*(knobs[kept, :2] - knobs[k, :2]).T)
+        if not (apart + knobs[k, REACH] <= knobs[kept, REACH] + WITHIN).any():
+            kept.append(k)
+    return np.sort(np.asarray(kept, dtype=np.int64))
 
 
 def _heights(scene: Scene) -> FloatArray:

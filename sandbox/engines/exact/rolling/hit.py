@@ -15,6 +15,7 @@ from sandbox.engines.exact.rolling.board import (
     BY_CAPTURE,
     COAT,
     CUSHIONS_AS,
+    END,
     GAVE_X,
     GAVE_Y,
     HIGH,
@@ -27,6 +28,7 @@ from sandbox.engines.exact.rolling.board import (
     NOSE,
     NX,
     NY,
+    PHASE,
     POCKET,
     RADIUS,
     REACH,
@@ -36,22 +38,25 @@ from sandbox.engines.exact.rolling.board import (
     THING,
     VX,
     VY,
+    WX,
+    WY,
     Board,
+    T,
     X,
     Y,
 )
 from sandbox.engines.exact.rolling.book import book_hit, book_hop, changed
 from sandbox.engines.exact.rolling.motion import give, go_on, motion_of, set_off
 from sandbox.engines.floor.collide import meet, rebound
-from sandbox.engines.floor.phase import CAPTURED
+from sandbox.engines.floor.phase import CAPTURED, SLIDING
 from sandbox.engines.kernel import bare_kernel as kernel
 
 CUT = 1e-3
 """m/s: hits that are slower lose nothing, so that cascades in clusters end."""
 
-HOP = 5e-4
+HOP = 1e-3
 """m/s, with which what presses on is sent off at least: so it hops instead of hitting ever faster. Between balls that
-brings up to m·HOP²/4 each time, some 1e-8 J, and a way of 1e-7 m."""
+brings up to m·HOP²/4 each time, some 4e-8 J, and a way of 3e-7 m."""
 
 
 @kernel
@@ -64,6 +69,35 @@ def log(
     line[AT_X], line[AT_Y], line[ALONG_X], line[ALONG_Y], line[GAVE_X], line[GAVE_Y] = x, y, nx, ny, jx, jy
     what[0], what[1], what[2] = kind, a, b
     board.counts[ROWS] += 1
+
+
+@kernel
+def drive(board: Board, i: int, nx: float, ny: float) -> float:
+    """Return how much faster along n a ball will be once it rolls, m/s: two sevenths of its slip are its to gain."""
+    state = board.state
+    if board.tags[i, PHASE] != SLIDING or board.figures.sliding == 0.0:
+        return 0.0
+    radius = state[i, RADIUS]
+    ux, uy = state[i, VX] - radius * state[i, WY], state[i, VY] + radius * state[i, WX]
+    return float(-2.0 / 7.0 * (ux * nx + uy * ny))
+
+
+@kernel
+def returns(parting: float, driven: float, pressed: float, lasts: float) -> bool:
+    """Tell whether what has just touched and parts would be back at once, again and again, and has to hop.
+
+    It is where the floor, which makes sliding balls roll, drives the two together by more than they part. A hit alone
+    does not: of the slip that it makes, less comes back than it parted them by.
+
+    Args:
+        parting: m/s.
+        driven: how much of that will be lost once both roll, m/s.
+        pressed: how fast it is lost now, m/s².
+        lasts: for how long at that rate, s.
+    """
+    if parting >= HOP or pressed <= 2.0 * PRESS:
+        return False
+    return driven >= parting or pressed * lasts > parting
 
 
 @kernel
@@ -87,7 +121,8 @@ def hit_ball(board: Board, i: int, k: int) -> None:
     set_off(board, k)
     parting = (state[k, VX] - state[i, VX]) * nx + (state[k, VY] - state[i, VY]) * ny
     pressed = (state[i, AX] - state[k, AX]) * nx + (state[i, AY] - state[k, AY]) * ny
-    if parting < HOP and pressed > 2.0 * PRESS:
+    driven = drive(board, i, nx, ny) - drive(board, k, nx, ny)
+    if returns(parting, driven, pressed, min(state[i, END], state[k, END]) - state[i, T]):
         push = (HOP - parting) / (li + lk)
         book_hop(board, push, parting, HOP)
         state[i, VX] -= push * li * nx
@@ -143,7 +178,8 @@ def hit_cushion(board: Board, i: int, kind: int, thing: int, coat: int, nx: floa
         book_hit(board, i, before, -1, before, nx, ny)
     set_off(board, i)
     parting = -(state[i, VX] * nx + state[i, VY] * ny)
-    if parting < HOP and state[i, AX] * nx + state[i, AY] * ny > 2.0 * PRESS:
+    pressed = state[i, AX] * nx + state[i, AY] * ny
+    if returns(parting, drive(board, i, nx, ny), pressed, state[i, END] - state[i, T]):
         book_hop(board, (HOP - parting) * state[i, MASS], parting, HOP)
         state[i, VX] -= (HOP - parting) * nx
         state[i, VY] -= (HOP - parting) * ny

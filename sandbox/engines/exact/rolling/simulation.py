@@ -160,7 +160,7 @@ class RollingSimulation(Running):
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if not self._board.counts[RECORDING]:
-            self._board = with_room(self._board, FIRST_ROWS)
+            self._board = with_room(self._board, max(FIRST_ROWS, 4 * len(self.bodies)))
             self._board.counts[RECORDING] = 1
         return taken(self._board)
 
@@ -231,6 +231,9 @@ class RollingSimulation(Running):
         self._set_out(self.time)
 
     def _set_out(self, time: float) -> None:
+        rows = int(self._board.counts[ROWS]) + len(self.bodies)  # each may be captured at once
+        if self._board.counts[RECORDING] and rows > len(self._board.log):
+            self._board = with_room(self._board, 2 * rows)
         troupe, state = self._troupe, self._board.state
         arrive_all(self._board, time)
         state[:, X : Y + 1], state[:, VX : VY + 1] = troupe.position, troupe.velocity

@@ -35,7 +35,7 @@ MOST_EVENTS = 2_000_000
 """of a shot"""
 
 ROOM = 512
-"""Events that there is room for at first."""
+"""Events, and motions, that there is room for at first, and no less than some for each ball."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -73,7 +73,8 @@ class Table:
         self.names = scene.bodies.names
         self._number = {name: k for k, name in enumerate(self.names)}
         simulation = RollingSimulation(scene, scene.solver)
-        board = with_room(simulation.board, ROOM)
+        count = len(scene.bodies)
+        board = with_paths(with_room(simulation.board, max(ROOM, 2 * count)), max(ROOM, 4 * count))
         board.counts[RECORDING], board.counts[LIMIT] = 1, MOST_EVENTS
         self._board = board
         self._state, self._tags = board.state.copy(), board.tags.copy()
@@ -197,7 +198,7 @@ class Table:
         board.counts[TRACING] = ways
         while (status := shoot(board, self._state, self._tags, number, motion, until)) == FULL:
             if ways and board.counts[STEPS] + 2 > len(board.path):
-                board = with_paths(board, max(2 * len(board.path), 4 * len(self.names), ROOM))
+                board = with_paths(board, 2 * len(board.path))
             else:
                 board = with_room(board, 2 * len(board.log))
             self._board = board
