@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from sandbox.scene.links import Links
 
 __all__ = [
-    "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc", "Emitter",
-    "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Pocket", "Polygon", "Post",
-    "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust", "Wall", "World",
-    "default_name",
+    "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc",
+    "Emitter", "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Pocket",
+    "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust",
+    "Wall", "World", "default_name",
 ]  # fmt: skip
 
 Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]

@@ -171,7 +171,7 @@ def test_faults_are_told_where_they_are(document: dict[str, Any], path: str, wor
 
 def test_faults_of_what_is_written_out_point_at_the_preset() -> None:
     with pytest.raises(SceneError) as caught:
-        loads(TEXT + '\n[world]\nbounds = [[0.0, 0.0], [1.0, 1.0]]\n', "eight.toml")
+        loads(TEXT + "\n[world]\nbounds = [[0.0, 0.0], [1.0, 1.0]]\n", "eight.toml")
     faults = caught.value.faults
     assert len(faults) == 15  # the rack lies outside, the cue ball does not
     assert {fault.line for fault in faults} == {4}

@@ -1,7 +1,7 @@
 """Racks: legal set-ups, seeded gaps."""
 
 import math
-from itertools import combinations
+from itertools import chain, combinations, pairwise
 from typing import Any
 
 import pytest
@@ -31,7 +31,7 @@ def rows(places: dict[str, Point]) -> list[list[str]]:
     """Return the balls in rows along the table, each from left to right."""
     ordered = sorted(places, key=lambda name: places[name][1])
     found: list[list[str]] = [[ordered[0]]]
-    for one, name in zip(ordered, ordered[1:], strict=False):
+    for one, name in pairwise(ordered):
         if places[name][1] - places[one][1] > RADIUS:
             found.append([])
         found[-1].append(name)
@@ -47,7 +47,7 @@ def test_eight_ball_is_racked_as_its_rules_say(seed: int) -> None:
     assert laid[2][1] == "8"
     ends = {laid[4][0], laid[4][4]}
     assert len(ends & SOLIDS) == len(ends & STRIPES) == 1
-    assert sorted(sum(laid, []), key=int) == [str(number) for number in range(1, 16)]
+    assert sorted(chain(*laid), key=int) == [str(number) for number in range(1, 16)]
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -56,11 +56,11 @@ def test_nine_ball_is_racked_as_its_rules_say(seed: int) -> None:
     assert [len(row) for row in laid] == [1, 2, 3, 2, 1]
     assert laid[0] == ["1"]
     assert laid[2][1] == "9"
-    assert sorted(sum(laid, [])) == [str(number) for number in range(1, 10)]
+    assert sorted(chain(*laid)) == [str(number) for number in range(1, 10)]
 
 
 def test_orders_of_a_rack_come_from_the_seed() -> None:
-    orders = {tuple(sum(rows(racked("8-ball", seed=seed)), [])) for seed in range(20)}
+    orders = {tuple(chain(*rows(racked("8-ball", seed=seed)))) for seed in range(20)}
     assert len(orders) == 20
     corners = {rows(racked("8-ball", seed=seed))[5][0] in SOLIDS for seed in range(20)}
     assert corners == {True, False}
@@ -81,7 +81,7 @@ def test_frozen_rack_touches_and_lies_on_its_spot(game: str) -> None:
     count = len(places)
     apart = gaps(places, RADIUS)
     contacts = 30 if count == 15 else 16  # three directions of a triangle of five rows; of a diamond of three
-    assert 0.0 <= apart[0]
+    assert apart[0] >= 0.0
     assert apart[contacts - 1] <= HAIR + ROUNDING
     assert apart[contacts] > RADIUS
     assert places["1"] == FOOT

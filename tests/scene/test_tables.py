@@ -36,7 +36,9 @@ def disc(centre: tuple[float, float], radius: float) -> Polygon:
 @cache
 def solid(name: str) -> list[Polygon]:
     scene = table(name)
-    return [LineString(wall.points) for wall in scene.walls] + [disc(post.position, post.radius) for post in scene.posts]
+    return [LineString(wall.points) for wall in scene.walls] + [
+        disc(post.position, post.radius) for post in scene.posts
+    ]
 
 
 @cache
@@ -143,7 +145,9 @@ def _ordered(there: list, own: list) -> list:  # type: ignore[type-arg]
 def test_jaws_are_tangent_to_nose_and_facing(name: str) -> None:
     scene = table(name)
     for post in scene.posts:
-        near = [wall for wall in scene.walls if LineString(wall.points).distance(Point(post.position)) < 1.1 * post.radius]
+        near = [
+            wall for wall in scene.walls if LineString(wall.points).distance(Point(post.position)) < 1.1 * post.radius
+        ]
         noses = [wall for wall in near if wall.name is not None and wall.name.endswith("cushion")]
         assert len(noses) == 1
         for wall in near:

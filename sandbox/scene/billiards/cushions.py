@@ -14,6 +14,16 @@ from sandbox.scene.part import Point, Vector
 
 MATERIAL = "cushion"
 
+CUSHIONS = (
+    "lower cushion",
+    "lower right cushion",
+    "upper right cushion",
+    "upper cushion",
+    "upper left cushion",
+    "lower left cushion",
+)
+"""Anti-clockwise, each after the pocket of the same number."""
+
 UP, DOWN, LEFT, RIGHT = (0.0, 1.0), (0.0, -1.0), (-1.0, 0.0), (1.0, 0.0)
 
 
@@ -55,9 +65,7 @@ def fixtures_of(table: Table, nose: float) -> Fixtures:
     if not holes:
         return Fixtures(_rectangle(table, nose), (), ())
     walls: list[Wall] = []
-    names = ("lower cushion", "lower right cushion", "upper right cushion")
-    names += ("upper cushion", "upper left cushion", "lower left cushion")
-    for k, name in enumerate(names):
+    for k, name in enumerate(CUSHIONS):
         here, there = holes[k], holes[(k + 1) % len(holes)]
         walls.append(_wall(name, (_nose_end(here, here.lips[1]), _nose_end(there, there.lips[0])), nose))
     posts: list[Post] = []

@@ -20,7 +20,7 @@ class Billiards(Part):
     """
 
     table: TableName | None = None
-    """without one, the scene's own walls, posts and pockets are the table, and its `[[play.spot]]`s say where to rack"""
+    """without one, the scene's own walls, posts and pockets are it, and its `[[play.spot]]`s say where to rack"""
     game: Game = "free"
     """which the window plays"""
     rack: RackName | None = None

@@ -80,7 +80,7 @@ def _nine_ball(random: np.random.Generator) -> list[list[str]]:
 
 
 def _snooker(spots: dict[str, Point], radius: float, gap: float, random: np.random.Generator) -> dict[str, Point]:
-    """WPBSA, position of balls: colours on their spots; reds in a triangle, the first as near the pink as it can be untouched."""
+    """WPBSA, position of balls: colours on their spots, reds in a triangle behind the pink, near but not touching."""
     along = _way(spots["blue"], spots["pink"])
     begin = _moved(spots["pink"], along, 2.0 * radius + max(gap, 1e-3))
     reds = _rows(range(1, 16), (1, 2, 3, 4, 5))

@@ -55,9 +55,9 @@ def _strings(width: float, length: float) -> dict[str, Point]:
     return {name: (0.5 * width, part * length) for name, part in along.items()}
 
 
-# WPA, pocket openings, the middle of what it allows: corner mouth 4.5 to 4.625 in, side mouth 5 to 5.125 in, cut 142° and 104°,
-# shelf 1 to 2.25 in and 0 to 0.375 in. It gives neither the hole nor how round a lip is: the holes, 62 and 64.5 mm, and
-# the jaws, 20.95 and 7.95 mm, were measured on a Showood table (Kiefl, pooltool).
+# WPA, pocket openings, the middle of what it allows: corner mouth 4.5 to 4.625 in, side mouth 5 to 5.125 in, cut 142°
+# and 104°, shelf 1 to 2.25 in and 0 to 0.375 in. It gives neither the hole nor how round a lip is: the holes, 62 and
+# 64.5 mm, and the jaws, 20.95 and 7.95 mm, were measured on a Showood table (Kiefl, pooltool).
 WPA_CORNER = Opening(4.5625 * INCH, 142.0, 1.625 * INCH, 0.062, 0.02095)
 WPA_SIDE = Opening(5.0625 * INCH, 104.0, 0.1875 * INCH, 0.0645, 0.00795)
 
@@ -67,8 +67,8 @@ BCA_CORNER = Opening(5.0 * INCH, 142.0, 1.75 * INCH, 0.066, 0.02095)
 BCA_SIDE = Opening(5.5 * INCH, 103.0, 0.1875 * INCH, 0.0705, 0.00795)
 
 # WPBSA: the openings "conform to the templates authorised", which are not published. Taken are facings that are
-# parallel, 85 mm apart at the corners, which players measure, and 87 mm in the middle; jaws, which are long arcs, of 3.6
-# and 2.5 in, and falls 36 mm behind the corner (Kiefl, pooltool's generic table); in the middle the fall is at the nose.
+# parallel, 85 mm apart at the corners and 87 mm in the middle, about what is told of tables in play; long arcs as jaws,
+# of 3.6 and 2.5 in, and falls 36 mm behind the mouth (Kiefl, pooltool's generic table), in the middle at the nose line.
 SNOOKER_CORNER = Opening(0.085, 135.0, 0.036, 0.0430, 3.6 * INCH)
 SNOOKER_MIDDLE = Opening(0.087, 90.0, 0.0, 0.0445, 2.5 * INCH)
 
