@@ -54,9 +54,7 @@ def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, 
 def _expand(name: str, overrides: tuple[str, ...]) -> int:
     """Print a scene as it is once its presets are written out."""
     try:
-        path = paths_of([name])[0][1]
-        require_scene(name, path)
-        click.echo(dumps(load(path, overrides)), nl=False)
+        click.echo(dumps(load(path_of(name), overrides)), nl=False)
     except SceneError as error:
         click.echo(str(error), err=True)
         return 2

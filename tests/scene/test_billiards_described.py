@@ -1,13 +1,16 @@
 """`[billiards]` of a scene file: what it stands for, what outranks it, and what is wrong with it."""
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
+from sandbox.games.billiards.rules.registry import RULES
 from sandbox.scene.billiards.balls import BALLS
+from sandbox.scene.billiards.expanding import RACKS
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import dumps, from_document, loads
+from sandbox.scene.spots import Game
 
 EIGHT: dict[str, Any] = {"billiards": {"table": "pool-9ft", "game": "8-ball"}}
 SHOT = {"name": "break", "aim": 1.5, "speed": 8.0}
@@ -44,6 +47,13 @@ def test_preset_becomes_a_scene_of_primitives(table: str, game: str) -> None:
     assert scene.play.game == game
     assert scene.play.area is not None
     assert loads(dumps(scene)) == scene
+
+
+def test_every_game_has_rules_for_the_balls_it_is_racked_with() -> None:
+    assert set(RULES) == set(get_args(Game)) == set(RACKS)
+    for name, rules in RULES.items():
+        if name != "free":
+            assert rules.rack == RACKS[name]  # type: ignore[index]
 
 
 def test_balls_are_of_their_set() -> None:

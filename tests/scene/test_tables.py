@@ -6,6 +6,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+import shapely
 from shapely import LineString, Point, Polygon, box, unary_union
 
 from sandbox.scene.billiards.described import TableName
@@ -67,7 +68,7 @@ def test_nothing_leaves_a_table_but_into_a_pocket(name: str) -> None:
     edges = np.asarray(centre.exterior.segmentize(0.005).coords)
     reach = radius_of(name)
     rims = [(pocket.position, pocket.radius) for pocket in table(name).pockets]
-    touched = np.min([[each.distance(Point(at)) for at in edges] for each in solid(name)], axis=0)
+    touched = shapely.distance(np.asarray(solid(name))[:, None], shapely.points(edges)).min(axis=0)
     rim = np.min([np.abs(np.hypot(*(edges - at).T) - size) for at, size in rims], axis=0) if rims else np.inf
     assert np.minimum(np.abs(touched - reach), rim).max() < 3.0 * FINE  # polygons of discs, and FINE itself
 
