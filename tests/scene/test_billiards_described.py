@@ -7,9 +7,11 @@ import pytest
 
 from sandbox.games.billiards.rules.registry import RULES
 from sandbox.scene.billiards.balls import BALLS
-from sandbox.scene.billiards.expanding import RACKS
+from sandbox.scene.billiards.described import Billiards
+from sandbox.scene.billiards.expanding import RACKS, expanded
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import dumps, from_document, loads
+from sandbox.scene.model import Scene
 from sandbox.scene.spots import Game
 
 EIGHT: dict[str, Any] = {"billiards": {"table": "pool-9ft", "game": "8-ball"}}
@@ -168,6 +170,8 @@ def test_override_brings_a_preset_or_mends_it() -> None:
         ({"billiards": {**EIGHT["billiards"], "place": {"16": [0, 0]}}}, "billiards.place.16", "no ball of the set"),
         ({**EIGHT, "shot": [{**SHOT, "ball": "queue"}]}, "shot.break.ball", "no body is named 'queue'"),
         ({**EIGHT, "play": {"arrows": "9 ball"}}, "play.arrows", "no body"),
+        ({**EIGHT, "play": {"area": [[1, 0], [0, 1]]}}, "play.area", "encloses nothing"),
+        ({"ball": [], "play": {"spot": 2 * [{"name": "foot", "position": [0, 0]}]}}, "play.spot.foot.name", "unique"),
         ({**EIGHT, "wall": [{"name": "cue", "points": [[5, 0], [6, 0]], "height": 0.03}]}, "wall.cue.name", "unique"),
     ],
 )
@@ -201,3 +205,10 @@ def test_faults_are_told_before_overrides_of_what_could_not_be_written_out() -> 
     assert [fault.path for fault in caught.value.faults] == ["billiards.table"]
     with pytest.raises(SceneError, match="no element 'queue'"):
         from_document(EIGHT, overrides=["ball.queue.mass=0.2"])
+
+
+def test_scene_made_by_hand_is_not_laid_out_without_its_preset() -> None:
+    scene = Scene(billiards=Billiards(table="carom-10ft", game="straight-rail"))
+    with pytest.raises(ValueError, match="written out"):
+        _ = scene.bodies
+    assert len(expanded(scene).bodies) == 3
