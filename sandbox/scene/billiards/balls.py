@@ -47,7 +47,7 @@ POOL = BallSet(
     colours={
         "cue": WHITE,
         **SOLIDS,
-        "8": "#151515",
+        "8": "#2a2a2e",
         **{str(int(name) + 8): _striped(colour) for name, colour in SOLIDS.items()},
     },
 )
@@ -64,7 +64,7 @@ SNOOKER = BallSet(
         "brown": "#7a4a22",
         "blue": "#1f5fb8",
         "pink": "#f08fb0",
-        "black": "#151515",
+        "black": "#2a2a2e",
     },
 )
 
