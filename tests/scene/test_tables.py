@@ -104,6 +104,14 @@ def test_ball_aimed_at_the_middle_of_a_mouth_falls_untouched(name: str) -> None:
             assert min(each.distance(way) for each in open_to) > radius_of(name)
 
 
+@pytest.mark.parametrize("name", ["pool-7ft", "pool-8ft", "pool-9ft"])  # in snooker it brushes a jaw on its way
+def test_ball_aimed_at_a_hole_from_the_middle_of_the_table_falls_untouched(name: str) -> None:
+    middle = (TABLES[name].width / 2.0, TABLES[name].length / 2.0)  # type: ignore[index]
+    for pocket in table(name).pockets:
+        way = LineString([middle, pocket.position]).difference(disc(pocket.position, pocket.radius))
+        assert min(each.distance(way) for each in solid(name)) > radius_of(name)
+
+
 @pytest.mark.parametrize("name", POCKETED)
 def test_pockets_are_reached_from_the_cloth_and_take_none_of_it(name: str) -> None:
     area, reach = TABLES[name], radius_of(name)  # type: ignore[index]

@@ -55,16 +55,17 @@ def _strings(width: float, length: float) -> dict[str, Point]:
     return {name: (0.5 * width, part * length) for name, part in along.items()}
 
 
-# WPA, pocket openings, the middle of what it allows: corner mouth 4.5 to 4.625 in, side mouth 5 to 5.125 in, cut 142°
-# and 104°, shelf 1 to 2.25 in and 0 to 0.375 in. It gives neither the hole nor how round a lip is: the holes, 62 and
-# 64.5 mm, and the jaws, 20.95 and 7.95 mm, were measured on a Showood table (Kiefl, pooltool).
-WPA_CORNER = Opening(4.5625 * INCH, 142.0, 1.625 * INCH, 0.062, 0.02095)
-WPA_SIDE = Opening(5.0625 * INCH, 104.0, 0.1875 * INCH, 0.0645, 0.00795)
+# WPA, pocket openings: corner mouth 4.5 to 4.625 in, side mouth 5 to 5.125 in, cut 142° and 104°, shelf 1 to 2.25 in
+# and 0 to 0.375 in. Mouths are in the middle of that; the shelf at the corner lets a ball that is aimed at the hole's
+# middle from the table's pass the jaws. The rules give neither hole nor how round a lip is: holes are as wide as the
+# mouths, and the jaws, 20.95 and 7.95 mm, were measured on a Showood table (Kiefl, pooltool).
+WPA_CORNER = Opening(4.5625 * INCH, 142.0, 1.125 * INCH, 2.28125 * INCH, 0.02095)
+WPA_SIDE = Opening(5.0625 * INCH, 104.0, 0.1875 * INCH, 2.53125 * INCH, 0.00795)
 
 # BCA, for home tables too, the middle of what it allows: corner mouth 4.875 to 5.125 in, side mouth 5.375 to 5.625 in,
-# cut 142° and 103°, shelf 1.625 to 1.875 in and 0 to 0.375 in. The holes grow with the mouths.
-BCA_CORNER = Opening(5.0 * INCH, 142.0, 1.75 * INCH, 0.066, 0.02095)
-BCA_SIDE = Opening(5.5 * INCH, 103.0, 0.1875 * INCH, 0.0705, 0.00795)
+# cut 142° and 103°, shelf 1.625 to 1.875 in and 0 to 0.375 in.
+BCA_CORNER = Opening(5.0 * INCH, 142.0, 1.75 * INCH, 2.5 * INCH, 0.02095)
+BCA_SIDE = Opening(5.5 * INCH, 103.0, 0.1875 * INCH, 2.75 * INCH, 0.00795)
 
 # WPBSA: the openings "conform to the templates authorised", which are not published. Taken are facings that are
 # parallel, 85 mm apart at the corners and 87 mm in the middle, about what is told of tables in play; long arcs as jaws,
