@@ -13,7 +13,7 @@ from sandbox.engines.registry import ENGINES
 from sandbox.measure.forecast import at_most, largest_safe_dt, notes, warnings
 from sandbox.scene.demands import JOINTS, Item, bill
 from sandbox.scene.faults import SceneError
-from sandbox.scene.file import load
+from sandbox.scene.file import dumps, load
 from sandbox.scene.model import Scene
 
 
@@ -22,8 +22,13 @@ from sandbox.scene.model import Scene
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene first")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 @click.option("--quiet", is_flag=True, help="say only what is wrong")
-def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, quiet: bool) -> int:
+@click.option("--expand", is_flag=True, help="print the scene file of primitives that a scene stands for")
+def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, quiet: bool, expand: bool) -> int:
     """Check scenes: faults, what they demand, which engines can run them, what would go wrong."""
+    if expand:
+        if len(scenes) > 1 or as_json:
+            raise click.UsageError("--expand prints one scene as TOML; give one, without --json")
+        return _expand(scenes[0], overrides)
     documents = []
     status = 0
     for name in scenes:
@@ -44,6 +49,16 @@ def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, 
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"scenes": documents})
     return status
+
+
+def _expand(name: str, overrides: tuple[str, ...]) -> int:
+    """Print a scene as it is once its presets are written out."""
+    try:
+        click.echo(dumps(load(path_of(name), overrides)), nl=False)
+    except SceneError as error:
+        click.echo(str(error), err=True)
+        return 2
+    return 0
 
 
 def _faulty(name: str, error: SceneError) -> dict[str, Any]:

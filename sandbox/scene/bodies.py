@@ -103,7 +103,10 @@ def expand(scene: Scene) -> Bodies:
     Raises:
         GeneratorError: a generator's balls do not fit.
         OutlineError: an outline cannot be cut into convex pieces.
+        ValueError: the scene was made by hand, and has a preset that nobody has written out.
     """
+    if scene.billiards is not None:
+        raise ValueError("its [billiards] is not written out; sandbox.scene.billiards.expanding.expanded does that")
     names: list[str] = []
     layouts: list[Layout] = []
     for kind, those in scene.kinds.items():

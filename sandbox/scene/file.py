@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from sandbox.scene import presets
 from sandbox.scene.address import AddressError, assign, parse_assignment
 from sandbox.scene.crosscheck import crosscheck
 from sandbox.scene.document import read_model, to_document
@@ -69,15 +70,21 @@ def from_document(
     Raises:
         SceneError: with every fault found; lines are known where the `text` is given.
     """
-    faults: list[Fault] = []
-    changed: set[Location] = set()
-    for override in overrides:
+    assignments, faults = _parsed(overrides, file)
+    stated, whole, changed = document, True, set[Location]()
+    if presets.KEY in document or any(path.startswith(presets.KEY) for path, _ in assignments):
+        stated, changed, assignments = presets.set_first(document, assignments)
+        written = presets.written_out(stated)
+        document, whole = (stated, False) if written is None else (written, True)
+    unset: list[Override] = []
+    for path, value in assignments:
         try:
-            path, value = parse_assignment(override) if isinstance(override, str) else override
             document, location = assign(document, path, value)
             changed.add(location)
         except AddressError as error:
-            faults.append(Fault(file, None, "--set", str(error)))
+            unset.append((path, value))
+            if whole:
+                faults.append(Fault(file, None, "--set", str(error)))
     if faults:
         raise SceneError(faults)
 
@@ -94,17 +101,36 @@ def from_document(
     except (RecursionError, ValueError) as error:
         found = [((), f"the scene cannot be read: {error}")]
     else:
-        found = crosscheck(scene)
-        if not found:
-            return scene
+        if not whole:
+            from sandbox.scene.billiards.expanding import faults_of
+
+            found = list(faults_of(scene))
+            if not found:  # it was mended by what was set
+                return from_document(document, file, unset, text)
+        else:
+            found = crosscheck(scene)
+            if not found:
+                return scene
 
     lines = Lines(text)
     for location, message in dict.fromkeys(found):
         is_set = any(location[: len(c)] == c for c in changed)
-        line = None if is_set else lines.find(location)
+        place: Location = (presets.KEY,) if whole and presets.is_written(location, stated) else location
+        line = None if is_set else lines.find(place)
         path = path_of(location, document) + (" (set)" if is_set else "")
         faults.append(Fault(file, line, path, message))
     raise SceneError(sorted(faults, key=lambda fault: (fault.line is None, fault.line or 0)))
+
+
+def _parsed(overrides: Iterable[Override], file: str) -> tuple[list[tuple[str, Any]], list[Fault]]:
+    """Return overrides as paths and values, and the faults of those that are none."""
+    parsed, faults = [], []
+    for override in overrides:
+        try:
+            parsed.append(parse_assignment(override) if isinstance(override, str) else override)
+        except AddressError as error:
+            faults.append(Fault(file, None, "--set", str(error)))
+    return parsed, faults
 
 
 def dumps(scene: Scene) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
+from sandbox.scene.billiards.described import Billiards
 from sandbox.scene.cue import Shot
 from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
 from sandbox.scene.floor import ContactModels, Floor, Pocket
@@ -19,6 +20,7 @@ from sandbox.scene.part import Friction, Name, Part, Point, Radius, Restitution,
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule, Compound, Polygon
+from sandbox.scene.spots import Game, Spot
 from sandbox.scene.stacks import Stack
 from sandbox.scene.surfaced import Collides, Mover, Single, Surfaced
 from sandbox.scene.weaves import Cloth, Rope
@@ -28,10 +30,10 @@ if TYPE_CHECKING:
     from sandbox.scene.links import Links
 
 __all__ = [
-    "Attraction", "Ball", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc", "Emitter",
-    "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Pocket", "Polygon", "Post",
-    "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust", "Wall", "World",
-    "default_name",
+    "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc",
+    "Emitter", "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Pocket",
+    "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust",
+    "Wall", "World", "default_name",
 ]  # fmt: skip
 
 Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
@@ -115,6 +117,11 @@ class Play(Part):
     """a generator whose bodies Space starts anew, with other chances"""
     show: Literal["overlap"] | None = None
     """Colour bodies by whether they overlap anything."""
+    game: Game | None = None
+    """whose rules the window keeps, of a table"""
+    area: tuple[Point, Point] | None = None
+    """lower left and upper right corner of a table's playing area, m"""
+    spots: tuple[Spot, ...] = Field((), alias="spot")
 
 
 class Scene(Part):
@@ -126,6 +133,8 @@ class Scene(Part):
     world: World = Field(default_factory=World)
     solver: Settings = Field(default_factory=Settings)
     play: Play = Field(default_factory=Play)
+    billiards: Billiards | None = None
+    """None once the scene was read: by then it is written out"""
     surface: Floor | None = None
     contact_models: ContactModels = Field(default_factory=ContactModels)
     materials: tuple[Material, ...] = Field((), alias="material")

@@ -10,6 +10,7 @@ from sandbox.scene.document import read_model
 from sandbox.scene.explain import model_at
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene
+from sandbox.scene.presets import written_out
 
 HARMLESS: dict[str, Any] = {
     "position": [0.0, 0.0],
@@ -65,8 +66,8 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
     document = copy.deepcopy(document)
     touched: set[Location] = set()
     wrong = list(wrong)
-    if () in wrong:
-        return []  # the document as a whole cannot be read
+    if () in wrong or any(location[:1] == ("billiards",) for location in wrong):
+        return []  # the document as a whole cannot be read, or what stands for most of it
     kept = _without_faulty(document, wrong)
     for location in wrong:
         if location[:1] in REFERRING:
@@ -91,6 +92,8 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
         for name, field in model_at(location[:depth]).model_fields.items():
             if field.is_required() and name not in holder and name in HARMLESS:
                 holder[name] = HARMLESS[name]
+    if "billiards" in document:
+        document = written_out(document) or {}
     try:
         scene = read_model(document)
     except ValueError:

@@ -7,6 +7,7 @@ from calling import DROP, FAULTY, json_of, lines_of, written
 
 from sandbox.engines.registry import ENGINES
 from sandbox.scene.demands import JOINTS, Demand
+from sandbox.scene.file import load, loads
 
 
 def test_json_of_a_sound_scene_has_every_key(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -114,3 +115,23 @@ def test_note_is_told_of_a_concave_outline(tmp_path: Path, capfd: pytest.Capture
     status, out, _ = lines_of(capfd, "check", scene)
     assert (status, out[-1]) == (0, f"  note: {message}")
     assert lines_of(capfd, "check", scene, "--quiet") == (0, [], [])  # nothing is wrong
+
+
+def test_expand_prints_the_primitive_scene_and_nothing_else(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    preset = written(tmp_path, '[billiards]\ntable = "pool-9ft"\ngame = "9-ball"\n')
+    status, out, err = lines_of(capfd, "check", "--expand", preset, "--set", "ball.cue.velocity=[1,0]")
+    assert (status, err) == (0, [])
+    scene = loads("\n".join(out))
+    assert scene == load(preset, ["ball.cue.velocity=[1,0]"])
+    assert scene.billiards is None
+    assert (len(scene.balls), scene.balls[0].velocity) == (10, (1.0, 0.0))
+
+
+def test_expand_is_of_one_sound_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    faulty, sound = written(tmp_path, FAULTY), written(tmp_path, DROP, "sound.toml")
+    status, out, err = lines_of(capfd, "check", "--expand", faulty)
+    assert (status, out, len(err)) == (2, [], 2)
+    for arguments in ((faulty, sound), (sound, "--json")):
+        status, out, err = lines_of(capfd, "check", "--expand", *arguments)
+        assert (status, out) == (2, [])
+        assert "--expand prints one scene" in "\n".join(err)

@@ -22,6 +22,9 @@ FALLING = {Demand.TRANSLATION, Demand.GRAVITY}
 MEETING = {Demand.TRANSLATION, Demand.BALL_BALL, Demand.RESTITUTION}
 BOX = {*FALLING, Demand.POLYGONS, Demand.FRICTION, Demand.ROTATION}
 PENDULUM = {*FALLING, Demand.RODS}
+ROLLING = {*MEETING, Demand.SURFACE, Demand.SPIN}
+CAROM = {*ROLLING, Demand.BALL_SEGMENT, Demand.FRICTION, Demand.ROTATION}
+POCKETED = {*CAROM, Demand.BALL_POST, Demand.POCKETS}
 DEMANDED = {
     "benchmark/bounce_to_rest": {*FALLING, Demand.BALL_PLANE, Demand.RESTITUTION},
     "benchmark/box_slides": BOX,
@@ -60,6 +63,15 @@ DEMANDED = {
     "benchmark/two_balls": MEETING,
     "benchmark/pyramid": {*FALLING, Demand.POLYGONS, Demand.FRICTION, Demand.ROTATION},
     "benchmark/tower": {*FALLING, Demand.POLYGONS, Demand.FRICTION, Demand.ROTATION},
+    "billiards/8-ball": POCKETED,
+    "billiards/9-ball": POCKETED,
+    "billiards/bank": CAROM,
+    "billiards/half_ball": ROLLING,
+    "billiards/snooker": POCKETED,
+    "billiards/straight-rail": CAROM,
+    "billiards/stun_draw_follow": ROLLING,
+    "billiards/three-cushion": CAROM,
+    "billiards/throw": {*ROLLING, Demand.ROTATION},
     "joints/bridge": {
         *FALLING,
         Demand.BALL_SEGMENT,

@@ -1,0 +1,149 @@
+"""Expanding: `[billiards]` to surface, walls, posts, pockets, balls and spots, of which everything else is made."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeVar
+
+from sandbox.scene.billiards.balls import BALLS, BallSet
+from sandbox.scene.billiards.cushions import MATERIAL, fixtures_of
+from sandbox.scene.billiards.described import Billiards, RackName
+from sandbox.scene.billiards.racks import BALLS_OF, NEEDED, racked
+from sandbox.scene.billiards.tables import NOSE, TABLES
+from sandbox.scene.discs import Ball
+from sandbox.scene.faults import Location
+from sandbox.scene.floor import Floor
+from sandbox.scene.model import Material, Pair, Scene
+from sandbox.scene.part import Part, Point
+from sandbox.scene.spots import Game, Spot
+
+BALL = "phenolic"
+"""The material of the balls."""
+
+RACKS: dict[Game, RackName] = {
+    "8-ball": "8-ball",
+    "9-ball": "9-ball",
+    "three-cushion": "carom",
+    "straight-rail": "carom",
+    "snooker": "snooker",
+    "free": "none",
+}
+"""What each game is racked as."""
+
+Stated = TypeVar("Stated", bound=Part)
+
+DURATION = 20.0
+"""s: a hard break rolls out in 10 to 15"""
+
+
+def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
+    """Yield why a scene's `[billiards]` stands for nothing."""
+    billiards = scene.billiards
+    if billiards is None:
+        return
+    rack, spots = _rack(billiards), _spots(scene, billiards)
+    missing = [name for name in NEEDED[rack] if name not in spots]
+    key = "rack" if billiards.rack is not None else "game"
+    if missing and billiards.table is None:
+        yield ("billiards", key), f"{rack} is racked by spots; state a `table`, or a [[play.spot]] for {_and(missing)}"
+    elif missing:
+        yield ("billiards", key), f"{rack} is not for {billiards.table}, which has no spots {_and(missing)}"
+    elif rack in ("8-ball", "9-ball", "carom") and math.dist(spots["head"], spots["foot"]) < 1e-9:
+        yield ("billiards", key), "the spots 'head' and 'foot' are one and the same; they say which way to rack"
+    known = _set(billiards).colours
+    for name in billiards.place:
+        if name not in known:
+            yield ("billiards", "place", name), f"is no ball of the set; there are {_and(list(known))}"
+
+
+def expanded(scene: Scene) -> Scene:
+    """Return the scene of primitives that a scene with a sound `[billiards]` stands for; another as it is.
+
+    What the scene states itself comes first in each list, and outranks what is of the same name.
+    """
+    billiards = scene.billiards
+    if billiards is None:
+        return scene
+    balls, rack, spots = _set(billiards), _rack(billiards), _spots(scene, billiards)
+    radius = balls.radius if billiards.ball_radius is None else billiards.ball_radius
+    floor = {
+        "sliding_friction": balls.sliding,
+        "rolling_friction": balls.rolling,
+        "spinning_friction": balls.spinning * radius,
+    }
+    changes: dict[str, Any] = {
+        "billiards": None,
+        "surface": _stated(scene.surface or Floor(), floor),
+        "contact_models": _stated(scene.contact_models, {"ball_ball": "frictional", "cushion": "han2005"}),
+        "world": _stated(scene.world, {"duration": DURATION}),
+        "materials": _added(scene.materials, (Material(name=BALL), Material(name=MATERIAL))),
+        "pairs": _pairs(scene, billiards),
+        "balls": _added(scene.balls, _balls(billiards, balls, rack, spots, radius, scene.world.seed)),
+    }
+    play: dict[str, Any] = {"game": billiards.game}
+    if billiards.table is not None:
+        table = TABLES[billiards.table]
+        nose = next(each for each in (billiards.nose, balls.nose, 2.0 * NOSE * radius) if each is not None)
+        fixtures = fixtures_of(table, nose)
+        changes["walls"] = _added(scene.walls, fixtures.walls)
+        changes["posts"] = _added(scene.posts, fixtures.posts)
+        changes["pockets"] = _added(scene.pockets, fixtures.pockets)
+        play["area"] = ((0.0, 0.0), (table.width, table.length))
+    named = tuple(Spot(name=name, position=at) for name, at in spots.items())
+    changes["play"] = _stated(scene.play, play).model_copy(update={"spots": named})
+    return scene.model_copy(update=changes)
+
+
+def _balls(
+    billiards: Billiards, balls: BallSet, rack: RackName, spots: dict[str, Point], radius: float, seed: int
+) -> list[Ball]:
+    """Return the balls on the table, in the order of their set."""
+    places = {**racked(rack, spots, radius, billiards.gap, seed), **billiards.place}
+    mass = balls.mass if billiards.ball_mass is None else billiards.ball_mass
+    return [
+        Ball(name=name, position=places[name], radius=radius, mass=mass, material=BALL, colour=colour)
+        for name, colour in balls.colours.items()
+        if name in places
+    ]
+
+
+def _rack(billiards: Billiards) -> RackName:
+    return RACKS[billiards.game] if billiards.rack is None else billiards.rack
+
+
+def _set(billiards: Billiards) -> BallSet:
+    """Return the balls: those of the rack, else the table's own, else of pool."""
+    name = BALLS_OF.get(_rack(billiards))
+    if name is None:
+        name = "pool" if billiards.table is None else TABLES[billiards.table].balls
+    return BALLS[name]
+
+
+def _spots(scene: Scene, billiards: Billiards) -> dict[str, Point]:
+    """Return the spots of the scene and of its table, by name; the scene's own come first."""
+    own = {spot.name: spot.position for spot in scene.play.spots}
+    more = {} if billiards.table is None else TABLES[billiards.table].spots
+    return own | {name: at for name, at in more.items() if name not in own}
+
+
+def _pairs(scene: Scene, billiards: Billiards) -> tuple[Pair, ...]:
+    pairs = (
+        Pair(between=(BALL, BALL), restitution=billiards.ball_restitution),
+        Pair(between=(BALL, MATERIAL), restitution=billiards.cushion_restitution, friction=billiards.cushion_friction),
+    )
+    stated = {frozenset(pair.between) for pair in scene.pairs}
+    return (*scene.pairs, *(pair for pair in pairs if frozenset(pair.between) not in stated))
+
+
+def _stated(part: Stated, values: dict[str, Any]) -> Stated:
+    """Return a part with values for what it does not state itself."""
+    return part.model_copy(update={key: value for key, value in values.items() if key not in part.model_fields_set})
+
+
+def _added(own: Sequence[Any], more: Sequence[Any]) -> tuple[Any, ...]:
+    """Return a scene's own things, and more that have other names."""
+    taken = {each.name for each in own}
+    return (*own, *(each for each in more if each.name not in taken))
+
+
+def _and(names: list[str]) -> str:
+    return ", ".join(map(repr, names))
