@@ -13,6 +13,7 @@ from sandbox.engines.exact.rolling.board import (
     BALL,
     BALLS_AS,
     BY_CAPTURE,
+    BY_FLOOR,
     COAT,
     CUSHIONS_AS,
     END,
@@ -54,6 +55,9 @@ from sandbox.engines.kernel import bare_kernel as kernel
 CUT = 1e-3
 """m/s: hits that are slower lose nothing, so that cascades in clusters end."""
 
+REST = 1e-4
+"""m/s: whose centre and whose rim are slower after such a slow hit stays where it is. Let go, it would roll 5e-8 m."""
+
 HOP = 1e-3
 """m/s, with which what presses on is sent off at least: so it hops instead of hitting ever faster. Between balls that
 brings up to m·HOP²/4 each time, some 4e-8 J, and a way of 3e-7 m."""
@@ -80,6 +84,19 @@ def drive(board: Board, i: int, nx: float, ny: float) -> float:
     radius = state[i, RADIUS]
     ux, uy = state[i, VX] - radius * state[i, WY], state[i, VY] + radius * state[i, WX]
     return float(-2.0 / 7.0 * (ux * nx + uy * ny))
+
+
+@kernel
+def calm(board: Board, i: int, closing: float) -> None:
+    """Lay a ball to rest where a slow hit has left it next to nothing; the floor takes that. It may spin on."""
+    state = board.state
+    if closing > CUT or state[i, LIGHTNESS] == 0.0 or board.figures.rolling == 0.0:
+        return
+    moving = state[i, VX] ** 2 + state[i, VY] ** 2
+    rolling = (state[i, WX] ** 2 + state[i, WY] ** 2) * state[i, RADIUS] ** 2
+    if moving < REST * REST and rolling < REST * REST:
+        board.world[BY_FLOOR] -= 0.5 * state[i, MASS] * (moving + 0.4 * rolling)
+        state[i, VX], state[i, VY], state[i, WX], state[i, WY] = 0.0, 0.0, 0.0, 0.0
 
 
 @kernel
@@ -117,6 +134,8 @@ def hit_ball(board: Board, i: int, k: int) -> None:
         give(state, i, a)
         give(state, k, b)
         book_hit(board, i, mine, k, theirs, nx, ny)
+        calm(board, i, closing)
+        calm(board, k, closing)
     set_off(board, i)
     set_off(board, k)
     parting = (state[k, VX] - state[i, VX]) * nx + (state[k, VY] - state[i, VY]) * ny
@@ -176,6 +195,7 @@ def hit_cushion(board: Board, i: int, kind: int, thing: int, coat: int, nx: floa
             state[i, VX] -= still * nx
             state[i, VY] -= still * ny
         book_hit(board, i, before, -1, before, nx, ny)
+        calm(board, i, closing)
     set_off(board, i)
     parting = -(state[i, VX] * nx + state[i, VY] * ny)
     pressed = state[i, AX] * nx + state[i, AY] * ny
