@@ -33,8 +33,13 @@ def test_odds_of_a_bullet_are_the_formula(v: float, r: float, w: float, dt: floa
     assert len(told) == (passage.odds(h) > 1e-9)  # less is rounding
     for warning in told:
         assert warning.figures == {
-            "ball": "b", "thing": "w", "speed": v, "odds": passage.odds(h), "safe_dt": largest_safe_dt(scene),
-        }  # fmt: skip
+            "ball": "b",
+            "thing": "w",
+            "others": 0,
+            "speed": v,
+            "odds": passage.odds(h),
+            "safe_dt": largest_safe_dt(scene),
+        }
 
 
 # `COUNT` bullets fly side by side at a wall, each from a place of its own: random phases.

@@ -1,13 +1,13 @@
 """Telling: all warnings of a scene, one after the other."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from sandbox.measure.forecast.chains import chain_warnings
 from sandbox.measure.forecast.events import event_warnings
 from sandbox.measure.forecast.laid import Laid, laid
-from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, farther, meet_each_other, passages
+from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, Passage, farther, meet_each_other, passages
 from sandbox.measure.forecast.springs import spring_warnings
 from sandbox.measure.forecast.stacks import stack_warnings
 from sandbox.measure.forecast.stretch import stretch_warnings
@@ -65,13 +65,15 @@ def _duration(scene: Scene, settings: Settings) -> Iterator[Warning]:
 
 def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
     times = farther(settings)
-    for passage in passages(scene, meet):
+    for passage, others in alike(passages(scene, meet)):
         odds = passage.odds(settings.h / times)
         if odds <= ROUNDING:
             continue
         safe = passage.safe_h * settings.substeps * times
         way = passage.speed * settings.h
         thing = passage.thing if passage.thing in (ANOTHER, ANOTHER_BODY) else repr(passage.thing)
+        if others:
+            thing += f" and {others:,} other{'s' if others > 1 else ''} like it"
         message = (
             f"{passage.ball!r} can close on {thing} at up to {passage.speed:.4g} m/s, {way:.3g} m a substep, "
             f"and pass through unseen: odds up to {100 * odds:.3g} %; dt <= {at_most(safe)} s would be safe"
@@ -79,11 +81,22 @@ def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Wa
         figures: Figures = {
             "ball": passage.ball,
             "thing": passage.thing,
+            "others": others,
             "speed": passage.speed,
             "odds": odds,
             "safe_dt": safe,
         }
         yield Warning("tunnelling", message, figures)
+
+
+def alike(found: Iterable[Passage]) -> list[tuple[Passage, int]]:
+    """Return the first of the passages that differ only in what is passed, and how many others there are like it."""
+    groups: dict[tuple[str, float, float], tuple[Passage, int]] = {}
+    for passage in found:
+        key = passage.ball, passage.speed, passage.safe_h
+        first, count = groups.get(key, (passage, -1))
+        groups[key] = first, count + 1
+    return list(groups.values())
 
 
 def _overlaps(scene: Scene, meet: Meetings, close: Laid) -> Iterator[Warning]:

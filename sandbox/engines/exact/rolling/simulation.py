@@ -14,6 +14,7 @@ from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contact_log import MAX_ROWS
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.exact.rolling.board import (
+    BOOKED,
     EVENTS,
     LIMIT,
     PAIR_TESTS,
@@ -26,6 +27,7 @@ from sandbox.engines.exact.rolling.board import (
     WY,
     WZ,
     Board,
+    T,
     X,
     Y,
     board_of,
@@ -227,6 +229,7 @@ class RollingSimulation(Running):
 
     def _acted(self) -> None:
         """Bring into the kernels' arrays what has been done to the roster, and go on from there."""
+        arrive_all(self._board, self.time)  # as those who were there until now
         self._board = renewed(self._board, self._troupe)
         self._set_out(self.time)
 
@@ -235,7 +238,7 @@ class RollingSimulation(Running):
         if self._board.counts[RECORDING] and rows > len(self._board.log):
             self._board = with_room(self._board, 2 * rows)
         troupe, state = self._troupe, self._board.state
-        arrive_all(self._board, time)
+        state[:, T] = state[:, BOOKED] = time
         state[:, X : Y + 1], state[:, VX : VY + 1] = troupe.position, troupe.velocity
         state[:, WX : WY + 1], state[:, WZ] = troupe.roll, troupe.angular_velocity
         set_out(self._board, time)
