@@ -193,6 +193,15 @@ class MeetingBodies:
         self._space.step(self._settings.h)
         self._state = None
 
+    def drive(self, velocity: FloatArray) -> None:
+        """Let all bodies of the space go by velocities (N, 2), m/s, for the next step."""
+        if self._moving:
+            self._reader.drive(velocity)
+
+    def pairs(self) -> IntArray:
+        """Return who is in contact, (K, 2) numbers, fixed things being −1 − k; a pair may be listed twice."""
+        return self._reader.pairs() if self._moving else np.empty((0, 2), np.int64)
+
     def _apply_forces(self) -> None:
         """Set what pymunk forgets after each step: the drag on all bodies, the steady forces on some."""
         world = self._scene.world

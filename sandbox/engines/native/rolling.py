@@ -1,0 +1,118 @@
+"""Rolling: spheres on a floor, advanced through a time in closed form, across the ends of their phases.
+
+Exact for a ball that meets nothing, whatever the time: within a phase its path is a parabola, and where a phase ends
+within the time the next one begins there. What has come to rest is at rest to the bit.
+"""
+
+import math
+from typing import NamedTuple
+
+from sandbox.engines.floor.collide import Five
+from sandbox.engines.floor.phase import ROLLING, SLIDING, SPINNING, Figures, fallen, phase_of, rates
+from sandbox.engines.kernel import bare_kernel as kernel
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+PHASES = 3
+"""That a ball can pass through until it rests: sliding, rolling, and one for a slide whose end rounding has put off."""
+
+
+class Balls(NamedTuple):
+    """N spheres, for kernels. The first five are the population's own arrays."""
+
+    position: FloatArray
+    """(N, 2) m"""
+    velocity: FloatArray
+    """(N, 2) m/s"""
+    roll: FloatArray
+    """(N, 2) rad/s, about x and y"""
+    spin: FloatArray
+    """(N,) rad/s, about z"""
+    angle: FloatArray
+    """(N,) rad, about z"""
+    gain: FloatArray
+    """(N, 5) how fast velocity, roll and spin changed of late, m/s² and rad/s²"""
+    since: FloatArray
+    """(N,) s, since its last hit, or since an action; inf where there was none"""
+    moved: BoolArray
+    """(N,) was put elsewhere than its motion led to: by a hit within the substep, or out of an overlap"""
+    plays: BoolArray
+    """(N,) moves, is there, and in no pocket"""
+    radius: FloatArray
+    """(N,) m"""
+    lightness: FloatArray
+    """(N,) 1/mass, 1/kg; 0 for what never moves"""
+    surface: IntArray
+    """(N,)"""
+
+
+@kernel
+def motion_of(balls: Balls, i: int) -> Five:
+    """Return a ball's velocity and spin."""
+    velocity, roll = balls.velocity, balls.roll
+    return velocity[i, 0], velocity[i, 1], roll[i, 0], roll[i, 1], balls.spin[i]
+
+
+@kernel
+def give(balls: Balls, i: int, motion: Five) -> None:
+    """Give a ball a velocity and a spin."""
+    velocity, roll = balls.velocity, balls.roll
+    velocity[i, 0], velocity[i, 1], roll[i, 0], roll[i, 1], balls.spin[i] = motion
+
+
+@kernel
+def note_gain(balls: Balls, i: int, then: Five, time: float) -> None:
+    """Note how fast a ball's motion has changed from what it was a time ago, s."""
+    now = motion_of(balls, i)
+    for k in range(5):
+        balls.gain[i, k] = (now[k] - then[k]) / time
+
+
+@kernel
+def roll_on(balls: Balls, i: int, floor: Figures, time: float) -> None:
+    """Advance a ball by a time, s, as if it met nothing."""
+    vx, vy, wx, wy, wz = motion_of(balls, i)
+    radius = balls.radius[i]
+    x = y = 0.0
+    left = time
+    for _ in range(PHASES):
+        phase = phase_of(vx, vy, wx, wy, wz, radius)
+        if phase <= SPINNING or left <= 0.0:
+            break
+        ax, ay, bx, by, lasts = rates(phase, vx, vy, wx, wy, wz, radius, floor)
+        t = min(left, lasts)
+        x, y = x + (vx + 0.5 * ax * t) * t, y + (vy + 0.5 * ay * t) * t
+        vx, vy, wx, wy = vx + ax * t, vy + ay * t, wx + bx * t, wy + by * t
+        if phase == ROLLING and lasts <= left:
+            vx = vy = 0.0
+        if phase == ROLLING or (phase == SLIDING and lasts <= left):
+            wx, wy = 0.0 - vy / radius, vx / radius  # no −0.0 at rest
+        left -= t
+    balls.position[i, 0] += x
+    balls.position[i, 1] += y
+    fall = floor.spinning / radius
+    turning = min(time, abs(wz) / fall) if fall > 0.0 else time
+    balls.angle[i] += (wz - math.copysign(0.5 * fall * turning, wz)) * turning
+    give(balls, i, (vx, vy, wx, wy, fallen(wz, fall * time)))
+
+
+@kernel
+def roll_all(balls: Balls, floor: Figures, time: float, way: FloatArray) -> None:
+    """Advance all that play by a time, s.
+
+    Args:
+        balls: whom.
+        floor: what it does to them.
+        time: s.
+        way: (N, 2) m; written to: how far each went.
+    """
+    for i in range(len(balls.plays)):
+        balls.moved[i] = False
+        way[i, 0] = way[i, 1] = 0.0
+        if not balls.plays[i]:
+            continue
+        then = motion_of(balls, i)
+        x, y = balls.position[i, 0], balls.position[i, 1]
+        roll_on(balls, i, floor, time)
+        way[i, 0], way[i, 1] = balls.position[i, 0] - x, balls.position[i, 1] - y
+        note_gain(balls, i, then, time)
+        balls.since[i] += time
