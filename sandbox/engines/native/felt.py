@@ -20,7 +20,9 @@ from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
 from sandbox.engines.native.cushions import Cushions, cushions_of
 from sandbox.engines.native.hits import IMPULSE_X, NORMAL_X, POINT_X, WIDTH, Laws, resolve
 from sandbox.engines.native.meeting import MeetingBodies
-from sandbox.engines.native.rolling import Balls, roll_all
+from sandbox.engines.native.rolling import Balls, find_in_pockets, first_beyond, roll_all
+from sandbox.engines.roster import MEETS
+from sandbox.engines.roster import NOTHING as NOTHING_AT_ALL
 from sandbox.engines.touching import NOTHING, ComplexArray, Touching
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.floor import Floor
@@ -28,6 +30,10 @@ from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
+
+
+ROOM = 100
+"""Pairs that hits may bring into contact within a substep, besides as many as were in contact; others wait."""
 
 
 class State(NamedTuple):
@@ -87,15 +93,17 @@ class Felt:
             before = len(old.since)
             gain[:before], since[:before], pocket[:before] = old.gain, old.since, self.pocket
         self.pocket = pocket
+        self._meets = np.asarray([MEETS[each.collides] for each in bodies.elements], np.int64)[bodies.element]
         self._moment = np.where(bodies.fixed, 0.0, bodies.moment)
         self._mass = np.where(bodies.fixed, 0.0, bodies.mass)
-        self._way = np.zeros((number, 2))
+        self._way, self._which = np.zeros((number, 2)), np.zeros(number, np.int64)
         self._balls = Balls(
             *state,
             gain=gain,
             since=since,
             moved=np.zeros(number, np.bool_),
             plays=present & ~bodies.fixed & (pocket < 0),
+            meets=np.where(present & (pocket < 0), self._meets, NOTHING_AT_ALL),
             radius=bodies.radius,
             lightness=np.where(bodies.fixed, 0.0, 1.0 / bodies.mass),
             surface=self._surface,
@@ -116,10 +124,12 @@ class Felt:
         """Bring a ball that lies in a pocket back into play."""
         self.pocket[number] = -1
         self.balls.plays[number] = True
+        self.balls.meets[number] = self._meets[number]
 
     def leave(self, numbers: IntArray) -> None:
         """Take balls out that are no longer there."""
         self.balls.plays[numbers] = False
+        self.balls.meets[numbers] = NOTHING_AT_ALL
         self.pocket[numbers] = -1
 
     def step(self, meeting: MeetingBodies, time: float, share: float = 1.0) -> None:
@@ -131,17 +141,16 @@ class Felt:
         self._book(Cause.FRICTION, before)
         meeting.drive(self._way / self._h)
         meeting.step(time)
-        pairs = meeting.pairs()
-        pairs = _ordered(pairs, balls.plays)
+        pairs, count = _with_room(meeting.pairs(), balls.plays)
         told, taken = np.zeros((len(pairs), WIDTH)), np.zeros(3)
-        if len(pairs):
-            resolve(balls, self._cushions, self._laws, self._floor, pairs, told, taken, h)
+        if count:
+            count = resolve(balls, self._cushions, self._laws, self._floor, pairs, told, taken, count, h)
             for number in np.flatnonzero(balls.moved).tolist():
                 meeting.set_position(number, balls.position[number])
             if self.account is not None:
                 self.account.touch(*taken[:2].tolist())
                 self.account.add(Cause.FRICTION, float(taken[2]))  # which may give back what it took too soon
-        self.touching = _touching(pairs, told)
+        self.touching = _touching(pairs[:count], told[:count])
 
     def _push(self, steady: list[tuple[int, tuple[FloatArray, float]]], h: float) -> None:
         """Let steady forces and torques act for a time, s, all at once."""
@@ -158,14 +167,10 @@ class Felt:
         self._fell = NOTHING
         if not len(self._pockets):
             return np.empty(0, np.int64)
-        playing = np.flatnonzero(balls.plays)
-        away = balls.position[playing, None] - self._pockets[None, :, :2]
-        inside = (away * away).sum(axis=2) < self._pockets[:, 2] ** 2
-        found = inside.any(axis=1)
-        numbers = playing[found]
-        if not len(numbers):
-            return numbers
-        which = inside[found].argmax(axis=1)
+        if not find_in_pockets(balls, self._pockets, self._which):
+            return np.empty(0, np.int64)
+        numbers = np.flatnonzero(self._which >= 0)
+        which = self._which[numbers]
         before = self._energy()
         centre, reach = self._pockets[which, :2], self._pockets[which, 2]
         place = balls.position[numbers]
@@ -174,6 +179,7 @@ class Felt:
         self._fell = Touching(numbers, -1 - self._solid - which, *map(_complex, (-given, normal, place)))
         self.pocket[numbers] = which
         balls.plays[numbers] = False
+        balls.meets[numbers] = NOTHING_AT_ALL
         balls.position[numbers] = centre
         for array in (balls.velocity, balls.roll, balls.spin):
             array[numbers] = 0.0
@@ -188,11 +194,8 @@ class Felt:
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a ball that is not finite or beyond all bounds, and what is the matter; else None."""
-        balls = self.balls
-        with np.errstate(over="ignore", invalid="ignore"):
-            good = (np.hypot(*balls.position.T) <= FARTHEST) & (np.hypot(*balls.velocity.T) <= FASTEST)
-            good &= np.isfinite(balls.roll.sum(axis=1) + balls.spin + balls.angle)
-        return None if good.all() else (int(np.argmin(good)), BEYOND)
+        number = first_beyond(self.balls, FARTHEST, FASTEST)
+        return None if number < 0 else (number, BEYOND)
 
     def _energy(self) -> float:
         """Return the energy of all balls, J, where an account is kept."""
@@ -215,14 +218,18 @@ def figures_of(floor: Floor | None) -> Figures:
     return Figures(floor.sliding_friction * g, floor.rolling_friction * g, 2.5 * floor.spinning_friction * g)
 
 
-def _ordered(pairs: IntArray, plays: BoolArray) -> IntArray:
-    """Return pairs (K, 2) each once, in order, with a ball that plays first: pymunk lists them by addresses."""
+def _with_room(pairs: IntArray, plays: BoolArray) -> tuple[IntArray, int]:
+    """Return pairs (K, 2) each once, in order, with a ball that plays first, and room for more; and how many they are.
+
+    pymunk lists them by addresses.
+    """
     if not len(pairs):
-        return pairs
+        return pairs, 0
     first, second = pairs.max(axis=1), pairs.min(axis=1)
     swapped = (second >= 0) & plays[second]
     first, second = np.where(swapped, second, first), np.where(swapped, first, second)
-    return np.unique(np.column_stack((first, second))[plays[first]], axis=0)
+    once = np.unique(np.column_stack((first, second))[plays[first]], axis=0)
+    return np.concatenate((once, np.zeros((ROOM + len(once), 2), np.int64))), len(once)
 
 
 def _touching(pairs: IntArray, told: FloatArray) -> Touching:

@@ -2,8 +2,8 @@
 
 Each hit is taken back to when the two touched, done there by the laws of `floor.collide`, and both go on from it for
 the rest of the substep: so directions and ways are right to second order in the substep, not to the way v·h that
-balls overlap by when they are found. Hits are done one after the other, the earliest first. Whom a hit drives into a
-third is found in contact with it at the end of the next substep, and taken back as far as it takes.
+balls overlap by when they are found. Hits are done one after the other, the earliest first; whom a hit drives into a
+third, or into a cushion, is found here, against all others.
 """
 
 import math
@@ -14,6 +14,7 @@ from sandbox.engines.floor.phase import Figures
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.native.cushions import Cushions, gap_to
 from sandbox.engines.native.rolling import Balls, give, motion_of, note_gain, roll_on
+from sandbox.engines.roster import ALL
 from sandbox.trajectory import FloatArray, IntArray
 
 DUE, IMPULSE_X, IMPULSE_Y, NORMAL_X, NORMAL_Y, POINT_X, POINT_Y, WIDTH = range(8)
@@ -27,7 +28,7 @@ RISE = 1e-9
 """m/s: what closes more slowly lies."""
 
 LATE = 8.0
-"""Substeps for which a hit may have gone unseen behind another."""
+"""Substeps for which a hit may wait, where there were too many in one."""
 
 OFTEN = 20
 """Hits for each contact in one substep; what would hit on does so in the next one."""
@@ -236,6 +237,47 @@ def mend(balls: Balls, cushions: Cushions, i: int, other: int, depth: float) -> 
 
 
 @kernel
+def listed(pairs: IntArray, count: int, i: int, other: int) -> bool:
+    """Tell whether two are among the first pairs, either way round."""
+    for k in range(count):
+        a, b = pairs[k, 0], pairs[k, 1]
+        if (a == i and b == other) or (a == other and b == i):
+            return True
+    return False
+
+
+@kernel
+def look_around(balls: Balls, cushions: Cushions, i: int, pairs: IntArray, told: FloatArray, count: int) -> int:
+    """List whom a ball that was hit now overlaps, and was not listed with; return how many pairs there then are."""
+    x, y = balls.position[i, 0], balls.position[i, 1]
+    for k in range(-len(cushions.height), len(balls.plays)):
+        if count == len(pairs):
+            return count
+        if k < 0:
+            near = approach(balls, cushions, i, k, 0.0)[0] < 0.0
+        else:
+            meets = k != i and balls.meets[k] == ALL and (balls.meets[i] == ALL or balls.lightness[k] == 0.0)
+            dx, dy, reach = balls.position[k, 0] - x, balls.position[k, 1] - y, balls.radius[i] + balls.radius[k]
+            near = meets and dx * dx + dy * dy < reach * reach
+        if near and not listed(pairs, count, i, k):
+            pairs[count, 0], pairs[count, 1] = i, k
+            told[count, DUE] = -1.0
+            describe(balls, cushions, i, k, told[count])
+            count += 1
+    return count
+
+
+@kernel
+def describe(balls: Balls, cushions: Cushions, i: int, other: int, row: FloatArray) -> None:
+    """Tell of a contact how it is, with no impulse yet."""
+    gap, nx, ny, _ = approach(balls, cushions, i, other, 0.0)
+    reach = balls.radius[i] + 0.5 * gap
+    row[IMPULSE_X] = row[IMPULSE_Y] = 0.0
+    row[NORMAL_X], row[NORMAL_Y] = nx, ny
+    row[POINT_X], row[POINT_Y] = balls.position[i, 0] + reach * nx, balls.position[i, 1] + reach * ny
+
+
+@kernel
 def resolve(
     balls: Balls,
     cushions: Cushions,
@@ -244,28 +286,27 @@ def resolve(
     pairs: IntArray,
     told: FloatArray,
     taken: FloatArray,
+    count: int,
     h: float,
 ) -> int:
-    """Let all hits of a substep happen, which has just ended; return how many there were.
+    """Let all hits of a substep happen, which has just ended; return how many pairs touched.
 
     Args:
         balls: all.
         cushions: all.
         laws: of hits.
         floor: on which balls go on.
-        pairs: (K, 2) of those in contact, a ball that plays and another, or a fixed thing −1 − k; none twice.
-        told: (K, WIDTH) of each pair; written to.
+        pairs: (M, 2) with those in contact first, a ball that plays and another, or a fixed thing −1 − k, none twice;
+            the rest is room for those that hits bring into contact.
+        told: (M, WIDTH) of each pair; written to.
         taken: (3,) as of `hit`.
+        count: of pairs in contact.
         h: the substep, s.
     """
-    count, done = len(pairs), 0
+    done = 0
     for k in range(count):
         i, other = pairs[k, 0], pairs[k, 1]
-        gap, nx, ny, _ = approach(balls, cushions, i, other, 0.0)
-        reach = balls.radius[i] + 0.5 * gap
-        told[k, IMPULSE_X] = told[k, IMPULSE_Y] = 0.0
-        told[k, NORMAL_X], told[k, NORMAL_Y] = nx, ny
-        told[k, POINT_X], told[k, POINT_Y] = balls.position[i, 0] + reach * nx, balls.position[i, 1] + reach * ny
+        describe(balls, cushions, i, other, told[k])
         told[k, DUE] = due(balls, cushions, i, other, h)
     while done < OFTEN * count:
         first, ago = -1, -1.0
@@ -277,6 +318,9 @@ def resolve(
         i, other = pairs[first, 0], pairs[first, 1]
         hit(balls, cushions, laws, floor, i, other, ago, told[first], taken)
         done += 1
+        count = look_around(balls, cushions, i, pairs, told, count)
+        if other >= 0 and balls.plays[other]:
+            count = look_around(balls, cushions, other, pairs, told, count)
         for k in range(count):
             a, b = pairs[k, 0], pairs[k, 1]
             if a == i or b == i or (other >= 0 and (a == other or b == other)):
@@ -289,4 +333,4 @@ def resolve(
             mend(balls, cushions, i, other, depth)
         elif depth > laws.slop:
             mend(balls, cushions, i, other, laws.mend * (depth - laws.slop))
-    return done
+    return count

@@ -37,6 +37,8 @@ class Balls(NamedTuple):
     """(N,) was put elsewhere than its motion led to: by a hit within the substep, or out of an overlap"""
     plays: BoolArray
     """(N,) moves, is there, and in no pocket"""
+    meets: IntArray
+    """(N,) what each can meet, as in the roster"""
     radius: FloatArray
     """(N,) m"""
     lightness: FloatArray
@@ -116,3 +118,36 @@ def roll_all(balls: Balls, floor: Figures, time: float, way: FloatArray) -> None
         way[i, 0], way[i, 1] = balls.position[i, 0] - x, balls.position[i, 1] - y
         note_gain(balls, i, then, time)
         balls.since[i] += time
+
+
+@kernel
+def find_in_pockets(balls: Balls, pockets: FloatArray, which: IntArray) -> int:
+    """Find the balls in play whose centres are within a pocket; return how many there are.
+
+    Args:
+        balls: among whom.
+        pockets: (P, 3) centre and radius, m.
+        which: (N,) written to: the pocket of each, −1 for none.
+    """
+    found = 0
+    for i in range(len(which)):
+        which[i] = -1
+        for k in range(len(pockets)):
+            dx, dy = balls.position[i, 0] - pockets[k, 0], balls.position[i, 1] - pockets[k, 1]
+            if balls.plays[i] and which[i] < 0 and dx * dx + dy * dy < pockets[k, 2] * pockets[k, 2]:
+                which[i] = k
+                found += 1
+    return found
+
+
+@kernel
+def first_beyond(balls: Balls, farthest: float, fastest: float) -> int:
+    """Return the first ball that is not finite, or farther out or faster than may be, m and m/s; −1 for none."""
+    for i in range(len(balls.plays)):
+        x, y = balls.position[i, 0], balls.position[i, 1]
+        vx, vy, wx, wy, wz = motion_of(balls, i)
+        # Comparisons with nan are false, so that what is not good is caught, whatever it is.
+        good = x * x + y * y <= farthest * farthest and vx * vx + vy * vy <= fastest * fastest
+        if not (good and abs(wx) + abs(wy) + abs(wz) + abs(balls.angle[i]) < math.inf):
+            return i
+    return -1
