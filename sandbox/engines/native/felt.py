@@ -18,8 +18,9 @@ from sandbox.engines.floor.collide import ELASTIC, FRICTIONAL, HAN2005, SIMPLE
 from sandbox.engines.floor.phase import Figures
 from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
 from sandbox.engines.native.cushions import Cushions, cushions_of
-from sandbox.engines.native.hits import IMPULSE_X, NORMAL_X, POINT_X, WIDTH, Laws, resolve
+from sandbox.engines.native.hits import Laws, resolve
 from sandbox.engines.native.meeting import MeetingBodies
+from sandbox.engines.native.overlaps import IMPULSE_X, NORMAL_X, POINT_X, WIDTH
 from sandbox.engines.native.rolling import Balls, find_in_pockets, first_beyond, roll_all
 from sandbox.engines.roster import MEETS
 from sandbox.engines.roster import NOTHING as NOTHING_AT_ALL
@@ -30,7 +31,6 @@ from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
-
 
 ROOM = 100
 """Pairs that hits may bring into contact within a substep, besides as many as were in contact; others wait."""
@@ -164,7 +164,6 @@ class Felt:
     def capture(self) -> IntArray:
         """Let balls whose centres are within a pocket fall into it, where they lie at its centre; return who did."""
         balls = self.balls
-        self._fell = NOTHING
         if not len(self._pockets):
             return np.empty(0, np.int64)
         if not find_in_pockets(balls, self._pockets, self._which):
@@ -176,7 +175,8 @@ class Felt:
         place = balls.position[numbers]
         given = balls.velocity[numbers] * self._mass[numbers, None]
         normal = (centre - place) / reach[:, None]
-        self._fell = Touching(numbers, -1 - self._solid - which, *map(_complex, (-given, normal, place)))
+        fell = Touching(numbers, -1 - self._solid - which, *map(_complex, (-given, normal, place)))
+        self._fell = Touching(*(np.concatenate(both) for both in zip(self._fell, fell, strict=True)))
         self.pocket[numbers] = which
         balls.plays[numbers] = False
         balls.meets[numbers] = NOTHING_AT_ALL
@@ -187,10 +187,11 @@ class Felt:
         return numbers
 
     def told(self) -> Touching:
-        """Return what touched in the last substep, and what fell at its end."""
-        if not len(self._fell.a):
+        """Return what touched in the last substep, and what has fallen since this was last asked."""
+        fell, self._fell = self._fell, NOTHING
+        if not len(fell.a):
             return self.touching
-        return Touching(*(np.concatenate(both) for both in zip(self.touching, self._fell, strict=True)))
+        return Touching(*(np.concatenate(both) for both in zip(self.touching, fell, strict=True)))
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a ball that is not finite or beyond all bounds, and what is the matter; else None."""

@@ -12,8 +12,8 @@ import numpy as np
 from sandbox.action import ActionError
 from sandbox.engines.acting import derived
 from sandbox.engines.native.felt import Felt, State
-from sandbox.engines.native.free import FreeFlight
 from sandbox.engines.native.floors import of_floors, on_floor
+from sandbox.engines.native.free import FreeFlight
 from sandbox.engines.native.meeting import MeetingBodies
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings, meetings

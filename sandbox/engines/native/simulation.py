@@ -226,6 +226,8 @@ class NativeSimulation(Running):
         if population.felt is None:
             population.meeting.step(start)
         else:
+            if self._ledger is None:
+                population.felt.told()  # who fell before contacts were asked for is nobody's concern
             population.felt.step(population.meeting, start, share)
             if population.capture():
                 self._still = None
