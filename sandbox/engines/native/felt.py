@@ -86,12 +86,9 @@ class Felt:
 
     def live_in(self, state: State, bodies: Bodies, present: BoolArray) -> None:
         """Advance these arrays from now on; of those that were there before, what was known of them still holds."""
-        number, old = len(bodies), self._balls
-        gain, since = np.zeros((number, 5)), np.full(number, np.inf)
+        number = len(bodies)
         pocket = np.full(number, -1, np.int64)
-        if old is not None:
-            before = len(old.since)
-            gain[:before], since[:before], pocket[:before] = old.gain, old.since, self.pocket
+        pocket[: len(self.pocket)] = self.pocket
         self.pocket = pocket
         self._meets = np.asarray([MEETS[each.collides] for each in bodies.elements], np.int64)[bodies.element]
         self._moment = np.where(bodies.fixed, 0.0, bodies.moment)
@@ -99,14 +96,15 @@ class Felt:
         self._way, self._which = np.zeros((number, 2)), np.zeros(number, np.int64)
         self._balls = Balls(
             *state,
-            gain=gain,
-            since=since,
+            anchor=np.zeros((number, 8)),
+            age=np.zeros(number),
             moved=np.zeros(number, np.bool_),
             plays=present & ~bodies.fixed & (pocket < 0),
             meets=np.where(present & (pocket < 0), self._meets, NOTHING_AT_ALL),
             radius=bodies.radius,
             lightness=np.where(bodies.fixed, 0.0, 1.0 / bodies.mass),
             surface=self._surface,
+            floor=self._floor,
         )
 
     @property
@@ -114,11 +112,6 @@ class Felt:
         """The balls."""
         assert self._balls is not None
         return self._balls
-
-    def touched(self, number: int) -> None:
-        """Note that an action has changed a ball's motion or place: it was not always so."""
-        self.balls.since[number] = 0.0
-        self.balls.gain[number] = 0.0
 
     def free(self, number: int) -> None:
         """Bring a ball that lies in a pocket back into play."""
@@ -137,14 +130,14 @@ class Felt:
         balls, h = self.balls, self._h * share
         self._push(meeting.steady.items(), h)
         before = self._energy()
-        roll_all(balls, self._floor, h, self._way)
+        roll_all(balls, h, self._way)
         self._book(Cause.FRICTION, before)
         meeting.drive(self._way / self._h)
         meeting.step(time)
         pairs, count = _with_room(meeting.pairs(), balls.plays)
         told, taken = np.zeros((len(pairs), WIDTH)), np.zeros(3)
         if count:
-            count = resolve(balls, self._cushions, self._laws, self._floor, pairs, told, taken, count, h)
+            count = resolve(balls, self._cushions, self._laws, pairs, told, taken, count)
             for number in np.flatnonzero(balls.moved).tolist():
                 meeting.set_position(number, balls.position[number])
             if self.account is not None:

@@ -1,15 +1,14 @@
 """Hits: what happens to balls on a floor that pymunk finds in contact at the end of a substep.
 
 Each hit is taken back to when the two touched, done there by the laws of `floor.collide`, and both go on from it for
-the rest of the substep: so directions and ways are right to second order in the substep, not to the way v·h that
-balls overlap by when they are found. Hits are done one after the other, the earliest first; whom a hit drives into a
+the rest of the substep: so directions and ways are right whatever the substep is, though balls overlap by up to v·h
+when they are found. Hits are done one after the other, the earliest first; whom a hit drives into a
 third, or into a cushion, is found here, against all others.
 """
 
 from typing import NamedTuple
 
 from sandbox.engines.floor.collide import ELASTIC, Five, meet, rebound
-from sandbox.engines.floor.phase import Figures
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.native.cushions import Cushions
 from sandbox.engines.native.overlaps import (
@@ -21,13 +20,12 @@ from sandbox.engines.native.overlaps import (
     POINT_X,
     POINT_Y,
     approach,
-    back,
     describe,
     due,
     look_around,
     mend,
 )
-from sandbox.engines.native.rolling import Balls, give, motion_of, note_gain, roll_on
+from sandbox.engines.native.rolling import Balls, give, motion_of, roll_on, then
 from sandbox.trajectory import FloatArray, IntArray
 
 CUT = 1e-3
@@ -63,21 +61,10 @@ def energy(motion: Five, lightness: float, radius: float) -> float:
 @kernel
 def put_back(balls: Balls, i: int, ago: float) -> Five:
     """Put a ball back to where it was a time ago, s, and how it moved; return that motion."""
-    x, y, then = back(balls, i, ago)
-    balls.angle[i] -= 0.5 * (balls.spin[i] + then[4]) * ago
-    balls.position[i, 0], balls.position[i, 1] = x, y
-    give(balls, i, then)
-    return then
-
-
-@kernel
-def go_on(balls: Balls, i: int, floor: Figures, time: float) -> None:
-    """Let a ball go on from a hit for a time, s."""
-    after = motion_of(balls, i)
-    roll_on(balls, i, floor, time)
-    if time > 0.0:
-        note_gain(balls, i, after, time)
-    balls.since[i], balls.moved[i] = time, True
+    balls.position[i, 0], balls.position[i, 1], balls.angle[i], motion = then(balls, i, ago)
+    give(balls, i, motion)
+    balls.moved[i] = True
+    return motion
 
 
 @kernel
@@ -95,7 +82,6 @@ def hit(
     balls: Balls,
     cushions: Cushions,
     laws: Laws,
-    floor: Figures,
     i: int,
     other: int,
     ago: float,
@@ -108,7 +94,6 @@ def hit(
         balls: all.
         cushions: all.
         laws: of hits.
-        floor: on which they go on.
         i: a ball.
         other: another, or the fixed thing −1 − k.
         ago: s.
@@ -144,7 +129,7 @@ def hit(
         ended = energy(after, light, radius) + energy(more, heft, radius)
         if balls.plays[other]:
             give(balls, other, more)
-            go_on(balls, other, floor, ago)
+            roll_on(balls, other, ago)
             more = motion_of(balls, other)
         redone = energy(more, heft, radius)
     if row[IMPULSE_X] == 0.0 and row[IMPULSE_Y] == 0.0:
@@ -155,7 +140,7 @@ def hit(
     taken[0] += smooth - began
     taken[1] += ended - smooth
     give(balls, i, after)
-    go_on(balls, i, floor, ago)
+    roll_on(balls, i, ago)
     taken[2] += began - undone + redone + energy(motion_of(balls, i), light, radius) - ended
 
 
@@ -164,12 +149,10 @@ def resolve(
     balls: Balls,
     cushions: Cushions,
     laws: Laws,
-    floor: Figures,
     pairs: IntArray,
     told: FloatArray,
     taken: FloatArray,
     count: int,
-    h: float,
 ) -> int:
     """Let all hits of a substep happen, which has just ended; return how many pairs touched.
 
@@ -177,19 +160,17 @@ def resolve(
         balls: all.
         cushions: all.
         laws: of hits.
-        floor: on which balls go on.
         pairs: (M, 2) with those in contact first, a ball that plays and another, or a fixed thing −1 − k, none twice;
             the rest is room for those that hits bring into contact.
         told: (M, WIDTH) of each pair; written to.
         taken: (3,) as of `hit`.
         count: of pairs in contact.
-        h: the substep, s.
     """
     done = 0
     for k in range(count):
         i, other = pairs[k, 0], pairs[k, 1]
         describe(balls, cushions, i, other, told[k])
-        told[k, DUE] = due(balls, cushions, i, other, h)
+        told[k, DUE] = due(balls, cushions, i, other)
     while done < OFTEN * count:
         first, ago = -1, -1.0
         for k in range(count):
@@ -198,7 +179,7 @@ def resolve(
         if first < 0 or ago < 0.0:
             break
         i, other = pairs[first, 0], pairs[first, 1]
-        hit(balls, cushions, laws, floor, i, other, ago, told[first], taken)
+        hit(balls, cushions, laws, i, other, ago, told[first], taken)
         done += 1
         count = look_around(balls, cushions, i, pairs, told, count)
         if other >= 0 and balls.plays[other]:
@@ -206,7 +187,7 @@ def resolve(
         for k in range(count):
             a, b = pairs[k, 0], pairs[k, 1]
             if a == i or b == i or (other >= 0 and (a == other or b == other)):
-                told[k, DUE] = due(balls, cushions, a, b, h)
+                told[k, DUE] = due(balls, cushions, a, b)
     for k in range(count):
         i, other = pairs[k, 0], pairs[k, 1]
         depth = -approach(balls, cushions, i, other, 0.0)[0]

@@ -2,10 +2,9 @@
 
 import math
 
-from sandbox.engines.floor.collide import Five
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.native.cushions import Cushions, gap_to
-from sandbox.engines.native.rolling import Balls, motion_of
+from sandbox.engines.native.rolling import Balls, then
 from sandbox.engines.roster import ALL
 from sandbox.trajectory import FloatArray, IntArray
 
@@ -16,35 +15,21 @@ the first gave to the second, N·s; the normal from the first to the second, and
 RISE = 1e-9
 """m/s: what closes more slowly lies."""
 
-LATE = 8.0
-"""Substeps for which a hit may wait, where there were too many in one."""
-
 ENOUGH = 60
 """Looks at the time of a contact. It is found to rounding in some eight."""
 
 ROUNDING = 1e-15
-"""The share of a radius, and of a substep, that does not matter."""
-
-
-@kernel
-def back(balls: Balls, i: int, ago: float) -> tuple[float, float, Five]:
-    """Return where a ball was a time ago, s, and how it moved, by its present motion and its late gain."""
-    vx, vy, wx, wy, wz = motion_of(balls, i)
-    gain = balls.gain[i]
-    x = balls.position[i, 0] - (vx - 0.5 * gain[0] * ago) * ago
-    y = balls.position[i, 1] - (vy - 0.5 * gain[1] * ago) * ago
-    then = vx - gain[0] * ago, vy - gain[1] * ago, wx - gain[2] * ago, wy - gain[3] * ago, wz - gain[4] * ago
-    return x, y, then
+"""The share of a radius, and of a time, that does not matter."""
 
 
 @kernel
 def approach(balls: Balls, cushions: Cushions, i: int, other: int, ago: float) -> tuple[float, float, float, float]:
     """Return the gap of two a time ago, m, the normal from the first to the second, and how fast it closed, m/s."""
-    x, y, mine = back(balls, i, ago)
+    x, y, _, mine = then(balls, i, ago)
     if other < 0:
         gap, nx, ny = gap_to(cushions, -1 - other, x, y, mine[0], mine[1])
         return gap - balls.radius[i], nx, ny, mine[0] * nx + mine[1] * ny
-    px, py, theirs = back(balls, other, ago)
+    px, py, _, theirs = then(balls, other, ago)
     dx, dy = px - x, py - y
     ux, uy = mine[0] - theirs[0], mine[1] - theirs[1]
     distance = math.sqrt(dx * dx + dy * dy)
@@ -57,13 +42,12 @@ def approach(balls: Balls, cushions: Cushions, i: int, other: int, ago: float) -
 
 
 @kernel
-def due(balls: Balls, cushions: Cushions, i: int, other: int, h: float) -> float:
+def due(balls: Balls, cushions: Cushions, i: int, other: int) -> float:
     """Return how long ago two that overlap hit each other, s; below 0 where they do not, or part."""
     near, _, _, closing = approach(balls, cushions, i, other, 0.0)
     if not near < 0.0:
         return -1.0
-    since = balls.since[i] if other < 0 else min(balls.since[i], balls.since[other])
-    most = since if since < LATE * h else h
+    most = balls.age[i] if other < 0 or not balls.plays[other] else min(balls.age[i], balls.age[other])
     far, _, _, began = approach(balls, cushions, i, other, most)
     if far <= 0.0:  # they touched all the while
         return most if began > RISE and far > near else 0.0 if closing > RISE else -1.0
@@ -72,7 +56,7 @@ def due(balls: Balls, cushions: Cushions, i: int, other: int, h: float) -> float
     for _ in range(ENOUGH):
         middle = (low * above - high * below) / (above - below)
         gap, _, _, began = approach(balls, cushions, i, other, middle)
-        if abs(gap) <= ROUNDING * balls.radius[i] or high - low <= ROUNDING * h:
+        if abs(gap) <= ROUNDING * balls.radius[i] or high - low <= ROUNDING * most:
             break
         if gap < 0.0:
             low, below = middle, gap

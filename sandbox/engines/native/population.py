@@ -208,7 +208,7 @@ class Population:
             self.roll[number] = roll
 
     def _plays(self, number: int) -> bool:
-        """Tell whether a body is a ball on a floor, and note that something is done to it.
+        """Tell whether a body is a ball on a floor.
 
         Raises:
             ActionError: it lies in a pocket.
@@ -217,7 +217,6 @@ class Population:
             return False
         if self._pocketed(number):
             raise ActionError(f"{self.bodies.names[number]!r} lies in a pocket; move it back into play first")
-        self.felt.touched(number)
         return True
 
     def _pocketed(self, number: int) -> bool:
@@ -239,12 +238,10 @@ class Population:
         """Put a body somewhere, m."""
         self.refresh()
         self.position[number] = position
-        if self.felt is not None:
-            self.felt.touched(number)
-            if self._pocketed(number):
-                self.felt.free(number)
-                self._place(np.asarray([number]))
-                return
+        if self.felt is not None and self._pocketed(number):
+            self.felt.free(number)
+            self._place(np.asarray([number]))
+            return
         half = self.half_of(number)
         if half is not None:
             half.set_position(number, position)

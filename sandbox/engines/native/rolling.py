@@ -29,10 +29,11 @@ class Balls(NamedTuple):
     """(N,) rad/s, about z"""
     angle: FloatArray
     """(N,) rad, about z"""
-    gain: FloatArray
-    """(N, 5) how fast velocity, roll and spin changed of late, m/s² and rad/s²"""
-    since: FloatArray
-    """(N,) s, since its last hit, or since an action; inf where there was none"""
+    anchor: FloatArray
+    """(N, 8) place, angle, velocity and spins from which each came undisturbed: of its last hit within the substep,
+    or of the substep's beginning"""
+    age: FloatArray
+    """(N,) s, how long ago that was"""
     moved: BoolArray
     """(N,) was put elsewhere than its motion led to: by a hit within the substep, or out of an overlap"""
     plays: BoolArray
@@ -45,6 +46,8 @@ class Balls(NamedTuple):
     """(N,) 1/mass, 1/kg; 0 for what never moves"""
     surface: IntArray
     """(N,)"""
+    floor: Figures
+    """what they roll on"""
 
 
 @kernel
@@ -62,18 +65,16 @@ def give(balls: Balls, i: int, motion: Five) -> None:
 
 
 @kernel
-def note_gain(balls: Balls, i: int, then: Five, time: float) -> None:
-    """Note how fast a ball's motion has changed from what it was a time ago, s."""
-    now = motion_of(balls, i)
-    for k in range(5):
-        balls.gain[i, k] = (now[k] - then[k]) / time
+def rolled(motion: Five, radius: float, floor: Figures, time: float) -> tuple[float, float, float, Five]:
+    """Return how far a ball goes in a time, m, how far it turns about z, rad, and how it then moves.
 
-
-@kernel
-def roll_on(balls: Balls, i: int, floor: Figures, time: float) -> None:
-    """Advance a ball by a time, s, as if it met nothing."""
-    vx, vy, wx, wy, wz = motion_of(balls, i)
-    radius = balls.radius[i]
+    Args:
+        motion: velocity and spin at first.
+        radius: m.
+        floor: on which it meets nothing.
+        time: s.
+    """
+    vx, vy, wx, wy, wz = motion
     x = y = 0.0
     left = time
     for _ in range(PHASES):
@@ -89,35 +90,54 @@ def roll_on(balls: Balls, i: int, floor: Figures, time: float) -> None:
         if phase == ROLLING or (phase == SLIDING and lasts <= left):
             wx, wy = 0.0 - vy / radius, vx / radius  # no −0.0 at rest
         left -= t
-    balls.position[i, 0] += x
-    balls.position[i, 1] += y
     fall = floor.spinning / radius
     turning = min(time, abs(wz) / fall) if fall > 0.0 else time
-    balls.angle[i] += (wz - math.copysign(0.5 * fall * turning, wz)) * turning
-    give(balls, i, (vx, vy, wx, wy, fallen(wz, fall * time)))
+    angle = (wz - math.copysign(0.5 * fall * turning, wz)) * turning
+    return x, y, angle, (vx, vy, wx, wy, fallen(wz, fall * time))
 
 
 @kernel
-def roll_all(balls: Balls, floor: Figures, time: float, way: FloatArray) -> None:
+def then(balls: Balls, i: int, ago: float) -> tuple[float, float, float, Five]:
+    """Return where a ball was a time ago, m, its angle, and how it moved; at most as long ago as its anchor."""
+    if ago == 0.0 or not balls.plays[i]:
+        return balls.position[i, 0], balls.position[i, 1], balls.angle[i], motion_of(balls, i)
+    old = balls.anchor[i]
+    began = old[3], old[4], old[5], old[6], old[7]
+    x, y, angle, motion = rolled(began, balls.radius[i], balls.floor, balls.age[i] - ago)
+    return old[0] + x, old[1] + y, old[2] + angle, motion
+
+
+@kernel
+def roll_on(balls: Balls, i: int, time: float) -> None:
+    """Anchor a ball, and advance it by a time, s, as if it met nothing."""
+    old, motion = balls.anchor[i], motion_of(balls, i)
+    old[0], old[1], old[2] = balls.position[i, 0], balls.position[i, 1], balls.angle[i]
+    for k in range(5):
+        old[3 + k] = motion[k]
+    balls.age[i] = time
+    x, y, angle, motion = rolled(motion, balls.radius[i], balls.floor, time)
+    balls.position[i, 0] += x
+    balls.position[i, 1] += y
+    balls.angle[i] += angle
+    give(balls, i, motion)
+
+
+@kernel
+def roll_all(balls: Balls, time: float, way: FloatArray) -> None:
     """Advance all that play by a time, s.
 
     Args:
         balls: whom.
-        floor: what it does to them.
         time: s.
         way: (N, 2) m; written to: how far each went.
     """
     for i in range(len(balls.plays)):
         balls.moved[i] = False
         way[i, 0] = way[i, 1] = 0.0
-        if not balls.plays[i]:
-            continue
-        then = motion_of(balls, i)
-        x, y = balls.position[i, 0], balls.position[i, 1]
-        roll_on(balls, i, floor, time)
-        way[i, 0], way[i, 1] = balls.position[i, 0] - x, balls.position[i, 1] - y
-        note_gain(balls, i, then, time)
-        balls.since[i] += time
+        if balls.plays[i]:
+            x, y = balls.position[i, 0], balls.position[i, 1]
+            roll_on(balls, i, time)
+            way[i, 0], way[i, 1] = balls.position[i, 0] - x, balls.position[i, 1] - y
 
 
 @kernel
