@@ -11,6 +11,7 @@ import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.engines.acting import derived
+from sandbox.engines.native.crowds import check_crowd
 from sandbox.engines.native.felt import Felt, State
 from sandbox.engines.native.floors import of_floors, on_floor
 from sandbox.engines.native.free import FreeFlight
@@ -20,13 +21,6 @@ from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Collides, Scene, Single
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
-
-CROWD = 100
-"""Balls that a ball may be put into: pymunk takes minutes to part a thousand on one spot."""
-
-SWARM = 1000
-"""The same for balls that pass through each other, of which pymunk still looks at every pair."""
-
 
 UNCORRECTED = 1e9
 """m of overlap that pymunk leaves alone: on a floor that is the felt's."""
@@ -317,10 +311,4 @@ class Population:
         self.refresh()
         if not self.meeting.reaches(place):
             raise ActionError(f"{position} m is out of reach: pymunk's half-planes end before it")
-        near = np.hypot(*(self.position - place).T) < self.bodies.radius + radius
-        into = self.bodies.element[near & self.present]
-        how = [self.bodies.elements[element].collides for element in into.tolist()]
-        if collides == "all" and how.count("all") >= CROWD:
-            raise ActionError(f"it would overlap {how.count('all')} bodies; pymunk parts {CROWD} at most")
-        if len(how) - how.count("none") >= SWARM:
-            raise ActionError(f"it would overlap {len(how) - how.count('none')} bodies; at most {SWARM}")
+        check_crowd(place, radius, collides, self.position, self.bodies, self.present)
