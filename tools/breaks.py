@@ -34,7 +34,7 @@ LAST = 2.0
 """s, from the first hit on"""
 SPEED = 6.0
 """m/s, of the cue ball"""
-GAPS = (0.0, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3)
+GAPS = (0.0, 1e-8, 1e-6, 1e-4, 1e-3, 1e-2)
 """m"""
 RATES = (60, 120, 240, 480, 960)
 """Hz"""

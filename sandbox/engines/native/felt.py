@@ -20,7 +20,7 @@ from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
 from sandbox.engines.native.cushions import Cushions, cushions_of
 from sandbox.engines.native.hits import Laws, resolve
 from sandbox.engines.native.meeting import MeetingBodies
-from sandbox.engines.native.overlaps import IMPULSE_X, NORMAL_X, POINT_X, WIDTH
+from sandbox.engines.native.overlaps import GAP, IMPULSE_X, NORMAL_X, POINT_X, WIDTH
 from sandbox.engines.native.rolling import Balls, find_in_pockets, first_beyond, roll_all
 from sandbox.engines.roster import MEETS
 from sandbox.engines.roster import NOTHING as NOTHING_AT_ALL
@@ -228,6 +228,8 @@ def _with_room(pairs: IntArray, plays: BoolArray) -> tuple[IntArray, int]:
 
 def _touching(pairs: IntArray, told: FloatArray) -> Touching:
     """Return contacts as told of: their impulses are on the first."""
+    met = (told[:, GAP] < 0.0) | told[:, IMPULSE_X : IMPULSE_X + 2].any(axis=1)  # others were only near
+    pairs, told = pairs[met], told[met]
     if not len(pairs):
         return NOTHING
     vectors = (_complex(told[:, k : k + 2]) for k in (IMPULSE_X, NORMAL_X, POINT_X))

@@ -16,6 +16,7 @@ from sandbox.engines.native.felt import Felt, State
 from sandbox.engines.native.floors import of_floors, on_floor
 from sandbox.engines.native.free import FreeFlight
 from sandbox.engines.native.meeting import MeetingBodies
+from sandbox.engines.native.overlaps import SKIN
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Collides, Scene, Single
@@ -45,7 +46,8 @@ class Population:
         self.roll = self.bodies.roll.copy()
         self.felt = Felt(scene, settings) if on_floor(scene) else None
         """what moves balls where there is a floor"""
-        self.meeting = MeetingBodies(scene, settings if self.felt is None else settings.replace(slop=UNCORRECTED))
+        floored = settings.replace(slop=UNCORRECTED), SKIN
+        self.meeting = MeetingBodies(scene, *(floored if self.felt is not None else (settings,)))
         self.free = FreeFlight(scene.world, settings.h, self.meeting.field)
         self._renew(scene, meetings(scene, self.bodies))
         self._live()
