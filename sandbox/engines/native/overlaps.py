@@ -16,8 +16,8 @@ RISE = 1e-9
 """m/s: what closes more slowly lies."""
 
 SKIN = 0.05
-"""The share of a radius by which discs are larger for pymunk: who grazes another in between two looks is then found near
-it, if as seen from there it goes no farther than 1.2 radii in a substep."""
+"""The share of a radius by which discs are larger for pymunk: whoever grazes another in between two looks is then found
+near it, if as seen from there it goes no farther than 1.28 radii in a substep."""
 
 ENOUGH = 60
 """Looks at the time of a contact. It is found to rounding in some eight."""
