@@ -155,7 +155,7 @@ class NativeSimulation(Running):
         position, velocity = position.copy(), velocity.copy()
         if self._settings.half_kick:
             velocity[population.moving] -= population.ahead
-        if population.turns or self._still is None:
+        if population.turns or population.felt is not None or self._still is None:
             self._still = angle.copy(), angular_velocity.copy()
         angle, angular_velocity = self._still
         roll = None if population.felt is None else population.roll.copy()
@@ -229,8 +229,7 @@ class NativeSimulation(Running):
             if self._ledger is None:
                 population.felt.told()  # who fell before contacts were asked for is nobody's concern
             population.felt.step(population.meeting, start, share)
-            if population.capture():
-                self._still = None
+            population.capture()
         self._work["joint_iterations"] += population.meeting.joined * self._settings.iterations
         population.changed()
         if self._books is not None:

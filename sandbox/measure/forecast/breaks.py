@@ -3,6 +3,9 @@
 pymunk looks for contacts at the end of each substep. Hits are then taken back to when they happened, grazes in between
 are found up to `FAR`, and those that hits cause in the same substep with them: so the step matters little. What does
 matter is a rack whose balls touch: its hits happen at one instant, and rounding says in which order.
+
+Measured by `tools/breaks.py`, 16 balls broken at 6 m/s, 5 seeds, 60 to 960 Hz: with gaps of 1e-8 m to 1 mm in the rack
+no ball was 1 mm from where a sixteenth of the step has it within 2 s; without, some were 0.02 s after the first hit.
 """
 
 from collections.abc import Iterator
