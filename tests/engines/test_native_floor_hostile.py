@@ -97,7 +97,7 @@ def outcome(simulation: Simulation, actions: list[Action]) -> tuple[list[str], s
 
 
 @given(tables(), st.lists(deeds(), min_size=1, max_size=6))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_any_table_and_any_action_stay_finite_or_diverge_and_do_so_again(scene: Scene, actions: list[Action]) -> None:
     first, again = start(scene), start(scene)
     first.contacts()
