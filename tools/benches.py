@@ -8,7 +8,7 @@ import drawing
 import peers
 import pooltool_shots
 from turning import turns
-from workloads import Timed, command, events, fanning, flying, running, scene, shooting, staged, stepping
+from workloads import Timed, command, events, fanning, flying, rolling, running, scene, shooting, staged, stepping
 
 from sandbox.scene.file import load
 
@@ -188,6 +188,17 @@ BENCHES = (
         lambda: connected.cloth("reference", 100),
         unit="steps/s",
         rate=True,
+    ),
+    *(
+        Bench(
+            f"spin-{count}",
+            f"steps a second of {count:,} balls on a floor, with three spins, on pymunk / of the same as discs without",
+            lambda count=count: rolling(count, floor=True),
+            lambda count=count: rolling(count, floor=False),
+            unit="steps/s",
+            rate=True,
+        )
+        for count in (16, 100, 1000)
     ),
     Bench(
         "tower",

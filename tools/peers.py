@@ -165,8 +165,8 @@ def give_moments(simulation: Simulation, scene: Scene) -> None:
         half.give_moment(number, moment)
 
 
-def gas(count: int, speed: float) -> Scene:
-    """Return an elastic gas of 16, 100 or 1,000 balls in a box, as dilute as the shipped one.
+def gas(count: int, speed: float, **more: object) -> Scene:
+    """Return an elastic gas of 16, 100 or 1,000 balls in a box, as dilute as the shipped one, with more if stated.
 
     The same gas at any speed, m/s, but for the clock. Exact is asked for a fast one, so that many events lie between
     two frames; pymunk is slow at high speeds, as its tree widens boxes by a tenth of a second's way.
@@ -191,6 +191,7 @@ def gas(count: int, speed: float) -> Scene:
                     "material": "elastic",
                 }
             ],
+            **more,
         }
     )
 

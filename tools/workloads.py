@@ -130,6 +130,20 @@ def events(count: int) -> Timed:
     return work
 
 
+def rolling(count: int, floor: bool) -> Callable[[], float]:
+    """Return the steps a second of a gas of so many balls on pymunk, on a floor with three spins, or as discs."""
+    surface = {"sliding_friction": 0.2, "rolling_friction": 0.01, "spinning_friction": 0.01}
+    more = {"surface": surface, "contact_models": {"ball_ball": "frictional"}} if floor else {}
+
+    def work() -> float:
+        simulation = start(peers.gas(count, 1.0, **more), "pymunk")
+        steps = 200_000 // (count + 100)
+        simulation.step()
+        return steps / timed(lambda: [simulation.step() for _ in range(steps)])
+
+    return work
+
+
 def staged(which: Scene, name: str, steps: int = 2000) -> Timed:
     """Time one stage of a reference step with one ball: "move", "look", "resolve", or "step" for the whole."""
 

@@ -51,11 +51,15 @@ def rates(
     if phase == SLIDING and floor.sliding > 0.0:
         ux, uy = vx - radius * wy, vy + radius * wx
         slip = math.sqrt(ux * ux + uy * uy)
+        if slip == 0.0:  # so slow that its square is nothing: it is over
+            return 0.0, 0.0, 0.0, 0.0, 0.0
         ax, ay = -floor.sliding * ux / slip, -floor.sliding * uy / slip
         turn = 2.5 / radius
         return ax, ay, turn * ay, -turn * ax, 2.0 * slip / (7.0 * floor.sliding)
     if phase == ROLLING and floor.rolling > 0.0:
         speed = math.sqrt(vx * vx + vy * vy)
+        if speed == 0.0:
+            return 0.0, 0.0, 0.0, 0.0, 0.0
         ax, ay = -floor.rolling * vx / speed, -floor.rolling * vy / speed
         return ax, ay, -ay / radius, ax / radius, speed / floor.rolling
     if phase == SPINNING and floor.spinning > 0.0:

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sandbox.engines.native.floors import of_floors, on_floor
 from sandbox.engines.overlap import BIAS, slop_of
-from sandbox.scene.demands import BALLS, JOINTS, Demand, unmodelled
+from sandbox.scene.demands import BALLS, FLOOR, JOINTS, Demand, unmodelled
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -29,7 +30,7 @@ class PymunkEngine:
 
     name: str = "pymunk"
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
-    capabilities: frozenset[Demand] = BALLS | JOINTS | {Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST}
+    capabilities: frozenset[Demand] = BALLS | JOINTS | FLOOR | {Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST}
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that pymunk lacks."""
@@ -53,6 +54,8 @@ class PymunkEngine:
             lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has drag")
         if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts):
             lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has other forces")
+        if on_floor(scene):
+            lacks += of_floors(scene)
         return tuple(lacks)
 
     def resolve(self, scene: Scene, settings: Settings) -> Settings:

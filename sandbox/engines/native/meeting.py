@@ -33,8 +33,15 @@ from sandbox.trajectory import BoolArray, FloatArray, IntArray
 class MeetingBodies:
     """Bodies in a space, addressed by their numbers. The space is not made before a first body joins."""
 
-    def __init__(self, scene: Scene, settings: Settings) -> None:
-        self._scene, self._settings = scene, settings
+    def __init__(self, scene: Scene, settings: Settings, skin: float = 0.0) -> None:
+        """Set up.
+
+        Args:
+            scene: what runs.
+            settings: resolved.
+            skin: the share of its radius by which each lone disc is larger in the space than it is.
+        """
+        self._scene, self._settings, self._skin = scene, settings, skin
         self._space = new_space(scene, settings)
         self._reader = Reader(self._space)
         self._setter = SurfaceSetter(self._space)
@@ -105,7 +112,7 @@ class MeetingBodies:
     def _give_shapes(self, number: int, bodies: Bodies) -> None:
         """Let a body in the space be touched from now on."""
         body, fixed = self._members[number].body, bool(bodies.fixed[number])
-        shapes = tuple(body_shapes(body, bodies, number))
+        shapes = tuple(body_shapes(body, bodies, number, self._skin))
         for piece, shape in shapes:
             collides = bodies.elements[bodies.element[number]].collides
             shape.filter = category(fixed, collides, int(bodies.group[number]))
@@ -192,6 +199,15 @@ class MeetingBodies:
         self._apply_forces()
         self._space.step(self._settings.h)
         self._state = None
+
+    def drive(self, velocity: FloatArray) -> None:
+        """Let all bodies of the space go by velocities (N, 2), m/s, for the next step."""
+        if self._moving:
+            self._reader.drive(velocity)
+
+    def pairs(self) -> IntArray:
+        """Return who is in contact, (K, 2) numbers, fixed things being −1 − k; a pair may be listed twice."""
+        return self._reader.pairs() if self._moving else np.empty((0, 2), np.int64)
 
     def _apply_forces(self) -> None:
         """Set what pymunk forgets after each step: the drag on all bodies, the steady forces on some."""

@@ -11,19 +11,22 @@ import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.engines.acting import derived
+from sandbox.engines.native.crowds import check_crowd
+from sandbox.engines.native.felt import Felt, State
+from sandbox.engines.native.floors import of_floors, on_floor
 from sandbox.engines.native.free import FreeFlight
 from sandbox.engines.native.meeting import MeetingBodies
+from sandbox.engines.native.overlaps import SKIN
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.meetings import meetings
+from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Collides, Scene, Single
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
-CROWD = 100
-"""Balls that a ball may be put into: pymunk takes minutes to part a thousand on one spot."""
+UNCORRECTED = 1e9
+"""m of overlap that pymunk leaves alone: on a floor that is the felt's."""
 
-SWARM = 1000
-"""The same for balls that pass through each other, of which pymunk still looks at every pair."""
+NOBODY: IntArray = np.empty(0, np.int64)
 
 
 class Population:
@@ -40,11 +43,38 @@ class Population:
         self.h = settings.h
         self._half_kick = 0.5 * settings.h if settings.half_kick else 0.0
         self.velocity[~self.bodies.fixed] += self.ahead
-        self.meeting = MeetingBodies(scene, settings)
+        self.roll = self.bodies.roll.copy()
+        self.felt = Felt(scene, settings) if on_floor(scene) else None
+        """what moves balls where there is a floor"""
+        floored = settings.replace(slop=UNCORRECTED), SKIN
+        self.meeting = MeetingBodies(scene, *(floored if self.felt is not None else (settings,)))
         self.free = FreeFlight(scene.world, settings.h, self.meeting.field)
-        self._meet = meetings(scene, self.bodies)
-        self.meeting.renew(scene, self._meet)
+        self._renew(scene, meetings(scene, self.bodies))
+        self._live()
         self._place(np.arange(len(self.bodies)))
+        self.capture()
+
+    def _renew(self, scene: Scene, meet: Meetings) -> None:
+        """Go on with a scene, and with what can meet what in it."""
+        self._meet = meet
+        if self.felt is not None:  # hits are the felt's, not pymunk's
+            self.felt.renew(scene, meet)
+            nothing = np.zeros_like(meet.surfaces.restitution)
+            meet = replace(meet, surfaces=replace(meet.surfaces, restitution=nothing, friction=nothing))
+        self.meeting.renew(scene, meet)
+
+    def _live(self) -> None:
+        """Let the felt, if there is one, move the present arrays."""
+        if self.felt is not None:
+            state = State(self.position, self.velocity, self.roll, self.angular_velocity, self.angle)
+            self.felt.live_in(state, self.bodies, self.present)
+
+    def capture(self) -> bool:
+        """Let balls fall into pockets; tell whether some did."""
+        fell = self.felt.capture() if self.felt is not None else NOBODY
+        if len(fell):
+            self.meeting.leave(fell)
+        return len(fell) > 0
 
     @property
     def ahead(self) -> FloatArray:
@@ -69,7 +99,7 @@ class Population:
 
     def changed(self) -> None:
         """Note that the halves have moved on from the arrays."""
-        self._fresh = self.ended
+        self._fresh = self.ended or self.felt is not None
 
     def end(self) -> None:
         """Let the arrays stand as they now are, for good."""
@@ -104,9 +134,9 @@ class Population:
 
     @property
     def _driven(self) -> BoolArray:
-        """(N,) which bodies only the space can kick: those with thrusts, and all where bodies attract each other."""
+        """(N,) which only the space can move: with thrusts, and all where bodies attract each other, or on a floor."""
         field = self.meeting.field
-        if field.between_bodies:
+        if field.between_bodies or self.felt is not None:
             return np.ones(len(self.bodies), dtype=np.bool_)
         if not field.level:
             return np.zeros(len(self.bodies), dtype=np.bool_)
@@ -120,19 +150,22 @@ class Population:
         """
         if self._half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             raise ActionError("drag cannot come up in a run that was started with half_kick, which knows none")
+        if self.felt is not None and (lacks := next(of_floors(scene), None)):
+            raise ActionError(lacks)
         spawned = self.bodies.elements[len(self.scene.elements) :]
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
         meet = derived(scene, bodies)
         self.refresh()
         self.velocity[self.moving] -= self.ahead
-        self.scene, self.bodies, self._meet = scene, bodies, meet
+        self.scene, self.bodies = scene, bodies
         self.velocity[self.moving] += self.ahead
         if self._half_kick:
             for number in self.meeting.movers():
                 self.meeting.set_velocity(number, self.velocity[number])
         self.free.world = scene.world
         self.free.forces_changed()
-        self.meeting.renew(scene, meet)
+        self._renew(scene, meet)
+        self._live()
 
     def motion(self, number: int) -> tuple[FloatArray, float]:
         """Return a body's velocity (2,), m/s, and angular velocity, rad/s."""
@@ -140,23 +173,58 @@ class Population:
         return self.velocity[number] - self.ahead, float(self.angular_velocity[number])
 
     def set_velocity(self, number: int, velocity: FloatArray) -> None:
-        """Give a body a velocity, m/s."""
-        self._home(number).set_velocity(number, velocity + self.ahead)
-
-    def set_spin(self, number: int, spin: float) -> None:
-        """Give a body an angular velocity, rad/s."""
-        self._home(number).set_spin(number, spin)
-
-    def set_roll(self, number: int, roll: tuple[float, float]) -> None:  # noqa: ARG002, all casts are asked alike
-        """Refuse: pymunk's bodies turn about one axis.
+        """Give a body a velocity, m/s.
 
         Raises:
-            ActionError: always.
+            ActionError: it lies in a pocket.
         """
-        raise ActionError(f"pymunk does not model the spin of {self.bodies.names[number]!r}")
+        if self._plays(number):
+            self.velocity[number] = velocity
+        else:
+            self._home(number).set_velocity(number, velocity + self.ahead)
+
+    def set_spin(self, number: int, spin: float) -> None:
+        """Give a body an angular velocity, rad/s.
+
+        Raises:
+            ActionError: it lies in a pocket.
+        """
+        if self._plays(number):
+            self.angular_velocity[number] = spin
+        else:
+            self._home(number).set_spin(number, spin)
+
+    def set_roll(self, number: int, roll: tuple[float, float]) -> None:
+        """Give a ball on a floor an angular velocity about x and y, rad/s; on one that asks for nothing it is none.
+
+        Raises:
+            ActionError: it lies in a pocket.
+        """
+        if self._plays(number):
+            self.roll[number] = roll
+
+    def _plays(self, number: int) -> bool:
+        """Tell whether a body is a ball on a floor.
+
+        Raises:
+            ActionError: it lies in a pocket.
+        """
+        if self.felt is None:
+            return False
+        if self._pocketed(number):
+            raise ActionError(f"{self.bodies.names[number]!r} lies in a pocket; move it back into play first")
+        return True
+
+    def _pocketed(self, number: int) -> bool:
+        return self.felt is not None and bool(self.felt.pocket[number] >= 0)
 
     def push(self, number: int, force: FloatArray, torque: float) -> None:
-        """Let a steady force (N) and torque (N·m) act on a body from now on."""
+        """Let a steady force (N) and torque (N·m) act on a body from now on.
+
+        Raises:
+            ActionError: it lies in a pocket.
+        """
+        self._plays(number)
         half = self._home(number)
         if torque and half is self.meeting and not math.isfinite(half.moment(number)):
             half.give_moment(number, float(self.bodies.moment[number]))
@@ -166,6 +234,10 @@ class Population:
         """Put a body somewhere, m."""
         self.refresh()
         self.position[number] = position
+        if self.felt is not None and self._pocketed(number):
+            self.felt.free(number)
+            self._place(np.asarray([number]))
+            return
         half = self.half_of(number)
         if half is not None:
             half.set_position(number, position)
@@ -181,25 +253,29 @@ class Population:
         """Add a body and return its number.
 
         Raises:
-            ActionError: it makes more surfaces than a scene may have.
+            ActionError: it makes more surfaces than a scene may have, or is nothing for this floor.
         """
         scene = self.scene
         bodies = self.bodies.joined_by(single, name)
+        if self.felt is not None and (lacks := next(of_floors(scene, bodies), None)):
+            raise ActionError(lacks)
         meet = derived(scene, bodies)
         self.refresh()
         number = len(self.bodies)
-        self.bodies, self._meet = bodies, meet
+        self.bodies = bodies
         ahead = np.zeros(2) if single.fixed else self.ahead
         self.position = np.vstack((self.position, self.bodies.position[-1:]))
         self.velocity = np.vstack((self.velocity, self.bodies.velocity[-1:] + ahead))
         self.angle = np.append(self.angle, self.bodies.angle[-1])
         self.angular_velocity = np.append(self.angular_velocity, self.bodies.angular_velocity[-1])
+        self.roll = np.vstack((self.roll, self.bodies.roll[-1:]))
         self.present = np.append(self.present, True)
 
-        self.meeting.renew(scene, meet)
+        self._renew(scene, meet)
+        self._live()
         self.meeting.touched(bodies)
         out = [n for n in np.flatnonzero(self.present & ~meet.free).tolist() if not self.meeting.holds(n)]
-        self._promote(np.asarray([n for n in out if n != number], np.int64))
+        self._promote(np.asarray([n for n in out if n != number and not self._pocketed(n)], np.int64))
         self._place(np.asarray([number]))
         return number
 
@@ -223,7 +299,9 @@ class Population:
         self.free.leave(numbers)
         self.meeting.leave(np.asarray([n for n in numbers.tolist() if self.meeting.holds(n)], np.int64))
         self.present[numbers] = False
-        self.velocity[numbers], self.angular_velocity[numbers] = 0.0, 0.0
+        self.velocity[numbers], self.angular_velocity[numbers], self.roll[numbers] = 0.0, 0.0, 0.0
+        if self.felt is not None:
+            self.felt.leave(numbers)
 
     def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
         """Refuse a place that pymunk cannot start from.
@@ -235,10 +313,4 @@ class Population:
         self.refresh()
         if not self.meeting.reaches(place):
             raise ActionError(f"{position} m is out of reach: pymunk's half-planes end before it")
-        near = np.hypot(*(self.position - place).T) < self.bodies.radius + radius
-        into = self.bodies.element[near & self.present]
-        how = [self.bodies.elements[element].collides for element in into.tolist()]
-        if collides == "all" and how.count("all") >= CROWD:
-            raise ActionError(f"it would overlap {how.count('all')} bodies; pymunk parts {CROWD} at most")
-        if len(how) - how.count("none") >= SWARM:
-            raise ActionError(f"it would overlap {len(how) - how.count('none')} bodies; at most {SWARM}")
+        check_crowd(place, radius, collides, self.position, self.bodies, self.present)

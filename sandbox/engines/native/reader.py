@@ -24,6 +24,8 @@ TOUCH = (
 )
 
 
+WHO = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID | ArbiterFields.CONTACT_COUNT
+
 SECOND = ArbiterFields.POINT_A_2 | ArbiterFields.POINT_B_2
 """What polygons have besides: they touch in two points."""
 
@@ -94,6 +96,25 @@ class Reader:
         self._outgoing[self._rows] = force
         self._forces.set_float_buf(self._outgoing.reshape(-1))
         set_space_bodies(self._space, BodyFields.FORCE, self._forces)
+
+    def drive(self, velocity: FloatArray) -> None:
+        """Set the velocities of all bodies that move to theirs of (N, 2), m/s, in scene order."""
+        if self._moved:
+            self._read_order()
+        self._outgoing = np.zeros((self._all, 2))  # kept alive, as in `push`; static bodies go nowhere
+        self._outgoing[self._rows] = velocity[self._numbers]
+        self._forces.set_float_buf(self._outgoing.reshape(-1))
+        set_space_bodies(self._space, BodyFields.VELOCITY, self._forces)
+
+    def pairs(self) -> IntArray:
+        """Return the numbers (K, 2) of who is in contact; a pair is listed as often as its shapes touch."""
+        self._arbiters.clear()
+        get_space_arbiters(self._space, WHO, self._arbiters)
+        words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
+        if not len(words):
+            return np.empty((0, 2), np.int64)
+        live = words[words[:, 2] > 0]
+        return np.column_stack([self._number_of.numbers(live[:, k]) for k in (0, 1)])
 
     def touching(self, polygons: bool = False) -> Touching:
         """Return what touches now, as arrays of their own; with polygons, which may touch in two points."""

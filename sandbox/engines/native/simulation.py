@@ -30,6 +30,9 @@ class NativeSimulation(Running):
 
     Contacts are found at the end of a substep, with no time of impact: a body that passes a thin thing within one
     substep is not seen to touch it.
+
+    On a floor balls slide and roll as `felt.py` has it: exactly while they meet nothing, and hits are taken back to
+    when the two touched.
     """
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
@@ -109,6 +112,14 @@ class NativeSimulation(Running):
     def _finish(self, part: float) -> None:
         whole, rest = divmod(part * self._settings.substeps, 1.0)
         self._advance(int(whole))
+        if self._population.felt is not None:  # which can take a shorter step, with its contacts
+            if rest:
+                self._substep(int(whole), share=rest)
+            self._part = part
+            self._guard()
+            self._retire()
+            self._population.end()
+            return
         before = [array.copy() for array in self._state()]
         self._substep(int(whole), look=False, share=rest)  # its contacts lie beyond the end
         self._part = part
@@ -131,6 +142,7 @@ class NativeSimulation(Running):
                 leaving = perform(action, self._population)
                 self._population.changed()
                 self._still = None
+            self._population.capture()
             if self._ledger is not None:
                 self._ledger.joints = self._population.meeting.joints  # a spawned body may have several pieces
             if leaving is not None:
@@ -143,27 +155,36 @@ class NativeSimulation(Running):
         position, velocity = position.copy(), velocity.copy()
         if self._settings.half_kick:
             velocity[population.moving] -= population.ahead
-        if population.turns or self._still is None:
+        if population.turns or population.felt is not None or self._still is None:
             self._still = angle.copy(), angular_velocity.copy()
         angle, angular_velocity = self._still
-        return Frame(self.time, position, velocity, angle, angular_velocity, population.present.copy())
+        roll = None if population.felt is None else population.roll.copy()
+        return Frame(self.time, position, velocity, angle, angular_velocity, population.present.copy(), roll)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
             meeting = self._population.meeting
-            self._ledger = ContactLog(len(self._population.scene.fixed), meeting.joints)
+            scene = self._population.scene
+            self._ledger = ContactLog(len(scene.fixed) + len(scene.pockets), meeting.joints)
             self._record(self.time)
         return self._ledger.take()
 
     def account(self) -> Mapping[Cause, float]:
         """Return the energy that each cause has brought since the first call, J; that call opens the account."""
+        felt = self._population.felt
+        if felt is not None:  # it books as it goes
+            felt.account = felt.account or Account()
+            return felt.account.entries()
         if self._books is None:
             self._books = Books(self._population)
         return self._books.account.entries()
 
     @property
     def _outside(self) -> Account | None:
+        felt = self._population.felt
+        if felt is not None:
+            return felt.account
         return None if self._books is None else self._books.account
 
     def watch(self, observer: Observer) -> None:
@@ -198,11 +219,17 @@ class NativeSimulation(Running):
         """
         population, h = self._population, self._settings.h
         start = self.time + k * h
-        before = self._state()[0].copy() if self._observer is not None else None
+        before = self._seen() if self._observer is not None else None
         opening = self._books.opening() if self._books is not None else None
         if fly:
             population.free.step()
-        population.meeting.step(start)
+        if population.felt is None:
+            population.meeting.step(start)
+        else:
+            if self._ledger is None:
+                population.felt.told()  # who fell before contacts were asked for is nobody's concern
+            population.felt.step(population.meeting, start, share)
+            population.capture()
         self._work["joint_iterations"] += population.meeting.joined * self._settings.iterations
         population.changed()
         if self._books is not None:
@@ -210,9 +237,16 @@ class NativeSimulation(Running):
         if population.meeting.breakable and look:
             self._come_apart(population.torn(), self._after(k + 1))
         if self._ledger is not None and look:
-            self._record(start + h)
+            self._record(start + h * share)
             if self._observer is not None and before is not None:
-                self._observer(start, before, self._state()[0], self._ledger.pairs())
+                self._observer(start, before, self._seen(), self._ledger.pairs())
+
+    def _seen(self) -> FloatArray:
+        """Return the centres, (N, 2) m, as an observer is told; of balls that lie in pockets nan."""
+        position, felt = self._state()[0].copy(), self._population.felt
+        if felt is not None:
+            position[felt.pocket >= 0] = np.nan
+        return position
 
     def _come_apart(self, numbers: IntArray, time: float) -> None:
         """Note that joints, by their numbers, have come apart."""
@@ -222,7 +256,8 @@ class NativeSimulation(Running):
 
     def _record(self, time: float) -> None:
         if self._ledger is not None:
-            now = self._population.meeting.touching()
+            felt = self._population.felt
+            now = self._population.meeting.touching() if felt is None else felt.told()
             self._work["contacts"] += len(now.a)
             self._work["contact_iterations"] += len(now.a) * self._settings.iterations
             self._ledger.record(time, now)
@@ -235,7 +270,8 @@ class NativeSimulation(Running):
 
     def _guard(self) -> None:
         """Stop what is no longer finite and bounded, or has left the reach within which planes are planes."""
-        for half in (self._population.free, self._population.meeting):
+        population = self._population
+        for half in (population.free, population.meeting, *(() if population.felt is None else (population.felt,))):
             beyond = half.beyond()
             if beyond is not None:
                 self._population.end()

@@ -86,10 +86,12 @@ def fixed_shapes(
         yield pymunk.Circle(body, thing.radius, thing.position)
 
 
-def body_shapes(body: pymunk.Body, bodies: Bodies, number: int) -> Iterator[tuple[int, pymunk.Shape]]:
-    """Yield the shapes of a body with the number of each among all pieces of all bodies."""
+def body_shapes(
+    body: pymunk.Body, bodies: Bodies, number: int, skin: float = 0.0
+) -> Iterator[tuple[int, pymunk.Shape]]:
+    """Yield the shapes of a body with the number of each among all pieces of all bodies; lone discs with a skin."""
     if bodies.round.all():
-        yield number, pymunk.Circle(body, float(bodies.radius[number]))
+        yield number, pymunk.Circle(body, float(bodies.radius[number]) * (1.0 + skin))
         return
     shapes = bodies.shapes
     first, last = np.searchsorted(shapes.body, (number, number + 1)).tolist()

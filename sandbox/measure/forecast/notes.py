@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sandbox.measure.forecast.breaks import break_notes
 from sandbox.measure.forecast.horizon import horizon_notes
 from sandbox.measure.forecast.warning import Warning
 from sandbox.scene.meetings import meetings
@@ -17,7 +18,7 @@ MOST_TOLD = 20
 
 def notes(scene: Scene) -> list[Warning]:
     """Return notes: how each concave outline is cut, what an audit cannot count, until when positions can be told."""
-    return [*_outlines(scene), *_audit(scene), *horizon_notes(scene)]
+    return [*_outlines(scene), *_audit(scene), *horizon_notes(scene), *break_notes(scene)]
 
 
 def _outlines(scene: Scene) -> Iterator[Warning]:

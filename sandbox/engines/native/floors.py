@@ -1,0 +1,31 @@
+"""Floors: which scenes are played on one, and what pymunk cannot model there. Imports no pymunk."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.demands import FLOOR, demands
+from sandbox.scene.model import Scene
+
+
+def on_floor(scene: Scene) -> bool:
+    """Tell whether a scene has what only balls on a floor have; of one that asks for nothing of it, they are discs."""
+    return (scene.surface is not None or bool(scene.pockets)) and bool(demands(scene) & FLOOR)
+
+
+def of_floors(scene: Scene, bodies: Bodies | None = None) -> Iterator[str]:
+    """Say what a scene on a floor has, with its own bodies or with those it has come to have, that is not modelled."""
+    bodies = scene.bodies if bodies is None else bodies
+    world = scene.world
+    if world.gravity != (0.0, 0.0):
+        yield "it does not model world.gravity in the plane of a floor"
+    if world.linear_drag or world.quadratic_drag:
+        yield "it does not model drag on a floor"
+    if len(scene.links) or scene.attractions or scene.thrusts:
+        yield "it does not model joints, attraction or thrusts on a floor"
+    if not bodies.round.all():
+        yield "it does not model bodies other than balls on a floor"
+    meets = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
+    if scene.surface is not None and len(np.unique(bodies.radius[meets & bodies.round])) > 1:
+        yield "it does not model balls of different radii that meet on a floor: where they touch is not level"
