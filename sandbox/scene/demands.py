@@ -177,6 +177,11 @@ def _count(n: int, one: str, many: str, none: str) -> str:
     return none if n == 0 else f"{n:,} {one if n == 1 else many}"
 
 
+def on_floor(scene: Scene) -> bool:
+    """Tell whether a scene has what only spheres on a floor have; of one that asks for none of it, they only turn."""
+    return bool(demands(scene) & FLOOR)
+
+
 def unmodelled(scene: Scene, capabilities: frozenset[Demand]) -> list[str]:
     """Return in words what a scene demands beyond what an engine can do: one reason, or none."""
     *others, last = "", *sorted(map(str, demands(scene) - capabilities))

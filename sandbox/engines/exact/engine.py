@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sandbox.scene.demands import BALLS, FLOOR, Demand, demands, unmodelled
+from sandbox.scene.demands import BALLS, FLOOR, Demand, on_floor, unmodelled
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -73,11 +73,6 @@ class ExactEngine:
 
             return RollingSimulation(scene, settings)
         return ExactSimulation(scene, settings)
-
-
-def on_floor(scene: Scene) -> bool:
-    """Tell whether a scene has what only balls on a floor have; of one that asks for nothing of it, they are discs."""
-    return bool(demands(scene) & FLOOR)
 
 
 def _of_floors(scene: Scene) -> Iterator[str]:

@@ -220,7 +220,7 @@ def _with_room(pairs: IntArray, plays: BoolArray) -> tuple[IntArray, int]:
     if not len(pairs):
         return pairs, 0
     first, second = pairs.max(axis=1), pairs.min(axis=1)
-    swapped = (second >= 0) & plays[second]
+    swapped = (second >= 0) & plays[np.maximum(second, 0)]
     first, second = np.where(swapped, second, first), np.where(swapped, first, second)
     once = np.unique(np.column_stack((first, second))[plays[first]], axis=0)
     return np.concatenate((once, np.zeros((ROOM + len(once), 2), np.int64))), len(once)

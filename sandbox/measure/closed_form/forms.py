@@ -14,6 +14,7 @@ from sandbox.measure.closed_form.on_plane import on_plane
 from sandbox.measure.closed_form.oscillator import oscillator
 from sandbox.measure.closed_form.pendulum import pendulum
 from sandbox.measure.closed_form.standing import standing
+from sandbox.scene.demands import on_floor
 from sandbox.scene.model import Scene
 from sandbox.trajectory import ContactEvent, Contacts, FloatArray, IntArray
 
@@ -79,6 +80,8 @@ def solution(scene: Scene) -> Solution | None:
 
     Where no two bodies that move can meet or are joined, each needs a form of its own; else all need one together.
     """
+    if on_floor(scene):
+        return None
     given = Given.of(scene)
     if given.meet.mutual:
         found = next((form for form in (assemble(given) for assemble in TOGETHER) if form is not None), None)

@@ -25,12 +25,16 @@ def gap(scene: Scene, bodies: Bodies, position: FloatArray, angle: FloatArray, p
     """
     first, second = pair
     centre = position[:, first]
+    if -1 - second >= len(scene.fixed):  # a pocket is in contact with whose centre it holds
+        pocket = scene.pockets[-1 - second - len(scene.fixed)]
+        return _distance(centre - np.asarray(pocket.position)) - pocket.radius
     thing = scene.fixed[-1 - second] if second < 0 else None
     if isinstance(thing, Plane):
         normal = np.asarray(thing.normal) / math.hypot(*thing.normal)
         return gap_above(bodies, first, centre, angle[:, first], np.asarray(thing.point), normal)
     if bodies.round[first] and (second < 0 or bodies.round[second]):
-        return _of_disc(centre, float(bodies.radius[first]), thing, position[:, second], float(bodies.radius[second]))
+        other, its_radius = (centre, 0.0) if second < 0 else (position[:, second], float(bodies.radius[second]))
+        return _of_disc(centre, float(bodies.radius[first]), thing, other, its_radius)
     if thing is None:
         others = list(pieces_over_time(bodies, second, position[:, second], angle[:, second]))
     else:

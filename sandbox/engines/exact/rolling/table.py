@@ -17,7 +17,7 @@ from typing import Self
 import numpy as np
 
 from sandbox.engines.contract import Exhaustion, Refusal
-from sandbox.engines.exact.engine import ExactEngine, on_floor
+from sandbox.engines.exact.engine import ExactEngine
 from sandbox.engines.exact.rolling.board import LIMIT, PHASE, RECORDING, ROWS, STEPS, TRACING, VX, WZ, Board, X, Y
 from sandbox.engines.exact.rolling.outcome import Outcome
 from sandbox.engines.exact.rolling.play import DONE, FULL, TOO_MANY
@@ -25,6 +25,7 @@ from sandbox.engines.exact.rolling.record import too_many, with_paths, with_room
 from sandbox.engines.exact.rolling.shoot import UNSTRUCK, shoot, shoot_many
 from sandbox.engines.exact.rolling.simulation import RollingSimulation
 from sandbox.scene.cue import Stroke, struck
+from sandbox.scene.demands import on_floor
 from sandbox.scene.model import Scene
 from sandbox.trajectory import FloatArray, IntArray
 
