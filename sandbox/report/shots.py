@@ -27,7 +27,7 @@ AIMS = 1501
 """Shots over the angles that are drawn."""
 
 WIDE = 4.0
-"""Standard deviations of aim to each side that are drawn, or the windows that were asked for."""
+"""Standard deviations of aim to each side that are drawn, or the nearest windows that were asked for."""
 
 LEAST = 1e-3
 """rad to each side that are drawn at least"""
@@ -85,10 +85,11 @@ def draw_rests(odds: Odds) -> Figure:
 def draw_aims(found: Study) -> Figure:
     """Return where the struck ball rests, and into which pocket each ball falls, over the angle of aim."""
     odds, attempt = found.odds, found.attempt
+    nearest = [(each, each.nearest) for each in found.windows]
     half = max(
         LEAST,
         WIDE * odds.spread.aim,
-        *(1.2 * max(abs(one.low - each.aim), abs(one.high - each.aim)) for each in found.windows for one in each.found),
+        *(1.2 * max(abs(near.low - each.aim), abs(near.high - each.aim)) for each, near in nearest if near),
     )
     off = np.linspace(-half, half, AIMS)
     fan = attempt.fan([attempt.changed("aim", by) for by in off.tolist()])
