@@ -32,7 +32,7 @@ def test_growth_per_hit_is_that_of_the_gaps() -> None:
     d, hits = 0.2, 4
     scene = floor(*(ball(str(k), d * k) for k in range(1, hits + 1)), shot(0.0, 4.0))
     gap = d - 2.0 * R
-    # Three hits that each make g/2R out of what the cue ball was off by at the first. Balls that have hit drift aside as
+    # Three hits that each make g/2R of what the cue ball was off by at the first. Balls that have hit drift aside as
     # much as who they hit goes astray, so it may be either.
     tolerance = 0.999 * 1e-9 * gap * (gap / (2.0 * R)) ** (hits - 1)
     found = horizon(scene, nudge=1e-9, tolerance=tolerance, ladder=()).parted
