@@ -74,7 +74,7 @@ class Odds:
 
     @property
     def unfinished(self) -> int:
-        """How many shots were given up, with too many events."""
+        """How many shots were given up: not all came to rest in time, or there were too many events."""
         return int(np.count_nonzero(~np.asarray(self.fan.complete, np.bool_)))
 
     def chance(self, ball: str, pocket: str | None = None) -> Chance:
