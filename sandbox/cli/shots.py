@@ -107,11 +107,11 @@ def command(
             return refused(faults, as_json, scene=scene, status="refused", odds=None)
     try:
         with telling(quiet or as_json) as told:
-            if told is not None:
-                told(f"playing {count:,} shots")
+            say = None if told is None else lambda share: told(f"playing {count:,} shots: {100.0 * share:.0f} %")
             found = study(
                 attempt, spread, count=count, seed=seed, threads=threads or os.cpu_count() or 1, slopes=slopes,
                 pots=wanted, foretold=foretold, nudge=nudge, by=by, tolerance=tolerance,
+                progress=say,
             )  # fmt: skip
     except Exhaustion as error:
         return _failed(scene, "failed", str(error), as_json)
@@ -121,6 +121,9 @@ def command(
     elif not quiet:
         print_study(scene, found)
     status = 0 if found.answered else 1
+    if found.odds.interrupted:
+        click.echo(f"interrupted: {found.odds.count:,} of {count:,} shots are played and counted", err=True)
+        status = 130
     return max(status, _kept(found, document, out, quiet or as_json))
 
 

@@ -1,13 +1,15 @@
 """Odds: how likely each ball falls into each pocket, and where balls stay, if a stroke strays as a player's does."""
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from sandbox.engines.exact.rolling.outcome import Outcome
 from sandbox.engines.exact.rolling.table import Fan
+from sandbox.interrupt import uninterrupted
 from sandbox.measure.shots.attempt import Attempt, attempt_of
 from sandbox.measure.shots.spread import Spread, sound, strayed
 from sandbox.measure.shots.wilson import wilson
@@ -16,6 +18,12 @@ from sandbox.trajectory import FloatArray
 
 COUNT = 10_000
 """Shots of an ensemble: a probability of a half is then known to 1 %."""
+
+TOGETHER = 512
+"""Shots that a thread plays between looks at whether it is interrupted: 0.2 s of breaks."""
+
+Progress = Callable[[float], None]
+"""Called now and then with the share of the shots that are played, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +74,8 @@ class Odds:
     fan: Fan
     """the M − `miscues` shots that were played"""
     miscues: int
+    interrupted: bool = False
+    """whether these are not all that were asked for"""
 
     @property
     def count(self) -> int:
@@ -129,6 +139,7 @@ class Odds:
             "count": self.count,
             "seed": self.seed,
             "spread": asdict(self.spread),
+            "interrupted": self.interrupted,
             "miscues": self.miscues,
             "unfinished": self.unfinished,
             "scratch": self.scratch.document(),
@@ -146,10 +157,11 @@ def odds(
     seed: int | None = None,
     threads: int = 1,
     errors: FloatArray | None = None,
+    progress: Progress | None = None,
 ) -> Odds:
     """Play a shot many times, each a little off, and count what came of it.
 
-    The same seed gives the same odds bit for bit, whatever the number of threads.
+    The same seed gives the same odds bit for bit, whatever the number of threads. An interrupt keeps what was played.
 
     Args:
         scene: with a `[surface]` and a `[[shot]]`.
@@ -159,6 +171,7 @@ def odds(
         seed: of what is drawn; by default the scene's.
         threads: how many play at once.
         errors: (M, 4) rad, share, of the radius twice: played instead of what would be drawn.
+        progress: who is told how far it is.
 
     Raises:
         NoSuchShotError: the scene has no such shot.
@@ -169,6 +182,20 @@ def odds(
     spread = Spread() if spread is None else spread
     seed = attempt.table.scene.world.seed if seed is None else seed
     drawn = spread.draw(count, seed) if errors is None else np.asarray(errors, np.float64).reshape(-1, 4)
-    strokes, kept = sound(strayed(attempt.stroke, drawn))
-    fan = attempt.fan(strokes, threads)
-    return Odds(attempt, spread, seed, attempt.played(), drawn, fan, int(np.count_nonzero(~kept)))
+    nominal, played, miscues = attempt.played(), 0, 0
+    parts: list[Fan] = []
+    try:
+        while played < len(drawn) or not parts:
+            some = drawn[played : played + TOGETHER * threads]
+            strokes, kept = sound(strayed(attempt.stroke, some))
+            fan = attempt.fan(strokes, threads)
+            with uninterrupted():
+                parts.append(fan)
+                played, miscues = played + len(some), miscues + int(np.count_nonzero(~kept))
+            if progress is not None:
+                progress(played / max(len(drawn), 1))
+    except KeyboardInterrupt:
+        if not parts:
+            raise
+    whole = Fan(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Fan)))
+    return Odds(attempt, spread, seed, nominal, drawn[:played], whole, miscues, played < len(drawn))

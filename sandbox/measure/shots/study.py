@@ -6,7 +6,7 @@ from typing import Any
 
 from sandbox.measure.shots.attempt import Attempt, NoSuchShotError
 from sandbox.measure.shots.horizon import NUDGE, TOLERANCE, By, Horizon, horizon
-from sandbox.measure.shots.odds import COUNT, Odds, odds
+from sandbox.measure.shots.odds import COUNT, Odds, Progress, odds
 from sandbox.measure.shots.sensitivity import Slope, sensitivity
 from sandbox.measure.shots.spread import Spread
 from sandbox.measure.shots.windows import Windows, windows
@@ -59,8 +59,9 @@ def study(
     nudge: float = NUDGE,
     by: By = "aim",
     tolerance: float = TOLERANCE,
+    progress: Progress | None = None,
 ) -> Study:
-    """Ask about a shot.
+    """Ask about a shot; of one whose ensemble is interrupted nothing else.
 
     Args:
         attempt: which.
@@ -74,14 +75,18 @@ def study(
         nudge: of the horizon.
         by: what is nudged.
         tolerance: m, of the horizon.
+        progress: who is told how many of the strokes are played.
 
     Raises:
         Exhaustion: a shot has too many events.
         NoSuchShotError: no ball or pocket has such a name.
     """
+    chances = odds(attempt, spread=spread, count=count, seed=seed, threads=threads, progress=progress)
+    if chances.interrupted:
+        return Study(attempt, chances, None, (), None)
     return Study(
         attempt,
-        odds(attempt, spread=spread, count=count, seed=seed, threads=threads),
+        chances,
         sensitivity(attempt) if slopes else None,
         tuple(windows(attempt, ball, pocket, threads=threads) for ball, pocket in pots),
         horizon(attempt, nudge=nudge, by=by, tolerance=tolerance, spread=spread) if foretold else None,

@@ -89,7 +89,8 @@ def test_miscues_are_counted_and_pot_nothing() -> None:
 
 def test_document_has_all_of_it() -> None:
     found = odds(straight_pot(0.5, 1.0), count=50).document()
-    assert set(found) == {"count", "seed", "spread", "miscues", "unfinished", "scratch", "any_pot", "balls"}
+    figures = {"count", "seed", "spread", "miscues", "unfinished", "interrupted"}
+    assert set(found) == {*figures, "scratch", "any_pot", "balls"}
     into = found["balls"]["object"]["pockets"]["hole"]
     assert into["probability"] == into["hits"] / 50
     assert into["low"] <= into["probability"] <= into["high"]

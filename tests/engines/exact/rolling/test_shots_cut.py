@@ -35,7 +35,8 @@ def test_fans_tell_which_shots_were_cut() -> None:
 
 
 def test_a_ball_that_nothing_slows_never_completes() -> None:
-    scene = loads('[surface]\nspinning_friction = 0.01\n[[ball]]\nname = "cue"\nposition = [0, 0]\nvelocity = [1, 0]\nradius = 0.03\n')
+    ball = '[[ball]]\nname = "cue"\nposition = [0, 0]\nvelocity = [1, 0]\nradius = 0.03\n'
+    scene = loads(f"[surface]\nspinning_friction = 0.01\n{ball}")
     outcome = Table(scene).shoot(until=3.0)
     assert not outcome.complete
     assert outcome.position[0] == pytest.approx([3.0, 0.0], abs=1e-14)  # rounding
