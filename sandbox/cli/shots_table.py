@@ -15,6 +15,13 @@ from sandbox.measure.shots.sensitivity import Slope
 from sandbox.measure.shots.study import Study
 from sandbox.measure.shots.windows import Windows
 
+ODDS_HEADS = ("ball", "falls", "95 %", "into", "else rests at, m", "spread, m", "as it is meant")
+OF_POCKETS = slice(1, 4)
+"""Those that a table without pockets does without."""
+
+MOST_POCKETS = 3
+"""Named of each ball; `--json` has all."""
+
 
 def print_study(scene: str, found: Study) -> None:
     """Print what is asked about, each ball's odds, and the answers.
@@ -28,7 +35,11 @@ def print_study(scene: str, found: Study) -> None:
 
     title = found.attempt.table.scene.title
     console = Console(width=None if sys.stdout.isatty() else WIDE)
-    tables = [_table(_ODDS_HEADS, _odds_rows(found.odds))]
+    rows = [list(ODDS_HEADS), *_odds_rows(found.odds)]
+    if not found.attempt.pockets:
+        for row in rows:
+            del row[OF_POCKETS]
+    tables = [_table(rows[0], rows[1:])]
     if found.slopes is not None:
         heads = [f"d/d({variable}), m/{UNITS[variable]}" for variable in VARIABLES]
         tables.append(_table(["ball", *heads, "same course within"], _slope_rows(found.slopes)))
@@ -48,9 +59,6 @@ def print_study(scene: str, found: Study) -> None:
     if found.horizon is not None:
         for line in _horizon(found.horizon):
             click.echo(line)
-
-
-_ODDS_HEADS = ["ball", "falls", "95 %", "into", "else rests at, m", "spread, m", "as it is meant"]
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
@@ -93,7 +101,7 @@ def _odds_rows(odds: Odds) -> list[list[str]]:
                 ball,
                 _percent(fell.share),
                 _bounds(fell),
-                ", ".join(f"{pocket} {_percent(chance.share)}" for pocket, chance in often) or "–",
+                _into(often),
                 "–" if rest is None else _place(rest.mean),
                 "–" if rest is None else _place(rest.spread),
                 meant,
@@ -102,7 +110,14 @@ def _odds_rows(odds: Odds) -> list[list[str]]:
     return rows
 
 
+def _into(often: Sequence[tuple[str, Chance]]) -> str:
+    named = [f"{pocket} {_percent(chance.share)}" for pocket, chance in often[:MOST_POCKETS]]
+    return ", ".join([*named, *(["…"] if len(often) > MOST_POCKETS else [])]) or "–"
+
+
 def _in_all(odds: Odds) -> Iterator[str]:
+    if not odds.attempt.pockets:
+        return
     pot, scratch = odds.any_pot, odds.scratch
     yield f"something else falls and {odds.attempt.ball!r} does not: {_percent(pot.share)}, {_bounds(pot)}"
     yield f"{odds.attempt.ball!r} falls: {_percent(scratch.share)}, {_bounds(scratch)}"
@@ -147,9 +162,9 @@ def _horizon(found: Horizon) -> Iterator[str]:
     yield f"nudged by {found.parted.nudge:g} {unit}: {_parted(found.by_a_radius, 'a radius')}"
     if found.player is not None:
         yield f"by a player's error: {_parted(found.player, 'a radius')}"
-    rungs = [
-        f"{each.nudge:.0e}: {'to the end' if each.time is None else f'{each.time:.3g} s'}" for each in found.ladder
-    ]
+    rungs = [f"{each.nudge:.0e}: {each.time:.3g} s" for each in found.ladder if each.time is not None]
+    whole = [each.nudge for each in found.ladder if each.time is None]
+    rungs += [f"{max(whole):.0e}: to the end"] if whole else []
     yield f"foretold within {within}, by how well aim is known, rad: {', '.join(rungs)}"
     digits = found.digits_per_second
     if digits is not None:
@@ -158,7 +173,7 @@ def _horizon(found: Horizon) -> Iterator[str]:
 
 def _parted(each: Parted, within: str) -> str:
     if each.time is None:
-        return f"no ball is ever {within} elsewhere"
+        return f"no ball is ever {within} elsewhere; {1e3 * each.farthest:.2g} mm at most"
     grown = ""
     if each.growth_per_hit is not None and each.growth_per_second is not None:
         decade = math.log(10.0) / each.growth_per_second

@@ -1,6 +1,7 @@
 """Pictures of shots: where balls come to rest over the table, and what falls where over the angle of aim."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -76,14 +77,15 @@ def draw_rests(odds: Odds) -> Figure:
         panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, m", ylabel="y, m")
         literal(panel.set_title(shortened(name), loc="left", size=11, color=INK))
     glow = ScalarMappable(scale_of, GLOW)
-    bar = figure.colorbar(glow, ax=list(panels), shrink=0.7, label=f"rests in a field of {100.0 * side:.2g} cm")
+    bar = figure.colorbar(glow, ax=list(panels), shrink=0.7)
     bar.ax.yaxis.set_major_formatter("{x:g}")
-    _head(figure, f"{_title(odds)}: where balls come to rest, {odds.count:,} shots")
+    about = f"where balls come to rest, of {odds.count:,} shots in a field of {100.0 * side:.2g} cm"
+    _head(figure, f"{_title(odds)}: {about}")
     return figure
 
 
 def draw_aims(found: Study) -> Figure:
-    """Return where the struck ball rests, and into which pocket each ball falls, over the angle of aim."""
+    """Return where the struck ball rests, and into which pocket it falls, and whatever else does, over the aim."""
     odds, attempt = found.odds, found.attempt
     nearest = [(each, each.nearest) for each in found.windows]
     half = max(
@@ -93,12 +95,13 @@ def draw_aims(found: Study) -> Figure:
     )
     off = np.linspace(-half, half, AIMS)
     fan = attempt.fan([attempt.changed("aim", by) for by in off.tolist()])
-    names = attempt.table.names
-    rows = 0.26 * len(names)
+    names, own = attempt.table.names, attempt.number(attempt.ball)
+    shown = [k for k in range(len(names)) if k == own or (fan.pocket[:, k] >= 0).any()]
+    rows = 0.26 * len(shown)
     figure = Figure(figsize=(9.0, 3.6 + rows + 1.4), facecolor="white", layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3.6, rows + 0.2))
-    _draw_place(upper, 1e3 * off, fan, attempt.number(attempt.ball), attempt.ball)
-    _draw_falls(lower, 1e3 * off, fan.pocket, names)
+    _draw_place(upper, 1e3 * off, fan, own, attempt.ball)
+    _draw_falls(lower, 1e3 * off, fan.pocket[:, shown], [names[k] for k in shown])
     for panel in (upper, lower):
         panel.axvline(0.0, color=FAINT, lw=0.9, ls=(0, (2, 3)))
         panel.axvspan(-1e3 * odds.spread.aim, 1e3 * odds.spread.aim, color=FAINT, alpha=0.12, lw=0)
@@ -164,7 +167,7 @@ def _draw_place(panel: Axes, off: FloatArray, fan: Fan, own: int, ball: str) -> 
     panel.grid(color="#e4e4e4", lw=0.6)
 
 
-def _draw_falls(panel: Axes, off: FloatArray, pocket: IntArray, names: tuple[str, ...]) -> None:
+def _draw_falls(panel: Axes, off: FloatArray, pocket: IntArray, names: Sequence[str]) -> None:
     most = max(int(pocket.max()), 0)
     colours = ListedColormap([STAYS, *(_colour(hole) for hole in range(most + 1))])
     step = 0.5 * float(off[1] - off[0])

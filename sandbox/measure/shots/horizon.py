@@ -46,6 +46,8 @@ class Parted:
     """by what the distance grew each time, from the first hit on; None where nothing hit"""
     growth_per_second: float | None
     """1/s, of its logarithm, likewise"""
+    farthest: float
+    """m, by which a ball is elsewhere at most, up to the end"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -172,8 +174,9 @@ def _as_a_player(attempt: Attempt, spread: Spread) -> list[Outcome]:
 def _parted(meant: Outcome, pairs: Sequence[Parting], nudge: float, tolerance: float) -> Parted:
     """Return when the first of some pairs parts."""
     found = [(*when, pair) for pair in pairs if (when := pair.beyond(tolerance)) is not None]
+    farthest = max((pair.farthest for pair in pairs), default=0.0)
     if not found:
-        return Parted(nudge, None, None, 0, None, None)
+        return Parted(nudge, None, None, 0, None, None, farthest)
     time, number, pair = min(found, key=lambda each: each[0])
     first, hits = _chain(meant, meant.names[number], time)
     per_hit = per_second = None
@@ -182,7 +185,7 @@ def _parted(meant: Outcome, pairs: Sequence[Parting], nudge: float, tolerance: f
         if 0.0 < began < tolerance and first < time:
             grown = math.log(tolerance / began)
             per_hit, per_second = math.exp(grown / hits), grown / (time - first)
-    return Parted(nudge, time, meant.names[number], hits, per_hit, per_second)
+    return Parted(nudge, time, meant.names[number], hits, per_hit, per_second, farthest)
 
 
 def _chain(outcome: Outcome, ball: str, until: float) -> tuple[float | None, int]:

@@ -1,6 +1,7 @@
 """Parting: when two shots that began almost alike have come apart."""
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 
@@ -46,10 +47,15 @@ class Parting:
                 gaps[times > self._until[number], number] = last[k, number]
         return np.asarray(gaps)
 
+    @property
+    def farthest(self) -> float:
+        """How far a ball is from itself at most, m."""
+        return float(self._looks[1].max(initial=0.0))
+
     def beyond(self, tolerance: float) -> tuple[float, int] | None:
         """Return when a ball first is farther from itself than a tolerance, m: s, and which; None where none is."""
-        times = np.linspace(0.0, self.end, LOOKS + 1)
-        over = np.flatnonzero((self.apart(times) > tolerance).any(axis=1))
+        times, gaps = self._looks
+        over = np.flatnonzero((gaps > tolerance).any(axis=1))
         if not len(over):
             return None
         k = int(over[0])
@@ -61,6 +67,12 @@ class Parting:
             else:
                 low = middle
         return high, int(self.apart(np.array([high]))[0].argmax())
+
+    @cached_property
+    def _looks(self) -> tuple[FloatArray, FloatArray]:
+        """Moments throughout, (T,) s, and how far each ball is from itself then, (T, N) m."""
+        times = np.linspace(0.0, self.end, LOOKS + 1)
+        return times, self.apart(times)
 
 
 def _falls(outcome: Outcome) -> Mapping[str, float]:

@@ -193,8 +193,6 @@ class Table:
         return own
 
     def _play(self, number: int, motion: FloatArray, until: float, ways: bool) -> Outcome:
-        if ways and len(self._board.path) < len(self.names):  # every ball's first motion is written unasked
-            self._board = with_paths(self._board, max(4 * len(self.names), ROOM))
         board = self._board
         board.counts[TRACING] = ways
         while (status := shoot(board, self._state, self._tags, number, motion, until)) == FULL:
