@@ -22,6 +22,9 @@ OF_POCKETS = slice(1, 4)
 MOST_POCKETS = 3
 """Named of each ball; `--json` has all."""
 
+MOST_WINDOWS = 3
+"""Told of each pot, the nearest ones, likewise."""
+
 
 def print_study(scene: str, found: Study) -> None:
     """Print what is asked about, each ball's odds, and the answers.
@@ -135,7 +138,7 @@ def _slope_rows(slopes: Sequence[Slope]) -> list[list[str]]:
 
 def _slope(slope: Slope) -> str:
     if slope.value is None:
-        return "falls" if slope.fitted is None and (slope.reason or "").startswith("falls") else "not smooth"
+        return "falls" if (slope.reason or "").startswith("falls") else "not smooth"
     x, y = slope.value
     return f"({x:.3g}, {y:.3g})"
 
@@ -146,9 +149,12 @@ def _window(found: Windows) -> Iterator[str]:
     if nearest is None:
         yield f"{who}: never, for aim within {found.reach:g} rad of {found.aim:.6g}"
         return
-    for each in found.found:
+    near = sorted(found.found, key=lambda each: max(each.low - found.aim, found.aim - each.high, 0.0))[:MOST_WINDOWS]
+    for each in sorted(near, key=lambda each: each.low):
         ends = f"[{each.low:.9f}, {each.high:.9f}] rad, ± {1e3 * each.half:.4g} mrad about {each.centre:.9f}"
         yield f"{who}: for aim in {ends}"
+    if len(found.found) > len(near):
+        yield f"{who}: {len(found.found) - len(near)} more windows within {found.reach:g} rad, farther off"
     off = 1e3 * (found.aim - nearest.centre)
     side = "left" if off > 0.0 else "right"
     inside = "within" if found.aim in nearest else "outside"

@@ -79,7 +79,7 @@ def draw_rests(odds: Odds) -> Figure:
     glow = ScalarMappable(scale_of, GLOW)
     bar = figure.colorbar(glow, ax=list(panels), shrink=0.7)
     bar.ax.yaxis.set_major_formatter("{x:g}")
-    about = f"where balls come to rest, of {odds.count:,} shots in a field of {100.0 * side:.2g} cm"
+    about = f"rests of {odds.count:,} shots, counted in fields of {100.0 * side:.2g} cm"
     _head(figure, f"{_title(odds)}: {about}")
     return figure
 

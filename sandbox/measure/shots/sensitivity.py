@@ -47,7 +47,8 @@ class Slope:
     fitted: tuple[float, float] | None
     """the slope of a cubic through a fan of shots, likewise"""
     holds: float | None
-    """the largest step tried within which, to both sides, the ball keeps its course; None where it keeps it in none"""
+    """the largest step tried within which, to both sides, the ball keeps its course, as far as the shots in between
+    tell; None where it keeps it in none"""
     reason: str | None
     """why there is no value"""
 
@@ -126,17 +127,20 @@ def _slope(
         least = pairs[-1].step
         reason = f"not smooth: another course within {max(least, pairs[last - 1].step):.2g} {UNITS[variable]}"
         return Slope(ball, variable, None, None, None, holds, reason)
-    value, error, step = _extrapolated(good[: LEVELS + 1], number)
-    if step not in fits:
-        fits[step] = _fitted(attempt, variable, step)
-    fitted = fits[step][number]
-    off = float(np.hypot(*(fitted - value)))
-    x, y = value.tolist()
-    both = float(fitted[0]), float(fitted[1])
-    if off > AGREE * float(np.hypot(x, y)) + 10.0 * error:
-        reason = f"not smooth: differences and a fit disagree by {off:.2g} m/{UNITS[variable]}"
-        return Slope(ball, variable, None, None, both, holds, reason)
-    return Slope(ball, variable, (x, y), max(error, off), both, holds, None)
+    # Between steps that keep the course there may be a gap in which it is another; then the fit tells, and farther in
+    # there is none.
+    off = 0.0
+    for start in range(len(good) - FEWEST + 1):
+        value, error, step = _extrapolated(good[start : start + LEVELS], number)
+        if step not in fits:
+            fits[step] = _fitted(attempt, variable, step)
+        fitted = fits[step][number]
+        off = float(np.hypot(*(fitted - value)))
+        (x, y), both = value.tolist(), (float(fitted[0]), float(fitted[1]))
+        if off <= AGREE * float(np.hypot(x, y)) + 10.0 * error:
+            return Slope(ball, variable, (x, y), max(error, off), both, good[start].step, None)
+    reason = f"not smooth: differences and a fit disagree by {off:.2g} m/{UNITS[variable]}"
+    return Slope(ball, variable, None, None, None, holds, reason)
 
 
 def _extrapolated(pairs: list[_Pair], number: int) -> tuple[FloatArray, float, float]:
