@@ -10,7 +10,12 @@ from calling import DROP, document_of, json_of, lines_of, process, written
 
 from sandbox.cli.main import call
 from sandbox.engines.contract import Exhaustion
-from sandbox.measure.shots.attempt import Attempt
+from sandbox.measure.run import run
+from sandbox.measure.shots.attempt import Attempt, attempt_of
+from sandbox.measure.shots.spread import Spread
+from sandbox.measure.shots.study import study
+from sandbox.scene.file import load, loads
+from sandbox.trajectory import Trajectory
 
 POT = """
 title = "Pot"
@@ -59,6 +64,14 @@ ball = "bystander"
 """
 
 FEW = ("--count", "400", "--threads", "2")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    """Have the kernels compiled before anything is asked: where they are not yet, that is told on standard error."""
+    scene = loads(POT)
+    study(attempt_of(scene), Spread(), count=1, foretold=True)
+    run(scene, "exact")
 
 
 @pytest.fixture
@@ -235,3 +248,19 @@ def test_help_is_a_screen() -> None:
     assert done.returncode == 0
     assert len(done.stdout.splitlines()) < 60
     assert "--aim-error RAD" in done.stdout
+
+
+def test_a_sweep_of_the_aim_runs_the_same_fan(scene: str, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    sweep = ("--engine", "exact", "--sweep", "shot.stun.aim=-0.02:0.02:5", "--set", "world.duration=30")
+    status, document, err = json_of(capfd, "run", scene, *sweep, "--out", str(tmp_path / "fan"))
+    assert (status, err) == (0, [])
+    attempt = attempt_of(load(scene))
+    for row in document["runs"]:
+        outcome = attempt.played(attempt.changed("aim", row["set"]["shot.stun.aim"]))
+        assert row["pocketed"] == outcome.pocketed
+        places = [body["position"] for body in row["final"].values()]
+        assert places == pytest.approx(outcome.position, abs=1e-12)  # m: frames in between change nothing
+        stored = Trajectory.load(row["path"])
+        assert stored.spin.shape == (*stored.position.shape[:2], 3)
+        assert stored.spin[-1].tolist() == [body["spin"] for body in row["final"].values()]
+    assert [bool(row["pocketed"]) for row in document["runs"]] == [False, False, True, False, False]
