@@ -25,7 +25,7 @@ def test_probability_is_that_of_the_window_under_a_normal_error(aim: float) -> N
     (window,) = windows(scene, "object", "hole", shots=401).found
     error = NormalDist(aim, sigma)
     known = error.cdf(window.high) - error.cdf(window.low)
-    found = odds(scene, spread=Spread(aim=sigma, speed=0.0), count=4000)
+    found = odds(scene, spread=Spread(aim=sigma, speed=0.0), count=1600)
     chance = found.chance("object", "hole")
     low, high = wilson(chance.hits, chance.trials, SURE)
     assert low < known < high
@@ -44,12 +44,12 @@ def test_scratch_and_pot_are_told_apart() -> None:
 
 
 def test_rest_of_a_lone_ball_spreads_as_its_speed_does() -> None:
-    found = odds(floor(shot(0.0, 1.0)), spread=Spread(aim=0.01, speed=0.02), count=4000)
+    found = odds(floor(shot(0.0, 1.0)), spread=Spread(aim=0.01, speed=0.02), count=1600)
     v = math.hypot(*struck(Stroke(aim=0.0, speed=1.0), 0.17, R)[0])
     far = 12.0 * v**2 / (49.0 * 0.2 * 9.81) + (5.0 * v / 7.0) ** 2 / (2.0 * 0.01 * 9.81)
     rest = found.rest("cue")
-    assert rest is not None and rest.count == 4000
-    off = SURE / math.sqrt(4000.0)
+    assert rest is not None and rest.count == 1600
+    off = SURE / math.sqrt(1600.0)
     assert rest.mean[0] == pytest.approx(far * (1.0 + 0.02**2 - 0.5 * 0.01**2), abs=off * 0.04 * far)
     # Spreads: of v² to first order, and far · angle; the next order is 1e-3 of it.
     assert rest.spread == pytest.approx((0.04 * far, 0.01 * far), rel=off + 2e-3)
