@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from sandbox.engines.relay import start
     from sandbox.measure.compare import compare
     from sandbox.measure.run import run
+    from sandbox.measure.shots import horizon, odds, sensitivity, windows
+    from sandbox.measure.shots.spread import Spread
     from sandbox.measure.tradeoff import tradeoff
     from sandbox.recording import Recording
     from sandbox.scene.cue import Stroke
@@ -37,17 +39,22 @@ __all__ = [
     "Scene",
     "SceneError",
     "Settings",
+    "Spread",
     "Stroke",
     "Table",
     "Trajectory",
     "compare",
     "demands",
     "dumps",
+    "horizon",
     "load",
     "loads",
+    "odds",
     "run",
+    "sensitivity",
     "start",
     "tradeoff",
+    "windows",
 ]
 
 _HOMES = {
@@ -59,17 +66,22 @@ _HOMES = {
     "Scene": "sandbox.scene.model",
     "SceneError": "sandbox.scene.faults",
     "Settings": "sandbox.scene.settings",
+    "Spread": "sandbox.measure.shots.spread",
     "Stroke": "sandbox.scene.cue",
     "Table": "sandbox.engines.exact.rolling.table",
     "Trajectory": "sandbox.trajectory",
     "compare": "sandbox.measure.compare",
     "demands": "sandbox.scene.demands",
     "dumps": "sandbox.scene.file",
+    "horizon": "sandbox.measure.shots",
     "load": "sandbox.scene.file",
     "loads": "sandbox.scene.file",
+    "odds": "sandbox.measure.shots",
     "run": "sandbox.measure.run",
+    "sensitivity": "sandbox.measure.shots",
     "start": "sandbox.engines.relay",
     "tradeoff": "sandbox.measure.tradeoff",
+    "windows": "sandbox.measure.shots",
 }
 
 

@@ -17,17 +17,22 @@ NAMES = [
     "Scene",
     "SceneError",
     "Settings",
+    "Spread",
     "Stroke",
     "Table",
     "Trajectory",
     "compare",
     "demands",
     "dumps",
+    "horizon",
     "load",
     "loads",
+    "odds",
     "run",
+    "sensitivity",
     "start",
     "tradeoff",
+    "windows",
 ]
 
 TEXT = '[world]\nduration = 0.1\n[[ball]]\nname = "a"\nposition = [0, 0]\nvelocity = [1, 0]\nradius = 1\n'

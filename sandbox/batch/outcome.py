@@ -68,6 +68,7 @@ class Outcome:
             "retired": {
                 str(name): time for name, time in zip(run.names, run.retired_time.tolist(), strict=True) if time == time
             },
+            "pocketed": self._pocketed(),
             "state_hash": info.get("state_hash"),
             **({"replayed": self.replayed} if self.job.recorded else {}),
             **({"ledger": self._ledger()} if ledger else {}),
@@ -89,6 +90,7 @@ class Outcome:
             run.velocity[-1].tolist(),
             run.angle[-1].tolist(),
             run.angular_velocity[-1].tolist(),
+            run.spin[-1].tolist() if len(run.spin) else [None] * len(run.names),
             strict=True,
         )
         return {
@@ -96,10 +98,21 @@ class Outcome:
                 "position": [finite(x) for x in position],
                 "velocity": [finite(v) for v in velocity],
                 "angle": finite(angle),
-                "angular_velocity": finite(spin),
+                "angular_velocity": finite(rate),
+                **({} if spin is None else {"spin": [finite(w) for w in spin]}),
             }
-            for name, position, velocity, angle, spin in columns
+            for name, position, velocity, angle, rate, spin in columns
         }
+
+    def _pocketed(self) -> dict[str, str]:
+        """Return which balls lie in which pockets in the end: at their centres, to the bit."""
+        run, scene = self.trajectory, self.job.scene
+        if not len(run.time):
+            return {}
+        names = scene.fixed_names[len(scene.fixed) :]
+        holes = {pocket.position: name for pocket, name in zip(scene.pockets, names, strict=True)}
+        places = zip(run.names.tolist(), run.position[-1].tolist(), strict=True)
+        return {name: holes[x, y] for name, (x, y) in places if (x, y) in holes}
 
 
 @heeded()

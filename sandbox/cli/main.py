@@ -16,6 +16,7 @@ COMMANDS = {
     "play": "the window: play a scene, or pick one",
     "compare": "one scene on several engines, against the best known truth",
     "tradeoff": "error against cost over engines and settings, and the setting to take",
+    "shots": "how likely a billiard shot is, what it hangs on, until when it can be foretold",
     "extremes": "how far each engine and setting goes before it breaks",
     "report": "one page over many scenes: errors, costs, replays",
     "check": "check scenes: faults, what they demand, who can run them, what would go wrong",

@@ -38,6 +38,9 @@ def print_runs(rows: Sequence[Row]) -> None:
     joints = *(("joints off",) if joined else ()), *(("broken",) if torn else ())
     for head in ("× real", "energy, J", *joints, "contacts", "missed"):
         table.add_column(head, justify="right", no_wrap=True)
+    fallen = any(row["pocketed"] for row in rows)
+    if fallen:
+        table.add_column("falls", no_wrap=True)
 
     for row in rows:
         status = Text(row["status"], style="green" if row["status"] == "ok" else "bold red")
@@ -56,6 +59,7 @@ def print_runs(rows: Sequence[Row]) -> None:
             *([_share(row["joint_error"])] if joined else []),
             *([f"{row['broken_joints']:,}"] if torn else []),
             *(("–", "–") if row["status"] == "refused" else (f"{row['contacts']:,}", _missed(row["missed_contacts"]))),
+            *([Text(", ".join(f"{ball}: {pocket}" for ball, pocket in row["pocketed"].items()))] if fallen else []),
         )
     console = Console(width=None if sys.stdout.isatty() else WIDE)
     # Too narrow a terminal wraps lines by itself, which loses nothing; a table made to fit it would. Only names fold.

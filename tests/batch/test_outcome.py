@@ -123,3 +123,23 @@ def test_ledger_made_later_keeps_the_audit_that_was_stored(tmp_path: Path) -> No
     found = execute(JOB, store, audit=False, account=True)
     assert (found.repeated, found.trajectory.missed_contacts, len(found.trajectory.energy)) == (True, 0, 11)
     store.close()
+
+
+def test_row_tells_what_fell_and_the_spins_of_a_scene_that_has_them() -> None:
+    floor = "[world]\nduration = 3\n[surface]\nsliding_friction = 0.2\nrolling_friction = 0.01\n"
+    balls = '[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 0.03\nvelocity = [1, 0]\n'
+    balls += '[[ball]]\nname = "b"\nposition = [0, 1]\nradius = 0.03\nspin = [0, 0, 9]\n'
+    scene = loads(f'{floor}{balls}[[pocket]]\nname = "hole"\nposition = [0.5, 0.0]\nradius = 0.06\n')
+    row = execute(Job("label", scene, "exact")).row()
+    assert row["pocketed"] == {"a": "hole"}
+    assert row["final"]["a"] | {"angle": 0.0} == {
+        "position": [0.5, 0.0],
+        "velocity": [0.0, 0.0],
+        "angle": 0.0,
+        "angular_velocity": 0.0,
+        "spin": [0.0, 0.0, 0.0],
+    }
+    assert row["final"]["b"]["spin"] == [0.0, 0.0, 9.0]  # nothing stops what only spins
+    plain = execute(JOB).row()
+    assert plain["pocketed"] == {}
+    assert "spin" not in plain["final"]["a"]

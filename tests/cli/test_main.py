@@ -15,7 +15,7 @@ from sandbox.scene.shipped import shipped
 
 
 def test_commands_are_those_promised() -> None:
-    promised = "run play compare tradeoff extremes report check scenes engines schema export replay"
+    promised = "run play compare tradeoff shots extremes report check scenes engines schema export replay"
     assert list(COMMANDS) == promised.split()
 
 

@@ -78,7 +78,8 @@ def go_on(board: Board, i: int, phase: int) -> None:
     state[i, AX], state[i, AY], state[i, BX], state[i, BY] = ax, ay, bx, by
     state[i, END] = state[i, T] + lasts
     was, now = tags[i, PHASE], phase
-    counts[AWAKE] += (now != RESTING and now != CAPTURED) - (was != RESTING and was != CAPTURED)
+    # As whole numbers: numpy's truths, which these are where nothing is compiled, cannot be subtracted.
+    counts[AWAKE] += int(now not in (RESTING, CAPTURED)) - int(was not in (RESTING, CAPTURED))
     tags[i, PHASE] = phase
 
 

@@ -9,6 +9,8 @@ import numpy as np
 from sandbox.engines.exact.rolling.board import (
     ALONG_X,
     AT_X,
+    AX,
+    AY,
     BALL,
     EVENT_TIME,
     GAVE_X,
@@ -108,23 +110,50 @@ class Outcome:
             log[:, GAVE_X : GAVE_X + 2].copy(),
         )
 
+    def at(self, times: FloatArray) -> FloatArray:
+        """Return where all balls are at some times, (T, N, 2) m: read off their parabolas, so right to rounding.
+
+        From its capture on a ball is at its pocket's centre. After the last event all go on as they do then, which at
+        the end of a whole shot is to rest.
+
+        Args:
+            times: (T,) s from the stroke on, in any order.
+
+        Raises:
+            ValueError: ways were not asked for.
+        """
+        path, owner = self._ways()
+        times = np.asarray(times, dtype=np.float64)
+        places = np.empty((len(times), len(self.names), 2))
+        for number in range(len(self.names)):
+            legs = path[owner == number]
+            leg = legs[np.maximum(np.searchsorted(legs[:, T], times, side="right") - 1, 0)]
+            gone = (times - leg[:, T])[:, None]
+            places[:, number] = leg[:, X : Y + 1] + (leg[:, VX : VY + 1] + 0.5 * leg[:, AX : AY + 1] * gone) * gone
+        return places
+
     def way(self, ball: str, spacing: float = 0.01) -> FloatArray:
         """Return points along a ball's way, (K, 2) m, no farther apart than asked for, its turns among them.
 
         Raises:
             ValueError: ways were not asked for.
         """
-        if self.path is None or self.path_ball is None:
-            raise ValueError("ways are kept only where they are asked for: shoot(…, ways=True)")
+        path, owner = self._ways()
         number = self.names.index(ball)
-        legs = self.path[self.path_ball == number]
+        legs = path[owner == number]
         ends = np.append(legs[1:, T], max(self.duration, float(legs[-1, T])))
         parts = []
         for leg, end in zip(legs, ends.tolist(), strict=True):
             span = end - leg[T]
             far = float(np.hypot(leg[VX], leg[VY])) * span
             share = np.linspace(0.0, 1.0, max(2, min(int(far / spacing) + 2, 1000)))[:, None] * span
-            parts.append(leg[X : Y + 1] + (leg[VX : VY + 1] + 0.5 * leg[VX + 2 : VY + 3] * share) * share)
+            parts.append(leg[X : Y + 1] + (leg[VX : VY + 1] + 0.5 * leg[AX : AY + 1] * share) * share)
         parts.append(self.position[number][None])
         points = np.concatenate(parts)
         return np.asarray(points[np.append(True, np.any(np.diff(points, axis=0) != 0.0, axis=1))])
+
+    def _ways(self) -> tuple[FloatArray, IntArray]:
+        """Return every motion, (M, 12), and whose it is, (M,)."""
+        if self.path is None or self.path_ball is None:
+            raise ValueError("ways are kept only where they are asked for: shoot(…, ways=True)")
+        return self.path, self.path_ball

@@ -39,8 +39,9 @@ from sandbox.engines.floor.phase import CAPTURED
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.roster import NOTHING
 
-DONE, PAUSED, FULL, TOO_MANY = range(4)
-"""What `play` returns: up to the time, or all at rest; after `PAUSE` events; a log is full; too many events."""
+DONE, PAUSED, FULL, TOO_MANY, CUT = range(5)
+"""What `play` returns: up to the time, or all at rest; after `PAUSE` events; a log is full; too many events. A whole
+shot that is stopped by the time is cut."""
 
 PAUSE = 20_000
 """Events after which a kernel lets Python see to signals: some hundredths of a second, compiled."""

@@ -1,11 +1,12 @@
 """Shoot: whole shots, from the stroke until all rest, in one kernel call each, or many in one."""
 
+import math
+
 from sandbox.engines.exact.rolling.board import (
     ACCOUNTING,
     AWAKE,
     BOOKED,
     EVENTS,
-    LIMIT,
     NOW,
     PHASE,
     ROWS,
@@ -17,8 +18,9 @@ from sandbox.engines.exact.rolling.board import (
     X,
     Y,
 )
+from sandbox.engines.exact.rolling.book import arrive_all
 from sandbox.engines.exact.rolling.motion import trace
-from sandbox.engines.exact.rolling.play import PAUSED, play, set_out
+from sandbox.engines.exact.rolling.play import CUT, DONE, PAUSED, play, set_out
 from sandbox.engines.floor.phase import CAPTURED, RESTING
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.trajectory import FloatArray, IntArray
@@ -29,7 +31,7 @@ UNSTRUCK = -1
 
 @kernel
 def shoot(board: Board, state: FloatArray, tags: IntArray, ball: int, motion: FloatArray, until: float) -> int:
-    """Play a shot; return why it stopped, as `play` does.
+    """Play a shot; return why it stopped: `DONE` if all rest, `CUT` if not all do, else as `play` does.
 
     Args:
         board: to play on; whatever it held is gone.
@@ -61,8 +63,12 @@ def shoot(board: Board, state: FloatArray, tags: IntArray, ball: int, motion: Fl
         for i in range(len(state)):
             trace(board, i)
     status = play(board, until)
-    while status == PAUSED and counts[EVENTS] < counts[LIMIT]:
+    while status == PAUSED:
         status = play(board, until)
+    if status == DONE and counts[AWAKE] != 0:
+        if until < math.inf:
+            arrive_all(board, until)
+        status = CUT
     return status
 
 

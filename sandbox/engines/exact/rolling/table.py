@@ -6,7 +6,6 @@
 A shot is one call of a kernel; a fan of them is one for each thread.
 """
 
-import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
@@ -213,7 +212,7 @@ class Table:
             board.log_what[:rows].copy(),
             board.state.copy(),
             board.tags[:, PHASE].copy(),
-            status == DONE and math.isfinite(until),
+            status == DONE,
             board.path[:steps].copy() if ways else None,
             board.path_what[:steps, 0].copy() if ways else None,
         )

@@ -1,0 +1,201 @@
+"""What `sandbox shots` prints: a row a ball, and below what else was asked."""
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import click
+
+from sandbox.cli.table import WIDE
+from sandbox.measure.shots.attempt import UNITS, VARIABLES
+from sandbox.measure.shots.horizon import Horizon, Parted
+from sandbox.measure.shots.odds import Chance, Odds
+from sandbox.measure.shots.sensitivity import Slope
+from sandbox.measure.shots.study import Study
+from sandbox.measure.shots.windows import Windows
+
+ODDS_HEADS = ("ball", "falls", "95 %", "into", "else rests at, m", "spread, m", "as it is meant")
+OF_POCKETS = slice(1, 4)
+"""Those that a table without pockets does without."""
+
+MOST_POCKETS = 3
+"""Named of each ball; `--json` has all."""
+
+MOST_WINDOWS = 3
+"""Told of each pot, the nearest ones, likewise."""
+
+
+def print_study(scene: str, found: Study) -> None:
+    """Print what is asked about, each ball's odds, and the answers.
+
+    Args:
+        scene: what it is called.
+        found: what to print.
+    """
+    from rich.console import Console
+    from rich.text import Text
+
+    title = found.attempt.table.scene.title
+    console = Console(width=None if sys.stdout.isatty() else WIDE)
+    rows = [list(ODDS_HEADS), *_odds_rows(found.odds)]
+    if not found.attempt.pockets:
+        for row in rows:
+            del row[OF_POCKETS]
+    tables = [_table(rows[0], rows[1:])]
+    if found.slopes is not None:
+        heads = [f"d/d({variable}), m/{UNITS[variable]}" for variable in VARIABLES]
+        tables.append(_table(["ball", *heads, "same course within"], _slope_rows(found.slopes)))
+    for table in tables:
+        console.width = max(console.width, Console(width=10_000).measure(table).maximum)
+    console.print(Text(f"{scene}: {title}" if title else scene), soft_wrap=True)
+    for line in _about(found):
+        click.echo(line)
+    console.print(tables[0])
+    for line in _in_all(found.odds):
+        click.echo(line)
+    for table in tables[1:]:
+        console.print(table)
+    for each in found.windows:
+        for line in _window(each):
+            click.echo(line)
+    if found.horizon is not None:
+        for line in _horizon(found.horizon):
+            click.echo(line)
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for k, head in enumerate(heads):
+        table.add_column(
+            head, justify="left" if k == 0 or head in ("into", "as it is meant") else "right", no_wrap=True
+        )
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    return table
+
+
+def _about(found: Study) -> Iterator[str]:
+    attempt, odds = found.attempt, found.odds
+    stroke = attempt.stroke
+    off = f", tip at ({stroke.side:+g}, {stroke.height:+g}) R" if stroke.side or stroke.height else ""
+    yield f"{attempt.name}: {attempt.ball!r} struck at {stroke.speed:g} m/s towards {stroke.aim:.6g} rad{off}"
+    errors = odds.spread
+    sides = f", tip ± ({errors.side:g}, {errors.height:g}) R" if errors.side or errors.height else ""
+    missed = f"; {odds.miscues:,} miscued" if odds.miscues else ""
+    given = f"; {odds.unfinished:,} did not come to rest" if odds.unfinished else ""
+    stray = f"aim ± {1e3 * errors.aim:g} mrad, speed ± {100.0 * errors.speed:g} %{sides}"
+    yield f"{odds.count:,} strokes, {stray} (one standard deviation), seed {odds.seed}{missed}{given}"
+
+
+def _odds_rows(odds: Odds) -> list[list[str]]:
+    nominal = odds.nominal
+    rows = []
+    for number, ball in enumerate(nominal.names):
+        fell, rest = odds.chance(ball), odds.rest(ball)
+        into = {pocket: odds.chance(ball, pocket) for pocket in odds.attempt.pockets}
+        often = sorted((each for each in into.items() if each[1].hits), key=lambda each: -each[1].hits)
+        meant = nominal.pocketed.get(ball) or _place(nominal.position[number].tolist())
+        rows.append(
+            [
+                ball,
+                _percent(fell.share),
+                _bounds(fell),
+                _into(often),
+                "–" if rest is None else _place(rest.mean),
+                "–" if rest is None else _place(rest.spread),
+                meant,
+            ]
+        )
+    return rows
+
+
+def _into(often: Sequence[tuple[str, Chance]]) -> str:
+    named = [f"{pocket} {_percent(chance.share)}" for pocket, chance in often[:MOST_POCKETS]]
+    return ", ".join([*named, *(["…"] if len(often) > MOST_POCKETS else [])]) or "–"
+
+
+def _in_all(odds: Odds) -> Iterator[str]:
+    if not odds.attempt.pockets:
+        return
+    pot, scratch = odds.any_pot, odds.scratch
+    yield f"something else falls and {odds.attempt.ball!r} does not: {_percent(pot.share)}, {_bounds(pot)}"
+    yield f"{odds.attempt.ball!r} falls: {_percent(scratch.share)}, {_bounds(scratch)}"
+
+
+def _slope_rows(slopes: Sequence[Slope]) -> list[list[str]]:
+    rows: dict[str, list[str]] = {}
+    for slope in slopes:
+        rows.setdefault(slope.ball, [slope.ball]).append(_slope(slope))
+    for slope in slopes:
+        if slope.variable == "aim":
+            rows[slope.ball].append("–" if slope.holds is None else f"± {slope.holds:.1g} rad")
+    return list(rows.values())
+
+
+def _slope(slope: Slope) -> str:
+    if slope.value is None:
+        return "falls" if (slope.reason or "").startswith("falls") else "not smooth"
+    x, y = slope.value
+    return f"({x:.3g}, {y:.3g})"
+
+
+def _window(found: Windows) -> Iterator[str]:
+    who = f"{found.ball!r} into {found.pocket!r}"
+    nearest = found.nearest
+    if nearest is None:
+        yield f"{who}: never, for aim within {found.reach:g} rad of {found.aim:.6g}"
+        return
+    near = sorted(found.found, key=lambda each: max(each.low - found.aim, found.aim - each.high, 0.0))[:MOST_WINDOWS]
+    for each in sorted(near, key=lambda each: each.low):
+        ends = f"[{each.low:.9f}, {each.high:.9f}] rad, ± {1e3 * each.half:.4g} mrad about {each.centre:.9f}"
+        yield f"{who}: for aim in {ends}"
+    if len(found.found) > len(near):
+        yield f"{who}: {len(found.found) - len(near)} more windows within {found.reach:g} rad, farther off"
+    off = 1e3 * (found.aim - nearest.centre)
+    side = "left" if off > 0.0 else "right"
+    inside = "within" if found.aim in nearest else "outside"
+    yield f"{who}: the shot's aim is {inside}, {abs(off):.4g} mrad to the {side} of the centre"
+
+
+def _horizon(found: Horizon) -> Iterator[str]:
+    unit = "rad of aim" if found.by == "aim" else "m of place"
+    within = f"{1e3 * found.tolerance:g} mm"
+    yield f"nudged by {found.parted.nudge:g} {unit}: {_parted(found.parted, within)}"
+    yield f"nudged by {found.parted.nudge:g} {unit}: {_parted(found.by_a_radius, 'a radius')}"
+    if found.player is not None:
+        yield f"by a player's error: {_parted(found.player, 'a radius')}"
+    rungs = [f"{each.nudge:.0e}: {each.time:.3g} s" for each in found.ladder if each.time is not None]
+    whole = [each.nudge for each in found.ladder if each.time is None]
+    rungs += [f"{max(whole):.0e}: to the end"] if whole else []
+    yield f"foretold within {within}, by how well aim is known, rad: {', '.join(rungs)}"
+    digits = found.digits_per_second
+    if digits is not None:
+        yield f"one more second takes {digits:.2g} more digits of aim"
+
+
+def _parted(each: Parted, within: str) -> str:
+    if each.time is None:
+        return f"no ball is ever {within} elsewhere; {1e3 * each.farthest:.2g} mm at most"
+    grown = ""
+    if each.growth_per_hit is not None and each.growth_per_second is not None:
+        decade = math.log(10.0) / each.growth_per_second
+        times = f"ten times in {decade:.2g} s" if decade > 0.0 else "no growth"
+        grown = f", after {each.hits} hits in a row, × {each.growth_per_hit:.3g} each, {times}"
+    return f"{each.ball!r} is {within} elsewhere from {each.time:.4g} s on{grown}"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %"
+
+
+def _bounds(chance: Chance) -> str:
+    low, high = chance.interval
+    return f"{100.0 * low:.1f}–{100.0 * high:.1f} %"
+
+
+def _place(xy: Sequence[float]) -> str:
+    return f"({xy[0]:.3f}, {xy[1]:.3f})"

@@ -1,0 +1,266 @@
+"""`sandbox shots`: what it prints, its JSON, what it writes, its exit status."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from calling import DROP, document_of, json_of, lines_of, process, written
+
+from sandbox.cli.main import call
+from sandbox.engines.contract import Exhaustion
+from sandbox.measure.run import run
+from sandbox.measure.shots.attempt import Attempt, attempt_of
+from sandbox.measure.shots.spread import Spread
+from sandbox.measure.shots.study import study
+from sandbox.scene.file import load, loads
+from sandbox.trajectory import Trajectory
+
+POT = """
+title = "Pot"
+
+[world]
+seed = 5
+
+[surface]
+sliding_friction = 0.2
+rolling_friction = 0.01
+spinning_friction = 0.0127
+
+[[ball]]
+name = "cue"
+position = [0.0, 0.0]
+radius = 0.028575
+restitution = 1.0
+
+[[ball]]
+name = "8:ball"
+position = [0.5, 0.0]
+radius = 0.028575
+restitution = 1.0
+
+[[ball]]
+name = "bystander"
+position = [0.5, 2.0]
+radius = 0.028575
+restitution = 1.0
+
+[[pocket]]
+name = "far [left]"
+position = [1.5, 0.0]
+radius = 0.06
+
+[[shot]]
+name = "stun"
+aim = 0.0
+speed = 3.0
+
+[[shot]]
+name = "soft"
+aim = 3.14159
+speed = 1.0
+ball = "bystander"
+"""
+
+FEW = ("--count", "400", "--threads", "2")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    """Have the kernels compiled before anything is asked: where they are not yet, that is told on standard error."""
+    scene = loads(POT)
+    study(attempt_of(scene), Spread(), count=1, foretold=True)
+    run(scene, "exact")
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> str:
+    return written(tmp_path, POT, "pot.toml")
+
+
+def test_json_has_the_shot_its_outcome_and_its_odds(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, err = json_of(capfd, "shots", scene, *FEW, "--aim-error", "0.003", "--speed-error", "0")
+    assert (status, err) == (0, [])
+    assert (document["scene"], document["title"], document["status"], document["reason"]) == (scene, "Pot", "ok", None)
+    assert document["shot"]["name"] == "stun"
+    assert {key: document["shot"][key] for key in ("ball", "aim", "speed")} == {"ball": "cue", "aim": 0.0, "speed": 3.0}
+    assert document["nominal"]["final"]["8:ball"] == {"position": [1.5, 0.0], "pocket": "far [left]"}
+    odds = document["odds"]
+    assert (odds["count"], odds["seed"], odds["miscues"], odds["unfinished"]) == (400, 5, 0, 0)
+    assert odds["spread"] == {"aim": 0.003, "speed": 0.0, "side": 0.0, "height": 0.0}
+    chance = odds["balls"]["8:ball"]["pockets"]["far [left]"]
+    assert chance["low"] < chance["probability"] < chance["high"]
+    assert odds["any_pot"]["hits"] == chance["hits"]
+    assert odds["balls"]["cue"]["rest"]["count"] == 400 - odds["scratch"]["hits"]
+    assert (document["sensitivity"], document["windows"], document["horizon"]) == (None, [], None)
+
+
+def test_answers_are_the_same_on_any_number_of_threads_and_others_with_another_seed(
+    scene: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    alike = [json_of(capfd, "shots", scene, "--count", "1200", "--threads", n) for n in ("1", "2")]
+    assert alike[0] == alike[1]
+    other = json_of(capfd, "shots", scene, "--count", "1200", "--seed", "6")
+    assert other[1]["odds"]["seed"] == 6
+    assert other[1]["odds"]["balls"] != alike[0][1]["odds"]["balls"]
+
+
+def test_all_that_can_be_asked_is_answered(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    asked = ("--sensitivity", "--horizon", "--window", "8:ball:far [left]")
+    status, document, err = json_of(capfd, "shots", scene, *FEW, *asked)
+    assert (status, err) == (0, [])
+    assert {row["ball"] for row in document["sensitivity"]} == {"cue", "8:ball", "bystander"}
+    assert {row["unit"] for row in document["sensitivity"]} == {"m/rad", "m/m/s", "m/R"}
+    (window,) = document["windows"]
+    assert window["within"] is True
+    assert window["windows"][0]["low"] < 0.0 < window["windows"][0]["high"]
+    assert document["horizon"]["nudge"] == 1e-9
+    assert [each["nudge"] for each in document["horizon"]["ladder"]] == [10.0**-k for k in range(2, 13)]
+
+
+def test_table_has_a_line_a_ball_and_sentences_below(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    asked = ("--sensitivity", "--horizon", "--nudge", "1e-4", "--window", "8:ball:far [left]")
+    status, out, err = lines_of(capfd, "shots", scene, *FEW, *asked, "--side-error", "0.01")
+    assert (status, err) == (0, [])
+    assert out[0] == f"{scene}: Pot"
+    assert out[1] == "stun: 'cue' struck at 3 m/s towards 0 rad"
+    spread = "aim ± 2 mrad, speed ± 3 %, tip ± (0.01, 0) R (one standard deviation), seed 5"
+    assert out[2] == f"400 strokes, {spread}"
+    assert out[3].split()[:4] == ["ball", "falls", "95", "%"]
+    assert re.match(r"8:ball +\d+\.\d % +\d+\.\d–\d+\.\d % +far \[left\] \d+\.\d %", out[5])
+    assert re.match(r"something else falls and 'cue' does not: \d+\.\d %", out[7])
+    assert out[9].split()[:2] == ["ball", "d/d(aim),"]
+    assert "falls" in out[11]
+    text = "\n".join(out[13:])
+    assert re.search(r"^'8:ball' into 'far \[left\]': for aim in \[-0\.00\d+, 0\.00\d+\] rad, ± \d", text, re.MULTILINE)
+    assert "the shot's aim is within" in text
+    assert "nudged by 0.0001 rad of aim: " in text
+    assert "foretold within 1 mm, by how well aim is known, rad: 1e-02: " in text
+
+
+def test_another_shot_is_asked_for_by_its_name(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, _ = json_of(capfd, "shots", scene, *FEW, "--shot", "soft")
+    assert (status, document["shot"]["ball"]) == (0, "bystander")
+
+
+def test_values_are_set(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, _ = json_of(capfd, "shots", scene, *FEW, "--set", "shot.stun.aim=1.0")
+    assert (status, document["shot"]["aim"], document["odds"]["any_pot"]["hits"]) == (0, 1.0, 0)
+
+
+def test_document_and_pictures_are_written(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "new" / "folder"
+    status, document, err = json_of(capfd, "shots", scene, *FEW, "--out", str(out))
+    assert (status, err) == (0, [])
+    assert json.loads((out / "shots.json").read_text(encoding="utf-8")) == document
+    assert sorted(path.name for path in out.iterdir()) == ["aims.png", "rests.png", "shots.json"]
+    assert all(path.read_bytes()[:4] == b"\x89PNG" for path in out.glob("*.png"))
+
+
+def test_quiet_prints_nothing(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert lines_of(capfd, "shots", scene, *FEW, "--quiet") == (0, [], [])
+
+
+def test_a_window_that_is_not_there_is_status_1(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "shots", scene, *FEW, "--window", "bystander:far [left]")
+    assert (status, err) == (1, [])
+    assert out[-1] == "'bystander' into 'far [left]': never, for aim within 0.1 rad of 0"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--window", "9:far [left]"), "--window: no ball is named '9'; there are: cue, 8:ball, bystander"),
+        (("--window", "cue:near"), "--window: no pocket is named 'near'; there are: far [left]"),
+        (("--window", "cue"), "--window: 'cue' is not BALL:POCKET"),
+        (("--shot", "draw"), "no shot is named 'draw'; there are: stun, soft"),
+        (("--aim-error", "nan"), "aim = nan is no spread; it is 0 or more, and finite"),
+        (("--nudge", "nan"), "--nudge: is no number; it is positive and finite"),
+    ],
+)
+def test_what_is_typed_wrongly_is_a_line_and_status_2(
+    scene: str, arguments: tuple[str, ...], message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    status, document, err = json_of(capfd, "shots", scene, *arguments)
+    assert status == 2
+    assert len(err) == 1 and message in err[0]
+    assert document["odds"] is None
+    assert len(document["faults"]) == 1
+
+
+def test_a_scene_without_a_shot_is_status_2(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "shots", written(tmp_path, DROP))
+    assert (status, out) == (2, [])
+    assert "the scene has no [[shot]]" in err[0]
+
+
+def test_a_scene_that_the_exact_engine_refuses_is_status_1(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, err = json_of(capfd, "shots", scene, "--set", "world.linear_drag=0.1")
+    assert (status, document["status"], document["odds"]) == (1, "refused", None)
+    assert err == [f"{scene}: refused: {document['reason']}"]
+
+
+def test_too_many_events_are_status_1(
+    scene: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gives_up(*_: Any, **__: Any) -> None:
+        raise Exhaustion("at 1 s: too many")
+
+    monkeypatch.setattr(Attempt, "played", gives_up)
+    status, document, err = json_of(capfd, "shots", scene, *FEW)
+    assert (status, document["status"], document["reason"]) == (1, "failed", "at 1 s: too many")
+    assert err == [f"{scene}: failed: at 1 s: too many"]
+
+
+def test_an_interrupt_keeps_what_was_played(
+    scene: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fan, calls = Attempt.fan, []
+
+    def interrupted(*arguments: Any) -> Any:
+        if calls:
+            raise KeyboardInterrupt
+        calls.append(arguments)
+        return fan(*arguments)
+
+    monkeypatch.setattr(Attempt, "fan", interrupted)
+    status = call(["shots", scene, "--count", "3000", "--threads", "2", "--horizon", "--json"])
+    out, err = capfd.readouterr()
+    document = document_of(out)
+    assert status == 130
+    assert err == "interrupted: 1,024 of 3,000 shots are played and counted\n"
+    assert (document["odds"]["count"], document["odds"]["interrupted"], document["horizon"]) == (1024, True, None)
+
+
+def test_a_folder_that_cannot_be_made_is_told_before_anything_is_played(
+    scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    file.write_text("", encoding="utf-8")
+    status, out, err = lines_of(capfd, "shots", scene, "--out", str(file))
+    assert (status, out) == (2, [])
+    assert err == [f"--out: {file}: is no folder"]
+
+
+def test_help_is_a_screen() -> None:
+    done = process("shots", "--help")
+    assert done.returncode == 0
+    assert len(done.stdout.splitlines()) < 60
+    assert "--aim-error RAD" in done.stdout
+
+
+def test_a_sweep_of_the_aim_runs_the_same_fan(scene: str, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    sweep = ("--engine", "exact", "--sweep", "shot.stun.aim=-0.02:0.02:5", "--set", "world.duration=30")
+    status, document, err = json_of(capfd, "run", scene, *sweep, "--out", str(tmp_path / "fan"))
+    assert (status, err) == (0, [])
+    attempt = attempt_of(load(scene))
+    for row in document["runs"]:
+        outcome = attempt.played(attempt.changed("aim", row["set"]["shot.stun.aim"]))
+        assert row["pocketed"] == outcome.pocketed
+        places = [body["position"] for body in row["final"].values()]
+        assert places == pytest.approx(outcome.position, abs=1e-12)  # m: frames in between change nothing
+        stored = Trajectory.load(row["path"])
+        assert stored.spin.shape == (*stored.position.shape[:2], 3)
+        assert stored.spin[-1].tolist() == [body["spin"] for body in row["final"].values()]
+    assert [bool(row["pocketed"]) for row in document["runs"]] == [False, False, True, False, False]
