@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from sandbox.cli.main import call
+from sandbox.engines.compiling import ANNOUNCEMENT
 
 DROP = """
 title = "Drop"
@@ -58,14 +59,19 @@ def json_of(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, di
     """Call with `--json`; return status, document, and the lines on standard error."""
     status = call([*arguments, "--json"])
     out, err = capfd.readouterr()
-    return status, document_of(out), err.splitlines()
+    return status, document_of(out), _told(err)
 
 
 def lines_of(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, list[str], list[str]]:
     """Call; return status, and the lines on standard output and standard error."""
     status = call(list(arguments))
     out, err = capfd.readouterr()
-    return status, out.splitlines(), err.splitlines()
+    return status, out.splitlines(), _told(err)
+
+
+def _told(err: str) -> list[str]:
+    """Return the lines of standard error, but for the one that only a machine's first run has."""
+    return [line for line in err.splitlines() if line != ANNOUNCEMENT]
 
 
 def process(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

@@ -12,6 +12,7 @@ import math
 from typing import NamedTuple
 
 from sandbox.engines.kernel import bare_kernel as kernel
+from sandbox.scene.floor import Floor
 
 RESTING, SPINNING, ROLLING, SLIDING, CAPTURED = range(5)
 """Phases, from the least to the most lively; and in a pocket."""
@@ -29,6 +30,14 @@ class Figures(NamedTuple):
     """μ_r·g"""
     spinning: float
     """5/2·μ_sp·g, by the radius the rate at which ω_z falls"""
+
+
+def figures_of(floor: Floor | None) -> Figures:
+    """Return what a floor does to spheres, as kernels count it."""
+    if floor is None:
+        return Figures(0.0, 0.0, 0.0)
+    g = floor.gravity
+    return Figures(floor.sliding_friction * g, floor.rolling_friction * g, 2.5 * floor.spinning_friction * g)
 
 
 @kernel

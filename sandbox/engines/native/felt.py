@@ -15,7 +15,7 @@ import numpy as np
 
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.floor.collide import ELASTIC, FRICTIONAL, HAN2005, SIMPLE
-from sandbox.engines.floor.phase import Figures
+from sandbox.engines.floor.phase import figures_of
 from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
 from sandbox.engines.native.cushions import Cushions, cushions_of
 from sandbox.engines.native.hits import Laws, resolve
@@ -26,7 +26,6 @@ from sandbox.engines.roster import MEETS
 from sandbox.engines.roster import NOTHING as NOTHING_AT_ALL
 from sandbox.engines.touching import NOTHING, ComplexArray, Touching
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.floor import Floor
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -202,14 +201,6 @@ class Felt:
     def _book(self, cause: Cause, before: float) -> None:
         if self.account is not None:
             self.account.enter(cause, self._energy() - before)
-
-
-def figures_of(floor: Floor | None) -> Figures:
-    """Return what a floor does to spheres, as kernels count it."""
-    if floor is None:
-        return Figures(0.0, 0.0, 0.0)
-    g = floor.gravity
-    return Figures(floor.sliding_friction * g, floor.rolling_friction * g, 2.5 * floor.spinning_friction * g)
 
 
 def _with_room(pairs: IntArray, plays: BoolArray) -> tuple[IntArray, int]:

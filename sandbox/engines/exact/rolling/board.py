@@ -10,9 +10,8 @@ import numpy as np
 
 from sandbox.engines.exact.arena import BY_PHANTOM, arena_of
 from sandbox.engines.floor.collide import ELASTIC, FRICTIONAL, HAN2005, SIMPLE
-from sandbox.engines.floor.phase import RESTING, Figures
+from sandbox.engines.floor.phase import RESTING, Figures, figures_of
 from sandbox.engines.roster import Roster
-from sandbox.scene.floor import Floor
 from sandbox.scene.model import Post, Scene, Wall
 from sandbox.trajectory import FloatArray, IntArray
 
@@ -97,14 +96,6 @@ class Board(NamedTuple):
     """(M, 12) of each motion that begins: its columns of `state`"""
     path_what: IntArray
     """(M, 2) ball and phase"""
-
-
-def figures_of(floor: Floor | None) -> Figures:
-    """Return what a floor does to spheres, as kernels count it."""
-    if floor is None:
-        return Figures(0.0, 0.0, 0.0)
-    g = floor.gravity
-    return Figures(floor.sliding_friction * g, floor.rolling_friction * g, 2.5 * floor.spinning_friction * g)
 
 
 def board_of(roster: Roster) -> Board:
