@@ -39,11 +39,14 @@ def test_the_scene_in_ten_lines_runs():
     assert run(loads(text)).status == "ok"
 
 
-def test_the_python_example_runs(monkeypatch, capsys):
+def test_the_python_examples_run(monkeypatch, capsys):
     monkeypatch.chdir(Path(__file__).parents[1])
-    (text,) = blocks("python")
-    exec(compile(text, "README", "exec"), {})
+    first, *others = blocks("python")
+    exec(compile(first, "README", "exec"), {})
     assert capsys.readouterr().out.startswith("ok ")
+    for text in others:
+        exec(compile(text, "README", "exec"), {})
+        assert capsys.readouterr().out
 
 
 def test_faults_read_as_shown():
