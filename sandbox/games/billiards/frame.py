@@ -1,7 +1,7 @@
 """Frame: a game played out between players, on any engine, and the session that it leaves."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -33,7 +33,7 @@ class Plan:
     """What a player does at the table."""
 
     stroke: Stroke
-    call: Call = Call()
+    call: Call = field(default_factory=Call)
     place: Point | None = None
     """where a cue ball in hand is put, m; without one it stays"""
 

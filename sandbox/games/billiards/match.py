@@ -1,6 +1,7 @@
 """Match: a game on a table, as a frozen value: rules, turn, score, and where every ball lies."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -111,9 +112,7 @@ class Match:
         """The balls that are not down, the cue ball too."""
         here = {*self.state.table, self.cue}
         return {
-            name: (*self.position[k], self.layout.radius[k])
-            for name, k in self.layout.number.items()
-            if name in here
+            name: (*self.position[k], self.layout.radius[k]) for name, k in self.layout.number.items() if name in here
         }
 
     def refusal(self, at: Point) -> str | None:
@@ -165,7 +164,7 @@ class Match:
         return Strike(time=time, ball=self.cue, **stroke.model_dump(exclude_defaults=True))
 
     def happenings(self, contacts: Contacts, began: float = 0.0) -> tuple[Happening, ...]:
-        """Return what the rules see of a shot from here: of its contacts, as any engine tells them, begun at a time, s."""
+        """Return what the rules see of a shot from here, of its contacts, from any engine, and when it began, s."""
         return happenings_of(self.layout, contacts, began, self.against)
 
     def played(self, contacts: Contacts, position: FloatArray, call: Call | None = None, began: float = 0.0) -> Self:
@@ -227,14 +226,10 @@ class Match:
         except (KeyError, TypeError, ValueError) as error:
             raise GameError(f"no match of this scene: {error}") from None
 
-    @property
+    @cached_property
     def against(self) -> frozenset[tuple[int, int]]:
-        """What touches before the shot, as pairs of numbers."""
-        kept: frozenset[tuple[int, int]] | None = self.__dict__.get("_against")
-        if kept is None:
-            kept = touching_pairs(self.layout, self.position)
-            self.__dict__["_against"] = kept  # asked for once for every shot that is tried
-        return kept
+        """What touches before the shot, as pairs of numbers: looked for once for all the shots that are tried."""
+        return touching_pairs(self.layout, self.position)
 
     @property
     def _cue_radius(self) -> float:

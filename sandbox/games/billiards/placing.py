@@ -111,8 +111,9 @@ def _bounds(layout: Layout, place: Place, radius: float) -> FloatArray:
     if place == "in the D" and layout.d_radius:
         (x, y), reach = layout.home, layout.d_radius + radius
         x0, y0, x1, y1 = max(x0, x - reach), max(y0, y - reach), min(x1, x + reach), min(y1, y + reach)
-    x, y = np.meshgrid(np.linspace(x0 + radius, x1 - radius, GRID), np.linspace(y0 + radius, y1 - radius, GRID))
-    return _into(layout, place, np.column_stack((x.ravel(), y.ravel())), radius)
+    columns, rows = np.linspace(x0 + radius, x1 - radius, GRID), np.linspace(y0 + radius, y1 - radius, GRID)
+    grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    return _into(layout, place, grid, radius)
 
 
 def _apart(points: FloatArray, radius: float, others: Sequence[Disc]) -> FloatArray:

@@ -12,8 +12,8 @@ from sandbox.scene.part import Point
 def spotted(layout: Layout, respot: Respot, radius: float, others: Sequence[Disc]) -> Point:
     """Return where a ball goes: on the first of its spots that is free, else behind the first, as near as can be.
 
-    Behind is along the table, towards its foot; where that is full up to the cushion, before the spot (WPA 1.4; WPBSA 3,
-    Spotting Colours). Balls are put 0.01 mm from each other: they do not touch.
+    Behind is along the table, towards its foot; where that is full up to the cushion, before the spot (WPA 1.4;
+    WPBSA 3, Spotting Colours). Balls are put 0.01 mm from each other: they do not touch.
 
     Args:
         layout: of the table.

@@ -67,9 +67,7 @@ def _middle(row: Sequence[bool]) -> int | None:
     return best
 
 
-def all_around(
-    trial: Trial, count: int, speeds: Sequence[float], sides: Sequence[float] = (0.0,)
-) -> Iterator[Stroke]:
+def all_around(trial: Trial, count: int, speeds: Sequence[float], sides: Sequence[float] = (0.0,)) -> Iterator[Stroke]:
     """Yield strokes in every direction, and more of them towards the balls: kicks, banks, caroms, safeties."""
     cue, targets, others = standing(trial.match)
     aims = list(np.linspace(-math.pi, math.pi, count, endpoint=False))

@@ -51,12 +51,12 @@ class Bot:
     @property
     def sigma(self) -> float:
         """The error of the aim, rad, one standard deviation."""
-        return WORST * (BEST / WORST) ** self.skill
+        return WORST * math.pow(BEST / WORST, self.skill)
 
     @property
     def off(self) -> float:
         """The error of the speed, as a share of it."""
-        return OFF * 0.1**self.skill
+        return OFF * math.pow(0.1, self.skill)
 
     def decide(self, match: Match) -> Decision:
         """Return the decision after which the table is best for this player, by how easy the next shot is."""

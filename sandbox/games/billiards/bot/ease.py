@@ -43,9 +43,7 @@ def mouths(layout: Layout, radius: float) -> tuple[FloatArray, FloatArray, Float
     return points, inward / np.maximum(size, 1e-12), holes[:, 2]
 
 
-def pots(
-    layout: Layout, radius: float, cue: FloatArray, targets: FloatArray, others: FloatArray, sigma: float
-) -> Pots:
+def pots(layout: Layout, radius: float, cue: FloatArray, targets: FloatArray, others: FloatArray, sigma: float) -> Pots:
     """Return how the straight shots are.
 
     Args:

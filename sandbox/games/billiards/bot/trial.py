@@ -9,15 +9,14 @@ import numpy as np
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.exact.rolling.table import Table
 from sandbox.games.billiards.bot.ease import Pots, pots
-from sandbox.games.billiards.frame import Plan
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Call
-from sandbox.games.billiards.rules.happening import Happening, read, touched_by
+from sandbox.games.billiards.rules.happening import Happening, touched_by
 from sandbox.scene.cue import Stroke
 from sandbox.trajectory import FloatArray
 
-FOUL = 0.9
-"""chance that a player with the ball in hand is taken to have of a pot"""
+IN_HAND = 0.9
+"""the chance of a pot that a player with the ball in hand is taken to have"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +56,11 @@ class Trial:
             call = called(match, match.happenings(contacts))
         return match.played(contacts, outcome.position, call), call
 
-    def worth(self, plan_call: tuple[Match, Call] | None) -> float:
+    def worth(self, made: tuple[Match, Call] | None) -> float:
         """Return how good what a stroke led to is for the player, −1 to 1 and a little more for points."""
-        if plan_call is None:
+        if made is None:
             return -1.0
-        me, after = self.match.turn, plan_call[0]
+        me, after = self.match.turn, made[0]
         if after.over:
             return 0.0 if after.state.winner is None else (1.5 if after.state.winner == me else -1.5)
         gained = 0.0
@@ -79,7 +78,7 @@ UNIT = {"snooker": 0.04, "three-cushion": 0.5, "straight-rail": 0.4, "free": 0.1
 def ease(match: Match, sigma: float) -> float:
     """Return the chance of the best straight shot for whoever is to shoot, 0 to 1; in carom a guess by distances."""
     if match.state.in_hand is not None:
-        return FOUL
+        return IN_HAND
     cue, targets, others = standing(match)
     if not len(targets):
         return 0.0
@@ -107,7 +106,7 @@ def standing(match: Match) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def called(match: Match, happenings: tuple[Happening, ...]) -> Call:
-    """Return the call that goes with what is meant to happen: the ball touched first, the pocket that the last takes."""
+    """Return the call that goes with what is meant to happen: the ball touched first, the last ball's pocket."""
     choices = match.choices
     if not choices.balls:
         return Call()
@@ -115,8 +114,8 @@ def called(match: Match, happenings: tuple[Happening, ...]) -> Call:
         if not choices.needed:
             return Call()
         fell = {each.ball: each.other for each in happenings if each.kind == "pocket"}
-        ball = choices.balls[0]
-        return Call(ball=ball, pocket=fell.get(ball, next(iter(match.layout.pockets))))
+        last = choices.balls[0]
+        return Call(ball=last, pocket=fell.get(last, next(iter(match.layout.pockets))))
     first = next((ball for each in happenings if (ball := touched_by(match.cue, each)) is not None), None)
     if first in choices.balls:
         return Call(ball=first)
