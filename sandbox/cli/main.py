@@ -24,8 +24,8 @@ COMMANDS = {
     "engines": "list the engines",
     "schema": "print the JSON Schema of a scene file",
     "export": "a stored run as csv, parquet, gif, mp4 or png",
-    "match": "frames of billiards between bots, and the score",
     "replay": "a stored run or a recorded session in the window",
+    "match": "frames of billiards between bots, and the score",
 }
 """Each command's line of help stands here, so that help needs to import none of them."""
 

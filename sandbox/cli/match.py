@@ -5,11 +5,10 @@ from typing import Any
 
 import click
 
-from sandbox.cli.naming import engines_in
 from sandbox.cli.output import make_folder, require_folder
 from sandbox.cli.reading import gathering, path_of, print_json, refused
 from sandbox.engines.contract import Refusal
-from sandbox.engines.registry import able, engine_named
+from sandbox.engines.registry import UnknownEngineError, able, engine_named
 from sandbox.games.billiards.bot.named import bots_in
 from sandbox.games.billiards.frame import Frame, play
 from sandbox.games.billiards.match import Match
@@ -50,7 +49,8 @@ def command(
     SCENE is a table: a file, or the name of a shipped one. Players take the first shot in turn.
     """
     faults: list[Fault] = []
-    engines_in(engine, faults)
+    with gathering(faults, "--engine", (UnknownEngineError,)):
+        engine_named(engine)
     count = 2
     with gathering(faults, "--players", (GameError,)):
         count = len(bots_in(players))
@@ -61,7 +61,7 @@ def command(
         path = path_of(scene)
         found = [load(path, overrides)]
         begin = found[0].world.seed if seed is None else seed
-    if not faults:
+    if found:
         with gathering(faults, scene, (GameError,)):
             Match.begin(found[0], game, count, **terms)
     if not faults and out is not None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import Self
@@ -28,6 +28,8 @@ class Layout:
     """The geometry of a scene with a floor."""
 
     scene: Scene
+    places: dict[tuple[str, float], FloatArray] = field(default_factory=dict, repr=False)
+    """(M, 2) m, all over where a ball of some radius may be put, by what rules call it; kept for the next time"""
 
     @classmethod
     def of(cls, scene: Scene) -> Self:

@@ -1,7 +1,7 @@
 """Lying: how the balls lie for the player to shoot: what touches the cue ball, and whether it is snookered."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 from sandbox.games.billiards.layout import TOUCH, Disc
 from sandbox.games.billiards.rules.verdict import Lie
@@ -14,7 +14,7 @@ def touching(cue: Disc, others: dict[str, Disc]) -> tuple[str, ...]:
     return tuple(name for name, (bx, by, r) in others.items() if math.hypot(bx - x, by - y) - radius - r <= TOUCH)
 
 
-def lie_of(cues: Sequence[Disc], others: dict[str, Disc], targets: frozenset[str], placed: bool) -> Lie:
+def lie_of(cues: Iterable[Disc], others: dict[str, Disc], targets: frozenset[str], placed: bool) -> Lie:
     """Return how the balls lie.
 
     Args:
@@ -26,16 +26,19 @@ def lie_of(cues: Sequence[Disc], others: dict[str, Disc], targets: frozenset[str
     Source: WPBSA 2, Snookered: a ball is on where both its edges can be hit straight; the ball in the way that is
     nearest to the cue ball snookers it.
     """
-    against = () if placed else touching(cues[0], others)
     free = {name: disc for name, disc in others.items() if name not in targets}
+    against: tuple[str, ...] = ()
     by: tuple[str, ...] = ()
+    looks = 0
     for cue in cues:
+        looks += 1
+        against = () if placed else touching(cue, others)
         found = [_hidden(cue, others[name], free) for name in others if name in targets]
         if not found or any(way is None for way in found) or not targets.isdisjoint(against):
             return Lie(against)
         names = {way for way in found if way is not None}
         by = tuple(names) if len(names) == 1 else ()
-    return Lie(against, bool(cues), by if len(cues) == 1 else ())
+    return Lie(against, looks > 0, by if looks == 1 else ())
 
 
 def _hidden(cue: Disc, target: Disc, others: dict[str, Disc]) -> str | None:

@@ -1,5 +1,6 @@
 """Match: a game on a table, as a frozen value: rules, turn, score, and where every ball lies."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
@@ -237,7 +238,8 @@ class Match:
 
     @property
     def _others(self) -> list[Disc]:
-        return [disc for name, disc in self.on_table.items() if name != self.cue]
+        cue = self.cue
+        return [disc for name, disc in self.on_table.items() if name != cue]
 
     def _with(self, places: dict[str, Point]) -> tuple[Point, ...]:
         """Return the positions with some balls elsewhere."""
@@ -305,19 +307,16 @@ class Match:
 
     def _lie(self) -> Lie:
         """Return how the balls lie for the one to shoot."""
-        others = {name: disc for name, disc in self.on_table.items() if name != self.cue}
-        radius = self._cue_radius
-        if self.state.in_hand is None:
-            cues = [(*self.position[self.layout.number[self.cue]], radius)]
-        else:
-            cues = [(x, y, radius) for x, y in self._places()]
-        return lie_of(cues, others, self.targets, self.state.in_hand is not None)
+        cue = self.cue
+        others = {name: disc for name, disc in self.on_table.items() if name != cue}
+        return lie_of(self._cues(), others, self.targets, self.state.in_hand is not None)
 
-    def _places(self) -> list[Point]:
-        """Return some places all over where the cue ball may be put, and where it is."""
-        at = self.position[self.layout.number[self.cue]]
-        place = self.state.in_hand
-        return [at] if place is None else [at, *spread(self.layout, place, self._cue_radius, self._others)]
+    def _cues(self) -> Iterator[Disc]:
+        """Yield where the cue ball lies; where it is in hand, then also all over where it may be put."""
+        radius, place = self._cue_radius, self.state.in_hand
+        yield (*self.position[self.layout.number[self.cue]], radius)
+        if place is not None:
+            yield from ((x, y, radius) for x, y in spread(self.layout, place, radius, self._others))
 
 
 def _require(layout: Layout, rules: Rules[Any], state: State) -> None:

@@ -55,8 +55,7 @@ def nearest(layout: Layout, place: Place, at: Point, radius: float, others: Sequ
     if refusal(layout, place, at, radius, others) is None:
         return at
     wanted = np.array([at])
-    bounds = _bounds(layout, place, radius)
-    found = [_into(layout, place, wanted, radius), bounds]
+    found = [_into(layout, place, wanted, radius), np.array(spread(layout, place, radius, others)).reshape(-1, 2)]
     near = np.array(others, dtype=float).reshape(-1, 3)
     for x, y, r in near.tolist():
         away, reach = math.atan2(at[1] - y, at[0] - x), radius + r + HAIR
@@ -74,9 +73,13 @@ def nearest(layout: Layout, place: Place, at: Point, radius: float, others: Sequ
 
 def spread(layout: Layout, place: Place, radius: float, others: Sequence[Disc]) -> list[Point]:
     """Return places all over where a ball in hand may be put, m."""
-    points = _bounds(layout, place, radius)
-    points = points[allowed(layout, place, points, radius, others)]
-    return [(x, y) for x, y in points.tolist()]
+    points = layout.places.get((place, radius))
+    if points is None:
+        points = _bounds(layout, place, radius)
+        points = points[allowed(layout, place, points, radius, ())]
+        layout.places[place, radius] = points
+    free = points[_apart(points, radius, others) >= -ROUNDING]
+    return [(x, y) for x, y in free.tolist()]
 
 
 def _within(layout: Layout, place: Place, points: FloatArray) -> BoolArray:

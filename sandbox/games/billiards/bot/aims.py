@@ -15,13 +15,13 @@ SPEEDS = (1.2, 2.0, 3.2)
 HEIGHTS = (-0.3, 0.0, 0.3)
 """draw, stun, follow"""
 
-THROWS = 9
+THROWS = 7
 """aims to either side of the ghost ball that are tried, for throw and spin turn the ball's way"""
 
 ASIDE = 0.12
 """rad, of the object ball's way, that these reach to either side"""
 
-COMBINATIONS = 6
+COMBINATIONS = 5
 """balls and pockets that are looked at closely"""
 
 

@@ -88,7 +88,7 @@ class Bot:
         strokes = self._strokes(trial)
         ranked = self._ranked(trial, strokes)
         if match.layout.pockets and not match.state.opening and (not ranked or ranked[0][0] < GOOD):
-            ranked += self._ranked(trial, list(all_around(trial, 90, (1.5, 3.0))))
+            ranked += self._ranked(trial, list(all_around(trial, 60, (1.5, 3.0))))
         ranked.sort(key=lambda each: -each[0])
         best = self._steadiest(trial, ranked[:FINALISTS])
         return Plan(best[0], best[1], place)

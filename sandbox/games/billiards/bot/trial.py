@@ -99,10 +99,11 @@ def straight(match: Match, sigma: float) -> Pots:
 def standing(match: Match) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return where the cue ball, the balls on and all object balls lie, (2,), (T, 2) and (B, 2) m."""
     number, position, on = match.layout.number, match.position, match.targets
-    balls = [ball for ball in match.state.table if ball != match.cue]
+    cue = match.cue
+    balls = [ball for ball in match.state.table if ball != cue]
     targets = [position[number[ball]] for ball in balls if ball in on]
     others = [position[number[ball]] for ball in balls]
-    return np.array(position[number[match.cue]]), np.array(targets).reshape(-1, 2), np.array(others).reshape(-1, 2)
+    return np.array(position[number[cue]]), np.array(targets).reshape(-1, 2), np.array(others).reshape(-1, 2)
 
 
 def called(match: Match, happenings: tuple[Happening, ...]) -> Call:
