@@ -5,11 +5,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
-import numpy as np
-
 from sandbox.action import Move, Strike
 from sandbox.games.billiards.layout import Disc, Layout
 from sandbox.games.billiards.lying import lie_of
+from sandbox.games.billiards.needs import require
 from sandbox.games.billiards.placing import nearest, refusal, spread
 from sandbox.games.billiards.rules.call import Call, Choices, Decision
 from sandbox.games.billiards.rules.happening import GameError, Happening
@@ -17,17 +16,12 @@ from sandbox.games.billiards.rules.registry import rules_named
 from sandbox.games.billiards.rules.rules import Rules
 from sandbox.games.billiards.rules.state import State
 from sandbox.games.billiards.rules.verdict import Lie, Verdict
-from sandbox.games.billiards.spotting import spotted
 from sandbox.games.billiards.telling import happenings_of, touching_pairs
+from sandbox.games.billiards.upkeep import racked, respotted, ways
 from sandbox.scene.cue import Stroke
 from sandbox.scene.model import Scene
 from sandbox.scene.part import Point
 from sandbox.trajectory import Contacts, FloatArray
-
-SPOTS = {"8-ball": ("head", "foot"), "9-ball": ("head", "foot"), "carom": ("head", "centre", "foot")}
-"""What a table needs for a rack; for snooker, the colours' own."""
-
-COLOURS = ("yellow", "green", "brown", "blue", "pink", "black")
 
 
 @dataclass(frozen=True)
@@ -70,7 +64,7 @@ class Match:
             state = rules.start(players, **terms)
         except TypeError:
             raise GameError(f"{rules.name} takes no {', '.join(terms)}") from None
-        _require(layout, rules, state)
+        require(layout, rules, state)
         return cls(layout, rules, state, layout.start)._in_hand()
 
     @property
@@ -188,17 +182,16 @@ class Match:
     def moves(self, position: FloatArray, time: float = 0.0) -> tuple[Move, ...]:
         """Return the actions that put the balls where this match has them.
 
-        So a shot is taken back too: by those of the match before it.
+        So a shot is taken back too: by those of the match before it. In their order no ball is put onto another.
 
         Args:
             position: (N, 2) m, where the bodies are now.
             time: of the actions, s.
         """
-        now = [(x, y) for x, y in np.asarray(position).tolist()]
+        now = [(x, y) for x, y in position.tolist()]
         return tuple(
-            Move(time=time, body=name, position=self.position[k], velocity=(0.0, 0.0))
-            for k, name in enumerate(self.layout.names)
-            if now[k] != self.position[k]
+            Move(time=time, body=self.layout.names[k], position=at, velocity=(0.0, 0.0))
+            for k, at in ways(self.layout, now, self.position)
         )
 
     def document(self) -> dict[str, Any]:
@@ -252,12 +245,13 @@ class Match:
         """Return the match once all is done at the table that a verdict asks for, and the lie is looked at."""
         position = self.position
         if verdict.rerack:
-            position = self._racked(verdict.state)
+            position = racked(self.layout, self.rules, verdict.state)
         elif verdict.restore and self.before is not None:
             position = self.before
         after = replace(self, state=verdict.state, position=position)
         if verdict.respot:
-            after = after._spotted(verdict)
+            here = [after.layout.number[name] for name in after.on_table]
+            after = replace(after, position=respotted(after.layout, verdict.respot, position, here))
         after = after._in_hand()
         if after.over:
             return replace(after, verdict=verdict)
@@ -270,29 +264,6 @@ class Match:
             messages=(*verdict.messages, *settled.messages),
         )
         return replace(after, state=settled.state, verdict=told)
-
-    def _racked(self, state: State) -> tuple[Point, ...]:
-        """Return where the balls lie when all begins anew: the one who shoots has the first cue ball's place."""
-        position = list(self.layout.start)
-        cue, first = self.rules.cue_ball(state), self.rules.cue_balls[0]
-        if cue != first and first in self.layout.number:
-            a, b = self.layout.number[cue], self.layout.number[first]
-            position[a], position[b] = position[b], position[a]
-        return tuple(position)
-
-    def _spotted(self, verdict: Verdict[Any]) -> Self:
-        """Return the match with balls put back, one after the other."""
-        after, lifted = self, {each.ball for each in verdict.respot}
-        for each in verdict.respot:
-            here = after.on_table
-            if after.layout.pocket_at(after.position[after.layout.number[after.cue]]) is not None:
-                lifted.add(after.cue)  # down, and not in the way of a spot
-            others = [disc for name, disc in here.items() if name not in lifted]
-            radius = after.layout.radius[after.layout.number[each.ball]]
-            at = spotted(after.layout, each, radius, others)
-            after = replace(after, position=after._with({each.ball: at}))
-            lifted.discard(each.ball)
-        return after
 
     def _in_hand(self) -> Self:
         """Return the match with a cue ball in hand at the legal place nearest to where it is, or to the head spot."""
@@ -317,27 +288,6 @@ class Match:
         yield (*self.position[self.layout.number[self.cue]], radius)
         if place is not None:
             yield from ((x, y, radius) for x, y in spread(self.layout, place, radius, self._others))
-
-
-def _require(layout: Layout, rules: Rules[Any], state: State) -> None:
-    """Refuse a table on which a game cannot be played.
-
-    Raises:
-        GameError: with all that is wrong.
-    """
-    wanted = {*state.table, *(rules.cue_balls if rules.name != "free" else (rules.cue_ball(state),))}
-    missing, idle = sorted(wanted - set(layout.names)), sorted(set(layout.names) - wanted)
-    spots = [name for name in SPOTS.get(rules.rack, COLOURS) if name not in layout.spots and rules.name != "free"]
-    wrong = [
-        *([f"no ball {', '.join(missing)}"] if missing else []),
-        *([f"it has no use for {', '.join(idle)}"] if idle else []),
-        *([f"no spot {', '.join(spots)}; state a [[play.spot]]"] if spots else []),
-        *(["no floor; state a [surface]"] if layout.scene.surface is None else []),
-        *(["no pockets"] if not layout.pockets and rules.name in ("8-ball", "9-ball", "snooker") else []),
-        *(["carom has no pockets"] if layout.pockets and rules.rack == "carom" else []),
-    ]
-    if wrong:
-        raise GameError(f"{rules.name} cannot be played on this table: {'; '.join(wrong)}")
 
 
 def _points(plain: Any, layout: Layout) -> tuple[Point, ...]:

@@ -173,3 +173,18 @@ def test_stepped_simulation_and_whole_shots_give_the_same_verdicts(name: str) ->
         if stepped.over:
             break
         now = stepped
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_balls_change_places_without_meeting(seed: int) -> None:
+    now = match("9-ball")
+    order = np.random.default_rng(seed).permutation(len(now.position))
+    pocket = table("9-ball").pockets[0].position
+    places = [now.position[k] if k != 4 else pocket for k in order.tolist()]
+    plain = now.document() | {"position": [list(each) for each in places]}
+    other = Match.restored(table("9-ball"), plain)
+    simulation = sandbox.start(now.scene, "exact")
+    for there in (other, now, other):
+        for action in there.moves(simulation.frame().position):
+            simulation.apply(action)  # the engine refuses a ball that is put onto another
+        assert [tuple(each) for each in simulation.frame().position.tolist()] == list(there.position)
