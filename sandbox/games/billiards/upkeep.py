@@ -60,7 +60,8 @@ def ways(layout: Layout, now: Sequence[Point], then: Sequence[Point]) -> list[tu
     at, left, found = list(now), [k for k in range(len(now)) if now[k] != then[k]], list[tuple[int, Point]]()
     (x0, y0), _ = layout.area
     while left:
-        ready = next((k for k in left if _free(layout, k, then[k], at)), None)
+        # Only who is still to be moved is in the way: where balls are to end is none of our business.
+        ready = next((k for k in left if _free(layout, k, then[k], at, left)), None)
         number = left[0] if ready is None else ready
         far = 4.0 * layout.radius[number] * (number + 1) + ASIDE
         place = (x0 - far, y0 - far) if ready is None else then[number]
@@ -72,13 +73,13 @@ def ways(layout: Layout, now: Sequence[Point], then: Sequence[Point]) -> list[tu
     return found
 
 
-def _free(layout: Layout, number: int, place: Point, at: Sequence[Point]) -> bool:
-    """Tell whether a ball can be put somewhere; in a pocket it meets nobody."""
+def _free(layout: Layout, number: int, place: Point, at: Sequence[Point], others: Sequence[int]) -> bool:
+    """Tell whether a ball can be put somewhere, for others; in a pocket it meets nobody."""
     if layout.pocket_at(place) is not None:
         return True
     radius = layout.radius
     return all(
-        math.dist(place, other) >= radius[number] + radius[k] or layout.pocket_at(other) is not None
-        for k, other in enumerate(at)
+        math.dist(place, at[k]) >= radius[number] + radius[k] or layout.pocket_at(at[k]) is not None
+        for k in others
         if k != number
     )
