@@ -13,8 +13,8 @@ SCENES = Path(__file__).parents[3] / "scenes" / "billiards"
 
 
 @cache
-def table(name: str) -> Scene:
-    return load(SCENES / f"{name}.toml")
+def table(name: str, seed: int | None = None) -> Scene:
+    return load(SCENES / f"{name}.toml", () if seed is None else [("world.seed", seed)])
 
 
 def match(name: str, **terms: Any) -> Match:

@@ -13,7 +13,6 @@ from sandbox.games.billiards.frame import play
 from sandbox.games.billiards.layout import Layout
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.happening import GameError
-from sandbox.scene.file import load
 from sandbox.scene.part import Point
 
 FAR = {str(k): (0.06 + 0.075 * k, 0.12) for k in range(2, 10)}
@@ -125,17 +124,11 @@ def test_players_are_named() -> None:
 def test_skill_wins(name: str, terms: dict[str, int]) -> None:
     won = 0
     for seed in range(8):
-        scene = load(table_file(name), [("world.seed", seed)])
+        scene = table(name, seed)
         good = seed % 2  # the first shot goes round
         bots = [Bot(0.9 if each == good else 0.2, seed) for each in (0, 1)]
         won += play(Match.begin(scene, **terms), bots).match.state.winner == good
     assert won >= 6  # of equals one in seven wins so many
-
-
-def table_file(name: str) -> str:
-    from tables_by_hand import SCENES
-
-    return str(SCENES / f"{name}.toml")
 
 
 def test_every_call_is_one_that_can_be_made() -> None:

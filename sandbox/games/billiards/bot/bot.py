@@ -107,7 +107,7 @@ class Bot:
             return list(all_around(trial, 72, speeds, sides))
         if match.state.opening:
             if match.rules.name == "snooker":
-                return list(all_around(trial, 12, (2.0, 2.8), (-0.3, 0.0, 0.3)))
+                return list(all_around(trial, 12, (2.0, 2.8), (-0.3, 0.3)))
             return list(breaks(trial))
         return pots_of(trial)
 
