@@ -23,6 +23,8 @@ from sandbox.engines.exact.rolling.play import DONE, FULL, TOO_MANY
 from sandbox.engines.exact.rolling.record import too_many, with_paths, with_room
 from sandbox.engines.exact.rolling.shoot import UNSTRUCK, shoot, shoot_many
 from sandbox.engines.exact.rolling.simulation import RollingSimulation
+from sandbox.engines.floor.phase import CAPTURED, RESTING
+from sandbox.engines.floor.pockets import caught
 from sandbox.scene.cue import Stroke, struck
 from sandbox.scene.demands import on_floor
 from sandbox.scene.model import Scene
@@ -164,13 +166,17 @@ class Table:
         return Fan(rest, pocket, ends, events, status == DONE)
 
     def with_balls(self, position: dict[str, tuple[float, float]]) -> Self:
-        """Return a table with balls at rest elsewhere, m; those that are not named stay."""
+        """Return a table with balls at rest elsewhere, m; those that are not named stay.
+
+        Who is put into a pocket lies in it.
+        """
         other = self._copy()
-        for name, place in position.items():
+        down = caught(self.scene, np.array(list(position.values()), dtype=float).reshape(-1, 2)) >= 0
+        for (name, place), inside in zip(position.items(), down.tolist(), strict=True):
             number = self._number[name]
             other._state[number, X : Y + 1] = place
             other._state[number, VX : WZ + 1] = 0.0
-            other._tags[number, PHASE] = 0
+            other._tags[number, PHASE] = CAPTURED if inside else RESTING
         return other
 
     def after(self, outcome: Outcome) -> Self:

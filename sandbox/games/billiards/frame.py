@@ -1,0 +1,209 @@
+"""Frame: a game played out between players, on any engine, and the session that it leaves."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from sandbox.action import Action
+from sandbox.engines.contract import Simulation
+from sandbox.engines.relay import start
+from sandbox.games.billiards.match import Match
+from sandbox.games.billiards.rules.call import Call, Decision
+from sandbox.games.billiards.rules.happening import GameError
+from sandbox.recording import Recording
+from sandbox.scene.cue import Stroke
+from sandbox.scene.part import Point
+from sandbox.trajectory import Contacts
+
+LONGEST = 300.0
+"""s, that a shot may take"""
+
+MOST_TURNS = 2000
+"""of a frame: what goes on for ever ends there, without a winner"""
+
+STILL = 1e-9
+"""m/s and rad/s: what is slower rests"""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a player does at the table."""
+
+    stroke: Stroke
+    call: Call = field(default_factory=Call)
+    place: Point | None = None
+    """where a cue ball in hand is put, m; without one it stays"""
+
+
+class Player(Protocol):
+    """Whoever decides and shoots: a bot, or a script."""
+
+    def decide(self, match: Match) -> Decision:
+        """Return one of `match.choices.decisions`; asked for where there are some."""
+
+    def plan(self, match: Match) -> Plan:
+        """Return the next shot."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """What a player decided or played, and what came of it."""
+
+    player: int
+    """from 0"""
+    decision: Decision | None
+    plan: Plan | None
+    """where nothing was decided"""
+    fouls: tuple[str, ...]
+    points: tuple[int, ...]
+    """what each player gained"""
+    messages: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame that was played."""
+
+    first: Match
+    """how it began"""
+    match: Match
+    """how it ended"""
+    turns: tuple[Turn, ...]
+    session: Recording
+    """scene and actions: the same engine gets to the same state again, bit for bit"""
+
+    @property
+    def shots(self) -> tuple[Turn, ...]:
+        """The turns in which somebody shot."""
+        return tuple(turn for turn in self.turns if turn.plan is not None)
+
+    def replayed(self) -> "Frame":
+        """Return the frame as a fresh simulation and the same turns lead to it.
+
+        Raises:
+            GameError: what was done cannot be done again: the versions differ.
+        """
+        script = Script(self.turns)
+        return play(self.first, (script, script), self.session.engine, most=len(self.turns))
+
+    def document(self) -> dict[str, Any]:
+        """Return the frame as a JSON object, without the session."""
+        plain: list[dict[str, Any]] = _TURNS.dump_python(self.turns, mode="json", exclude_defaults=True)
+        state = self.match.state
+        return {
+            "game": self.match.rules.name,
+            "winner": state.winner,
+            "over": state.over,
+            "scores": list(state.scores),
+            "shots": len(self.shots),
+            "duration": self.session.duration,
+            "state_hash": self.session.state_hash,
+            "turns": plain,
+        }
+
+
+class Script:
+    """A player who does what was done."""
+
+    def __init__(self, turns: Sequence[Turn]) -> None:
+        self._turns = iter(turns)
+
+    def decide(self, match: Match) -> Decision:
+        """Return the next decision."""
+        turn = next(self._turns, None)
+        if turn is None or turn.decision is None or turn.player != match.turn:
+            raise GameError("the frame did not come to this decision")
+        return turn.decision
+
+    def plan(self, match: Match) -> Plan:
+        """Return the next shot."""
+        turn = next(self._turns, None)
+        if turn is None or turn.plan is None or turn.player != match.turn:
+            raise GameError("the frame did not come to this shot")
+        return turn.plan
+
+
+def play(
+    match: Match,
+    players: Sequence[Player],
+    engine: str = "exact",
+    *,
+    most: int = MOST_TURNS,
+    told: Callable[[Turn, Match], None] | None = None,
+) -> Frame:
+    """Play a match to its end.
+
+    Args:
+        match: how it begins; the balls lie where its scene has them.
+        players: one for each.
+        engine: by name.
+        most: how many turns.
+        told: called after every turn.
+
+    Raises:
+        GameError: a player does what may not be done, or a shot does not come to rest.
+        Refusal: the engine cannot play this table.
+    """
+    if len(players) != match.state.players:
+        raise GameError(f"{match.state.players} play, not {len(players)}")
+    simulation = start(match.scene, engine)
+    simulation.contacts()  # the recording begins
+    first, actions, turns = match, list[Action](), list[Turn]()
+
+    def act(some: Sequence[Action]) -> None:
+        for action in some:
+            simulation.apply(action)
+        actions.extend(some)
+
+    while not match.over and len(turns) < most:
+        player, who = players[match.turn], match.turn
+        decision: Decision | None = None
+        plan: Plan | None = None
+        if match.choices.decisions and not (turns and turns[-1].decision is not None and turns[-1].player == who):
+            decision = player.decide(match)
+            match = match.decide(decision)
+        else:
+            plan = player.plan(match)
+            if plan.place is not None:
+                match = match.place(plan.place)
+            # Not before: an action counts from the step that it is followed by.
+            act(match.moves(simulation.frame().position, simulation.time))
+            began = simulation.time
+            act((match.strike(plan.stroke, began),))
+            contacts = roll_out(simulation)
+            match = match.played(contacts, simulation.frame().position, plan.call, began)
+        verdict = match.verdict
+        told_of = ((), (), ()) if verdict is None else (verdict.fouls, verdict.points, verdict.messages)
+        turns.append(Turn(who, decision, plan, *told_of))
+        if told is not None:
+            told(turns[-1], match)
+    session = Recording(
+        match.scene, engine, match.scene.solver, tuple(actions), simulation.time, simulation.state_hash()
+    )
+    simulation.close()
+    return Frame(first, match, tuple(turns), session)
+
+
+def roll_out(simulation: Simulation) -> Contacts:
+    """Step until everything rests; return the contacts since they were last asked for.
+
+    Raises:
+        GameError: it does not come to rest.
+    """
+    until = simulation.time + LONGEST
+    while True:
+        simulation.step()
+        frame = simulation.frame()
+        roll = 0.0 if frame.roll is None else float(np.abs(frame.roll).max(initial=0.0))
+        fastest = max(float(np.abs(frame.velocity).max(initial=0.0)), float(np.abs(frame.angular_velocity).max()), roll)
+        if fastest <= STILL:
+            break
+        if simulation.time > until:
+            raise GameError(f"a shot does not come to rest within {LONGEST:g} s")
+    return simulation.contacts()
+
+
+_TURNS = TypeAdapter(tuple[Turn, ...])

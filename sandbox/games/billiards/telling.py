@@ -1,0 +1,54 @@
+"""Telling: what an engine saw of a shot, as the rules read it: by names."""
+
+import math
+
+from sandbox.games.billiards.layout import TOUCH, Layout
+from sandbox.games.billiards.rules.happening import Happening
+from sandbox.scene.part import Point
+from sandbox.trajectory import Contacts
+
+AT_ONCE = 5e-3
+"""s: what touches from the start, and is seen so soon, was never left"""
+
+
+def happenings_of(
+    layout: Layout,
+    contacts: Contacts,
+    began: float = 0.0,
+    against: frozenset[tuple[int, int]] = frozenset(),
+) -> tuple[Happening, ...]:
+    """Return what happened in a shot.
+
+    Args:
+        layout: of the table.
+        contacts: of any engine, since the stroke. What began before it is left out.
+        began: the time of the stroke, s.
+        against: what touched when the shot began, as `touching_pairs` tells it; it counts once it was left (WPA 8.4).
+    """
+    names, fixed, solid = layout.names, layout.scene.fixed_names, len(layout.scene.fixed)
+    found = []
+    for time, (a, b) in zip(contacts.time.tolist(), contacts.pair.tolist(), strict=True):
+        since = time - began
+        if since < 0.0 or (since <= AT_ONCE and (a, b) in against):
+            continue
+        if b >= 0:
+            found.append(Happening(since, names[a], "ball", names[b]))
+        else:
+            found.append(Happening(since, names[a], "cushion" if -1 - b < solid else "pocket", fixed[-1 - b]))
+    return tuple(found)
+
+
+def touching_pairs(layout: Layout, position: tuple[Point, ...]) -> frozenset[tuple[int, int]]:
+    """Return what touches, as pairs of numbers: of bodies the lower first; fixed things are −1 − k."""
+    found = []
+    ordered = sorted(range(len(position)), key=lambda k: position[k][0])
+    widest = 2.0 * max(layout.radius, default=0.0) + TOUCH
+    for n, i in enumerate(ordered):
+        (x, y), radius = position[i], layout.radius[i]
+        for k in ordered[n + 1 :]:
+            if position[k][0] - x > widest:
+                break
+            if math.hypot(position[k][0] - x, position[k][1] - y) - radius - layout.radius[k] <= TOUCH:
+                found.append((min(i, k), max(i, k)))
+    found += layout.against_fixed(position)
+    return frozenset(found)

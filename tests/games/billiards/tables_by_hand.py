@@ -1,0 +1,32 @@
+"""Tables for tests: the shipped ones, and balls put where a test wants them."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from sandbox.games.billiards.match import Match
+from sandbox.scene.file import load
+from sandbox.scene.model import Scene
+from sandbox.scene.part import Point
+
+SCENES = Path(__file__).parents[3] / "scenes" / "billiards"
+
+
+@cache
+def table(name: str, seed: int | None = None) -> Scene:
+    return load(SCENES / f"{name}.toml", () if seed is None else [("world.seed", seed)])
+
+
+def match(name: str, **terms: Any) -> Match:
+    return Match.begin(table(name), **terms)
+
+
+def lying(name: str, places: dict[str, Point], **terms: Any) -> Match:
+    """A match with balls elsewhere; those that are not named are where they begin."""
+    scene = table(name)
+    position = scene.bodies.position.copy()
+    for ball, at in places.items():
+        position[scene.bodies.names.index(ball)] = at
+    begun = Match.begin(scene, **terms)
+    plain = begun.document() | {"position": position.tolist()}
+    return Match.restored(scene, plain)

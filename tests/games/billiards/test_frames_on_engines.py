@@ -1,0 +1,14 @@
+"""Frames on engines of fixed steps: the same rules read what these tell of a shot."""
+
+from tables_by_hand import match
+
+from sandbox.games.billiards.bot.bot import Bot
+from sandbox.games.billiards.frame import play
+
+
+def test_shots_on_pymunk_are_judged_and_replay() -> None:
+    played = play(match("9-ball"), [Bot(0.9, 1), Bot(0.9, 2)], "pymunk", most=3)
+    assert len(played.shots) == 3
+    first = played.shots[0]
+    assert not any("touched no ball" in foul for foul in first.fouls)
+    assert played.replayed() == played

@@ -1,0 +1,57 @@
+"""Telling: contacts of engines as happenings by names."""
+
+import numpy as np
+from tables_by_hand import lying, table
+
+from sandbox.games.billiards.layout import Layout
+from sandbox.games.billiards.rules.happening import Happening
+from sandbox.games.billiards.telling import happenings_of, touching_pairs
+from sandbox.trajectory import Contacts
+
+POOL = Layout.of(table("9-ball"))
+FIXED = POOL.scene.fixed_names
+
+
+def contacts(*rows: tuple[float, int, int]) -> Contacts:
+    none = np.zeros((len(rows), 2))
+    times, pairs = np.array([row[0] for row in rows]), np.array([row[1:] for row in rows]).reshape(-1, 2)
+    return Contacts(times, pairs, none, none, none)
+
+
+def test_balls_cushions_jaws_and_pockets_are_named() -> None:
+    jaw, pocket = FIXED.index("right pocket jaw 1"), FIXED.index("right pocket")
+    told = happenings_of(POOL, contacts((3.0, 0, 1), (3.1, 1, -1), (3.2, 1, -1 - jaw), (3.3, 1, -1 - pocket)), 2.5)
+    assert told == (
+        Happening(0.5, "cue", "ball", "1"),
+        Happening(3.1 - 2.5, "1", "cushion", FIXED[0]),
+        Happening(3.2 - 2.5, "1", "cushion", "right pocket jaw 1"),
+        Happening(3.3 - 2.5, "1", "pocket", "right pocket"),
+    )
+
+
+def test_what_began_before_the_stroke_is_left_out() -> None:
+    assert happenings_of(POOL, contacts((2.0, 0, -1)), 2.5) == ()
+
+
+def test_what_touches_from_the_start_counts_once_it_was_left() -> None:
+    against = frozenset({(0, 1), (2, -1)})
+    rows = contacts((0.0, 0, 1), (1e-4, 2, -1), (0.0, 0, 3), (0.7, 2, -1), (0.8, 0, 1))
+    told = happenings_of(POOL, rows, 0.0, against)
+    assert [(each.ball, each.other) for each in told] == [("cue", "3"), ("2", FIXED[0]), ("cue", "1")]
+
+
+def test_touching_balls_cushions_and_jaws_are_found() -> None:
+    radius = POOL.radius[0]
+    post = POOL.scene.posts[0]
+    by_jaw = (post.position[0] + 0.6 * (post.radius + radius), post.position[1] + 0.8 * (post.radius + radius))
+    match = lying(
+        "9-ball",
+        {"1": (0.5, 1.0), "2": (0.5 + 2.0 * radius, 1.0), "3": (0.5, 1.0 + 2.0 * radius + 1e-5),
+         "4": (0.6, radius), "5": by_jaw},
+    )  # fmt: skip
+    number = match.layout.number
+    lower, jaw = FIXED.index("lower cushion"), len(POOL.scene.walls)
+    expected = {(number["1"], number["2"]), (number["4"], -1 - lower), (number["5"], -1 - jaw)}
+    found = touching_pairs(POOL, match.position)
+    assert expected <= found
+    assert not any(number["3"] in pair for pair in found)  # 1e-5 m apart, ten times what counts as touching
