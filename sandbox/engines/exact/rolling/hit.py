@@ -125,11 +125,10 @@ def hit_ball(board: Board, i: int, k: int) -> None:
     distance = math.sqrt(dx * dx + dy * dy)
     nx, ny = dx / distance, dy / distance
     li, lk = state[i, LIGHTNESS], state[k, LIGHTNESS]
-    before_x, before_y = state[i, VX], state[i, VY]
+    mine, theirs = motion_of(state, i), motion_of(state, k)
     closing = (state[i, VX] - state[k, VX]) * nx + (state[i, VY] - state[k, VY]) * ny
     if closing > 0.0:
         restitution = board.coefficients[0, tags[i, SURFACE], tags[k, SURFACE]] if closing > CUT else 1.0
-        mine, theirs = motion_of(state, i), motion_of(state, k)
         a, b = meet(board.counts[BALLS_AS], restitution, mine, theirs, (li, lk), state[i, RADIUS], nx, ny)
         give(state, i, a)
         give(state, k, b)
@@ -151,8 +150,10 @@ def hit_ball(board: Board, i: int, k: int) -> None:
         set_off(board, i)
         set_off(board, k)
     if board.counts[RECORDING] != 0:
-        mass, reach = state[i, MASS], state[i, RADIUS]
-        jx, jy = mass * (before_x - state[i, VX]), mass * (before_y - state[i, VY])
+        jx, jy = state[i, MASS] * (mine[0] - state[i, VX]), state[i, MASS] * (mine[1] - state[i, VY])
+        if li == 0.0:  # what never moves shows nothing
+            jx, jy = state[k, MASS] * (state[k, VX] - theirs[0]), state[k, MASS] * (state[k, VY] - theirs[1])
+        reach = state[i, RADIUS]
         x, y = state[i, X] + reach * nx, state[i, Y] + reach * ny
         if i < k:
             log(board, BALL, i, k, x, y, nx, ny, jx, jy)

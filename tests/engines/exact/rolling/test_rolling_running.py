@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from felt import MASS, R, ball, rack, table
+from felt import MASS, SLIDING, G, R, ball, rack, table
 
 from sandbox.action import Action, ActionError, Impulse, Move, Remove, SetParameter, Spawn, Strike
 from sandbox.engines.contract import Exhaustion, Refusal
@@ -185,6 +185,15 @@ def test_who_cannot_meet_does_not() -> None:
     trajectory = run(table(ball("a", 0.5, 0.5, velocity=[0.0, 2.0]), ghost), "exact")
     assert (trajectory.position[:, 1] == (0.5, 0.9)).all()
     assert (trajectory.contact_pair[:, 1] == -1).all()
+
+
+@pytest.mark.parametrize("first", ["fixed", "moving"])
+def test_impulse_on_a_fixed_ball_is_told_whoever_has_the_lower_number(first: str) -> None:
+    balls = [ball("moving", 0.5, 0.5, velocity=[0.0, 2.0]), ball("fixed", 0.5, 0.9, fixed=True)]
+    trajectory = run(table(*sorted(balls, key=lambda each: each["name"] != first), rubs=False, e=1.0), "exact")
+    speed = math.sqrt(4.0 - 2.0 * G * SLIDING * (0.4 - 2.0 * R))  # it slides up to there
+    sign = 1.0 if first == "moving" else -1.0
+    assert trajectory.contact_impulse[0, 1] == pytest.approx(sign * 2.0 * MASS * speed, rel=1e-12)  # rounding
 
 
 def test_fixed_ball_is_a_post_that_rubs() -> None:
