@@ -13,7 +13,7 @@ Spin = tuple[AngularVelocity, AngularVelocity, AngularVelocity]
 """rad/s, right-handed, z up: natural roll is (−v_y, v_x, 0) / R"""
 
 BallBall = Literal["elastic", "frictional"]
-Cushion = Literal["simple", "han2005"]
+Cushion = Literal["simple", "han2005", "mathavan2010"]
 
 
 class Floor(Part):
@@ -40,12 +40,13 @@ class ContactModels(Part):
     ball_ball: BallBall = "elastic"
     """`elastic`: restitution alone, spins are kept; `frictional`: balls rub, μ = 0.009951 + 0.108·exp(−1.088 |u|)"""
     cushion: Cushion = "simple"
-    """`simple`: restitution along the normal alone; `han2005`: a nose of some height, which rubs"""
+    """`simple`: restitution along the normal alone; `han2005`: a nose of some height, which rubs; `mathavan2010`: one
+    that rubs while it is pressed, as the floor does"""
 
     @property
     def spins(self) -> bool:
         """Whether one of them asks for spin."""
-        return self.ball_ball == "frictional" or self.cushion == "han2005"
+        return self.ball_ball == "frictional" or self.cushion != "simple"
 
 
 class Pocket(Part):

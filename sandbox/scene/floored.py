@@ -39,14 +39,14 @@ def floored(scene: Scene, bodies: Bodies) -> Iterator[Found]:
 
 def _noses(scene: Scene) -> Iterator[Found]:
     """Check the heights of cushions: a nose must touch balls, and a model that counts on one must know it."""
-    rubs = scene.contact_models.cushion == "han2005"
+    model = scene.contact_models.cushion
     radii = sorted({ball.radius for ball in scene.balls if not ball.fixed and ball.collides != "none"})
     noses: dict[str, Sequence[Wall | Post]] = {"wall": scene.walls, "post": scene.posts}
     for kind, things in noses.items():
         for k, thing in enumerate(things):
             if thing.height is None:
-                if rubs and scene.surface is not None:
-                    message = "the cushion model 'han2005' counts on the height of the nose; state `height`, m"
+                if model != "simple" and scene.surface is not None:
+                    message = f"the cushion model {model!r} counts on the height of the nose; state `height`, m"
                     yield (kind, k), message
             elif scene.surface is None:
                 yield (kind, k, "height"), "is of a nose above a floor; give the scene a [surface]"

@@ -11,7 +11,7 @@ from sandbox.action import ActionError, Force, Impulse, Move, Remove, SetParamet
 from sandbox.engines.account import Cause
 from sandbox.engines.contract import Refusal, Simulation
 from sandbox.engines.energy import total_energy
-from sandbox.engines.floor.collide import ELASTIC, FRICTIONAL, HAN2005, SIMPLE, meet, rebound
+from sandbox.engines.floor.collide import CUSHION, ELASTIC, FRICTIONAL, meet, rebound
 from sandbox.engines.registry import start
 from sandbox.engines.relay import Relay
 from sandbox.scene.cue import struck
@@ -150,7 +150,7 @@ def test_each_hit_of_two_balls_obeys_its_law(model: str, offset: float) -> None:
     assert simulation.frame().position[1] == pytest.approx([0.4 + theirs[0] * gone, y + theirs[1] * gone], abs=ROUNDING)
 
 
-@pytest.mark.parametrize("model", ["simple", "han2005"])
+@pytest.mark.parametrize("model", ["simple", "han2005", "mathavan2010"])
 @pytest.mark.parametrize("kind", ["wall", "post", "end"])
 def test_each_hit_of_a_cushion_obeys_its_law(model: str, kind: str) -> None:
     spin, speed, lift = [12.0, -7.0, 20.0], 3.0, 0.03
@@ -174,8 +174,8 @@ def test_each_hit_of_a_cushion_obeys_its_law(model: str, kind: str) -> None:
     simulation.contacts()
     for _ in range(120):
         simulation.step()
-    law = HAN2005 if model == "han2005" else SIMPLE
-    expected = rebound(law, 0.85, 0.2, (speed, 0.0, *spin), RADIUS, NOSE, *n)
+    law = CUSHION[model]
+    expected = rebound(law, 0.85, 0.2, 0.0, (speed, 0.0, *spin), RADIUS, NOSE, *n)
     assert five(simulation, 0) == pytest.approx(expected, abs=ROUNDING)
     (row,) = simulation.contacts()
     assert row.pair == (0, -1)

@@ -5,13 +5,15 @@ Velocities along z are left out: the floor takes them, and nothing jumps. n poin
 
 import math
 
+from sandbox.engines.floor.mathavan import mathavan2010
 from sandbox.engines.kernel import bare_kernel as kernel
+from sandbox.scene.floor import BallBall, Cushion
 
 ELASTIC, FRICTIONAL = range(2)
-"""Models of ball and ball, as `[contact_models]` names them."""
-
-SIMPLE, HAN2005 = range(2)
-"""Models of ball and cushion."""
+SIMPLE, HAN2005, MATHAVAN2010 = range(3)
+BALL_BALL: dict[BallBall, int] = {"elastic": ELASTIC, "frictional": FRICTIONAL}
+CUSHION: dict[Cushion, int] = {"simple": SIMPLE, "han2005": HAN2005, "mathavan2010": MATHAVAN2010}
+"""Models of ball and ball, and of ball and cushion, as `[contact_models]` names them."""
 
 Five = tuple[float, float, float, float, float]
 """v_x, v_y, m/s; ω_x, ω_y, ω_z, rad/s"""
@@ -72,14 +74,23 @@ def meet(
 
 @kernel
 def rebound(
-    model: int, restitution: float, friction: float, a: Five, radius: float, height: float, nx: float, ny: float
+    model: int,
+    restitution: float,
+    friction: float,
+    sliding: float,
+    a: Five,
+    radius: float,
+    height: float,
+    nx: float,
+    ny: float,
 ) -> Five:
     """Return a ball after it has hit a cushion.
 
     Args:
-        model: `SIMPLE` or `HAN2005`.
+        model: `SIMPLE`, `HAN2005` or `MATHAVAN2010`.
         restitution: along the normal of contact.
-        friction: of ball and cushion, which only `HAN2005` has.
+        friction: of ball and cushion, which `SIMPLE` has not.
+        sliding: of ball and floor, which only `MATHAVAN2010` asks for.
         a: velocity and spin.
         radius: m.
         height: of the nose above the floor, m.
@@ -88,6 +99,8 @@ def rebound(
     """
     if model == HAN2005:
         return _han2005(restitution, friction, a, radius, height, nx, ny)
+    if model == MATHAVAN2010:
+        return mathavan2010(restitution, friction, sliding, a, radius, height, nx, ny)
     vx, vy, wx, wy, wz = a
     push = (1.0 + restitution) * (vx * nx + vy * ny)
     return vx - push * nx, vy - push * ny, wx, wy, wz

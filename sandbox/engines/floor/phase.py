@@ -30,14 +30,17 @@ class Figures(NamedTuple):
     """μ_r·g"""
     spinning: float
     """5/2·μ_sp·g, by the radius the rate at which ω_z falls"""
+    grip: float
+    """μ_s itself"""
 
 
 def figures_of(floor: Floor | None) -> Figures:
     """Return what a floor does to spheres, as kernels count it."""
     if floor is None:
-        return Figures(0.0, 0.0, 0.0)
+        return Figures(0.0, 0.0, 0.0, 0.0)
     g = floor.gravity
-    return Figures(floor.sliding_friction * g, floor.rolling_friction * g, 2.5 * floor.spinning_friction * g)
+    mu = floor.sliding_friction
+    return Figures(mu * g, floor.rolling_friction * g, 2.5 * floor.spinning_friction * g, mu)
 
 
 @kernel

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.engines.account import Account, Cause
-from sandbox.engines.floor.collide import ELASTIC, FRICTIONAL, HAN2005, SIMPLE
+from sandbox.engines.floor.collide import BALL_BALL, CUSHION
 from sandbox.engines.floor.phase import figures_of
 from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
 from sandbox.engines.native.cushions import Cushions, cushions_of
@@ -73,10 +73,11 @@ class Felt:
         """Go on with a scene's changed coefficients, or with more surfaces."""
         surfaces, models = meet.surfaces, scene.contact_models
         self._laws = Laws(
-            FRICTIONAL if models.ball_ball == "frictional" else ELASTIC,
-            HAN2005 if models.cushion == "han2005" else SIMPLE,
+            BALL_BALL[models.ball_ball],
+            CUSHION[models.cushion],
             surfaces.restitution,
             surfaces.friction,
+            self._floor.grip,
             self._slop,
             self._mend,
         )

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.engines.exact.arena import BY_PHANTOM, arena_of
-from sandbox.engines.floor.collide import ELASTIC, FRICTIONAL, HAN2005, SIMPLE
+from sandbox.engines.floor.collide import BALL_BALL, CUSHION
 from sandbox.engines.floor.phase import RESTING, Figures, figures_of
 from sandbox.engines.roster import Roster
 from sandbox.scene.model import Post, Scene, Wall
@@ -115,8 +115,8 @@ def board_of(roster: Roster) -> Board:
     tags[:, PHASE] = RESTING
     models = scene.contact_models
     counts = np.zeros(16, np.int64)
-    counts[BALLS_AS] = FRICTIONAL if models.ball_ball == "frictional" else ELASTIC
-    counts[CUSHIONS_AS] = HAN2005 if models.cushion == "han2005" else SIMPLE
+    counts[BALLS_AS] = BALL_BALL[models.ball_ball]
+    counts[CUSHIONS_AS] = CUSHION[models.cushion]
     counts[SOLID] = len(scene.fixed)
     board = Board(
         state=state,

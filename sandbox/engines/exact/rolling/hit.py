@@ -190,7 +190,8 @@ def hit_cushion(board: Board, i: int, kind: int, thing: int, coat: int, nx: floa
         restitution = board.coefficients[0, surface, coat] if closing > CUT else 1.0
         friction = board.coefficients[1, surface, coat]
         before = motion_of(state, i)
-        give(state, i, rebound(board.counts[CUSHIONS_AS], restitution, friction, before, radius, height, nx, ny))
+        model, grip = board.counts[CUSHIONS_AS], board.figures.grip
+        give(state, i, rebound(model, restitution, friction, grip, before, radius, height, nx, ny))
         still = state[i, VX] * nx + state[i, VY] * ny
         if still > 0.0:  # a nose far above the centre leaves it some of its way: the ball stays below it
             state[i, VX] -= still * nx
