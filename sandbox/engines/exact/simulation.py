@@ -1,8 +1,6 @@
 """ExactSimulation: a scene running from event to event."""
 
 from collections.abc import Mapping
-from time import perf_counter
-from typing import NoReturn
 
 import numpy as np
 
@@ -10,9 +8,7 @@ from sandbox.action import Action
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.acting import perform
 from sandbox.engines.booked import booked
-from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contact_log import MAX_ROWS
-from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.exact.advance import (
     DONE,
     FULL,
@@ -50,15 +46,11 @@ from sandbox.engines.exact.arena import (
     renewed,
 )
 from sandbox.engines.exact.books import Books
+from sandbox.engines.exact.driven import EventDriven
 from sandbox.engines.exact.excess import too_many
 from sandbox.engines.exact.log import log_rests, open_rest, taken, with_room
 from sandbox.engines.exact.predict import predict
 from sandbox.engines.exact.support import freed, knocked
-from sandbox.engines.exact.troupe import Troupe
-from sandbox.engines.kernel import tell_if_slow
-from sandbox.engines.limits import BEYOND
-from sandbox.engines.running import Running
-from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, Frame, IntArray
@@ -70,7 +62,7 @@ FIRST_ROWS = 1024
 """Rows that the log of contacts starts with."""
 
 
-class ExactSimulation(Running):
+class ExactSimulation(EventDriven):
     """A running scene.
 
     Between events every ball moves in closed form from its own last event on; frames are read off and change nothing.
@@ -78,35 +70,12 @@ class ExactSimulation(Running):
     """
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
-        super().__init__(settings)
-        self._troupe = Troupe(scene, settings.dt)
-        self._stopped: float | None = None
+        super().__init__(scene, settings)
         self._books: Books | None = None
         self._arena: Arena = arena_of(self._troupe)
-        tell_if_slow(len(scene.bodies))
         self._allow()
         with np.errstate(all="ignore"):
             start(self._arena)
-
-    @property
-    def time(self) -> float:
-        """Simulated time, s; after an exhaustion, that of the last event."""
-        return super().time if self._stopped is None else self._stopped
-
-    @property
-    def scene(self) -> Scene:
-        """What runs, with all that was set since."""
-        return self._troupe.scene
-
-    @property
-    def bodies(self) -> Bodies:
-        """The bodies by number, as they started; spawned ones join at the end."""
-        return self._troupe.bodies
-
-    @property
-    def retired(self) -> Mapping[int, float]:
-        """When each body that is no longer there was gone: number → s."""
-        return self._troupe.retired
 
     @property
     def events(self) -> int:
@@ -122,35 +91,6 @@ class ExactSimulation(Running):
             "predictions": int(counts[PREDICTIONS]),
             "pair_tests": int(counts[PAIR_TESTS]),
         }
-
-    def step(self) -> None:
-        """Advance by one dt.
-
-        Raises:
-            Divergence: a body is no longer finite, or beyond all bounds. The state can still be read.
-            Exhaustion: too many events, or too many contacts to keep.
-        """
-        with self._turn:
-            self._check_running()
-            self._advance((self._steps + 1) * self._settings.dt)
-            self._steps += 1
-            self._look()
-
-    def finish(self, part: float) -> None:
-        """Advance by a last part of dt, 0 < part < 1.
-
-        Raises:
-            Divergence: as `step`.
-            Exhaustion: as `step`.
-            ValueError: there is no such part.
-        """
-        self._check_part(part)
-        with self._turn:
-            self._check_running()
-            self._advance((self._steps + part) * self._settings.dt)
-            self._part = part
-            self._look()
-            self._ended = True
 
     def apply(self, action: Action) -> None:
         """Do what an action says, now.
@@ -203,47 +143,28 @@ class ExactSimulation(Running):
     def _outside(self) -> Account | None:
         return None if self._books is None else self._books.account
 
-    def watch(self, observer: Observer) -> None:
-        """Do nothing: there are no substeps to call an observer after, and no contact is missed."""
-
     def _advance(self, until: float) -> None:
-        """Let all events up to a time happen. Python sees to signals now and then, and makes room in the log."""
-        began, compiled = perf_counter(), COMPILING.seconds
-        with np.errstate(all="ignore"):
-            while (status := advance(self._arena, until)) != DONE:
-                waited = perf_counter() - began - (COMPILING.seconds - compiled)
-                if self.patience is not None and waited > self.patience:
-                    self._stop(f"a step of {self._settings.dt:g} s takes longer than {self.patience:g} s to compute")
-                if status == FULL:
-                    rows = int(self._arena.counts[ROWS])
-                    if rows > MAX_ROWS:
-                        self._stop(f"more than {MAX_ROWS:,} contacts in one run")
-                    self._arena = with_room(self._arena, 2 * len(self._arena.log))
-                elif status != PAUSED:
-                    self._stop(too_many(self._arena, self.bodies.names, self._troupe.scene.fixed_names, status))
+        """Let all events up to a time happen, and make room in the log."""
+        self._through(lambda: advance(self._arena, until), DONE, self._halted)
 
-    def _stop(self, why: str) -> NoReturn:
-        self._ended = True
-        self._stopped = float(self._arena.world[NOW])
-        self._evaluate()
-        raise Exhaustion(why)
+    def _halted(self, status: int) -> None:
+        if status == FULL:
+            rows = int(self._arena.counts[ROWS])
+            if rows > MAX_ROWS:
+                self._stop(f"more than {MAX_ROWS:,} contacts in one run")
+            self._arena = with_room(self._arena, 2 * len(self._arena.log))
+        elif status != PAUSED:
+            self._stop(too_many(self._arena, self.bodies.names, self._troupe.scene.fixed_names, status))
+
+    @property
+    def _last_event(self) -> float:
+        return float(self._arena.world[NOW])
 
     def _evaluate(self) -> None:
         troupe = self._troupe
         with np.errstate(all="ignore"):
             state = (troupe.position, troupe.velocity, troupe.angle, troupe.angular_velocity)
             evaluate(self._arena, self.time, *state)
-
-    def _look(self) -> None:
-        """Read the state off, stop what is no longer finite and bounded, retire whose time is up."""
-        self._evaluate()
-        beyond = self._troupe.beyond()
-        if beyond is not None:
-            self._ended = True
-            raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
-        going = self._troupe.going(self.time)
-        if len(going):
-            self._take_out(going)
 
     def _acted(self) -> None:
         """Bring into the kernels' arrays what an action has done to the roster."""

@@ -1,8 +1,6 @@
 """RollingSimulation: a scene on a floor, running from event to event."""
 
 from collections.abc import Mapping
-from time import perf_counter
-from typing import NoReturn
 
 import numpy as np
 
@@ -10,13 +8,13 @@ from sandbox.action import Action
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.acting import perform
 from sandbox.engines.booked import booked
-from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contact_log import MAX_ROWS
-from sandbox.engines.contract import Divergence, Exhaustion, Observer
+from sandbox.engines.exact.driven import EventDriven
 from sandbox.engines.exact.rolling.board import (
     BOOKED,
     EVENTS,
     LIMIT,
+    NOW,
     PAIR_TESTS,
     PREDICTIONS,
     RECORDING,
@@ -38,11 +36,6 @@ from sandbox.engines.exact.rolling.books import Books
 from sandbox.engines.exact.rolling.motion import evaluate
 from sandbox.engines.exact.rolling.play import DONE, FULL, TOO_MANY, play, set_out
 from sandbox.engines.exact.rolling.record import taken, too_many, with_room
-from sandbox.engines.exact.troupe import Troupe
-from sandbox.engines.kernel import tell_if_slow
-from sandbox.engines.limits import BEYOND
-from sandbox.engines.running import Running
-from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, Frame, IntArray
@@ -54,38 +47,15 @@ FIRST_ROWS = 1024
 """Rows that the log of events starts with."""
 
 
-class RollingSimulation(Running):
+class RollingSimulation(EventDriven):
     """A running scene of spheres on a floor. Frames are read off between events, and change nothing."""
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
-        super().__init__(settings)
-        self._troupe = Troupe(scene, settings.dt)
-        self._stopped: float | None = None
+        super().__init__(scene, settings)
         self._books: Books | None = None
         self._board: Board = board_of(self._troupe)
-        tell_if_slow(len(scene.bodies))
         with np.errstate(all="ignore"):
             self._set_out(0.0)
-
-    @property
-    def time(self) -> float:
-        """Simulated time, s; after an exhaustion, that of the last event."""
-        return super().time if self._stopped is None else self._stopped
-
-    @property
-    def scene(self) -> Scene:
-        """What runs, with all that was set since."""
-        return self._troupe.scene
-
-    @property
-    def bodies(self) -> Bodies:
-        """The bodies by number, as they started; spawned ones join at the end."""
-        return self._troupe.bodies
-
-    @property
-    def retired(self) -> Mapping[int, float]:
-        """When each body that is no longer there was gone: number → s. Who lies in a pocket is still there."""
-        return self._troupe.retired
 
     @property
     def board(self) -> Board:
@@ -102,35 +72,6 @@ class RollingSimulation(Running):
             "pair_tests": int(counts[PAIR_TESTS]),
         }
 
-    def step(self) -> None:
-        """Advance by one dt.
-
-        Raises:
-            Divergence: a body is no longer finite, or beyond all bounds. The state can still be read.
-            Exhaustion: too many events, or too many contacts to keep.
-        """
-        with self._turn:
-            self._check_running()
-            self._advance((self._steps + 1) * self._settings.dt)
-            self._steps += 1
-            self._look()
-
-    def finish(self, part: float) -> None:
-        """Advance by a last part of dt, 0 < part < 1.
-
-        Raises:
-            Divergence: as `step`.
-            Exhaustion: as `step`.
-            ValueError: there is no such part.
-        """
-        self._check_part(part)
-        with self._turn:
-            self._check_running()
-            self._advance((self._steps + part) * self._settings.dt)
-            self._part = part
-            self._look()
-            self._ended = True
-
     def apply(self, action: Action) -> None:
         """Do what an action says, now.
 
@@ -142,9 +83,9 @@ class RollingSimulation(Running):
             self._troupe.settled()
             with booked(self._outside, Cause.ACTIONS, self):
                 leaving = perform(action, self._troupe)
+            self._acted()
             if leaving is not None:
                 self._take_out(np.asarray([leaving]))
-            self._acted()
 
     def frame(self) -> Frame:
         """Return the present state."""
@@ -177,31 +118,23 @@ class RollingSimulation(Running):
     def _outside(self) -> Account | None:
         return None if self._books is None else self._books.account
 
-    def watch(self, observer: Observer) -> None:
-        """Do nothing: there are no substeps to call an observer after, and no contact is missed."""
-
     def _advance(self, until: float) -> None:
-        """Let all events up to a time happen. Python sees to signals now and then, and makes room in the log."""
-        began, compiled = perf_counter(), COMPILING.seconds
+        """Let all events up to a time happen, and make room in the log."""
         self._board.counts[LIMIT] = PER_SECOND * (1 + int(until))
-        with np.errstate(all="ignore"):
-            while (status := play(self._board, until)) != DONE:
-                waited = perf_counter() - began - (COMPILING.seconds - compiled)
-                if self.patience is not None and waited > self.patience:
-                    self._stop(f"a step of {self._settings.dt:g} s takes longer than {self.patience:g} s to compute")
-                if status == FULL:
-                    rows = int(self._board.counts[ROWS])
-                    if rows > MAX_ROWS:
-                        self._stop(f"more than {MAX_ROWS:,} contacts in one run")
-                    self._board = with_room(self._board, 2 * len(self._board.log))
-                elif status == TOO_MANY:
-                    self._stop(too_many(self._board, self.bodies.names, self._troupe.scene.fixed_names))
+        self._through(lambda: play(self._board, until), DONE, self._halted)
 
-    def _stop(self, why: str) -> NoReturn:
-        self._ended = True
-        self._stopped = float(self._board.world[0])
-        self._evaluate()
-        raise Exhaustion(why)
+    def _halted(self, status: int) -> None:
+        if status == FULL:
+            rows = int(self._board.counts[ROWS])
+            if rows > MAX_ROWS:
+                self._stop(f"more than {MAX_ROWS:,} contacts in one run")
+            self._board = with_room(self._board, 2 * len(self._board.log))
+        elif status == TOO_MANY:
+            self._stop(too_many(self._board, self.bodies.names, self._troupe.scene.fixed_names))
+
+    @property
+    def _last_event(self) -> float:
+        return float(self._board.world[NOW])
 
     def _evaluate(self) -> None:
         troupe = self._troupe
@@ -209,23 +142,11 @@ class RollingSimulation(Running):
             state = (troupe.position, troupe.velocity, troupe.roll, troupe.angle, troupe.angular_velocity)
             evaluate(self._board, self.time, *state)
 
-    def _look(self) -> None:
-        """Read the state off, stop what is no longer finite and bounded, retire whose time is up."""
-        self._evaluate()
-        beyond = self._troupe.beyond()
-        if beyond is not None:
-            self._ended = True
-            raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
-        going = self._troupe.going(self.time)
-        if len(going):
-            with np.errstate(all="ignore"):
-                self._take_out(going)
-                self._acted()
-
     def _take_out(self, numbers: IntArray) -> None:
         """Remove bodies; they stay where they are, with no velocity."""
-        with booked(self._outside, Cause.RETIRED, self):
+        with booked(self._outside, Cause.RETIRED, self), np.errstate(all="ignore"):
             self._troupe.take_out(numbers, self.time)
+        self._acted()
 
     def _acted(self) -> None:
         """Bring into the kernels' arrays what has been done to the roster, and go on from there."""
