@@ -3,6 +3,7 @@
 import numpy as np
 
 from sandbox.play.camera import Box
+from sandbox.play.drawing.table.cushions import outside
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import LinkKind
 from sandbox.scene.model import Scene
@@ -24,7 +25,12 @@ FAR = 20.0
 
 
 def framing(scene: Scene) -> Box:
-    """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there."""
+    """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there.
+
+    Of a table that is the table.
+    """
+    if scene.play.area is not None:
+        return outside(scene.play.area)
     bodies = scene.bodies
     things = [corners for corners in _things(scene) if (np.abs(corners) < LARGEST).all()]
     discs = bodies.round | ~bodies.fixed  # what turns is anywhere within its circle; what stands is where it is
@@ -50,6 +56,14 @@ def framing(scene: Scene) -> Box:
         if np.abs(foot - middle).max() <= FAR * float((high - low).max()):
             low, high = np.minimum(low, foot), np.maximum(high, foot)
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+
+
+def lies_down(scene: Scene, free: tuple[int, int]) -> bool:
+    """Tell whether a scene is a table that is seen larger when turned, in a picture of so many px."""
+    if scene.play.area is None or scene.planes:
+        return False
+    (left, bottom), (right, top) = scene.play.area
+    return (top - bottom > right - left) == (free[0] > free[1])
 
 
 ONE = np.ones(2)
