@@ -5,6 +5,7 @@ from pathlib import Path
 import pygame
 
 from sandbox.play.account import account
+from sandbox.play.billiards.seen import at_table
 from sandbox.play.camera import Camera
 from sandbox.play.claims import Claims, claims
 from sandbox.play.drawing.palette import BACKGROUND, INK
@@ -17,6 +18,7 @@ from sandbox.play.instruments.panel import Panel
 from sandbox.play.instruments.picker import Picker
 from sandbox.play.instruments.plates import plate
 from sandbox.play.instruments.timeline import HEIGHT, Timeline
+from sandbox.play.instruments.tools import Tools
 from sandbox.play.knobs import Knobs
 from sandbox.play.running.live import Live
 from sandbox.play.shelf import to_pick
@@ -39,6 +41,7 @@ class Desk:
         self.panel = Panel(size, unit)
         self.manual = Manual()
         self.picker: Picker | None = None
+        self.tools = Tools()
         self._timeline = Timeline()
         self._graph = EnergyGraph()
         self._picture = Picture()
@@ -75,9 +78,9 @@ class Desk:
         """Return the keys that the scene claims."""
         if not isinstance(stage.show, Live):
             return Claims({}, (), {})
-        key = stage.show.scene.play
+        key = stage.gestures or stage.show.scene.play
         if self._claims is None or self._claims[0] is not key:
-            self._claims = key, claims(stage.show.scene, stage.hands)
+            self._claims = key, claims(stage.show.scene, stage.hands, stage.gestures)
         return self._claims[1]
 
     def claimed(self, stage: Stage) -> frozenset[int]:
@@ -119,6 +122,8 @@ class Desk:
         if self.manual.handle(event) or self._close_faults(event, stage) or self.panel.handle(event):
             return True
         show = stage.show
+        if stage.game is not None and self.tools.handle(event, stage.game, stage.act):
+            return True
         if show is not None and self._area.height:
             held = self._timeline.held
             time = self._timeline.handle(event, self._area)
@@ -149,6 +154,8 @@ class Desk:
         else:
             pull = stage.hands.line(show) if isinstance(show, Live) else None
             sight = show.sight(frozenset(self.overlays), stage.hands.picked, pull)
+            if stage.game is not None:
+                sight = at_table(sight, stage.game)
             foot = float(self._area.height)
             self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=foot)
             if show.contacts is not self._heard:
@@ -156,6 +163,9 @@ class Desk:
                 self._sounds.hits(show.contacts, show.bodies)
         status = self.status(stage, rate, recording)
         self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot)
+        if stage.game is not None and not self.manual.open:
+            free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
+            self.tools.draw(surface, stage.game, free, self.unit)
         if show is not None:
             self._draw_graph(surface, stage)
             if self.foot:
@@ -223,7 +233,10 @@ class Desk:
         """Return what is told in words."""
         if self._untold:
             self._untold = False
-            for keys, what in self.claims(stage).told:
+            told = self.claims(stage).told
+            if stage.game is not None:
+                stage.messages.tell("aim with the mouse; Space shoots, H lists all keys")
+            for keys, what in told if stage.game is None else ():
                 stage.messages.tell(f"{keys}: {what}")
         return account(stage, self.claims(stage).told, rate, recording)
 

@@ -14,6 +14,7 @@ from sandbox.play.drawing.overlays import Overlays
 from sandbox.play.drawing.palette import BACKGROUND, CLEAR, TOUCHING, ColourArray, colour_of
 from sandbox.play.drawing.points import LARGEST, Packed, Points, packed
 from sandbox.play.drawing.polygons import Polygons
+from sandbox.play.drawing.table.aiming import draw_aim, draw_ways
 from sandbox.play.drawing.table.balls import Balls
 from sandbox.play.drawing.table.cloth import draw_table
 from sandbox.play.drawing.view import View
@@ -118,11 +119,15 @@ class Picture:
             colours=tint,
         )
         self._overlays.below(view)
+        if sight.aim is not None:
+            draw_ways(view, sight.aim, self._colours)
         if "shapes" in sight.overlays and sight.scene.surface is not None and not sizes.side:
             self._balls.draw(view)
         elif "shapes" in sight.overlays:
             self._draw_bodies(view, np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None)
         self._overlays.above(view)
+        if sight.aim is not None:
+            draw_aim(view, sight.aim)
         draw_scale(surface, camera, unit, foot)
 
     def _draw_bodies(self, view: View, which: IntArray | None) -> None:

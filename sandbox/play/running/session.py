@@ -185,6 +185,23 @@ class Session(Course):
         self._calm = 0
         return timed
 
+    def retract(self, place: int) -> int:
+        """Take back what was done from the place-th action on, and forget what came of it.
+
+        Returns:
+            The step to seek: the one after which that action was done. Until it is there, the state is as it was.
+
+        Raises:
+            IndexError: not so much was done.
+        """
+        step = self.history.nearest(self.actions[place].time)[0]
+        self._script.cut(place)
+        self.history.cut(step - 1)
+        self._everyone = self.bodies
+        self._breaks = np.full(len(self._breaks), np.inf)
+        self._astray = True  # what is seen was never done
+        return step
+
     def seek(self, step: int) -> Iterator[float]:
         """Go to a step, back or forth. Yields the share that is done, after each part of the way.
 
@@ -218,3 +235,4 @@ class Session(Course):
         self._calm = 0
         self._contacts.clear()
         self._previous = self._frame = self.relay.frame()
+        self.history.keep(self._step, self._frame)

@@ -86,9 +86,7 @@ def _cushion(wall: Wall, out: Vector, scene: Scene, facings: list[Wall], depth: 
     return Cushion((*nose, *corners), nose, out)
 
 
-def _end(
-    end: Point, along: Vector, out: Vector, scene: Scene, facings: list[Wall], depth: float
-) -> tuple[Point, ...]:
+def _end(end: Point, along: Vector, out: Vector, scene: Scene, facings: list[Wall], depth: float) -> tuple[Point, ...]:
     """Return the points from where a nose ends around its jaw and along its facing."""
     jaw = next((post for post in scene.posts if math.dist(post.position, _moved(end, out, post.radius)) < TOUCH), None)
     if jaw is None:
