@@ -83,9 +83,9 @@ class Mouse:
         moved = began is not None and math.dist(began, place) > SLACK * seat.desk.unit
         self._began = None
         picked = seat.stage.hands.picked if self._pressed is not None and not moved else None
-        if began is not None and not self._at_table(lambda table: table.release(seat.camera.to_world(place), moved)):
-            if picked is not None:
-                self._at_table(lambda table: table.name_ball(picked))
+        used = began is not None and self._at_table(lambda table: table.release(seat.camera.to_world(place), moved))
+        if picked is not None and not used:
+            self._at_table(lambda table: table.name_ball(picked))
         self._open_hand()
 
     def _move(self, event: pygame.event.Event) -> None:
@@ -110,9 +110,12 @@ class Mouse:
         pixels = (now[0] - before[0]) / unit, (now[1] - before[1]) / unit
         fine = bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
         time = pygame.time.get_ticks() / 1000.0
-        self._at_table(
-            lambda table: table.motion(camera.to_world(before), camera.to_world(now), pixels, fine, time) is None
-        )
+
+        def aim(table: Gestures) -> bool:
+            table.motion(camera.to_world(before), camera.to_world(now), pixels, fine, time)
+            return True
+
+        self._at_table(aim)
 
     def settle(self) -> None:
         """Bring what is held to where the mouse is by now: one action, however many motions led there."""

@@ -14,8 +14,8 @@ from types import FrameType
 import pygame
 
 from sandbox.engines.compiling import COMPILING
-from sandbox.play.claims import Deed
 from sandbox.play.commands import Commands
+from sandbox.play.cue_keys import Deed
 from sandbox.play.keys import Keyboard
 from sandbox.play.mouse import Mouse
 from sandbox.play.screen import close_screen, open_screen, unit

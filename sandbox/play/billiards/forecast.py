@@ -9,7 +9,7 @@ from sandbox.scene.model import Scene
 from sandbox.scene.part import Point
 from sandbox.trajectory import FloatArray
 
-SPACING = 0.02
+SPACING = 0.05
 """m between the points of a way"""
 
 

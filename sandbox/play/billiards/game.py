@@ -171,9 +171,8 @@ class Game:
         self._turns += [after] * (number + 2 - len(self._turns))
         self._calls += [Call()] * (number + 2 - len(self._calls))
         self.cue.centre()
-        self.notes += [
-            ("warning" if after.verdict and after.verdict.fouls else "info", text) for text in after.messages
-        ]
+        level = "warning" if after.verdict is not None and after.verdict.fouls else "info"
+        self.notes += [(level, text) for text in after.messages]
         self._lay(after)
 
     def _contacts(self, began: float) -> Contacts:
@@ -182,8 +181,9 @@ class Game:
         rows = np.column_stack((joined.time, joined.pair)) if len(joined) else np.empty((0, 3))
         _, first = np.unique(rows, axis=0, return_index=True)
         kept = np.sort(first[joined.time[first] >= began])
-        columns = (joined.time, joined.pair, joined.point, joined.normal, joined.impulse)
-        return Contacts(*(column[kept] for column in columns))
+        return Contacts(
+            joined.time[kept], joined.pair[kept], joined.point[kept], joined.normal[kept], joined.impulse[kept]
+        )
 
     def _lay(self, match: Match) -> None:
         """Put the balls where the game has them."""

@@ -61,8 +61,8 @@ class Points:
         if not area.width or not area.height:
             return
         if camera.turned:  # the same as one that is not, of a world that is
-            x, y = camera.centre
-            position, camera = position[:, ::-1] * (1.0, -1.0), replace(camera, centre=(y, -x), turned=False)
+            right, up = camera.centre[1], -camera.centre[0]
+            position, camera = position[:, ::-1] * (1.0, -1.0), replace(camera, centre=(right, up), turned=False)
         if len(position) >= MANY and self._compiled(surface, camera, position, colours, present, area, side):
             return
         write, stride = _writer(surface)

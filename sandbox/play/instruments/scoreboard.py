@@ -5,6 +5,7 @@ from functools import lru_cache
 import pygame
 
 from sandbox.games.billiards.match import Match
+from sandbox.games.billiards.rules.call import Decision
 from sandbox.games.billiards.rules.eight_ball import EightBallState
 from sandbox.play.billiards.game import Game
 from sandbox.play.drawing.palette import FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY, Colour, hex_colour
@@ -21,7 +22,7 @@ LEFT, RIGHT = 205.0, 66.0
 
 def draw_scoreboard(
     surface: pygame.Surface, game: Game, free: pygame.Rect, unit: float
-) -> tuple[tuple[pygame.Rect, str], ...]:
+) -> tuple[tuple[pygame.Rect, Decision], ...]:
     """Draw it at the top of what is free; return where the decisions are that can be clicked."""
     size, pad = 13.0 * unit, round(9 * unit)
     left, right = free.left + round(LEFT * unit), free.right - round(RIGHT * unit)
@@ -152,7 +153,7 @@ def _small(coat: Coat, side: int) -> pygame.Surface:
     return pygame.transform.smoothscale(large, (side, side))
 
 
-def _choices(game: Game) -> tuple[str, ...]:
+def _choices(game: Game) -> tuple[Decision, ...]:
     """Return what is to be decided; in free play nothing needs to be."""
     if not game.mine or game.match.over:
         return ()
@@ -163,8 +164,8 @@ def _choices(game: Game) -> tuple[str, ...]:
 
 
 def _draw_choices(
-    surface: pygame.Surface, game: Game, choices: tuple[str, ...], rect: pygame.Rect, y: float, size: float
-) -> tuple[tuple[pygame.Rect, str], ...]:
+    surface: pygame.Surface, game: Game, choices: tuple[Decision, ...], rect: pygame.Rect, y: float, size: float
+) -> tuple[tuple[pygame.Rect, Decision], ...]:
     """Draw the decisions as plates side by side."""
     found, x = [], rect.left + 0.7 * size
     for each in choices:

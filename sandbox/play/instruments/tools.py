@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import pygame
 
+from sandbox.games.billiards.rules.call import Decision
 from sandbox.play.billiards.game import Game
 from sandbox.play.instruments.scoreboard import draw_scoreboard
 from sandbox.play.instruments.tip import draw_power, draw_tip
@@ -23,7 +24,7 @@ class Tools:
 
     def __init__(self) -> None:
         self._tip = self._power = pygame.Rect(0, 0, 0, 0)
-        self._choices: tuple[tuple[pygame.Rect, str], ...] = ()
+        self._choices: tuple[tuple[pygame.Rect, Decision], ...] = ()
         self._held = ""
 
     def draw(self, surface: pygame.Surface, game: Game, free: pygame.Rect, unit: float) -> None:
@@ -52,11 +53,10 @@ class Tools:
     def handle(self, event: pygame.event.Event, game: Game, act: Act) -> bool:
         """Take an event in; return whether it was used up."""
         if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
-            for rect, decision in self._choices:
-                if rect.collidepoint(event.pos):
-                    known = next(each for each in game.match.choices.decisions if each == decision)
-                    act(lambda _: game.decide(known))
-                    return True
+            clicked = next((each for rect, each in self._choices if rect.collidepoint(event.pos)), None)
+            if clicked is not None:
+                act(lambda _: game.decide(clicked))
+                return True
             self._held = next((name for name, rect in self._rects() if rect.collidepoint(event.pos)), "")
             if self._held and game.mine:
                 self._set(event.pos, game)

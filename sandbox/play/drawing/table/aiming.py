@@ -123,9 +123,9 @@ def _cue(view: View, aim: Aim, radius: float) -> None:
         grown = max(wide, 0.8 * view.unit / (view.camera.scale * size))
         wider = max(wider, grown)
         fill(view.surface, corners(first, last, grown, wider, (0.0, 0.0)), colour, view.antialias)
-        lit = corners(first, last, 0.25 * grown, 0.25 * wider, (-0.1 * far, -0.15 * far))
         if wide * size * view.camera.scale > 2.0:
-            fill(view.surface, lit, mixed(colour, INK, 0.28), view.antialias)
+            lit = corners(first, last, 0.3 * grown, 0.3 * wider, (0.0, 0.0))
+            fill(view.surface, lit, mixed(colour, INK, 0.14), view.antialias)
 
 
 def _dim(view: View, corners: list[Pixel]) -> None:

@@ -171,7 +171,7 @@ def _globe(size: int, offset: tuple[int, int]) -> Globe:
     normal = np.stack((x, y, z), 1)
     toward = normal @ np.asarray(LIGHT)
     shade = 0.50 + 0.52 * np.clip(0.25 + 0.75 * toward, 0.0, 1.0) - 0.16 * (1.0 - z) ** 2
-    half_way = np.asarray(LIGHT) + (0.0, 0.0, 1.0)
+    half_way = np.asarray(LIGHT) + np.asarray((0.0, 0.0, 1.0))
     mirror = np.clip(normal @ (half_way / np.linalg.norm(half_way)), 0.0, 1.0)
     shine = 150.0 * mirror**70 + 26.0 * mirror**8
     return Globe(side, inside, normal, cover[inside], shade[:, None], shine[:, None])

@@ -1,6 +1,7 @@
 """Cloth: a table as it stands, with wood, cushions, pockets, spots and strings; it changes with the camera alone."""
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -91,7 +92,7 @@ class _Pen:
 
     def line(self, points: tuple[Point, ...], colour: Colour, width: float) -> None:
         places = self.at(points)
-        for a, b in zip(places, places[1:], strict=False):
+        for a, b in pairwise(places):
             stroke(self.surface, a, b, colour, width, self.antialias)
 
     def disc(self, at: Point, radius: float, colour: Colour, rim: Colour | None = None, line: float = 0.0) -> None:
@@ -150,12 +151,9 @@ def _light(surface: pygame.Surface, camera: Camera, area: Box) -> None:
     y = (rect.top + (np.arange(grain[1]) + 0.5) * rect.height / grain[1] - (top + bottom) / 2) / (bottom - top)
     far = np.clip((x[:, None] ** 2 + y[None, :] ** 2) / 0.5, 0.0, 1.0)
     bright = LIT + (UNLIT - LIT) * far
-    for most, flag in ((1.0, pygame.BLEND_RGB_MULT), (LIT, pygame.BLEND_RGB_ADD)):
-        # SDL cannot multiply by more than 1: what is above is added.
-        if most == 1.0:
-            tone = np.clip(bright, 0.0, 1.0) * 255.0
-        else:
-            tone = np.clip(bright - 1.0, 0.0, 1.0) * 110.0
+    # SDL cannot multiply by more than 1: what is above is added.
+    dimmed, added = np.clip(bright, 0.0, 1.0) * 255.0, np.clip(bright - 1.0, 0.0, 1.0) * 110.0
+    for tone, flag in ((dimmed, pygame.BLEND_RGB_MULT), (added, pygame.BLEND_RGB_ADD)):
         layer = pygame.surfarray.make_surface(np.repeat(np.rint(tone)[:, :, None], 3, 2).astype(np.uint8))
         surface.blit(pygame.transform.smoothscale(layer, rect.size), rect, special_flags=flag)
 

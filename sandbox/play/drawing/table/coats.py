@@ -66,7 +66,7 @@ def painted(coat: Coat, ball: FloatArray, radius: float) -> FloatArray:
     if coat.kind == "spots":
         off = 1.0 - np.abs(ball).max(axis=1)  # from the nearest of the six ends of the axes, of the height
         share = np.clip((SPOT - np.sqrt(2.0 * off)) * soft + 0.5, 0.0, 1.0)
-        return own + (np.asarray(mixed(coat.colour, RED, 0.92)) - own) * share[:, None]
+        return np.asarray(own + (np.asarray(mixed(coat.colour, RED, 0.92)) - own) * share[:, None])
     colours = np.broadcast_to(own, ball.shape)
     if coat.kind == "stripe":
         white = np.clip((np.abs(ball[:, 1]) - STRIPE) * soft + 0.5, 0.0, 1.0)
