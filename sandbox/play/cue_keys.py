@@ -35,18 +35,18 @@ TOLD = (
 
 def deeds(gestures: Gestures) -> tuple[dict[int, Deed], dict[int, Deed]]:
     """Return what keys do, and what is done when they are let go."""
-    game = gestures.game
+    game, person = gestures.game, gestures.person
     pressed: dict[int, Deed] = {
-        pygame.K_SPACE: lambda _: game.shoot(),
-        pygame.K_g: lambda _: game.take_in_hand(),
+        pygame.K_SPACE: lambda _: person.shoot(),
+        pygame.K_g: lambda _: person.take_in_hand(),
         pygame.K_z: lambda _: game.undo(),
         pygame.K_LEFT: lambda _: gestures.nudge(_step()),
         pygame.K_RIGHT: lambda _: gestures.nudge(-_step()),
         pygame.K_UP: lambda _: gestures.strengthen(POWER),
         pygame.K_DOWN: lambda _: gestures.strengthen(-POWER),
-        pygame.K_c: lambda _: game.call_safety(),
-        pygame.K_d: lambda _: game.choose_next(),
-        pygame.K_RETURN: lambda _: game.take_choice(),
+        pygame.K_c: lambda _: person.call_safety(),
+        pygame.K_d: lambda _: person.choose_next(),
+        pygame.K_RETURN: lambda _: person.take_choice(),
     }
     released: dict[int, Deed] = {}
     modes: tuple[tuple[int, Mode], ...] = (

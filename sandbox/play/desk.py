@@ -5,7 +5,7 @@ from pathlib import Path
 import pygame
 
 from sandbox.play.account import account
-from sandbox.play.billiards.seen import at_table
+from sandbox.play.billiards.game import PLAYERS
 from sandbox.play.camera import Camera
 from sandbox.play.claims import Claims, claims
 from sandbox.play.drawing.palette import BACKGROUND, INK
@@ -13,6 +13,7 @@ from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.instruments.graph import EnergyGraph
 from sandbox.play.instruments.hud import draw_hud
+from sandbox.play.instruments.knob import Knob
 from sandbox.play.instruments.manual import Manual
 from sandbox.play.instruments.panel import Panel
 from sandbox.play.instruments.picker import Picker
@@ -122,7 +123,7 @@ class Desk:
         if self.manual.handle(event) or self._close_faults(event, stage) or self.panel.handle(event):
             return True
         show = stage.show
-        if stage.game is not None and self.tools.handle(event, stage.game, stage.act):
+        if stage.gestures is not None and self.tools.handle(event, stage.gestures.person, stage.act):
             return True
         if show is not None and self._area.height:
             held = self._timeline.held
@@ -154,8 +155,8 @@ class Desk:
         else:
             pull = stage.hands.line(show) if isinstance(show, Live) else None
             sight = show.sight(frozenset(self.overlays), stage.hands.picked, pull)
-            if stage.game is not None:
-                sight = at_table(sight, stage.game)
+            if stage.gestures is not None:
+                sight = stage.gestures.seen.over(sight)
             foot = float(self._area.height)
             self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=foot)
             if show.contacts is not self._heard:
@@ -163,9 +164,9 @@ class Desk:
                 self._sounds.hits(show.contacts, show.bodies)
         status = self.status(stage, rate, recording)
         self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot)
-        if stage.game is not None and not self.manual.open:
+        if stage.gestures is not None and not self.manual.open:
             free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
-            self.tools.draw(surface, stage.game, free, self.unit)
+            self.tools.draw(surface, stage.gestures.person, free, self.unit)
         if show is not None:
             self._draw_graph(surface, stage)
             if self.foot:
@@ -212,6 +213,8 @@ class Desk:
         shown = (
             self._knobs.of(live, stage.file, stage.hands.picked) if live is not None and stage.file is not None else ()
         )
+        if stage.game is not None:
+            shown = (*shown, Knob("players", "players", value=stage.game.players, choices=PLAYERS))
         toggles = {name: name in self.overlays for name in OVERLAYS}
         if live is not None:
             toggles |= {"ghost": live.company.ghosted, "trust": live.company.trust is not None}

@@ -11,6 +11,8 @@ from sandbox.trajectory import BoolArray, FloatArray
 
 LOOKS = 17
 """Moments of free flight that are looked at."""
+ROLLING = 1.2
+"""s: where balls on a floor fly for longer says little, as the floor brakes them and they meet each other"""
 OUTLIERS = 0.5
 """Per cent of the places at each side that need not be seen, where there are many."""
 MANY = 1000
@@ -93,7 +95,8 @@ def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
     world = scene.world
     chosen = np.flatnonzero(~_tethered(scene, bodies))
     chosen = chosen[:: max(1, len(chosen) // 5000)]  # so many are enough to tell
-    time = np.linspace(0.0, world.duration, LOOKS)[:, None, None]
+    duration = world.duration if scene.surface is None else min(world.duration, ROLLING)
+    time = np.linspace(0.0, duration, LOOKS)[:, None, None]
     start, velocity = bodies.position[chosen], bodies.velocity[chosen]
     with np.errstate(all="ignore"):
         place = start + velocity * time + 0.5 * np.asarray(world.gravity) * time**2

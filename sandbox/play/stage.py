@@ -14,6 +14,7 @@ from sandbox.games.billiards.layout import Layout
 from sandbox.games.billiards.rules.happening import GameError
 from sandbox.play.billiards.game import PLAYERS, Game, Players, plays
 from sandbox.play.billiards.gestures import Gestures
+from sandbox.play.billiards.person import Person
 from sandbox.play.hands import Hands
 from sandbox.play.instruments.knob import Value
 from sandbox.play.knobs import turned
@@ -129,7 +130,7 @@ class Stage:
         except GameError as error:
             self.messages.tell(str(error), "warning")
         else:
-            self.gestures = Gestures(self.game)
+            self.gestures = Gestures(Person(self.game))
 
     def _let_go_of_table(self) -> None:
         if self.game is not None:

@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import Literal
 
 from sandbox.play.billiards.cue import FASTEST, SLOWEST
-from sandbox.play.billiards.game import Game
+from sandbox.play.billiards.person import Person
+from sandbox.play.billiards.seen import Seen
 from sandbox.scene.part import Point
 
 Mode = Literal["aim", "stroke", "draw", "english", "power"]
@@ -28,11 +29,13 @@ NEAR = 1.5
 class Gestures:
     """What a hand is doing at the table."""
 
-    def __init__(self, game: Game) -> None:
-        self.game = game
+    def __init__(self, person: Person) -> None:
+        self.person, self.game = person, person.game
+        self.seen = Seen(person)
         self.mode: Mode = "aim"
         self._offset: float | None = None
         """rad, from where the mouse points to where the cue does; none before the mouse has moved"""
+        self._strokes = 0
         self._drawn = 0.0
         self._deepest = 0.0
         self._recent: deque[tuple[float, float]] = deque()
@@ -65,8 +68,8 @@ class Gestures:
             ActionError: a stroke cannot be played.
         """
         game = self.game
-        if game.carried is not None:
-            game.carry(now)
+        if self.person.carried is not None:
+            self.person.carry(now)
             return
         if not game.mine:
             return
@@ -82,13 +85,13 @@ class Gestures:
             self._push((now[0] - before[0]) * x + (now[1] - before[1]) * y, time)
 
     def _turn(self, before: Point, now: Point, fine: bool) -> None:
-        cue, (x, y) = self.game.cue, self.game.place
+        cue, (x, y) = self.game.cue, self.person.place
         match = self.game.match
         if math.dist((x, y), now) < NEAR * match.layout.radius[self.game.ball]:
             return
         angle = math.atan2(now[1] - y, now[0] - x)
-        if self._offset is None:
-            self._offset = 0.0
+        if self._offset is None or self._strokes != self.game.strokes:
+            self._offset, self._strokes = 0.0, self.game.strokes
         if fine:
             turned = math.remainder(angle - math.atan2(before[1] - y, before[0] - x), math.tau)
             self._offset = math.remainder(cue.aim + FINE * turned - angle, math.tau)
@@ -118,7 +121,7 @@ class Gestures:
         elif self._drawn <= 0.0 and self._deepest >= DRAWN:
             speed = sum(each for _, each in self._recent) / RECENT
             self._end()
-            self.game.shoot(min(max(speed, SLOWEST), FASTEST))
+            self.person.shoot(min(max(speed, SLOWEST), FASTEST))
         self._drawn = max(self._drawn, 0.0)
 
     def press(self, at: Point, reach: float) -> bool:
@@ -130,18 +133,18 @@ class Gestures:
         Raises:
             ActionError: the ball cannot be put there.
         """
-        game = self.game
-        if game.carried is not None:
-            game.put_down()
+        game, person = self.game, self.person
+        if person.carried is not None:
+            person.put_down()
             return True
         if not game.mine:
             return False
         match = game.match
         radius = match.layout.radius[game.ball]
-        if math.dist(game.place, at) <= radius + reach:
+        if math.dist(person.place, at) <= radius + reach:
             if match.state.in_hand is None:
                 return False
-            game.carried, game.refused = game.place, False
+            person.take_in_hand()
             return True
         if any(math.dist((x, y), at) <= r + reach for x, y, r in match.on_table.values()):
             return False
@@ -154,16 +157,15 @@ class Gestures:
         Raises:
             ActionError: a stroke cannot be played, or a ball put down.
         """
-        game = self.game
-        if game.carried is not None and moved:
-            game.put_down()
+        if self.person.carried is not None and moved:
+            self.person.put_down()
             return True
         if self.mode != "draw":
             return False
-        drawn = game.cue.back
+        drawn = self.game.cue.back
         self._end()
         if drawn >= DRAWN:
-            game.shoot()
+            self.person.shoot()
         elif not moved:
             self._name(at)
         return True
@@ -173,7 +175,7 @@ class Gestures:
         match, call = self.game.match, self.game.call
         pocket = match.layout.pocket_at(at)
         if pocket is not None and match.choices.pocket:
-            self.game.say(replace(call, pocket=None if pocket == call.pocket else pocket))
+            self.person.say(replace(call, pocket=None if pocket == call.pocket else pocket))
 
     def name_ball(self, number: int) -> bool:
         """Call the ball that was clicked, where the rules ask for one; return whether they did.
@@ -185,5 +187,5 @@ class Gestures:
         name = match.layout.names[number]
         if not self.game.mine or name not in match.choices.balls:
             return False
-        self.game.say(replace(call, ball=None if name == call.ball else name))
+        self.person.say(replace(call, ball=None if name == call.ball else name))
         return True

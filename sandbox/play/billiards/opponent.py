@@ -1,6 +1,8 @@
 """Opponent: a bot at the window's table. It thinks beside the picture, takes aim to be seen, and strokes."""
 
+import math
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from typing import NamedTuple
 
 from sandbox.games.billiards.bot.bot import Bot
@@ -19,7 +21,8 @@ DRAWN = 0.02
 class Thought(NamedTuple):
     """What it has come to."""
 
-    decisions: tuple[Decision, ...]
+    decision: Decision | None
+    """before the stroke"""
     plan: Plan | None
     """none where what it decided leaves the table to the other"""
 
@@ -32,7 +35,7 @@ class Opponent:
         self._pool = ThreadPoolExecutor(1, "bot")
         self._future: Future[Thought] | None = None
         self._match: Match | None = None
-        self._since = 0.0
+        self._since = -1.0
         self._from: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
@@ -45,19 +48,19 @@ class Opponent:
         if self._match is not match or self._future is None:
             if self._future is not None and not self._future.done():
                 return None  # of a table that is no more; it cannot be told to stop
-            self._match, self._since = match, -1.0
+            self._match, self._since = match, -1.0  # it has not yet moved
             self._future = self._pool.submit(self._think, match)
         return self._future.result() if self._future.done() else None
 
     def _think(self, match: Match) -> Thought:
-        decisions: tuple[Decision, ...] = ()
+        decision: Decision | None = None
         if match.choices.decisions and match.rules.name != "free":
-            decisions = (self._bot.decide(match),)
-            after = match.decide(decisions[0])
+            decision = self._bot.decide(match)
+            after = match.decide(decision)
             if after.over or after.turn != match.turn:
-                return Thought(decisions, None)
+                return Thought(decision, None)
             match = after
-        return Thought(decisions, self._bot.plan(match))
+        return Thought(decision, self._bot.plan(match))
 
     def moves(self, cue: Cue, stroke: Stroke, elapsed: float) -> bool:
         """Let the cue come to a stroke while real time passes, s; tell whether it is to be played."""
@@ -67,17 +70,24 @@ class Opponent:
         share = min(self._since / TURNING, 1.0)
         share = share * share * (3.0 - 2.0 * share)
         aim, side, height = self._from
-        turn = (stroke.aim - aim + 3.141592653589793) % 6.283185307179586 - 3.141592653589793
-        cue.aim = aim + turn * share
+        cue.aim = aim + math.remainder(stroke.aim - aim, math.tau) * share
         cue.tip_at(side + (stroke.side - side) * share, height + (stroke.height - height) * share)
         cue.speed = stroke.speed
         drawn = min(max(self._since - TURNING, 0.0) / DRAWING, 1.0)
         cue.back = DRAWN * stroke.speed * drawn
         return self._since > TURNING + 1.15 * DRAWING
 
+    def stays(self, match: Match) -> None:
+        """Keep to what it has come to, now that the table is as it wanted it."""
+        if self._future is None:
+            return
+        self._match, thought = match, self._future.result()
+        self._future = Future()
+        self._future.set_result(Thought(None, thought.plan and replace(thought.plan, place=None)))
+
     def forget(self) -> None:
         """Begin anew with the next table."""
-        self._match = None
+        self._match, self._since = None, -1.0
 
     def close(self) -> None:
         """Stop; a thought that is under way is let go of."""

@@ -8,11 +8,12 @@ from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Decision
 from sandbox.games.billiards.rules.eight_ball import EightBallState
 from sandbox.play.billiards.game import Game
+from sandbox.play.billiards.person import Person
 from sandbox.play.drawing.palette import FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY, Colour, hex_colour
 from sandbox.play.drawing.table.coats import IVORY, Coat, coat_of
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.instruments.icons import draw_disc
-from sandbox.play.instruments.plates import plate, shortened
+from sandbox.play.instruments.plates import plate, wrapped
 
 WIDEST = 470.0
 """px at unit 1"""
@@ -21,7 +22,7 @@ LEFT, RIGHT = 205.0, 66.0
 
 
 def draw_scoreboard(
-    surface: pygame.Surface, game: Game, free: pygame.Rect, unit: float
+    surface: pygame.Surface, person: Person, free: pygame.Rect, unit: float
 ) -> tuple[tuple[pygame.Rect, Decision], ...]:
     """Draw it at the top of what is free; return where the decisions are that can be clicked."""
     size, pad = 13.0 * unit, round(9 * unit)
@@ -29,11 +30,13 @@ def draw_scoreboard(
     width = min(right - left, round(WIDEST * unit))
     if width < 150 * unit:
         return ()
+    game = person.game
     match, line = game.match, round(1.5 * size)
-    told = _told(game)
-    choices = _choices(game)
+    told = _told(person)
+    choices = _choices(person)
     down = _down(match)
-    rows = 2 + bool(down) + bool(choices)
+    lines = wrapped(told, size, width - 2 * pad - 1.3 * size, 2)
+    rows = 1 + len(lines) + bool(down) + bool(choices)
     rect = pygame.Rect((left + right - width) // 2, free.top + round(10 * unit), width, rows * line + 2 * pad)
     plate(surface, rect, 8 * unit)
     y = rect.top + pad + line / 2
@@ -44,9 +47,10 @@ def draw_scoreboard(
         y += line
     mark = ORANGE if match.verdict is not None and match.verdict.fouls and game.resting else SKY
     draw_disc(surface, (rect.left + pad + 0.4 * size, y), 0.3 * size, mark)
-    text = shortened(told, size, rect.width - 2 * pad - 1.3 * size)
-    write(surface, text, (rect.left + pad + 1.2 * size, y), size, INK, "midleft")
-    return _draw_choices(surface, game, choices, rect, y + line, size) if choices else ()
+    for text in lines:
+        write(surface, text, (rect.left + pad + 1.2 * size, y), size, INK, "midleft")
+        y += line
+    return _draw_choices(surface, person.choice, choices, rect, y, size) if choices else ()
 
 
 def _players(surface: pygame.Surface, game: Game, rect: pygame.Rect, y: float, size: float) -> None:
@@ -74,9 +78,9 @@ def _players(surface: pygame.Surface, game: Game, rect: pygame.Rect, y: float, s
             write(surface, score, (left + cell - 0.9 * size, y), size, INK, "midright", bold=True, mono=True)
 
 
-def _told(game: Game) -> str:
+def _told(person: Person) -> str:
     """Return the line about what happened and what is to be done."""
-    match = game.match
+    game, match = person.game, person.game.match
     if not game.resting:
         return "…"
     if match.over:
@@ -85,12 +89,12 @@ def _told(game: Game) -> str:
     before = "; ".join(match.messages)
     if game.opponent is not None and match.turn == 1:
         now = f"{who} {'thinks' if game.opponent.thinking else 'takes aim'}"
-    elif game.carried is not None:
+    elif person.carried is not None:
         now = "click where the cue ball is to lie"
     elif match.choices.needed and game.call.pocket is None:
         now = f"{who}: click the pocket of the {match.choices.balls[0] if match.choices.balls else 'ball'}"
     elif match.state.in_hand is not None and match.rules.name != "free":
-        now = f"{who} shoots; the cue ball is in hand {match.state.in_hand}".removesuffix(" anywhere")
+        now = f"{who} has the ball in hand {match.state.in_hand}".removesuffix(" anywhere")
     elif match.state.players == 1:
         now = _asked(game)
     else:
@@ -149,22 +153,36 @@ def _small(coat: Coat, side: int) -> pygame.Surface:
         large.blit(band, (0, 0))
     if coat.label:
         pygame.draw.circle(large, IVORY, middle, round(0.58 * radius))
-        write(large, coat.label, (middle[0], middle[1] + over / 2), 0.78 * radius, (20, 20, 24), "center", bold=True)
+        write(
+            large,
+            coat.label,
+            (middle[0], middle[1] + over / 2),
+            (0.8 if len(coat.label) == 1 else 0.62) * radius,
+            (20, 20, 24),
+            "center",
+            bold=True,
+        )
     return pygame.transform.smoothscale(large, (side, side))
 
 
-def _choices(game: Game) -> tuple[Decision, ...]:
+def _choices(person: Person) -> tuple[Decision, ...]:
     """Return what is to be decided; in free play nothing needs to be."""
+    game = person.game
     if not game.mine or game.match.over:
         return ()
     decisions = game.match.choices.decisions
     if game.match.rules.name == "free":
-        return decisions if game.choice not in (None, "play") else ()
+        return decisions if person.choice not in (None, "play") else ()
     return decisions if len(decisions) > 1 else ()
 
 
 def _draw_choices(
-    surface: pygame.Surface, game: Game, choices: tuple[Decision, ...], rect: pygame.Rect, y: float, size: float
+    surface: pygame.Surface,
+    now: Decision | None,
+    choices: tuple[Decision, ...],
+    rect: pygame.Rect,
+    y: float,
+    size: float,
 ) -> tuple[tuple[pygame.Rect, Decision], ...]:
     """Draw the decisions as plates side by side."""
     found, x = [], rect.left + 0.7 * size
@@ -173,7 +191,7 @@ def _draw_choices(
         spot = pygame.Rect(round(x), round(y - 0.7 * size), wide, round(1.4 * size))
         if spot.right > rect.right - 0.5 * size:
             break
-        chosen = each == game.choice
+        chosen = each == now
         edge: Colour = SKY if chosen else LINE
         plate(surface, spot, 0.4 * size, PANEL_RAISED, 255, edge)
         write(surface, each, spot.center, 0.92 * size, INK if chosen else FAINT, "center")

@@ -5,7 +5,8 @@ from collections.abc import Callable
 import pygame
 
 from sandbox.games.billiards.rules.call import Decision
-from sandbox.play.billiards.game import Game
+from sandbox.play.billiards.cue import Cue
+from sandbox.play.billiards.person import Person
 from sandbox.play.instruments.scoreboard import draw_scoreboard
 from sandbox.play.instruments.tip import draw_power, draw_tip
 from sandbox.play.running.live import Live
@@ -27,12 +28,12 @@ class Tools:
         self._choices: tuple[tuple[pygame.Rect, Decision], ...] = ()
         self._held = ""
 
-    def draw(self, surface: pygame.Surface, game: Game, free: pygame.Rect, unit: float) -> None:
+    def draw(self, surface: pygame.Surface, person: Person, free: pygame.Rect, unit: float) -> None:
         """Draw all.
 
         Args:
             surface: the picture.
-            game: that is played.
+            person: who plays.
             free: px, what nothing else covers.
             unit: px of a pixel at 1080 lines.
         """
@@ -41,7 +42,8 @@ class Tools:
         self._choices = ()
         if free.width < LEAST[0] * unit or free.height < LEAST[1] * unit:
             return
-        self._choices = draw_scoreboard(surface, game, free, scale)
+        game = person.game
+        self._choices = draw_scoreboard(surface, person, free, scale)
         if not game.aiming:
             return
         side, gap, bar = round(SIDE * scale), round(GAP * scale), round(BAR * scale)
@@ -50,20 +52,20 @@ class Tools:
         draw_power(surface, self._power, game.cue, scale)
         draw_tip(surface, self._tip, game.cue, scale)
 
-    def handle(self, event: pygame.event.Event, game: Game, act: Act) -> bool:
+    def handle(self, event: pygame.event.Event, person: Person, act: Act) -> bool:
         """Take an event in; return whether it was used up."""
         if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
             clicked = next((each for rect, each in self._choices if rect.collidepoint(event.pos)), None)
             if clicked is not None:
-                act(lambda _: game.decide(clicked))
+                act(lambda _: person.decide(clicked))
                 return True
             self._held = next((name for name, rect in self._rects() if rect.collidepoint(event.pos)), "")
-            if self._held and game.mine:
-                self._set(event.pos, game)
+            if self._held and person.game.mine:
+                self._set(event.pos, person.game.cue)
             return bool(self._held)
         if event.type == pygame.MOUSEMOTION and self._held:
-            if game.mine:
-                self._set(event.pos, game)
+            if person.game.mine:
+                self._set(event.pos, person.game.cue)
             return True
         if event.type in (pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST):
             self._held = ""
@@ -72,9 +74,9 @@ class Tools:
     def _rects(self) -> tuple[tuple[str, pygame.Rect], ...]:
         return ("tip", self._tip), ("power", self._power)
 
-    def _set(self, at: tuple[int, int], game: Game) -> None:
+    def _set(self, at: tuple[int, int], cue: Cue) -> None:
         if self._held == "tip" and self._tip.width:
             half = self._tip.width / 2.0
-            game.cue.tip_at((at[0] - self._tip.centerx) / half, (self._tip.centery - at[1]) / half)
+            cue.tip_at((at[0] - self._tip.centerx) / half, (self._tip.centery - at[1]) / half)
         elif self._power.height:
-            game.cue.power = (self._power.bottom - at[1]) / self._power.height
+            cue.power = (self._power.bottom - at[1]) / self._power.height

@@ -9,15 +9,14 @@ import pygame
 from sandbox.play.billiards.aim import Aim
 from sandbox.play.drawing.palette import BACKGROUND, INK, ORANGE, SKY, WARNING, YELLOW, Colour, ColourArray, mixed
 from sandbox.play.drawing.shade import Look, disc_distance, paint
-from sandbox.play.drawing.strokes import Pixel, fill, stroke
+from sandbox.play.drawing.strokes import Pixel, stroke
+from sandbox.play.drawing.table.cloth import felt_of
 from sandbox.play.drawing.view import View
 from sandbox.trajectory import FloatArray
 
 FADE = 3.0
 """m along a way after which it is half as bright"""
 FAINTEST = 0.16
-CLOTH: Colour = (24, 96, 92)
-"""What lines fade into."""
 LENGTH = 1.47
 """m, of a cue; for balls of another size, in proportion"""
 BALL = 0.028575
@@ -49,19 +48,25 @@ def draw_ways(view: View, aim: Aim, colours: ColourArray) -> None:
     _end(view, found.way, aim, aim.ball in found.falls, INK)
 
 
+def _faded(view: View, colour: Colour, share: float) -> Colour:
+    """Return a colour of which so much is seen, on what is below."""
+    scene = view.sight.scene
+    return mixed(BACKGROUND if scene.play.area is None else felt_of(scene).bed, colour, share)
+
+
 def _way(view: View, points: FloatArray, colour: Colour, width: float) -> None:
     """Draw a way, the fainter the farther along."""
     pixels = view.camera.to_screen(points).tolist()
     steps = np.hypot(*np.diff(points, axis=0).T)
     bright = np.maximum(0.5 ** (np.cumsum(steps) / FADE), FAINTEST).tolist()
     for (a, b), share in zip(pairwise(pixels), bright, strict=True):
-        stroke(view.surface, a, b, mixed(CLOTH, colour, share), width * view.unit, view.antialias)
+        stroke(view.surface, a, b, _faded(view, colour, share), width * view.unit, view.antialias)
 
 
 def _end(view: View, points: FloatArray, aim: Aim, falls: bool, colour: Colour) -> None:
     """Draw where a ball comes to rest, or that it falls."""
     radius = float(view.sight.bodies.radius[aim.ball])
-    tint = colour if falls else mixed(CLOTH, colour, 0.45)
+    tint = colour if falls else _faded(view, colour, 0.45)
     _ring(view, points[-1], (0.55 if falls else 1.0) * radius, tint, 2.2 if falls else 1.2)
 
 
@@ -119,13 +124,34 @@ def _cue(view: View, aim: Aim, radius: float) -> None:
     shade = corners(0.0, LENGTH, PARTS[0][2], BUTT, (0.8 * far, far))
     _dim(view, shade)
     ends = [*(part[2] for part in PARTS[1:]), BUTT]
+    scale = view.camera.scale * size
     for (first, last, wide, colour), wider in zip(PARTS, ends, strict=True):
-        grown = max(wide, 0.8 * view.unit / (view.camera.scale * size))
-        wider = max(wider, grown)
-        fill(view.surface, corners(first, last, grown, wider, (0.0, 0.0)), colour, view.antialias)
-        if wide * size * view.camera.scale > 2.0:
-            lit = corners(first, last, 0.3 * grown, 0.3 * wider, (0.0, 0.0))
-            fill(view.surface, lit, mixed(colour, INK, 0.14), view.antialias)
+        a, b = view.camera.to_screen(np.asarray([at(first, 0.0), at(last, 0.0)])).tolist()
+        thin, thick = (max(half * scale, 0.8 * view.unit) for half in (wide, wider))
+        _taper(view, a, b, (thin, thick), colour)
+        if thin > 2.0:
+            _taper(view, a, b, (0.3 * thin, 0.3 * thick), mixed(colour, INK, 0.12))
+
+
+def _taper(view: View, a: Pixel, b: Pixel, halves: tuple[float, float], colour: Colour) -> None:
+    """Draw a piece that grows from one half width to another, px, with flat ends."""
+    length = math.hypot(b[0] - a[0], b[1] - a[1])
+    if length < 1e-3:
+        return
+    along = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+    slope = (halves[1] - halves[0]) / length
+
+    def distance(px: FloatArray, py: FloatArray) -> FloatArray:
+        x, y = px - a[0], py - a[1]
+        t = x * along[0] + y * along[1]
+        across = np.abs(y * along[0] - x * along[1]) - halves[0] - slope * t
+        return np.asarray(np.maximum(across, np.maximum(-t, t - length) - 0.5))  # half a pixel over the next piece
+
+    reach = math.ceil(max(halves)) + 2
+    left, top = math.floor(min(a[0], b[0])) - reach, math.floor(min(a[1], b[1])) - reach
+    wide, high = abs(b[0] - a[0]) + 2 * reach + 1, abs(b[1] - a[1]) + 2 * reach + 1
+    within = pygame.Rect(left, top, math.ceil(wide), math.ceil(high))
+    paint(view.surface, distance, Look(colour, colour, 0.0, antialias=view.antialias), within)
 
 
 def _dim(view: View, corners: list[Pixel]) -> None:

@@ -83,6 +83,8 @@ class Balls:
         self._known = bodies
         self._sprites.clear()
         struck = {name for name in STRUCK if name != "yellow" or "white" in bodies.names}
+        if view.sight.scene.play.game is None:  # a study of spin: all of it is to be seen
+            struck = set(bodies.names)
         colours = dict(zip(view.shown.tolist(), view.colours.tolist(), strict=True))
         self._coats = tuple(
             coat_of(name, _three(colours.get(number, (128, 128, 128))), name in struck)

@@ -40,11 +40,16 @@ CAROM = Felt((30, 88, 142), (23, 68, 112), (80, 136, 186))
 FELTS = {"snooker": SNOOKER, "three-cushion": CAROM, "straight-rail": CAROM}
 
 
+def felt_of(scene: Scene) -> Felt:
+    """Return the colours of a table's cloth, by the game that it is for."""
+    return FELTS.get(scene.play.game or "free", POOL)
+
+
 def draw_table(
     surface: pygame.Surface, camera: Camera, scene: Scene, area: Box, unit: float = 1.0, antialias: bool = True
 ) -> None:
     """Draw a table, as far as it is in sight."""
-    felt = FELTS.get(scene.play.game or "free", POOL)
+    felt = felt_of(scene)
     pen = _Pen(surface, camera, unit, antialias)
     rubber, width = cushions(scene, area), width_of(area)
     _wood(pen, area, width)
