@@ -13,6 +13,8 @@ LOOKS = 17
 """Moments of free flight that are looked at."""
 ROLLING = 1.2
 """s: where balls on a floor fly for longer says little, as the floor brakes them and they meet each other"""
+BESIDE = 0.12
+"""of its size, so much is seen beside where balls on a floor are"""
 OUTLIERS = 0.5
 """Per cent of the places at each side that need not be seen, where there are many."""
 MANY = 1000
@@ -47,6 +49,8 @@ def framing(scene: Scene) -> Box:
     near = NEAR * float((flown[1] - flown[0]).max())
     met = [each for each in met if (each[0] <= flown[1] + near).all() and (each[1] >= flown[0] - near).all()]
     low, high = _union([start, *met]) if met else flown
+    if scene.surface is not None:  # room to roll on
+        low, high = low - BESIDE * (high - low).max(), high + BESIDE * (high - low).max()
     if scene.play.arrows is not None:  # room to move it
         low, high = low - 2.0 * scene.play.arrow_step, high + 2.0 * scene.play.arrow_step
     if not (high - low).max() > 0.0:

@@ -10,9 +10,9 @@ from sandbox.games.billiards.rules.happening import GameError
 from sandbox.play.billiards.cue import Cue
 from sandbox.play.billiards.hearing import Hearing
 from sandbox.play.billiards.opponent import Opponent
-from sandbox.play.billiards.rest import at_rest
 from sandbox.play.billiards.turns import Turns
 from sandbox.play.running.live import Live
+from sandbox.play.running.rest import at_rest
 from sandbox.scene.cue import Shot
 from sandbox.scene.model import Scene
 from sandbox.scene.part import Point

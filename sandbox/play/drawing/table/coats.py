@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import pygame
 
-from sandbox.play.drawing.palette import Colour, hex_colour, mixed
+from sandbox.play.drawing.palette import Colour, hex_colour
 from sandbox.play.drawing.text import write
 from sandbox.scene.billiards.balls import POOL, SOLIDS, WHITE
 from sandbox.trajectory import FloatArray
@@ -21,6 +21,8 @@ STRIPE = 0.58
 DISC = 0.46
 """radius of the disc under a number, likewise"""
 SPOT = 0.17
+BRIGHT = 350
+"""Sum of its colour's parts, from which a ball's spots are red; else they are white."""
 STRUCK = ("cue", "white", "yellow")
 """Balls that cues strike, by name; a yellow one only on a table with a white."""
 
@@ -66,7 +68,8 @@ def painted(coat: Coat, ball: FloatArray, radius: float) -> FloatArray:
     if coat.kind == "spots":
         off = 1.0 - np.abs(ball).max(axis=1)  # from the nearest of the six ends of the axes, of the height
         share = np.clip((SPOT - np.sqrt(2.0 * off)) * soft + 0.5, 0.0, 1.0)
-        return np.asarray(own + (np.asarray(mixed(coat.colour, RED, 0.92)) - own) * share[:, None])
+        spot = RED if sum(coat.colour) > BRIGHT else IVORY
+        return np.asarray(own + (np.asarray(spot) - own) * share[:, None])
     colours = np.broadcast_to(own, ball.shape)
     if coat.kind == "stripe":
         white = np.clip((np.abs(ball[:, 1]) - STRIPE) * soft + 0.5, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Rest: whether everything on a table has come to it."""
+"""Rest: whether everything has come to it."""
 
 import numpy as np
 
