@@ -8,10 +8,11 @@ import numpy as np
 import pygame
 
 from sandbox.play.camera import Box, Camera
+from sandbox.play.drawing.fixtures import draw_fixtures
 from sandbox.play.drawing.palette import BACKGROUND, Colour, mixed
 from sandbox.play.drawing.shade import Look, disc_distance, paint
 from sandbox.play.drawing.strokes import Pixel, clipped, fill, stroke
-from sandbox.play.drawing.table.cushions import DEPTH, RIM, Cushion, cushions, width_of
+from sandbox.play.drawing.table.cushions import DEPTH, RIM, Cushion, cushions, others, width_of
 from sandbox.scene.model import Scene
 from sandbox.scene.part import Point
 
@@ -72,6 +73,9 @@ def draw_table(
     for hole in scene.pockets:
         pen.disc(hole.position, hole.radius, HOLE, rim=mixed(IRON, HOLE, 0.5), line=3.0)
     _diamonds(pen, scene, area, width)
+    walls, posts = others(scene, area)
+    if walls or posts or scene.planes:
+        draw_fixtures(surface, camera, scene.model_copy(update={"walls": walls, "posts": posts}), unit, antialias)
 
 
 class _Pen:

@@ -53,6 +53,22 @@ def cushions(scene: Scene, area: Box) -> tuple[Cushion, ...]:
     return tuple(_cushion(scene.walls[k], out, scene, facings, depth) for k, out in noses.items())
 
 
+def others(scene: Scene, area: Box) -> tuple[tuple[Wall, ...], tuple[Post, ...]]:
+    """Return the walls and posts that are no part of the cushions."""
+    noses = [(wall, out) for wall in scene.walls if (out := _out(wall, area)) is not None]
+    jaws = [jaw for wall, out in noses for end in wall.points if (jaw := _jaw(end, out, scene)) is not None]
+    known = [wall for wall, _ in noses] + [
+        wall for wall in scene.walls if len(wall.points) == 2 and any(_from_jaw(wall, jaw) for jaw in jaws)
+    ]
+    walls = tuple(wall for wall in scene.walls if not any(wall is each for each in known))
+    return walls, tuple(post for post in scene.posts if not any(post is each for each in jaws))
+
+
+def _jaw(end: Point, out: Vector, scene: Scene) -> Post | None:
+    """Return the post that a nose touches where it ends."""
+    return next((post for post in scene.posts if math.dist(post.position, _moved(end, out, post.radius)) < TOUCH), None)
+
+
 def _out(wall: Wall, area: Box) -> Vector | None:
     """Return the way out of the area, of a wall along one of its edges."""
     if len(wall.points) != 2 or wall.closed:
@@ -88,7 +104,7 @@ def _cushion(wall: Wall, out: Vector, scene: Scene, facings: list[Wall], depth: 
 
 def _end(end: Point, along: Vector, out: Vector, scene: Scene, facings: list[Wall], depth: float) -> tuple[Point, ...]:
     """Return the points from where a nose ends around its jaw and along its facing."""
-    jaw = next((post for post in scene.posts if math.dist(post.position, _moved(end, out, post.radius)) < TOUCH), None)
+    jaw = _jaw(end, out, scene)
     if jaw is None:
         return (end,)
     facing = next((ends for wall in facings if (ends := _from_jaw(wall, jaw)) is not None), None)
