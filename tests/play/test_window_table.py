@@ -81,7 +81,7 @@ def test_help_lists_the_keys_of_the_table(window: Window) -> None:
     told = dict(window.desk.claims(window.stage).told)
     for label in ("S (hold)", "E (hold)", "X (hold)", "Space", "G", "Z"):
         assert label in told
-    named = {title: lines for title, lines in groups(window.desk.claims(window.stage).told)}
+    named = dict(groups(window.desk.claims(window.stage).told))
     assert ("Space", "shoot") in named["This scene"]
     assert any(keys == "P" for keys, _ in named["Time"])  # Space is the table's
 
