@@ -26,6 +26,7 @@ TOLD = (
     ("Space", "shoot"),
     ("G", "cue ball in hand"),
     ("Z", "take the stroke back"),
+    ("Click", "call a ball, or a pocket"),
     ("C", "call a safety"),
     ("D", "another choice, where there is one"),
     ("Enter", "take that choice"),

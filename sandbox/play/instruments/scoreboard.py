@@ -82,7 +82,7 @@ def _told(person: Person) -> str:
     """Return the line about what happened and what is to be done."""
     game, match = person.game, person.game.match
     if not game.resting:
-        return "…"
+        return "the balls roll"
     if match.over:
         return f"{'; '.join(match.messages) or 'the frame is over'} (R begins another)"
     who = "bot" if game.players == "bot" and match.turn == 1 else f"player {match.turn + 1}"
