@@ -12,7 +12,7 @@ from sandbox.play.drawing.palette import BACKGROUND, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.instruments.graph import EnergyGraph
-from sandbox.play.instruments.hud import draw_hud
+from sandbox.play.instruments.hud import draw_hud, hud_width
 from sandbox.play.instruments.knob import Knob
 from sandbox.play.instruments.manual import Manual
 from sandbox.play.instruments.panel import Panel
@@ -162,11 +162,14 @@ class Desk:
             if show.contacts is not self._heard:
                 self._heard = show.contacts
                 self._sounds.hits(show.contacts, show.bodies)
+        if stage.game is None:
+            self.tools.foot = 0
         status = self.status(stage, rate, recording)
-        self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot)
+        self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot + self.tools.foot)
         if stage.gestures is not None and not self.manual.open:
             free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
-            self.tools.draw(surface, stage.gestures.person, free, self.unit)
+            words = f"{status.engine}  ·  {status.settings}"
+            self.tools.draw(surface, stage.gestures.person, free, hud_width(words, self.unit), self.unit)
         if show is not None:
             self._draw_graph(surface, stage)
             if self.foot:

@@ -1,6 +1,7 @@
 """Scoreboard: who plays, what for, how it stands, what is to be done; and what may be decided."""
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import pygame
 
@@ -17,19 +18,35 @@ from sandbox.play.instruments.plates import plate, wrapped
 
 WIDEST = 470.0
 """px at unit 1"""
-LEFT, RIGHT = 205.0, 66.0
-"""px at unit 1 beside it, for what else is told there"""
+NARROWEST = 300.0
+RIGHT = 66.0
+"""px at unit 1 beside it, for how many pictures a second there are"""
 
 
-def draw_scoreboard(
-    surface: pygame.Surface, person: Person, free: pygame.Rect, unit: float
-) -> tuple[tuple[pygame.Rect, Decision], ...]:
-    """Draw it at the top of what is free; return where the decisions are that can be clicked."""
-    size, pad = 13.0 * unit, round(9 * unit)
-    left, right = free.left + round(LEFT * unit), free.right - round(RIGHT * unit)
+class Drawn(NamedTuple):
+    """A scoreboard as it was drawn."""
+
+    rect: pygame.Rect
+    choices: tuple[tuple[pygame.Rect, Decision], ...]
+    """where the decisions are that can be clicked"""
+
+
+def draw_scoreboard(surface: pygame.Surface, person: Person, free: pygame.Rect, left: int, unit: float) -> Drawn:
+    """Draw it at the top of what is free, or where that is too narrow, at the bottom.
+
+    Args:
+        surface: the picture.
+        person: who plays.
+        free: px, what it may cover.
+        left: px, what else covers the top.
+        unit: px of a pixel at 1080 lines.
+    """
+    size, pad, margin = 13.0 * unit, round(9 * unit), round(10 * unit)
+    right = free.right - round(RIGHT * unit)
+    above = right - left >= NARROWEST * unit
+    if not above:
+        left, right = free.left + margin, free.right - margin
     width = min(right - left, round(WIDEST * unit))
-    if width < 150 * unit:
-        return ()
     game = person.game
     match, line = game.match, round(1.5 * size)
     told = _told(person)
@@ -37,7 +54,9 @@ def draw_scoreboard(
     down = _down(match)
     lines = wrapped(told, size, width - 2 * pad - 1.3 * size, 2)
     rows = 1 + len(lines) + bool(down) + bool(choices)
-    rect = pygame.Rect((left + right - width) // 2, free.top + round(10 * unit), width, rows * line + 2 * pad)
+    rect = pygame.Rect((left + right - width) // 2, free.top + margin, width, rows * line + 2 * pad)
+    if not above:
+        rect.bottomleft = left, free.bottom - margin
     plate(surface, rect, 8 * unit)
     y = rect.top + pad + line / 2
     _players(surface, game, rect, y, size)
@@ -50,7 +69,7 @@ def draw_scoreboard(
     for text in lines:
         write(surface, text, (rect.left + pad + 1.2 * size, y), size, INK, "midleft")
         y += line
-    return _draw_choices(surface, person.choice, choices, rect, y, size) if choices else ()
+    return Drawn(rect, _draw_choices(surface, person.choice, choices, rect, y, size) if choices else ())
 
 
 def _players(surface: pygame.Surface, game: Game, rect: pygame.Rect, y: float, size: float) -> None:

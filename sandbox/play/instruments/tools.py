@@ -26,27 +26,34 @@ class Tools:
     def __init__(self) -> None:
         self._tip = self._power = pygame.Rect(0, 0, 0, 0)
         self._choices: tuple[tuple[pygame.Rect, Decision], ...] = ()
+        self.foot = 0
+        """px that they cover at the bottom left, where messages are told"""
         self._held = ""
 
-    def draw(self, surface: pygame.Surface, person: Person, free: pygame.Rect, unit: float) -> None:
+    def draw(self, surface: pygame.Surface, person: Person, free: pygame.Rect, left: int, unit: float) -> None:
         """Draw all.
 
         Args:
             surface: the picture.
             person: who plays.
             free: px, what nothing else covers.
+            left: px, what is told at the upper left.
             unit: px of a pixel at 1080 lines.
         """
         scale = unit * min(1.0, free.width / (640.0 * unit), free.height / (520.0 * unit))
         self._tip = self._power = pygame.Rect(0, 0, 0, 0)
-        self._choices = ()
+        self._choices, self.foot = (), 0
         if free.width < LEAST[0] * unit or free.height < LEAST[1] * unit:
             return
         game = person.game
-        self._choices = draw_scoreboard(surface, person, free, scale)
+        side, gap, bar = round(SIDE * scale), round(GAP * scale), round(BAR * scale)
+        beside = pygame.Rect(free.left, free.top, free.width - (side + bar + 2 * gap), free.height)
+        board = draw_scoreboard(surface, person, free if left < free.centerx else beside, left, scale)
+        self._choices = board.choices
+        if board.rect.top > free.centery:
+            self.foot = free.bottom - board.rect.top
         if not game.aiming:
             return
-        side, gap, bar = round(SIDE * scale), round(GAP * scale), round(BAR * scale)
         self._power = pygame.Rect(free.right - gap - bar, free.bottom - gap - side, bar, side)
         self._tip = pygame.Rect(self._power.left - gap - side, self._power.top, side, side)
         draw_power(surface, self._power, game.cue, scale)
