@@ -79,7 +79,11 @@ def rolling(file: str, seconds: float) -> None:
         if k % 4 == 0:
             pixels = pygame.surfarray.array3d(opened.surface).transpose(1, 0, 2)
             shots.append(Image.fromarray(pixels).resize((640, 400), Image.Resampling.LANCZOS))
-    few = [shot.quantize(128) for shot in shots]
+    # Half of the colours for what there is most of, the cloth in its light; half so that no ball is without its own.
+    halves = [shots[0].quantize(128, how) for how in (Image.Quantize.MEDIANCUT, Image.Quantize.MAXCOVERAGE)]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([part for half in halves for part in (half.getpalette() or [])[: 3 * 128]])
+    few = [shot.quantize(palette=palette, dither=Image.Dither.NONE) for shot in shots]
     few[0].save(FOLDER / file, save_all=True, append_images=few[1:], duration=67, loop=0, optimize=True)
     opened.close()
 
