@@ -100,7 +100,10 @@ class Mouse:
         stage = seat.stage
         if self._pressed is not None and math.dist(self._pressed, event.pos) > SLACK * seat.desk.unit:
             self._pressed = None
-            stage.act(lambda live: stage.hands.hold(live, stage.paused))
+            if stage.game is not None and stage.game.match.rules.name != "free":
+                stage.messages.tell("in a game balls are moved by the cue", "warning")
+            else:
+                stage.act(lambda live: stage.hands.hold(live, stage.paused))
         if stage.hands.holding:
             self._drag = event.pos
 

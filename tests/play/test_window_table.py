@@ -194,3 +194,12 @@ def test_restart_begins_the_game_anew(window: Window) -> None:
     assert game_in(window) is not before
     assert game_in(window).strokes == 0
     assert (game_in(window).cue.aim, game_in(window).cue.speed) == (1.5708, 4.0)
+
+
+def test_balls_of_a_game_are_moved_by_the_cue_alone(window: Window) -> None:
+    game = game_in(window)
+    x, y = game.position[game.live.bodies.names.index("1")]
+    start, end = at(window, x, y), at(window, x - 0.2, y)
+    do(window, move(*start), press(*start), move(*end, held=True), release(*end))
+    assert game.live.session.actions == ()
+    assert "by the cue" in window.stage.messages.shown()[-1][1]
