@@ -74,7 +74,7 @@ def test_ball_in_a_pocket_is_not_seen() -> None:
     scene = loads(AT_REST)
     position = scene.bodies.position.copy()
     position[0] = scene.pockets[2].position
-    picture, camera = drawn(scene, frame_of(scene, position))
+    picture, camera = drawn(scene, frame_of(scene, position, time=3.0))
     assert at(picture, camera, scene.pockets[2].position).max() < 20
 
 

@@ -100,8 +100,9 @@ class Balls:
         for hole in scene.pockets:
             within = (frame.position == np.asarray(hole.position)).all(axis=1) & frame.present
             for number in np.flatnonzero(within).tolist():
-                since = self._fell.setdefault(number, frame.time)
-                found[number] = min((frame.time - since) / DROP, 1.0) if frame.time > 0.0 else 1.0
+                # Who lay there when it was looked at for the first time was not seen to fall.
+                since = self._fell.setdefault(number, frame.time if self._rolling.goes_on else -math.inf)
+                found[number] = min((frame.time - since) / DROP, 1.0)
         for number in [each for each in self._fell if each not in found or self._fell[each] > frame.time]:
             del self._fell[number]
         return found

@@ -16,7 +16,9 @@ class Rolling:
         """(N, 3, 3) from a ball's own frame to the world's"""
         self.version: IntArray = np.empty(0, np.int64)
         """(N,) which grows when a ball turns"""
-        self._time = 0.0
+        self._time: float | None = None
+        self.goes_on = False
+        """whether the last picture was of a moment before"""
 
     def go_on(self, frame: Frame) -> None:
         """Let the balls roll on to a frame. Time that runs backwards rolls nothing back."""
@@ -24,8 +26,9 @@ class Rolling:
         if count > known:
             self.turned = np.concatenate((self.turned, [_thrown(k) for k in range(known, count)]))
             self.version = np.append(self.version, np.zeros(count - known, np.int64))
-        dt, self._time = frame.time - self._time, frame.time
-        if not 0.0 < dt < LONGEST:
+        dt = 0.0 if self._time is None else frame.time - self._time
+        self._time, self.goes_on = frame.time, 0.0 < dt < LONGEST
+        if not self.goes_on:
             return
         spin = np.zeros((count, 3))
         spin[:, 2] = frame.angular_velocity
