@@ -14,7 +14,7 @@ from sandbox.play.drawing.table.coats import STRUCK, Coat, coat_of, painted
 from sandbox.play.drawing.table.rolling import Rolling
 from sandbox.play.drawing.view import View
 from sandbox.scene.bodies import Bodies
-from sandbox.trajectory import FloatArray, Frame
+from sandbox.trajectory import FloatArray
 
 FINEST, LARGEST = 48.0, 160.0
 """px: what moves is drawn no finer than the first, what rests than the second, and larger by scaling"""
@@ -130,14 +130,6 @@ class Balls:
         else:
             corner = place[0] // OFFSETS - half, place[1] // OFFSETS - half
         view.surface.blit(known[1], (round(corner[0]), round(corner[1])))
-
-
-def lies_in_pocket(frame: Frame, view: View) -> npt.NDArray[np.bool_]:
-    """Tell which bodies lie in a pocket, (N,)."""
-    found = np.zeros(len(frame.position), np.bool_)
-    for hole in view.sight.scene.pockets:
-        found |= (frame.position == np.asarray(hole.position)).all(axis=1)
-    return found
 
 
 def _sprite(
