@@ -12,8 +12,11 @@ os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"  # the w
 os.environ["PYGAME_HIDE_SUPPORT_PROMPT"] = "1"
 
 import pygame
+from PIL import Image
 
 from sandbox.cli.main import call
+from sandbox.games.billiards.bot.bot import Bot
+from sandbox.play.messages import Messages
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
 from sandbox.scene.shipped import find
@@ -50,9 +53,65 @@ def film(scene: str, file: str, *options: str) -> None:
                 sys.exit(f"sandbox {' '.join(arguments)} failed")
 
 
+def table(file: str) -> None:
+    """Break, aim as a good player would, and keep what is seen; the numbers of the bot are those of its seed."""
+    opened = sit_down("8-ball")
+    stroke_and_roll(opened)
+    game = opened.stage.game
+    assert game is not None
+    plan = Bot(1.0, 1).intend(game.match).stroke
+    game.cue.aim, game.cue.speed = plan.aim, plan.speed
+    game.cue.tip_at(plan.side, plan.height)
+    opened.turn(FRAME)
+    pygame.image.save(opened.surface, FOLDER / file)
+    opened.close()
+
+
+def rolling(file: str, seconds: float) -> None:
+    """Break off, and film the picture without what surrounds it."""
+    opened = sit_down("9-ball")
+    opened.desk.panel.visible = False
+    opened.home()
+    opened.take(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0))
+    shots = []
+    for k in range(round(seconds / FRAME)):
+        opened.turn(FRAME)
+        if k % 4 == 0:
+            pixels = pygame.surfarray.array3d(opened.surface).transpose(1, 0, 2)
+            shots.append(Image.fromarray(pixels).resize((640, 400), Image.Resampling.LANCZOS))
+    # Half of the colours for what there is most of, the cloth in its light; half so that no ball is without its own.
+    halves = [shots[0].quantize(128, how) for how in (Image.Quantize.MEDIANCUT, Image.Quantize.MAXCOVERAGE)]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([part for half in halves for part in (half.getpalette() or [])[: 3 * 128]])
+    few = [shot.quantize(palette=palette, dither=Image.Dither.NONE) for shot in shots]
+    few[0].save(FOLDER / file, save_all=True, append_images=few[1:], duration=67, loop=0, optimize=True)
+    opened.close()
+
+
+def sit_down(scene: str) -> Window:
+    """Open a table."""
+    opened = Window(Stage(), size=SIZE)
+    opened.stage.open(find(scene))
+    opened.turn(FRAME)
+    opened.stage.messages = Messages()  # what it says to begin with is no part of the picture
+    return opened
+
+
+def stroke_and_roll(opened: Window) -> None:
+    """Play the stroke that is laid ready, and let all come to rest."""
+    game = opened.stage.game
+    assert game is not None
+    game.shoot()
+    opened.turn(FRAME)
+    while not game.waits:
+        opened.turn(FRAME)
+
+
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
     window("gas", 4.0, {"velocities", "energy"}, ghost=True, trust=True, file="window.png")
     film("pile", "pile.gif", "--size", "320x400", "--fps", "15", "--until", "2")
     film("ragdoll_stairs", "ragdoll.gif", "--size", "640x300", "--fps", "20", "--until", "2.5")
+    table("table.png")
+    rolling("break.gif", 2.6)
     film("tearing_cloth", "tearing.gif", "--size", "640x340", "--fps", "20", "--until", "1.6")

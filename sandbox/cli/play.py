@@ -8,29 +8,30 @@ import click
 from sandbox.cli.reading import gathering, path_of, refused
 from sandbox.cli.showing import show_stage, window_options
 from sandbox.engines.contract import Refusal
-from sandbox.engines.registry import UnknownEngineError, able, engine_named
+from sandbox.engines.registry import USUAL, UnknownEngineError, able, engine_named, usual
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import load
 
 
 @click.command(name="play")
 @click.argument("scene", required=False)
-@click.option("--engine", default="pymunk", metavar="NAME", help="which engine to begin with; E goes to the next")
+@click.option("--engine", metavar="NAME", help="which engine to begin with: by default exact at tables, else pymunk")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of every scene")
 @window_options
-def command(scene: str | None, engine: str, overrides: tuple[str, ...], **window: Any) -> int:
+def command(scene: str | None, engine: str | None, overrides: tuple[str, ...], **window: Any) -> int:
     """Play a scene in a window. SCENE is a file, or the name of a shipped one; without, pick one there."""
     faults: list[Fault] = []
     with gathering(faults, "--engine", (UnknownEngineError,)):
-        engine_named(engine)
+        engine_named(engine or USUAL)
     path: Path | None = None
     with gathering(faults):
         if scene is not None:
             path = Path(path_of(scene))
             found = load(path, overrides)
-            missing = engine_named(engine).missing(found, found.solver) if not faults else ()
+            first = engine or usual(found)
+            missing = engine_named(first).missing(found, found.solver) if not faults else ()
             if missing:
-                click.echo(f"{scene}: {Refusal(engine, missing, able(found))}", err=True)
+                click.echo(f"{scene}: {Refusal(first, missing, able(found))}", err=True)
                 return 1
         elif overrides:
             raise SceneError([Fault("--set", None, "", "sets values of a scene; name the scene too")])

@@ -14,6 +14,10 @@ ENGINES: dict[str, Engine] = {
 }
 
 
+USUAL = "pymunk"
+"""The engine of whoever does not say."""
+
+
 class UnknownEngineError(ValueError):
     """No engine has that name."""
 
@@ -28,6 +32,11 @@ def engine_named(name: str) -> Engine:
         return ENGINES[name]
     except KeyError:
         raise UnknownEngineError(f"no engine {name!r}; engines: {', '.join(ENGINES)}") from None
+
+
+def usual(scene: Scene) -> str:
+    """Return the engine that a scene is played on where nobody has said: of a table the one that is exact."""
+    return "exact" if scene.surface is not None else USUAL
 
 
 def able(scene: Scene, settings: Settings | None = None) -> tuple[str, ...]:

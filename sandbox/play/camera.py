@@ -17,7 +17,10 @@ Box = tuple[tuple[float, float], tuple[float, float]]
 
 @dataclass(frozen=True)
 class Camera:
-    """A view of the world: y up in metres there, y down in pixels here. A value: moving it makes another."""
+    """A view of the world: y up in metres there, y down in pixels here. A value: moving it makes another.
+
+    One that is turned, as for tables that are longer than wide, has y to the right and x downwards.
+    """
 
     centre: tuple[float, float]
     """what is shown in the middle, m"""
@@ -25,9 +28,19 @@ class Camera:
     """px/m"""
     size: tuple[int, int]
     """of the picture, px"""
+    turned: bool = False
+    """by a quarter, clockwise"""
 
     @classmethod
-    def fitting(cls, box: Box, size: tuple[int, int], margin: float = 0.06, inset: int = 0, foot: int = 0) -> Self:
+    def fitting(
+        cls,
+        box: Box,
+        size: tuple[int, int],
+        margin: float = 0.06,
+        inset: int = 0,
+        foot: int = 0,
+        turned: bool = False,
+    ) -> Self:
         """Return the camera that shows a box whole.
 
         Args:
@@ -36,31 +49,45 @@ class Camera:
             margin: share of the picture left free on each side.
             inset: px at the right that something else covers.
             foot: px at the bottom that something else covers.
+            turned: whether the picture is.
         """
         (left, bottom), (right, top) = box
         free = max(size[0] - inset, size[0] // 3, 1), max(size[1] - foot, size[1] // 3, 1)
         room = 1.0 - 2.0 * margin
         width, height = max(right - left, 1e-9), max(top - bottom, 1e-9)
+        if turned:
+            width, height = height, width
         scale = min(max(min(free[0] * room / width, free[1] * room / height), FARTHEST), CLOSEST)
-        aside, down = (size[0] - free[0]) / 2.0 / scale, (size[1] - free[1]) / 2.0 / scale
-        return cls(((left + right) / 2.0 + aside, (bottom + top) / 2.0 - down), scale, size)
+        whole = cls(((left + right) / 2.0, (bottom + top) / 2.0), scale, size, turned)
+        return whole.panned(((free[0] - size[0]) / 2.0, (free[1] - size[1]) / 2.0))
 
     def to_screen(self, points: FloatArray) -> FloatArray:
         """Return where points (…, 2), m, lie in the picture, (…, 2) px from its upper left corner."""
         middle = np.asarray(self.size) / 2.0
-        return np.asarray((points - np.asarray(self.centre)) * (self.scale, -self.scale) + middle)
+        return self.ways(points - np.asarray(self.centre)) + middle
+
+    def ways(self, vectors: FloatArray) -> FloatArray:
+        """Return vectors (…, 2), m, as they are in the picture, (…, 2) px."""
+        if self.turned:
+            return np.asarray(vectors[..., ::-1] * self.scale)
+        return np.asarray(vectors * (self.scale, -self.scale))
 
     def to_world(self, pixel: tuple[float, float]) -> tuple[float, float]:
         """Return the place that a pixel shows, m."""
-        return (
-            self.centre[0] + (pixel[0] - self.size[0] / 2.0) / self.scale,
-            self.centre[1] - (pixel[1] - self.size[1] / 2.0) / self.scale,
-        )
+        x, y = self._way((pixel[0] - self.size[0] / 2.0, pixel[1] - self.size[1] / 2.0))
+        return self.centre[0] + x, self.centre[1] + y
+
+    def _way(self, pixels: tuple[float, float]) -> tuple[float, float]:
+        """Return a vector of the picture, px, as it is in the world, m."""
+        right, down = pixels[0] / self.scale, pixels[1] / self.scale
+        return (down, right) if self.turned else (right, -down)
 
     @property
     def box(self) -> Box:
         """What is in sight, m."""
         half = self.size[0] / 2.0 / self.scale, self.size[1] / 2.0 / self.scale
+        if self.turned:
+            half = half[1], half[0]
         x, y = self.centre
         return (x - half[0], y - half[1]), (x + half[0], y + half[1])
 
@@ -76,15 +103,15 @@ class Camera:
         """Return this camera closer by a factor; the place under a pixel stays there."""
         scale = min(max(self.scale * factor, FARTHEST), CLOSEST)
         x, y = self.to_world(about)
-        centre = (
-            x - (about[0] - self.size[0] / 2.0) / scale,
-            y + (about[1] - self.size[1] / 2.0) / scale,
-        )
-        return replace(self, centre=centre, scale=scale) if all(map(math.isfinite, centre)) else self
+        closer = replace(self, scale=scale)
+        right, up = closer._way((about[0] - self.size[0] / 2.0, about[1] - self.size[1] / 2.0))
+        centre = x - right, y - up
+        return replace(closer, centre=centre) if all(map(math.isfinite, centre)) else self
 
     def panned(self, by: tuple[float, float]) -> Self:
         """Return this camera moved so that what is shown moves by so many pixels."""
-        return replace(self, centre=(self.centre[0] - by[0] / self.scale, self.centre[1] + by[1] / self.scale))
+        x, y = self._way(by)
+        return replace(self, centre=(self.centre[0] - x, self.centre[1] - y))
 
     def resized(self, size: tuple[int, int]) -> Self:
         """Return this camera for a picture of another size, showing about the same."""

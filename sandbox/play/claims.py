@@ -1,12 +1,14 @@
 """Claims: the keys that a scene takes for itself, and what they do."""
 
-from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
 import pygame
 
 from sandbox.action import Throttle
+from sandbox.play import cue_keys
+from sandbox.play.billiards.gestures import Gestures
+from sandbox.play.cue_keys import Deed
 from sandbox.play.hands import Hands
 from sandbox.play.running.live import Live
 from sandbox.scene.model import Scene, default_name
@@ -19,8 +21,6 @@ ARROWS = {
 }
 
 KEYS = {"left": pygame.K_LEFT, "right": pygame.K_RIGHT, "up": pygame.K_UP, "down": pygame.K_DOWN}
-
-Deed = Callable[[Live], object]
 
 
 class Claims(NamedTuple):
@@ -38,8 +38,8 @@ class Claims(NamedTuple):
         return None if again and (key not in ARROWS or key in self.releases) else self.deeds.get(key)
 
 
-def claims(scene: Scene, hands: Hands) -> Claims:
-    """Return the keys that a scene claims."""
+def claims(scene: Scene, hands: Hands, gestures: Gestures | None = None) -> Claims:
+    """Return the keys that a scene claims, those of a table among them."""
     deeds: dict[int, Deed] = {}
     told: list[tuple[str, str]] = []
     body, step, generator = scene.play.arrows, scene.play.arrow_step, scene.play.relaunch
@@ -58,6 +58,11 @@ def claims(scene: Scene, hands: Hands) -> Claims:
             deeds[key] = partial(_throttle, thrust=name, level=1.0, also=deeds.get(key))
             releases[key] = partial(_throttle, thrust=name, level=0.0, also=releases.get(key))
             told.append((thrust.key.capitalize(), f"fire {name}"))
+    if gestures is not None:
+        pressed, released = cue_keys.deeds(gestures)
+        deeds |= pressed
+        releases |= released
+        told += cue_keys.TOLD
     return Claims(deeds, tuple(told), releases)
 
 

@@ -5,18 +5,21 @@ from pathlib import Path
 import pygame
 
 from sandbox.play.account import account
+from sandbox.play.billiards.game import PLAYERS
 from sandbox.play.camera import Camera
 from sandbox.play.claims import Claims, claims
 from sandbox.play.drawing.palette import BACKGROUND, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.instruments.graph import EnergyGraph
-from sandbox.play.instruments.hud import draw_hud
+from sandbox.play.instruments.hud import draw_hud, hud_width
+from sandbox.play.instruments.knob import Knob
 from sandbox.play.instruments.manual import Manual
 from sandbox.play.instruments.panel import Panel
 from sandbox.play.instruments.picker import Picker
 from sandbox.play.instruments.plates import plate
 from sandbox.play.instruments.timeline import HEIGHT, Timeline
+from sandbox.play.instruments.tools import Tools
 from sandbox.play.knobs import Knobs
 from sandbox.play.running.live import Live
 from sandbox.play.shelf import to_pick
@@ -39,6 +42,7 @@ class Desk:
         self.panel = Panel(size, unit)
         self.manual = Manual()
         self.picker: Picker | None = None
+        self.tools = Tools()
         self._timeline = Timeline()
         self._graph = EnergyGraph()
         self._picture = Picture()
@@ -75,9 +79,9 @@ class Desk:
         """Return the keys that the scene claims."""
         if not isinstance(stage.show, Live):
             return Claims({}, (), {})
-        key = stage.show.scene.play
+        key = stage.gestures or stage.show.scene.play
         if self._claims is None or self._claims[0] is not key:
-            self._claims = key, claims(stage.show.scene, stage.hands)
+            self._claims = key, claims(stage.show.scene, stage.hands, stage.gestures)
         return self._claims[1]
 
     def claimed(self, stage: Stage) -> frozenset[int]:
@@ -119,6 +123,8 @@ class Desk:
         if self.manual.handle(event) or self._close_faults(event, stage) or self.panel.handle(event):
             return True
         show = stage.show
+        if stage.gestures is not None and self.tools.handle(event, stage.gestures.person, stage.act):
+            return True
         if show is not None and self._area.height:
             held = self._timeline.held
             time = self._timeline.handle(event, self._area)
@@ -149,13 +155,21 @@ class Desk:
         else:
             pull = stage.hands.line(show) if isinstance(show, Live) else None
             sight = show.sight(frozenset(self.overlays), stage.hands.picked, pull)
+            if stage.gestures is not None:
+                sight = stage.gestures.seen.over(sight)
             foot = float(self._area.height)
             self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=foot)
             if show.contacts is not self._heard:
                 self._heard = show.contacts
                 self._sounds.hits(show.contacts, show.bodies)
+        if stage.game is None:
+            self.tools.foot = 0
         status = self.status(stage, rate, recording)
-        self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot)
+        self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot + self.tools.foot)
+        if stage.gestures is not None and not self.manual.open:
+            free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
+            words = f"{status.engine}  ·  {status.settings}"
+            self.tools.draw(surface, stage.gestures.person, free, hud_width(words, self.unit), self.unit)
         if show is not None:
             self._draw_graph(surface, stage)
             if self.foot:
@@ -202,6 +216,8 @@ class Desk:
         shown = (
             self._knobs.of(live, stage.file, stage.hands.picked) if live is not None and stage.file is not None else ()
         )
+        if stage.game is not None:
+            shown = (*shown, Knob("players", "players", value=stage.game.players, choices=PLAYERS))
         toggles = {name: name in self.overlays for name in OVERLAYS}
         if live is not None:
             toggles |= {"ghost": live.company.ghosted, "trust": live.company.trust is not None}
@@ -223,7 +239,10 @@ class Desk:
         """Return what is told in words."""
         if self._untold:
             self._untold = False
-            for keys, what in self.claims(stage).told:
+            told = self.claims(stage).told
+            if stage.game is not None:
+                stage.messages.tell("aim with the mouse; Space shoots, H lists all keys")
+            for keys, what in told if stage.game is None else ():
                 stage.messages.tell(f"{keys}: {what}")
         return account(stage, self.claims(stage).told, rate, recording)
 

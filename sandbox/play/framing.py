@@ -3,6 +3,7 @@
 import numpy as np
 
 from sandbox.play.camera import Box
+from sandbox.play.drawing.table.cushions import outside
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import LinkKind
 from sandbox.scene.model import Scene
@@ -10,6 +11,10 @@ from sandbox.trajectory import BoolArray, FloatArray
 
 LOOKS = 17
 """Moments of free flight that are looked at."""
+ROLLING = 1.2
+"""s: where balls on a floor fly for longer says little, as the floor brakes them and they meet each other"""
+BESIDE = 0.12
+"""of its size, so much is seen beside where balls on a floor are"""
 OUTLIERS = 0.5
 """Per cent of the places at each side that need not be seen, where there are many."""
 MANY = 1000
@@ -24,7 +29,12 @@ FAR = 20.0
 
 
 def framing(scene: Scene) -> Box:
-    """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there."""
+    """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there.
+
+    Of a table that is the table.
+    """
+    if scene.play.area is not None:
+        return outside(scene.play.area)
     bodies = scene.bodies
     things = [corners for corners in _things(scene) if (np.abs(corners) < LARGEST).all()]
     discs = bodies.round | ~bodies.fixed  # what turns is anywhere within its circle; what stands is where it is
@@ -39,6 +49,8 @@ def framing(scene: Scene) -> Box:
     near = NEAR * float((flown[1] - flown[0]).max())
     met = [each for each in met if (each[0] <= flown[1] + near).all() and (each[1] >= flown[0] - near).all()]
     low, high = _union([start, *met]) if met else flown
+    if scene.surface is not None:  # room to roll on
+        low, high = low - BESIDE * (high - low).max(), high + BESIDE * (high - low).max()
     if scene.play.arrows is not None:  # room to move it
         low, high = low - 2.0 * scene.play.arrow_step, high + 2.0 * scene.play.arrow_step
     if not (high - low).max() > 0.0:
@@ -50,6 +62,14 @@ def framing(scene: Scene) -> Box:
         if np.abs(foot - middle).max() <= FAR * float((high - low).max()):
             low, high = np.minimum(low, foot), np.maximum(high, foot)
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+
+
+def lies_down(scene: Scene, free: tuple[int, int]) -> bool:
+    """Tell whether a scene is a table that is seen larger when turned, in a picture of so many px."""
+    if scene.play.area is None or scene.planes:
+        return False
+    (left, bottom), (right, top) = scene.play.area
+    return (top - bottom > right - left) == (free[0] > free[1])
 
 
 ONE = np.ones(2)
@@ -79,7 +99,8 @@ def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
     world = scene.world
     chosen = np.flatnonzero(~_tethered(scene, bodies))
     chosen = chosen[:: max(1, len(chosen) // 5000)]  # so many are enough to tell
-    time = np.linspace(0.0, world.duration, LOOKS)[:, None, None]
+    duration = world.duration if scene.surface is None else min(world.duration, ROLLING)
+    time = np.linspace(0.0, duration, LOOKS)[:, None, None]
     start, velocity = bodies.position[chosen], bodies.velocity[chosen]
     with np.errstate(all="ignore"):
         place = start + velocity * time + 0.5 * np.asarray(world.gravity) * time**2

@@ -4,9 +4,12 @@ A press only picks a body, so that its figures can be read without a touch; who 
 """
 
 import math
+from collections.abc import Callable
 
 import pygame
 
+from sandbox.play.billiards.gestures import Gestures
+from sandbox.play.running.live import Live
 from sandbox.play.seat import Seat
 
 NOTCH = 1.15
@@ -24,6 +27,7 @@ class Mouse:
         self._seat = seat
         self._panning = False
         self._pressed: tuple[int, int] | None = None  # on a body that nobody has taken hold of yet
+        self._began: tuple[int, int] | None = None  # where the left button came down
         self._drag: tuple[int, int] | None = None  # where what is held is to go
         self.place: tuple[int, int] | None = None
         """where it is, px; None before it was over the picture"""
@@ -47,19 +51,48 @@ class Mouse:
             if event.button in (2, 3):
                 self._panning = False
             elif event.button == 1:
-                self._open_hand()
+                self._release(event.pos)
         elif event.type == pygame.WINDOWFOCUSLOST:  # the release goes elsewhere
             self.let_go()
 
     def _look(self, place: tuple[int, int]) -> None:
         seat, show = self._seat, self._seat.stage.show
         reach = REACH * seat.desk.unit / seat.camera.scale
+        self._began = place
+        if self._at_table(lambda table: table.press(seat.camera.to_world(place), reach)):
+            return
         there = show is not None and seat.stage.hands.look(show, seat.camera.to_world(place), reach)
         self._pressed = place if there else None
 
+    def _at_table(self, deed: Callable[[Gestures], bool]) -> bool:
+        """Let the hand do something at the table, where one is on; return whether that was all that was meant."""
+        stage, done = self._seat.stage, [False]
+        gestures = stage.gestures
+        if gestures is None:
+            return False
+
+        def do(_: Live) -> None:
+            done[0] = True  # also where it cannot be done, which is said
+            done[0] = deed(gestures)
+
+        stage.act(do)
+        return done[0]
+
+    def _release(self, place: tuple[int, int]) -> None:
+        seat, began = self._seat, self._began
+        moved = began is not None and math.dist(began, place) > SLACK * seat.desk.unit
+        self._began = None
+        picked = seat.stage.hands.picked if self._pressed is not None and not moved else None
+        used = began is not None and self._at_table(lambda table: table.release(seat.camera.to_world(place), moved))
+        if picked is not None and not used:
+            self._at_table(lambda table: table.name_ball(picked))
+        self._open_hand()
+
     def _move(self, event: pygame.event.Event) -> None:
         seat = self._seat
-        self.place = event.pos
+        before, self.place = self.place, event.pos
+        if not self._panning and not seat.stage.hands.holding and self._pressed is None:
+            self._aim(event.pos if before is None else before, event.pos)
         if self._panning:
             seat.camera = seat.camera.panned(event.rel)
             seat.at_home = False
@@ -67,9 +100,25 @@ class Mouse:
         stage = seat.stage
         if self._pressed is not None and math.dist(self._pressed, event.pos) > SLACK * seat.desk.unit:
             self._pressed = None
-            stage.act(lambda live: stage.hands.hold(live, stage.paused))
+            if stage.game is not None and stage.game.match.rules.name != "free":
+                stage.messages.tell("in a game balls are moved by the cue", "warning")
+            else:
+                stage.act(lambda live: stage.hands.hold(live, stage.paused))
         if stage.hands.holding:
             self._drag = event.pos
+
+    def _aim(self, before: tuple[int, int], now: tuple[int, int]) -> None:
+        """Let the table know of a motion."""
+        camera, unit = self._seat.camera, self._seat.desk.unit
+        pixels = (now[0] - before[0]) / unit, (now[1] - before[1]) / unit
+        fine = bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
+        time = pygame.time.get_ticks() / 1000.0
+
+        def aim(table: Gestures) -> bool:
+            table.motion(camera.to_world(before), camera.to_world(now), pixels, fine, time)
+            return True
+
+        self._at_table(aim)
 
     def settle(self) -> None:
         """Bring what is held to where the mouse is by now: one action, however many motions led there."""

@@ -9,7 +9,7 @@ import pygame
 from sandbox.play.camera import Box, Camera
 from sandbox.play.desk import Desk
 from sandbox.play.footage.taking import Taking
-from sandbox.play.framing import around, framing
+from sandbox.play.framing import around, framing, lies_down
 from sandbox.play.stage import Stage
 
 TITLE = "sandbox"
@@ -83,8 +83,10 @@ class Seat:
 
     def _fit(self, box: Box) -> None:
         """Show a box whole, beside what the panel and the timeline cover."""
-        size = self.surface.get_size()
-        self.camera = Camera.fitting(box, size, inset=self.desk.panel.width, foot=self.desk.foot)
+        size, covered = self.surface.get_size(), self.desk.panel.width
+        show = self.stage.show
+        lies = show is not None and lies_down(show.scene, (size[0] - covered, size[1] - self.desk.foot))
+        self.camera = Camera.fitting(box, size, inset=covered, foot=self.desk.foot, turned=lies)
 
     def resize(self, surface: pygame.Surface) -> None:
         """Go on with a surface of another size."""

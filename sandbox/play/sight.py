@@ -4,6 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from sandbox.play.billiards.aim import Aim
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import Links
 from sandbox.scene.model import Scene
@@ -61,6 +62,8 @@ class Sight:
     """where a body is held, and the hand that pulls it, m"""
     broken: Collection[int] = ()
     """numbers of the scene's joints that have broken by then"""
+    aim: Aim | None = None
+    """of the next stroke, at a table"""
 
     @cached_property
     def links(self) -> Links:

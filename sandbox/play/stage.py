@@ -9,7 +9,12 @@ from typing import Any
 
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.contract import Refusal
-from sandbox.engines.registry import ENGINES, able, engine_named
+from sandbox.engines.registry import ENGINES, USUAL, able, engine_named, usual
+from sandbox.games.billiards.layout import Layout
+from sandbox.games.billiards.rules.happening import GameError
+from sandbox.play.billiards.game import PLAYERS, Game, Players, plays
+from sandbox.play.billiards.gestures import Gestures
+from sandbox.play.billiards.person import Person
 from sandbox.play.hands import Hands
 from sandbox.play.instruments.knob import Value
 from sandbox.play.knobs import turned
@@ -31,17 +36,23 @@ FEW = 64
 class Stage:
     """What the window shows, and what is done to it."""
 
-    def __init__(self, engine: str = "pymunk", overrides: Iterable[Override] = ()) -> None:
+    def __init__(self, engine: str | None = None, overrides: Iterable[Override] = ()) -> None:
         """Start with nothing on.
 
         Args:
-            engine: whose name is tried first for every scene, until another is chosen.
+            engine: whose name is tried first for every scene, until another is chosen; by default the exact one
+                for tables, and pymunk for all else.
             overrides: values set in every scene that is opened.
         """
         self.show: Live | Stored | None = None
         self.path: Path | None = None
         self.file: Scene | None = None
         """the scene as its file has it"""
+        self.game: Game | None = None
+        """who plays at the table, where one is on"""
+        self.gestures: Gestures | None = None
+        """what a hand does at it"""
+        self._players: Players | None = None
         self._paused = False
         self.hands = Hands()
         self.messages = Messages()
@@ -63,7 +74,7 @@ class Stage:
     @property
     def engine(self) -> str:
         """The present engine's name."""
-        return self.show.engine if self.show is not None else self._engine
+        return self.show.engine if self.show is not None else self._engine or USUAL
 
     @property
     def paused(self) -> bool:
@@ -93,6 +104,7 @@ class Stage:
             same: it is the scene that was on.
             again: makes it anew for a restart, where scene and settings are not all of it, as of a recording.
         """
+        self._let_go_of_table()
         if self.show is not None:
             self.show.close()
         self.show, self.path, self.file = show, path, file
@@ -104,7 +116,31 @@ class Stage:
             show.company.show_trust(few if self._trusting is None else self._trusting)
             if self._ghosted and not show.company.ghosted:
                 show.company.show_ghost(True)
+            self._sit_down(show, file)
         self.on_new(same)
+
+    def _sit_down(self, live: Live, file: Scene) -> None:
+        """Begin a game, where the scene is a table."""
+        if not plays(live.scene):
+            return
+        # A scene that starts by its own shot has been struck already.
+        shot = file.shots[0] if file.shots and not live.scene.shots else None
+        try:
+            self.game = Game(live, self._players, shot)
+        except GameError as error:
+            self.messages.tell(str(error), "warning")
+        else:
+            self.gestures = Gestures(Person(self.game))
+
+    def _let_go_of_table(self) -> None:
+        if self.game is not None:
+            self.game.close()
+        self.game = self.gestures = None
+
+    def seat(self, players: Players) -> None:
+        """Begin the game anew with other players."""
+        self._players = players
+        self.restart()
 
     def open(self, path: Path, same: bool = False, engine: str | None = None) -> bool:
         """Open a scene file; one with faults is told, and what was on goes on. Return whether it was opened."""
@@ -114,11 +150,13 @@ class Stage:
             # By the file's own name: its folders would take the place of what is wrong.
             self.faults = tuple(str(Fault(path.name, f.line, f.path, f.message)) for f in error.faults)
             return False
-        return self._start(scene, path, scene, engine or self._engine, None, same)
+        return self._start(scene, path, scene, engine or self._engine or usual(scene), None, same)
 
     def _start(
         self, scene: Scene, path: Path | None, file: Scene, engine: str, settings: Settings | None, same: bool
     ) -> bool:
+        if scene.play.game is not None:
+            scene = Layout.of(scene).scene  # whose shots are the players'
         try:
             session = Session(scene, engine, settings)
         except Refusal as refusal:
@@ -219,6 +257,10 @@ class Stage:
         if key == "engine":
             self.switch(str(value))
             return
+        players = next((each for each in PLAYERS if each == value), None)
+        if key == "players" and players is not None:
+            self.seat(players)
+            return
 
         def turn(live: Live) -> None:
             for action in turned(live, key, value, self.hands.picked_of(live)):
@@ -250,7 +292,14 @@ class Stage:
         """Let real time pass, s."""
         if self.show is None:
             return
-        self.show.go_on(elapsed, self.paused)
+        game = self.game
+        still = game is not None and game.waits and not self.hands.holding
+        self.show.go_on(elapsed, self.paused or still)
+        if game is not None:
+            self.act(lambda _: game.go_on(elapsed))
+            for level, text in game.notes:
+                self.messages.tell(text, level)
+            game.notes.clear()
         if isinstance(self.show, Live) and self.show.wants_pause:
             self.paused, self.show.wants_pause = True, False
         elif isinstance(self.show, Stored) and self.show.at_end:
@@ -283,6 +332,7 @@ class Stage:
 
     def close(self) -> None:
         """Let go of what is on."""
+        self._let_go_of_table()
         if self.show is not None:
             self.show.close()
             self.show = None

@@ -5,6 +5,7 @@ picture.
 """
 
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,8 +14,8 @@ from types import FrameType
 import pygame
 
 from sandbox.engines.compiling import COMPILING
-from sandbox.play.claims import Deed
 from sandbox.play.commands import Commands
+from sandbox.play.cue_keys import Deed
 from sandbox.play.keys import Keyboard
 from sandbox.play.mouse import Mouse
 from sandbox.play.screen import close_screen, open_screen, unit
@@ -88,7 +89,9 @@ class Window(Seat):
         self.desk.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
 
     def _show_wait(self, what: str) -> None:
-        """Say what the next picture has to wait for; it takes no events in."""
+        """Say what the next picture has to wait for; it takes no events in. What others wait for keeps none waiting."""
+        if threading.current_thread() is not threading.main_thread():
+            return
         self.desk.draw_wait(self.surface, what)
         pygame.display.flip()
         pygame.event.pump()  # so that the desktop does not think that nobody is there

@@ -104,6 +104,14 @@ class Driven:
         """Press keys one after the other, as xdotool names them; in a hurry, SDL takes them for one that repeats."""
         self._do("key", "--delay", 20, *names)
 
+    def hold(self, name: str) -> None:
+        """Press a key, and keep it down."""
+        self._do("keydown", name)
+
+    def let_go(self, name: str) -> None:
+        """Release a key that is held."""
+        self._do("keyup", name)
+
     def focus(self) -> None:
         """Give the window the keyboard."""
         self._do("windowfocus", self.window)

@@ -39,7 +39,7 @@ def draw_velocities(view: View) -> None:
     some = view.first(MOST)
     longest = max(min(view.camera.size) / 3.0, 1.0)
     with np.errstate(invalid="ignore", over="ignore"):
-        way = view.sight.frame.velocity[some.shown] * (view.camera.scale * SPAN, -view.camera.scale * SPAN)
+        way = view.camera.ways(view.sight.frame.velocity[some.shown] * SPAN)
         length = np.hypot(way[:, 0], way[:, 1])
         way = way * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
     for k in np.flatnonzero((length > 2.0 * view.unit) & np.isfinite(length)).tolist():
@@ -49,14 +49,14 @@ def draw_velocities(view: View) -> None:
 
 
 def _in_sight(view: View, most: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return which contacts are in sight, (K,), where, (K, 2) px, and their normals, (K, 2), y down."""
+    """Return which contacts are in sight, (K,), where, (K, 2) px, and their normals there, (K, 2)."""
     place, normal = touches(view)
     with np.errstate(invalid="ignore", over="ignore"):
         pixels = view.camera.to_screen(place)
     seen = view.inside(pixels, 20.0 * view.unit)
     if len(seen) > most:
         seen = seen[np.linspace(0, len(seen) - 1, most).astype(np.intp)]
-    return seen, pixels[seen], normal[seen] * (1.0, -1.0)
+    return seen, pixels[seen], view.camera.ways(normal[seen]) / view.camera.scale
 
 
 def draw_contacts(view: View, discs: Discs) -> None:

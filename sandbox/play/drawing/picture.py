@@ -14,6 +14,9 @@ from sandbox.play.drawing.overlays import Overlays
 from sandbox.play.drawing.palette import BACKGROUND, CLEAR, TOUCHING, ColourArray, colour_of
 from sandbox.play.drawing.points import LARGEST, Packed, Points, packed
 from sandbox.play.drawing.polygons import Polygons
+from sandbox.play.drawing.table.aiming import draw_aim, draw_ways
+from sandbox.play.drawing.table.balls import Balls
+from sandbox.play.drawing.table.cloth import draw_table
 from sandbox.play.drawing.view import View
 from sandbox.play.sight import Sight
 from sandbox.scene.bodies import Bodies
@@ -63,6 +66,7 @@ class Picture:
         self._discs = Discs()
         self._points = Points()
         self._polygons = Polygons()
+        self._balls = Balls()
         self._overlays = Overlays(self._discs, self._points, self._polygons)
         self._background: tuple[Kept, pygame.Surface] | None = None
         self._sizes: Sizes | None = None
@@ -115,9 +119,15 @@ class Picture:
             colours=tint,
         )
         self._overlays.below(view)
-        if "shapes" in sight.overlays:
+        if sight.aim is not None:
+            draw_ways(view, sight.aim, self._colours)
+        if "shapes" in sight.overlays and sight.scene.surface is not None and not sizes.side:
+            self._balls.draw(view)
+        elif "shapes" in sight.overlays:
             self._draw_bodies(view, np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None)
         self._overlays.above(view)
+        if sight.aim is not None:
+            draw_aim(view, sight.aim)
         draw_scale(surface, camera, unit, foot)
 
     def _draw_bodies(self, view: View, which: IntArray | None) -> None:
@@ -196,8 +206,12 @@ class Picture:
         if known is None or known[0].scene is not wanted.scene or known[0][1:] != wanted[1:]:
             drawn = pygame.Surface(surface.get_size(), 0, surface)
             drawn.fill(BACKGROUND)
-            draw_grid(drawn, camera, unit)
-            draw_fixtures(drawn, camera, sight.scene, unit, antialias)
+            area = sight.scene.play.area
+            if area is None:
+                draw_grid(drawn, camera, unit)
+                draw_fixtures(drawn, camera, sight.scene, unit, antialias)
+            else:
+                draw_table(drawn, camera, sight.scene, area, unit, antialias)
             if wanted.bounds:
                 draw_bounds(drawn, camera, sight.scene.world.bounds, unit, antialias)
             self._background = known = (wanted, drawn)

@@ -5,6 +5,7 @@ that are kept. Both draw the same.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -59,6 +60,9 @@ class Points:
         area = surface.get_clip()
         if not area.width or not area.height:
             return
+        if camera.turned:  # the same as one that is not, of a world that is
+            right, up = camera.centre[1], -camera.centre[0]
+            position, camera = position[:, ::-1] * (1.0, -1.0), replace(camera, centre=(right, up), turned=False)
         if len(position) >= MANY and self._compiled(surface, camera, position, colours, present, area, side):
             return
         write, stride = _writer(surface)

@@ -16,6 +16,7 @@ from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.footage.crowd import anchors_of, crowd
 from sandbox.play.footage.run_graph import RunGraph
+from sandbox.play.framing import framing
 from sandbox.play.picking import overlapping
 from sandbox.play.sight import Flash, Sight
 from sandbox.scene.bodies import Bodies
@@ -157,6 +158,8 @@ class Film:
     @cached_property
     def box(self) -> Box:
         """What a picture of the whole run shows, m; what strays far from the rest does not count."""
+        if self.scene.play.area is not None:
+            return framing(self.scene)
         return crowd(self.trajectory.position, self.bodies.radius, anchors_of(self.scene))
 
     def draw(

@@ -10,6 +10,7 @@ from sandbox.play.footage.capture import Recorder, recorder_for, save
 from sandbox.play.footage.film import Film, moments
 from sandbox.play.footage.outfile import Outfile
 from sandbox.play.footage.still import Size, offscreen
+from sandbox.play.framing import lies_down
 
 Progress = Callable[[float], None]
 """Called with the share of the film that is done, 0 to 1."""
@@ -41,7 +42,7 @@ def shoot(film: Film, shot: Shot, path: Path, progress: Progress | None = None) 
         CaptureError: the file cannot be made.
     """
     surface = offscreen(shot.size)
-    camera = Camera.fitting(film.box, shot.size)
+    camera = Camera.fitting(film.box, shot.size, turned=lies_down(film.scene, shot.size))
     if path.suffix.lower() == ".png":
         film.draw(surface, camera, shot.end, shot.overlays, shot.speed)
         save(surface, Outfile.at(path))

@@ -128,6 +128,12 @@ def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int
     return nothing
 
 
+def hud_width(longest: str, unit: float) -> int:
+    """Return how far to the right the state of things reaches at full size, px, by the longest of its lines."""
+    size = 13.5 * unit
+    return round(10 * unit) + measure(longest, size)[0] + 2 * _pad(size) + round(2 * size)
+
+
 def _pad(size: float) -> int:
     return round(0.6 * size)
 

@@ -10,7 +10,7 @@ from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.registry import able, start
 from sandbox.play.camera import Box, Camera
 from sandbox.play.drawing.picture import Picture
-from sandbox.play.framing import framing
+from sandbox.play.framing import framing, lies_down
 from sandbox.play.sight import Sight
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import load
@@ -56,9 +56,10 @@ def thumbnail(scene: Scene, size: tuple[int, int], picture: Picture, unit: float
     made = pygame.Surface(size)
     box = framing(scene)
     flown = _bursts(scene, box)
-    later = _later(scene) if not flown and 0 < len(scene.bodies) <= FEW else None
+    tells = not flown and scene.play.area is None  # at a table nothing happens until somebody strikes
+    later = _later(scene) if tells and 0 < len(scene.bodies) <= FEW else None
     frame = _free_flight(scene, FLOWN * scene.world.duration if flown else 0.0)
-    camera = Camera.fitting(box, size, margin=0.08)
+    camera = Camera.fitting(box, size, margin=0.08, turned=lies_down(scene, size))
     picture.draw(made, camera, Sight(scene, scene.bodies, frame, ghost=later), unit=unit)
     return made
 

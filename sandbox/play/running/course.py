@@ -83,6 +83,11 @@ class Course:
         """All that was done, up to now."""
         return self._script.so_far
 
+    @property
+    def ahead(self) -> bool:
+        """Whether something was done later than now, and will be done again on the way there."""
+        return self._script.ahead
+
     def _make_step(self) -> bool:
         """Make a step, and do what is to be done then; tell whether the step was made."""
         try:

@@ -135,6 +135,13 @@ class History:
         self._marks.clear()
         self.marking = False
 
+    def forget(self, steps: list[int]) -> None:
+        """Forget the states after some steps."""
+        gone = set(steps)
+        kept = [k for k, step in enumerate(self._steps) if step not in gone]
+        self._steps, self._frames = [self._steps[k] for k in kept], [self._frames[k] for k in kept]
+        self._bytes = sum(map(_bytes, self._frames))
+
     def cut(self, step: int) -> None:
         """Forget what came after a step: from there it will go another way."""
         at = bisect_right(self._steps, step)

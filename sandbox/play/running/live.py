@@ -1,5 +1,6 @@
 """Live: a session with all that runs beside it, driven by real time."""
 
+from collections.abc import Callable
 from time import perf_counter
 
 from sandbox.action import Action, ActionError, Launch
@@ -40,7 +41,10 @@ class Live:
         self.pace = Pace()
         self.company = Company(session, ghost)
         self._journey, self._worked = Journey(), 0.0
-        self._contacts, self._since = session.contacts(), session.settings.dt
+        self.on_contacts: Callable[[Contacts], object] = len
+        """Called with contacts as they come."""
+        self._since = session.settings.dt
+        self._hear()
         self._seed = session.scene.world.seed
         self._told_end = False
         self._breaks = BreakNotes()
@@ -48,6 +52,7 @@ class Live:
         self.wants_pause = False
         """It has come to the end of what was recorded; whoever pauses it takes this back."""
         self._peek: tuple[int, Frame] | None = None
+        self._anew = False  # what runs beside it has seen what was taken back
 
     @property
     def scene(self) -> Scene:
@@ -133,7 +138,8 @@ class Live:
             self.seek(self.session.step_number)
             return 0
         if made:
-            self._contacts, self._since = self.session.contacts(), self.session.time - before
+            self._since = self.session.time - before
+            self._hear()
             self.company.advance(self.session.redone())
             self.company.notes += self._breaks.told(len(self.session.relay.broken), self.session.time)
         if self.session.ended is not None and not self._told_end:
@@ -150,7 +156,21 @@ class Live:
         self._check_there()
         done = self.session.act(action)
         self.company.did(done)
+        self._hear()
+
+    def _hear(self) -> None:
         self._contacts = self.session.contacts()
+        self.on_contacts(self._contacts)
+
+    def retract(self, place: int) -> None:
+        """Take back what was done from the place-th action on, and set out for when it was done.
+
+        Raises:
+            ActionError: it is on its way elsewhere.
+        """
+        self._check_there()
+        step, self._anew = self.session.retract(place), True
+        self.seek(step)
 
     def relaunch(self, generator: str) -> None:
         """Start the balls of a generator anew, each time with another seed.
@@ -187,7 +207,8 @@ class Live:
 
     def _begin(self, anew: bool = False) -> None:
         """Begin what runs beside the session anew, from where it is."""
-        self._contacts, self._since = self.session.contacts(), self.session.settings.dt
+        self._since = self.session.settings.dt
+        self._hear()
         self.company.begin(anew)
 
     def arrive(self) -> None:
@@ -231,7 +252,8 @@ class Live:
         if self._journey.go():
             self._peek = None
             self.session.rest()
-            self._begin()
+            self._begin(self._anew)
+            self._anew = False
 
     @property
     def contacts(self) -> Contacts:

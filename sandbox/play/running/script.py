@@ -20,6 +20,16 @@ class Script:
         """What was done up to now."""
         return tuple(self._actions[: self.done])
 
+    @property
+    def ahead(self) -> bool:
+        """Whether more was done than up to now."""
+        return self.done < len(self._actions)
+
+    def cut(self, place: int) -> None:
+        """Forget the actions from a place in the order on."""
+        del self._actions[place:]
+        self.done = min(self.done, place)
+
     def redo(self, relay: Relay) -> list[Action]:
         """Do what was done at this time, and return it.
 

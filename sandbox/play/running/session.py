@@ -17,6 +17,7 @@ import numpy as np
 from sandbox.action import Action, ActionError
 from sandbox.play.running.course import Course
 from sandbox.play.running.history import History, Mark
+from sandbox.play.running.rest import at_rest
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -53,6 +54,9 @@ class Session(Course):
         super().__init__(scene, engine, settings, actions)
         self._calm = 0
         self._mark: Mark | None = None  # that the relay was taken up from, as long as all that followed was known
+        self._unsure: list[
+            int
+        ] = []  # steps first seen on a way from a checkpoint, and not yet confirmed by what follows
         self._astray = False
         self._contacts: list[Contacts] = []
         self._everyone = self.bodies
@@ -130,8 +134,12 @@ class Session(Course):
         if self._exhausted:  # within the step after this one: that state is none of the session's
             return
         self._check(self._frame)
+        if self._mark is not None and self.history.known(self._step) is None:
+            self._unsure.append(self._step)
         self.history.keep(self._step, self._frame)
         calm = self._calm >= max(CALM, 2 * (self.relay.settings.persistence or 1))
+        if self.scene.surface is not None and not at_rest(self._frame):
+            calm = False  # a state in mid-roll does not tell when the roll began: the way on differs by roundings
         if calm and self.ended is None and self.history.wants_mark(self._step):
             self.history.mark(Mark(self._step, self._script.done, self.relay.checkpoint()))
 
@@ -148,11 +156,16 @@ class Session(Course):
         known = self.history.known(self._step)
         if known is not None and known.state_hash() != (frame or self.relay.frame()).state_hash():
             self._astray = True
+            self.history.forget(self._unsure)
+            self._unsure.clear()
             raise WrongWayError(f"step {self._step} led elsewhere than before")
+        if known is not None:
+            self._unsure.clear()
 
     def _own_up(self) -> None:
         """Make the taking up of the checkpoint part of the session: from here on, what comes is new."""
         mark, self._mark = self._mark, None
+        self._unsure.clear()
         if mark is not None and self._script.hand_over(mark.actions, mark.point.frame.time):
             self.history.inserted(mark.step)
 
@@ -185,6 +198,23 @@ class Session(Course):
         self._calm = 0
         return timed
 
+    def retract(self, place: int) -> int:
+        """Take back what was done from the place-th action on, and forget what came of it.
+
+        Returns:
+            The step to seek: the one after which that action was done. Until it is there, the state is as it was.
+
+        Raises:
+            IndexError: not so much was done.
+        """
+        step = self.history.nearest(self.actions[place].time)[0]
+        self._script.cut(place)
+        self.history.cut(step - 1)
+        self._everyone = self.bodies
+        self._breaks = np.full(len(self._breaks), np.inf)
+        self._astray = True  # what is seen was never done
+        return step
+
     def seek(self, step: int) -> Iterator[float]:
         """Go to a step, back or forth. Yields the share that is done, after each part of the way.
 
@@ -214,7 +244,9 @@ class Session(Course):
         if mark is not None and not taken:
             self.history.distrust()
         self._mark = mark if taken else None
+        self._unsure.clear()
         self._astray = False
         self._calm = 0
         self._contacts.clear()
         self._previous = self._frame = self.relay.frame()
+        self.history.keep(self._step, self._frame)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, SetParameter, Spawn, Switch
+from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, SetParameter, Spawn, Strike, Switch
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, UnknownEngineError
 from sandbox.measure.replay import rerun
@@ -18,7 +18,7 @@ from sandbox.play.running import history as history_module
 from sandbox.play.running.history import Mark
 from sandbox.play.running.session import Session, WrongWayError
 from sandbox.play.running.switching import switch
-from sandbox.scene.file import from_document, load
+from sandbox.scene.file import from_document, load, loads
 from sandbox.scene.model import Ball, Scene
 from sandbox.scene.shipped import find
 from sandbox.trajectory import Frame
@@ -37,6 +37,9 @@ FIRST = {"bounce": "ball", "gas": "atom-1", "newtons_cradle": "a", "pile": "ball
 
 def ball(name: str, x: float, y: float, **more: Any) -> dict[str, Any]:
     return {"name": name, "position": [x, y], "radius": 0.25, **more}
+
+
+TABLE = loads('title = "Table"\n[billiards]\ntable = "pool-7ft"\ngame = "9-ball"\n')
 
 
 def scene_of(*balls: dict[str, Any], **document: Any) -> Scene:
@@ -509,3 +512,52 @@ def test_in_any_order_of_moves_a_step_is_what_it_was(engine: str, plan: list[tup
         assert np.isfinite(session.frame.position).all()
     go(session, session.step_number + 1)
     assert_replays(session)
+
+
+def struck(aim: float, speed: float, steps: int) -> Session:
+    """Return a session of a table in which the cue ball was struck, and some steps made, not all of them looked at."""
+    session = Session(TABLE, "exact")
+    session.act(Strike(time=0.0, ball="cue", aim=aim, speed=speed))
+    while session.step_number < steps:
+        session.advance(3)
+    return session
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_balls_on_a_floor_go_back_and_forth_to_the_same_states(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    session = struck(1.5708 + random.uniform(-0.2, 0.2), random.uniform(2.0, 6.0), 600)
+    before = hashes(session)
+    for target in random.integers(0, session.history.furthest, 6).tolist():
+        go(session, target)
+        assert all(hashes(session)[step] == state for step, state in before.items())
+    assert_replays(session)
+
+
+def test_what_a_wrong_way_has_shown_is_forgotten() -> None:
+    session = struck(1.5, 4.0, 300)
+    before = hashes(session)
+    session.history.mark(Mark(150, 1, session.relay.checkpoint()))  # of quite another time
+    go(session, 200)
+    assert all(hashes(session)[step] == state for step, state in before.items())
+    go(session, 300)
+    assert hashes(session)[300] == before[300]
+
+
+def test_retracted_action_and_what_it_led_to_are_gone() -> None:
+    session = Session(TABLE, "exact")
+    untouched = session.relay.state_hash()
+    session.act(Move(time=0.0, body="cue", position=(0.4, 0.3)))
+    moved = session.relay.state_hash()
+    session.act(Strike(time=0.0, ball="cue", aim=1.5, speed=3.0))
+    played(session, 50)
+    go(session, session.retract(1))
+    assert session.relay.state_hash() == moved
+    assert len(session.actions) == 1
+    assert session.history.furthest == 0
+    played(session, 10)
+    assert not session.frame.velocity.any()
+    assert_replays(session)
+    go(session, session.retract(0))
+    assert session.relay.state_hash() == untouched
+    assert session.actions == ()

@@ -1,0 +1,247 @@
+"""Game: who plays what at the table in the window, stroke by stroke."""
+
+import math
+from typing import Literal
+
+from sandbox.action import ActionError, Strike
+from sandbox.games.billiards.match import Match
+from sandbox.games.billiards.rules.call import Call
+from sandbox.games.billiards.rules.happening import GameError
+from sandbox.play.billiards.cue import Cue
+from sandbox.play.billiards.hearing import Hearing
+from sandbox.play.billiards.opponent import Opponent
+from sandbox.play.billiards.turns import Turns
+from sandbox.play.running.live import Live
+from sandbox.play.running.rest import at_rest
+from sandbox.scene.cue import Shot
+from sandbox.scene.model import Scene
+from sandbox.scene.part import Point
+
+Players = Literal["alone", "two", "bot"]
+PLAYERS: tuple[Players, ...] = ("alone", "two", "bot")
+
+BOT = 1
+"""the bot's number"""
+
+
+def plays(scene: Scene) -> bool:
+    """Tell whether a scene is a table to play at: it names a game, or has a floor and a ball to strike."""
+    if scene.surface is None:
+        return False
+    return scene.play.game is not None or any(ball.name == "cue" for ball in scene.balls)
+
+
+class Game:
+    """A game that is played in a session. Time stands still at the table until somebody strikes."""
+
+    def __init__(self, live: Live, players: Players | None = None, shot: Shot | None = None) -> None:
+        """Begin.
+
+        Args:
+            live: the session; its scene has no shots of its own where it names a game.
+            players: by default two, and one where there are no rules.
+            shot: with which the scene would have begun: the cue is laid ready for it.
+
+        Raises:
+            GameError: the game that the scene names cannot be played on its table.
+        """
+        game = live.scene.play.game or "free"
+        self.players: Players = players or ("alone" if game == "free" else "two")
+        self.live = live
+        first = Match.begin(live.scene, game, 1 if self.players == "alone" else 2)
+        self._turns = Turns(first)
+        along = first.layout.along
+        self.cue = Cue.laid(shot) if shot is not None else Cue(math.atan2(along[1], along[0]))
+        self.opponent = Opponent(seed=live.scene.world.seed) if self.players == "bot" else None
+        self._hearing = Hearing(live)
+        self.notes: list[tuple[str, str]] = []
+        """(level, text) of what happened; whoever tells it empties the list"""
+
+    @property
+    def strokes(self) -> int:
+        """How many have been played up to now."""
+        return len(self._strikes())
+
+    def _strikes(self) -> list[Strike]:
+        return [action for action in self.live.session.actions if isinstance(action, Strike)]
+
+    @property
+    def match(self) -> Match:
+        """The game as it stands; while balls roll, as it stood before the stroke."""
+        strokes = self.strokes
+        return self._turns.match(strokes if self.resting else max(strokes - 1, 0))
+
+    @property
+    def call(self) -> Call:
+        """What is called of the next stroke."""
+        return self._turns.call(self.strokes)
+
+    @property
+    def resting(self) -> bool:
+        """Whether all balls are at rest, in what is shown."""
+        return self.live.busy is None and at_rest(self.live.frame)
+
+    @property
+    def _known(self) -> bool:
+        """Whether the rules have seen the last stroke."""
+        return self.strokes < len(self._turns)
+
+    @property
+    def waits(self) -> bool:
+        """Whether time stands still until somebody does something; not where what was done is seen again."""
+        session = self.live.session
+        last = not session.ahead and session.step_number >= session.history.furthest
+        return last and session.ended is None and self.resting and self._known
+
+    @property
+    def aiming(self) -> bool:
+        """Whether a stroke can be played now."""
+        present = self.live.frame is self.live.session.frame and self.live.session.ended is None
+        return present and self.resting and self._known and not self.match.over
+
+    @property
+    def mine(self) -> bool:
+        """Whether it is a person's stroke."""
+        return self.aiming and not self._bots(self.match)
+
+    def _bots(self, match: Match) -> bool:
+        return self.opponent is not None and match.turn == BOT
+
+    @property
+    def ball(self) -> int:
+        """Number of the ball that is struck next."""
+        match = self.match
+        return match.layout.number[match.cue]
+
+    @property
+    def position(self) -> tuple[Point, ...]:
+        """Where the balls are, m, by number."""
+        return tuple((x, y) for x, y in self.live.frame.position.tolist())
+
+    def go_on(self, elapsed: float) -> None:
+        """Look at what has become of the table, and let a bot play, in so much real time, s.
+
+        Raises:
+            ActionError: what the rules or the bot ask for cannot be done.
+        """
+        if not self.resting or self.live.frame is not self.live.session.frame:
+            return
+        if not self._known:
+            self._judge()
+        elif self.waits:
+            self._turns.lie(self.strokes, self.position)
+        if self.waits and self.opponent is not None and self.aiming and self._bots(self.match):
+            self._let_play(self.opponent, elapsed)
+
+    def _judge(self) -> None:
+        """Let the rules say what came of the last stroke."""
+        strikes = self._strikes()
+        began = strikes[-1].time
+        try:
+            after = self._turns.judge(len(strikes), self._hearing.since(began), self.live.frame.position, began)
+        except GameError as error:
+            self.notes.append(("warning", str(error)))
+            after = self._turns.record(len(strikes), self._turns.match(len(strikes)))
+        self.cue.centre()
+        self._lay(after)
+
+    def _lay(self, match: Match) -> None:
+        """Put the balls where the game has them; in what is seen again that was done."""
+        if not self.live.session.ahead:
+            for move in match.moves(self.live.frame.position):
+                self.live.act(move)
+
+    def _let_play(self, opponent: Opponent, elapsed: float) -> None:
+        """Go on with the bot's turn."""
+        match = self.match
+        thought = opponent.thought(match)
+        if thought is None:
+            return
+        plan = thought.plan
+        if thought.decision is not None:
+            match = match.decide(thought.decision)
+        if plan is None:
+            self.go_another_way(match)
+            return
+        if plan.place is not None and match.state.in_hand is not None:
+            match = match.place(plan.place)
+        if match is not self.match:
+            self.go_another_way(match)
+            opponent.stays(self.match)
+        if opponent.moves(self.cue, plan.stroke, elapsed):
+            opponent.forget()
+            self._turns.say(self.strokes, plan.call)
+            self._strike()
+
+    def go_another_way(self, match: Match) -> None:
+        """Go on with another match from here, and put the balls where it has them."""
+        self._turns.go_another_way(self.strokes, match)
+        self._lay(match)
+
+    def say(self, call: Call) -> None:
+        """Call a ball or a pocket of the next stroke."""
+        self._turns.say(self.strokes, call)
+
+    def check(self) -> None:
+        """Refuse what only the one whose stroke it is may do.
+
+        Raises:
+            ActionError: it is nobody's here.
+        """
+        if self.resting and self.match.over:
+            raise ActionError("the frame is over; R begins another")
+        if not self.aiming:
+            raise ActionError("wait until the balls are at rest")
+        if not self.mine:
+            raise ActionError("it is the bot's turn")
+
+    def shoot(self, speed: float | None = None) -> None:
+        """Play the stroke, with its own power or another speed of the cue, m/s.
+
+        Raises:
+            ActionError: it cannot be played now.
+        """
+        self.check()
+        call = self.call
+        if self.match.choices.needed and call.pocket is None and not call.safety:
+            raise ActionError("call the pocket first: click it")
+        if speed is not None:
+            self.cue.speed = speed
+        self._strike()
+
+    def _strike(self) -> None:
+        strokes = self.strokes
+        self._turns.lie(strokes, self.position)
+        match = self._turns.match(strokes)
+        self._turns.say(strokes, self.call)
+        self.cue.back = 0.0
+        self._hearing.clear()
+        self.live.act(match.strike(self.cue.stroke))
+
+    def undo(self) -> None:
+        """Take back a person's last stroke, and what followed.
+
+        Raises:
+            ActionError: none was played.
+        """
+        strikes = [k for k, action in enumerate(self.live.session.actions) if isinstance(action, Strike)]
+        while strikes and self._bots(self._turns.match(len(strikes) - 1)):
+            strikes.pop()
+        if not strikes:
+            raise ActionError("there is no stroke to take back")
+        struck = self.live.session.actions[strikes[-1]]
+        assert isinstance(struck, Strike)
+        self.live.retract(strikes[-1])
+        before = len(strikes) - 1
+        self._turns.say(before, self._turns.call(before))
+        self._hearing.clear()
+        if self.opponent is not None:
+            self.opponent.forget()
+        self.cue = Cue(struck.aim, struck.speed, struck.side, struck.height)
+        self.notes.append(("info", "the stroke is taken back"))
+
+    def close(self) -> None:
+        """Let go of the bot."""
+        self._hearing.close()
+        if self.opponent is not None:
+            self.opponent.close()

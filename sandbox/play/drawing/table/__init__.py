@@ -1,0 +1,1 @@
+"""table: how a billiard table, its balls and a cue are drawn."""

@@ -1,0 +1,211 @@
+"""Cloth: a table as it stands, with wood, cushions, pockets, spots and strings; it changes with the camera alone."""
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+
+from sandbox.play.camera import Box, Camera
+from sandbox.play.drawing.fixtures import draw_fixtures
+from sandbox.play.drawing.palette import BACKGROUND, Colour, mixed
+from sandbox.play.drawing.shade import Look, disc_distance, paint
+from sandbox.play.drawing.strokes import Pixel, clipped, fill, stroke
+from sandbox.play.drawing.table.cushions import DEPTH, RIM, Cushion, cushions, others, width_of
+from sandbox.scene.model import Scene
+from sandbox.scene.part import Point
+
+WOOD: Colour = (66, 45, 36)
+WOOD_LIGHT: Colour = (104, 74, 56)
+WOOD_DARK: Colour = (44, 30, 25)
+IRON: Colour = (26, 24, 26)
+HOLE: Colour = (8, 8, 10)
+PEARL: Colour = (206, 200, 184)
+CHALK: Colour = (226, 236, 232)
+LIT, UNLIT = 1.12, 0.80
+"""how bright the cloth is in the middle and at its corners"""
+
+
+class Felt(NamedTuple):
+    """The colours of a cloth."""
+
+    bed: Colour
+    rubber: Colour
+    edge: Colour
+
+
+POOL = Felt((22, 106, 104), (17, 84, 84), (58, 150, 146))
+SNOOKER = Felt((24, 110, 70), (18, 86, 55), (66, 152, 108))
+CAROM = Felt((30, 88, 142), (23, 68, 112), (80, 136, 186))
+FELTS = {"snooker": SNOOKER, "three-cushion": CAROM, "straight-rail": CAROM}
+
+
+def felt_of(scene: Scene) -> Felt:
+    """Return the colours of a table's cloth, by the game that it is for."""
+    return FELTS.get(scene.play.game or "free", POOL)
+
+
+def draw_table(
+    surface: pygame.Surface, camera: Camera, scene: Scene, area: Box, unit: float = 1.0, antialias: bool = True
+) -> None:
+    """Draw a table, as far as it is in sight."""
+    felt = felt_of(scene)
+    pen = _Pen(surface, camera, unit, antialias)
+    rubber, width = cushions(scene, area), width_of(area)
+    _wood(pen, area, width)
+    for hole in scene.pockets:
+        pen.disc(hole.position, hole.radius + 0.016 * width, IRON, rim=mixed(IRON, PEARL, 0.25), line=1.0)
+    pen.box(area, felt.bed)
+    for hole in scene.pockets:
+        _throat(pen, hole.position, hole.radius, rubber, area, felt.bed)
+    _light(surface, camera, area)
+    _marks(pen, scene, area, felt)
+    for cushion in rubber:
+        _shadow(pen, cushion, felt, 0.010 * width)
+    for cushion in rubber:
+        pen.polygon(cushion.outline, felt.rubber)
+        pen.line(cushion.nose, felt.edge, 1.6 * unit)
+        outer = cushion.outline[len(cushion.nose) :]
+        pen.line(outer, mixed(felt.rubber, HOLE, 0.55), 1.4 * unit)
+        for corner, end in zip(outer, (cushion.nose[-1], cushion.nose[0]), strict=True):
+            pen.line((corner, end), mixed(felt.rubber, HOLE, 0.3), 1.0 * unit)
+    for hole in scene.pockets:
+        pen.disc(hole.position, hole.radius, HOLE, rim=mixed(IRON, HOLE, 0.5), line=3.0)
+    _diamonds(pen, scene, area, width)
+    walls, posts = others(scene, area)
+    if walls or posts or scene.planes:
+        draw_fixtures(surface, camera, scene.model_copy(update={"walls": walls, "posts": posts}), unit, antialias)
+
+
+class _Pen:
+    """Draws in metres."""
+
+    def __init__(self, surface: pygame.Surface, camera: Camera, unit: float, antialias: bool) -> None:
+        self.surface, self.camera, self.unit, self.antialias = surface, camera, unit, antialias
+
+    def at(self, points: tuple[Point, ...]) -> list[Pixel]:
+        return [(x, y) for x, y in self.camera.to_screen(np.asarray(points)).tolist()]
+
+    def polygon(self, points: tuple[Point, ...], colour: Colour) -> None:
+        fill(self.surface, self.at(points), colour, self.antialias)
+
+    def box(self, box: Box, colour: Colour, rounding: float = 0.0) -> None:
+        """Fill a box; SDL would have its sides at whole pixels, which is what is wanted."""
+        (left, top), (right, bottom) = _corners(self.camera, box)
+        area = self.surface.get_rect().inflate(400, 400)
+        left, right = (min(max(x, area.left), area.right) for x in (left, right))
+        top, bottom = (min(max(y, area.top), area.bottom) for y in (top, bottom))
+        rect = pygame.Rect(round(left), round(top), round(right) - round(left), round(bottom) - round(top))
+        pygame.draw.rect(self.surface, colour, rect, border_radius=round(rounding * self.camera.scale))
+
+    def line(self, points: tuple[Point, ...], colour: Colour, width: float) -> None:
+        places = self.at(points)
+        for a, b in pairwise(places):
+            stroke(self.surface, a, b, colour, width, self.antialias)
+
+    def disc(self, at: Point, radius: float, colour: Colour, rim: Colour | None = None, line: float = 0.0) -> None:
+        ((x, y),), r = self.at((at,)), radius * self.camera.scale
+        if clipped((x, y), (x, y), self.surface.get_rect(), r + 4.0) is None:
+            return
+        within = pygame.Rect(math.floor(x - r) - 2, math.floor(y - r) - 2, math.ceil(2 * r) + 5, math.ceil(2 * r) + 5)
+        look = Look(colour, rim or colour, line * self.unit, antialias=self.antialias)
+        paint(self.surface, disc_distance(x, y, r), look, within)
+
+
+def _corners(camera: Camera, box: Box) -> tuple[Pixel, Pixel]:
+    """Return the upper left and the lower right corner of a box in the picture."""
+    (ax, ay), (bx, by) = camera.to_screen(np.asarray(box)).tolist()
+    return (min(ax, bx), min(ay, by)), (max(ax, bx), max(ay, by))
+
+
+def _wood(pen: _Pen, area: Box, width: float) -> None:
+    """Draw the rails: dark without, a bevel of light within."""
+    rim, depth = RIM * width, DEPTH * width
+    for out, colour in (
+        (rim, WOOD_DARK),
+        (rim - 0.004 * width, WOOD_LIGHT),
+        (rim - 0.008 * width, WOOD),
+        (depth + 0.006 * width, WOOD_DARK),
+    ):
+        (left, bottom), (right, top) = area
+        rounding = max(out - depth, 0.0) + 0.02 * width if out > 0.05 * width else 0.0
+        pen.box(((left - out, bottom - out), (right + out, top + out)), colour, rounding)
+
+
+def _throat(pen: _Pen, hole: Point, radius: float, rubber: tuple[Cushion, ...], area: Box, colour: Colour) -> None:
+    """Draw the cloth between the two cushions that a pocket cuts."""
+    reach = 3.0 * radius + 0.1 * width_of(area)
+    ends = [nose for each in rubber for nose in (each.nose, each.nose[::-1]) if math.dist(nose[0], hole) < reach]
+    ends.sort(key=lambda nose: math.dist(nose[0], hole))
+    if len(ends) >= 2:
+        # Two fans with the hole's middle: from each lip to where its nose line is straight.
+        a, b = (nose[: max(len(nose) // 2, 2)] for nose in ends[:2])
+        pen.polygon((hole, *a, *reversed(b)), colour)
+
+
+def _light(surface: pygame.Surface, camera: Camera, area: Box) -> None:
+    """Light the bed from above its middle."""
+    (left, top), (right, bottom) = _corners(camera, area)
+    depth = DEPTH * width_of(area) * camera.scale
+    seen = surface.get_rect()
+    rect = pygame.Rect(0, 0, 0, 0)
+    rect.left, rect.top = max(math.floor(left - depth), 0), max(math.floor(top - depth), 0)
+    rect.width = min(math.ceil(right + depth), seen.right) - rect.left
+    rect.height = min(math.ceil(bottom + depth), seen.bottom) - rect.top
+    if rect.width < 2 or rect.height < 2 or not seen.contains(rect):
+        return
+    grain = min(96, rect.width), min(96, rect.height)
+    x = (rect.left + (np.arange(grain[0]) + 0.5) * rect.width / grain[0] - (left + right) / 2) / (right - left)
+    y = (rect.top + (np.arange(grain[1]) + 0.5) * rect.height / grain[1] - (top + bottom) / 2) / (bottom - top)
+    far = np.clip((x[:, None] ** 2 + y[None, :] ** 2) / 0.5, 0.0, 1.0)
+    bright = LIT + (UNLIT - LIT) * far
+    # SDL cannot multiply by more than 1: what is above is added.
+    dimmed, added = np.clip(bright, 0.0, 1.0) * 255.0, np.clip(bright - 1.0, 0.0, 1.0) * 110.0
+    for tone, flag in ((dimmed, pygame.BLEND_RGB_MULT), (added, pygame.BLEND_RGB_ADD)):
+        layer = pygame.surfarray.make_surface(np.repeat(np.rint(tone)[:, :, None], 3, 2).astype(np.uint8))
+        surface.blit(pygame.transform.smoothscale(layer, rect.size), rect, special_flags=flag)
+
+
+def _marks(pen: _Pen, scene: Scene, area: Box, felt: Felt) -> None:
+    """Draw strings and spots, faintly."""
+    spots = {spot.name: spot.position for spot in scene.play.spots}
+    faint, (left, bottom), (right, top) = mixed(felt.bed, CHALK, 0.32), *area
+    tall, thin = top - bottom > right - left, 1.2 * pen.unit
+    if {"yellow", "green", "brown"} <= spots.keys():
+        (x, y), (gx, gy) = spots["brown"], spots["green"]
+        radius = math.dist((x, y), (gx, gy))
+        pen.line(((left, y), (right, y)) if tall else ((x, bottom), (x, top)), faint, thin)
+        side = math.copysign(1.0, (bottom + top) / 2 - y) if tall else math.copysign(1.0, (left + right) / 2 - x)
+        turns = [math.pi * k / 48.0 for k in range(49)]
+        arc = [(radius * math.cos(t), -side * radius * math.sin(t)) for t in turns]
+        pen.line(tuple((x + u, y + v) if tall else (x + v, y + u) for u, v in arc), faint, thin)
+    elif "head" in spots and scene.pockets:
+        x, y = spots["head"]
+        pen.line(((left, y), (right, y)) if tall else ((x, bottom), (x, top)), mixed(felt.bed, CHALK, 0.2), thin)
+    size = 0.0042 * width_of(area)
+    for place in spots.values():
+        pen.disc(place, max(size, 1.2 * pen.unit / pen.camera.scale), mixed(felt.bed, CHALK, 0.5))
+
+
+def _shadow(pen: _Pen, cushion: Cushion, felt: Felt, reach: float) -> None:
+    """Darken the cloth below a nose."""
+    for share, dark in ((1.0, 0.10), (0.62, 0.20), (0.3, 0.32)):
+        by = reach * share
+        moved = tuple((x - cushion.out[0] * by, y - cushion.out[1] * by) for x, y in cushion.nose)
+        pen.polygon((*moved, *cushion.nose[::-1]), mixed(felt.bed, HOLE, dark))
+
+
+def _diamonds(pen: _Pen, scene: Scene, area: Box, width: float) -> None:
+    """Draw the sights on the rails; snooker has none."""
+    if scene.play.game == "snooker" or not scene.play.spots or any(s.name == "brown" for s in scene.play.spots):
+        return
+    (left, bottom), (right, top) = area
+    tall = top - bottom > right - left
+    off, size = (RIM + DEPTH) / 2.0 * width, 0.0062 * width
+    wide, high = (4, 8) if tall else (8, 4)
+    places = [(left + (right - left) * k / wide, y) for k in range(1, wide) for y in (bottom - off, top + off)]
+    places += [(x, bottom + (top - bottom) * k / high) for k in range(1, high) for x in (left - off, right + off)]
+    for place in places:
+        if all(math.dist(place, hole.position) > hole.radius + 0.03 * width for hole in scene.pockets):
+            pen.disc(place, size, PEARL, rim=mixed(WOOD, BACKGROUND, 0.6), line=0.8)

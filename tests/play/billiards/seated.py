@@ -1,0 +1,54 @@
+"""Tables for tests: few balls, so that strokes are short."""
+
+from sandbox.games.billiards.layout import Layout
+from sandbox.play.billiards.game import Game, Players
+from sandbox.play.running.live import Live
+from sandbox.play.running.session import Session
+from sandbox.scene.file import loads
+
+RADIUS = 0.028575
+"""m, of pool balls"""
+
+FREE = """
+title = "Free"
+[billiards]
+table = "pool-7ft"
+[billiards.place]
+cue = [0.5, 0.5]
+1 = [0.5, 1.0]
+2 = [0.2, 1.5]
+"""
+
+NINE = """
+title = "Nine"
+[billiards]
+table = "pool-7ft"
+game = "9-ball"
+[[shot]]
+aim = 1.5708
+speed = 4.0
+side = 0.2
+"""
+
+
+def game_of(text: str, players: Players | None = None) -> Game:
+    """Sit down at a table."""
+    scene = loads(text)
+    live = Live(Session(Layout.of(scene).scene, "exact"))
+    return Game(live, players, scene.shots[0] if scene.shots else None)
+
+
+def turn(game: Game, elapsed: float = 1.0 / 60.0) -> None:
+    """Let real time pass, s, as the stage does."""
+    game.live.go_on(elapsed, game.waits)
+    game.go_on(elapsed)
+
+
+def roll_out(game: Game, until: float = 60.0) -> None:
+    """Let the balls roll until the table waits."""
+    turn(game)
+    while not game.waits:
+        assert game.live.session.time < until
+        if game.live.busy is None and not game.waits:
+            game.live.step()
+        turn(game, 0.0)

@@ -1,0 +1,78 @@
+"""Outlines of rubber, from the walls, jaws and facings of tables."""
+
+import math
+
+import pytest
+
+from sandbox.play.drawing.table.cushions import DEPTH, cushions, others, outside, width_of
+from sandbox.scene.billiards.tables import TABLES
+from sandbox.scene.file import loads
+from sandbox.scene.model import Scene
+
+
+def table(name: str) -> Scene:
+    ball = "white" if name.startswith("carom") else "cue"
+    return loads(f'title = "t"\n[billiards]\ntable = "{name}"\n[billiards.place]\n{ball} = [0.5, 0.5]\n')
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_cushion_is_found_and_lies_between_area_and_wood(name: str) -> None:
+    scene = table(name)
+    area = scene.play.area
+    assert area is not None
+    found = cushions(scene, area)
+    assert len(found) == (4 if name.startswith("carom") else 6)
+    (left, bottom), (right, top) = area
+    depth = DEPTH * width_of(area)
+    for each in found:
+        for x, y in each.outline:
+            # A facing may end behind the line of the wood, where its hole is.
+            out = max(left - x, x - right, bottom - y, y - top)
+            assert -1e-9 < out < max(depth, 0.1)
+    assert outside(area)[0][0] < left - depth
+
+
+def test_noses_with_jaws_are_tangent_to_them() -> None:
+    scene = table("pool-9ft")
+    assert scene.play.area is not None
+    jaws = [(post.position, post.radius) for post in scene.posts]
+    for each in cushions(scene, scene.play.area):
+        on_jaws = [
+            point
+            for point in each.nose
+            if any(abs(math.dist(point, at) - radius) < 1e-9 for at, radius in jaws)  # rounding
+        ]
+        assert len(on_jaws) >= 8
+        assert len(each.nose) - len(on_jaws) == 2  # the far ends of the facings
+
+
+def test_cushions_without_jaws_meet_in_a_mitre() -> None:
+    scene = table("carom-10ft")
+    assert scene.play.area is not None
+    corners = {point for each in cushions(scene, scene.play.area) for point in each.outline[2:]}
+    assert len({(round(x, 9), round(y, 9)) for x, y in corners}) == 4
+
+
+def test_walls_elsewhere_are_no_cushions() -> None:
+    scene = loads(
+        """
+title = "t"
+[billiards]
+table = "carom-10ft"
+[billiards.place]
+white = [0.5, 0.5]
+[[wall]]
+points = [[0.2, 0.2], [0.2, 0.6]]
+height = 0.037
+"""
+    )
+    assert scene.play.area is not None
+    assert len(cushions(scene, scene.play.area)) == 4
+    assert others(scene, scene.play.area) == ((scene.walls[0],), ())
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_have_nothing_else(name: str) -> None:
+    scene = table(name)
+    assert scene.play.area is not None
+    assert others(scene, scene.play.area) == ((), ())

@@ -1,0 +1,100 @@
+"""A table as it is seen: cloth, pockets, balls with their colours, who lies in a pocket not."""
+
+import numpy as np
+import pygame
+import pytest
+
+from sandbox.play.billiards.aim import Aim
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.picture import Picture
+from sandbox.play.drawing.table.cloth import CAROM, HOLE, POOL, SNOOKER
+from sandbox.play.drawing.table.coats import IVORY, coat_of, painted
+from sandbox.play.framing import framing
+from sandbox.play.sight import Sight
+from sandbox.scene.file import loads
+from sandbox.scene.model import Scene
+from sandbox.trajectory import Frame
+
+SIZE = (700, 400)
+AT_REST = """
+title = "t"
+[billiards]
+table = "pool-7ft"
+[billiards.place]
+cue = [0.5, 0.5]
+8 = [0.7, 1.2]
+"""
+
+
+def frame_of(scene: Scene, position: np.ndarray | None = None, time: float = 0.0) -> Frame:
+    bodies = scene.bodies
+    place = bodies.position if position is None else position
+    none = np.zeros((len(bodies), 2))
+    return Frame(time, place.copy(), none, bodies.angle, np.zeros(len(bodies)), np.ones(len(bodies), np.bool_), none)
+
+
+def drawn(scene: Scene, frame: Frame, aim: Aim | None = None, turned: bool = True) -> tuple[np.ndarray, Camera]:
+    camera = Camera.fitting(framing(scene), SIZE, turned=turned)
+    surface = pygame.Surface(SIZE)
+    Picture().draw(surface, camera, Sight(scene, scene.bodies, frame, aim=aim))
+    return pygame.surfarray.array3d(surface).astype(int), camera
+
+
+def at(picture: np.ndarray, camera: Camera, place: tuple[float, float]) -> np.ndarray:
+    x, y = camera.to_screen(np.array(place)).tolist()
+    return picture[round(x), round(y)]
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_balls_lie_on_the_cloth_where_they_are(turned: bool) -> None:
+    scene = loads(AT_REST)
+    picture, camera = drawn(scene, frame_of(scene), turned=turned)
+    white, black = at(picture, camera, (0.505, 0.495)), at(picture, camera, (0.72, 1.2))
+    assert white.min() > 110
+    assert black.max() < white.min()
+    # Light makes the cloth at most a fifth brighter or darker, and adds as much as 14.
+    assert np.abs(at(picture, camera, (0.3, 1.7)) - POOL.bed).max() < 30
+    hole = scene.pockets[0].position
+    assert np.abs(at(picture, camera, hole) - HOLE).max() < 4
+
+
+@pytest.mark.parametrize(
+    ("table", "game", "felt"),
+    [("snooker-12ft", "snooker", SNOOKER), ("carom-10ft", "three-cushion", CAROM), ("pool-9ft", "9-ball", POOL)],
+)
+def test_cloth_is_that_of_the_game(table: str, game: str, felt: object) -> None:
+    scene = loads(f'title = "t"\n[billiards]\ntable = "{table}"\ngame = "{game}"\n')
+    assert scene.play.area is not None
+    x, y = scene.play.area[1]
+    picture, camera = drawn(scene, frame_of(scene))
+    assert np.abs(at(picture, camera, (0.8 * x, 0.61 * y)) - felt[0]).max() < 30  # as above
+
+
+def test_ball_in_a_pocket_is_not_seen() -> None:
+    scene = loads(AT_REST)
+    position = scene.bodies.position.copy()
+    position[0] = scene.pockets[2].position
+    picture, camera = drawn(scene, frame_of(scene, position, time=3.0))
+    assert at(picture, camera, scene.pockets[2].position).max() < 20
+
+
+def test_cue_lies_behind_the_ball() -> None:
+    scene = loads(AT_REST)
+    cue = scene.bodies.names.index("cue")
+    without, camera = drawn(scene, frame_of(scene))
+    picture, _ = drawn(scene, frame_of(scene), Aim(cue, (0.5, 0.5), 0.0, 0.0, 0.0))
+    assert np.abs(at(picture, camera, (0.3, 0.5)) - at(without, camera, (0.3, 0.5))).max() > 60
+    back, _ = drawn(scene, frame_of(scene), Aim(cue, (0.5, 0.5), 0.0, 0.0, 0.2))
+    beside = (0.5 - 0.0286 - 0.1, 0.5)  # which the cue leaves when it is drawn back
+    assert np.abs(at(back, camera, beside) - at(without, camera, beside)).max() < 40
+
+
+def test_numbers_and_stripes_are_painted_on_the_ball() -> None:
+    solid = coat_of("3", (208, 36, 36), struck=False)
+    stripe = coat_of("11", (226, 138, 134), struck=False)
+    face, side, pole = np.array([[0.0, 0.4, 0.9165]]), np.array([[1.0, 0.0, 0.0]]), np.array([[0.0, 1.0, 0.0]])
+    assert painted(solid, side, 20.0)[0] == pytest.approx(solid.colour, abs=1e-9)
+    assert painted(solid, pole, 20.0)[0] == pytest.approx(solid.colour, abs=1e-9)
+    assert painted(solid, face, 20.0)[0].min() > painted(solid, side, 20.0)[0].min() + 60  # the disc of its number
+    assert painted(stripe, pole, 20.0)[0] == pytest.approx(IVORY, abs=1e-9)
+    assert painted(stripe, side, 20.0)[0] == pytest.approx(stripe.colour, abs=1e-9)

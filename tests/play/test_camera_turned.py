@@ -1,0 +1,56 @@
+"""A camera that is turned by a quarter, as for tables that are longer than wide."""
+
+import numpy as np
+import pytest
+
+from sandbox.play.camera import Camera
+from sandbox.play.framing import lies_down
+from sandbox.scene.file import loads
+
+CAMERA = Camera((0.6, 1.3), 200.0, (640, 400), turned=True)
+TABLE = loads('title = "t"\n[billiards]\ntable = "pool-7ft"\n[billiards.place]\ncue = [0.5, 0.5]\n')
+
+
+def test_y_is_to_the_right_and_x_downwards() -> None:
+    assert CAMERA.to_screen(np.array([0.6, 1.3])).tolist() == [320.0, 200.0]
+    assert CAMERA.to_screen(np.array([0.6, 1.4])) == pytest.approx([340.0, 200.0], abs=1e-9)  # rounding
+    assert CAMERA.to_screen(np.array([0.7, 1.3])) == pytest.approx([320.0, 220.0], abs=1e-9)
+
+
+def test_it_turns_and_does_not_mirror() -> None:
+    right, up = CAMERA.ways(np.eye(2))
+    assert right[0] * up[1] - right[1] * up[0] < 0.0  # as an upright camera's, whose y is down
+
+
+def test_pixels_lead_back_to_their_places() -> None:
+    for pixel in ((0.0, 0.0), (640.0, 17.0), (123.4, 399.0)):
+        assert CAMERA.to_screen(np.array(CAMERA.to_world(pixel))) == pytest.approx(pixel, abs=1e-9)  # rounding
+
+
+def test_zoom_and_pan_keep_what_is_under_the_hand() -> None:
+    pixel = (100.0, 300.0)
+    place = np.array(CAMERA.to_world(pixel))
+    assert CAMERA.zoomed(1.7, pixel).to_screen(place) == pytest.approx(pixel, abs=1e-9)  # rounding
+    assert CAMERA.panned((30.0, -20.0)).to_screen(place) == pytest.approx((130.0, 280.0), abs=1e-9)
+
+
+def test_box_is_what_the_corners_show() -> None:
+    corners = np.array([CAMERA.to_world((0.0, 0.0)), CAMERA.to_world((640.0, 400.0))])
+    assert np.array(CAMERA.box) == pytest.approx(np.array([corners.min(axis=0), corners.max(axis=0)]), abs=1e-12)
+
+
+def test_fitting_shows_a_box_beside_what_is_covered() -> None:
+    box = ((0.0, 0.0), (1.0, 2.0))
+    camera = Camera.fitting(box, (900, 600), inset=260, foot=34, turned=True)
+    corners = camera.to_screen(np.array(box))
+    assert corners.min() > 0.0
+    assert corners[:, 0].max() < 900 - 260
+    assert corners[:, 1].max() < 600 - 34
+    upright = Camera.fitting(box, (900, 600), inset=260, foot=34)
+    assert camera.scale > upright.scale
+
+
+def test_tables_lie_down_in_wide_pictures_alone() -> None:
+    assert lies_down(TABLE, (800, 500))
+    assert not lies_down(TABLE, (500, 800))
+    assert not lies_down(loads('title = "t"\n[[ball]]\nposition = [0.0, 0.0]\nradius = 1.0\n'), (800, 500))
