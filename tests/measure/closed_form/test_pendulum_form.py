@@ -70,7 +70,12 @@ def test_period_is_the_published_one(degrees: float, period: float) -> None:
     assert found == pytest.approx(exact, rel=1e-14)  # scipy rounds its parameter, too
 
 
-@given(degrees=st.floats(-179.0, 179.0), rate=st.floats(-12.0, 12.0))
+def _sound(rate: float) -> float:
+    """Return a rate, or 0 for one whose components are so small that doubles no longer hold their ratio."""
+    return rate if abs(rate) > 1e-290 else 0.0
+
+
+@given(degrees=st.floats(-179.0, 179.0), rate=st.floats(-12.0, 12.0).map(_sound))
 def test_energy_and_length_stay(degrees: float, rate: float) -> None:
     found = motion_of(hung(degrees, rate), TIME)
     energy = 0.5 * (found.velocity**2).sum(axis=1) + G * found.position[:, 1]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from tables_by_hand import R, ball, floor, pocket, shot, straight_pot
+from shots_by_hand import R, ball, floor, pocket, shot, straight_pot
 
 from sandbox.measure.shots.attempt import attempt_of
 from sandbox.measure.shots.horizon import horizon

@@ -5,7 +5,7 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
-from tables_by_hand import R, ball, floor, pocket, shot, straight_pot
+from shots_by_hand import R, ball, floor, pocket, shot, straight_pot
 
 from sandbox.engines.exact.rolling.table import Table
 from sandbox.measure.shots.attempt import NoSuchShotError

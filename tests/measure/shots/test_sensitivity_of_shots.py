@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from tables_by_hand import R, ball, floor, pocket, shot, straight_pot
+from shots_by_hand import R, ball, floor, pocket, shot, straight_pot
 
 from sandbox.measure.shots.attempt import Variable, attempt_of
 from sandbox.measure.shots.sensitivity import Slope, sensitivity

@@ -4,7 +4,7 @@ import math
 
 import pytest
 from scipy.optimize import brentq
-from tables_by_hand import R, ball, floor, pocket, shot, straight_pot
+from shots_by_hand import R, ball, floor, pocket, shot, straight_pot
 
 from sandbox.measure.shots.attempt import NoSuchShotError
 from sandbox.measure.shots.windows import CLOSE, windows
