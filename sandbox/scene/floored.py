@@ -28,6 +28,9 @@ def floored(scene: Scene, bodies: Bodies) -> Iterator[Found]:
         for key in sorted(scene.contact_models.model_fields_set):
             yield ("contact_models", key), NEEDS_FLOOR
     yield from _noses(scene)
+    for k, pocket in enumerate(scene.pockets):
+        if any(pocket.position == other.position for other in scene.pockets[:k]):
+            yield ("pocket", k, "position"), "a second pocket lies there; state one, the larger"
     names: set[str] = set()
     for k, shot in enumerate(scene.shots):
         name = shot.name or default_name("shot", k)
@@ -69,5 +72,7 @@ def _shot(scene: Scene, bodies: Bodies, k: int, shot: Shot) -> Iterator[Found]:
         yield ("shot", k, "ball"), f"{shot.ball!r} is not a single ball"
     elif bodies.fixed[number]:
         yield ("shot", k, "ball"), f"{shot.ball!r} is fixed; nothing can move it"
+    elif any(math.dist(bodies.position[number], pocket.position) < pocket.radius for pocket in scene.pockets):
+        yield ("shot", k, "ball"), f"{shot.ball!r} lies in a pocket, where nothing can strike it"
     if any(each.ball == shot.ball for each in scene.shots[:k]):
         yield ("shot", k, "ball"), f"a second shot at {shot.ball!r}; a scene starts with one a ball"

@@ -9,6 +9,7 @@ import numpy as np
 from sandbox.scene.demands import BALLS, FLOOR, Demand, on_floor, unmodelled
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
+from sandbox.trajectory import FloatArray
 
 if TYPE_CHECKING:
     from sandbox.engines.exact.rolling.simulation import RollingSimulation
@@ -48,7 +49,7 @@ class ExactEngine:
         if settings.half_kick:
             lacks.append("half_kick is not a choice it has (it takes no steps; leave it out)")
         lacks += _of_floors(scene)
-        overlap = _overlap(scene)
+        overlap = overlap_of(scene, scene.bodies.position)
         return (*lacks, overlap) if overlap else tuple(lacks)
 
     def resolve(self, scene: Scene, settings: Settings) -> Settings:  # noqa: ARG002, all engines are asked alike
@@ -82,13 +83,14 @@ def _of_floors(scene: Scene) -> Iterator[str]:
     if scene.world.gravity != (0.0, 0.0):
         yield "it does not model world.gravity in the plane of a floor: what slides then goes no parabola"
     bodies = scene.bodies
-    radii = set(bodies.radius[np.asarray([e.collides == "all" for e in bodies.elements])[bodies.element]].tolist())
+    meets = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
+    radii = set(bodies.radius[meets].tolist())
     if scene.surface is not None and len(radii) > 1:
         yield "it does not model spheres of different radii that meet on a floor: their normal is not level"
 
 
-def _overlap(scene: Scene) -> str | None:
-    """Say which two overlap at the start, or None."""
+def overlap_of(scene: Scene, position: FloatArray) -> str | None:
+    """Say which two of a scene's overlap with its bodies at some places (N, 2), m, or None."""
     from sandbox.engines.exact.overlap import overlapping_balls, overlapping_things, told
     from sandbox.engines.fixtures import fixtures_of
     from sandbox.engines.floor.pockets import caught
@@ -97,13 +99,13 @@ def _overlap(scene: Scene) -> str | None:
     if not bodies.round.any():
         return None
     kinds = np.asarray([element.collides for element in bodies.elements])[bodies.element]
-    there = bodies.round & (caught(scene, bodies.position) < 0)  # what lies in a pocket meets nothing
+    there = bodies.round & (caught(scene, position) < 0)  # what lies in a pocket meets nothing
     to_all, to_fixed = (kinds == "all") & there, (kinds == "fixed") & there
-    pair = overlapping_balls(bodies.position, bodies.radius, to_all, to_fixed, bodies.fixed)
+    pair = overlapping_balls(position, bodies.radius, to_all, to_fixed, bodies.fixed)
     if pair is not None:
         return told(bodies.names[pair[0]], bodies.names[pair[1]], pair[2])
     meets = np.flatnonzero((to_all | to_fixed) & ~bodies.fixed)
-    found = overlapping_things(bodies.position[meets], bodies.radius[meets], fixtures_of(scene))
+    found = overlapping_things(position[meets], bodies.radius[meets], fixtures_of(scene))
     if found is not None:
         return told(bodies.names[meets[found[0]]], scene.fixed_names[found[1]], found[2])
     return None

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from sandbox.engines.exact.engine import overlap_of
 from sandbox.engines.exact.rolling.outcome import Outcome
 from sandbox.measure.shots.attempt import Attempt, attempt_of
 from sandbox.measure.shots.parting import Parting
@@ -124,7 +125,7 @@ def horizon(
         NoSuchShotError: the scene has no such shot.
         Refusal: the exact engine lacks something.
         Exhaustion: a shot has too many events.
-        ValueError: the nudge or the tolerance is not positive.
+        ValueError: the nudge or the tolerance is not positive; or the ball has no room to be nudged.
     """
     if not (nudge > 0.0 and tolerance > 0.0):
         raise ValueError(f"a nudge of {nudge:g} and a tolerance of {tolerance:g} m; both are more than 0")
@@ -158,10 +159,19 @@ def _aside(attempt: Attempt, nudge: float) -> list[Outcome]:
 
 
 def _elsewhere(attempt: Attempt, nudge: float) -> list[Outcome]:
-    x, y = attempt.table.position[attempt.number(attempt.ball)].tolist()
-    places = (x - nudge, y), (x + nudge, y), (x, y - nudge), (x, y + nudge)
-    tables = [attempt.table.with_balls({attempt.ball: place}) for place in places]
-    return [table.shoot(attempt.stroke, attempt.ball, ways=True) for table in tables]
+    """Play from beside where the ball stands, on all four sides that have room for it."""
+    table, number = attempt.table, attempt.number(attempt.ball)
+    x, y = table.position[number].tolist()
+    played = []
+    for place in (x - nudge, y), (x + nudge, y), (x, y - nudge), (x, y + nudge):
+        position = table.position
+        position[number] = place
+        if overlap_of(table.scene, position) is None:
+            moved = table.with_balls({attempt.ball: place})
+            played.append(moved.shoot(attempt.stroke, attempt.ball, ways=True))
+    if not played:
+        raise ValueError(f"{attempt.ball!r} has no room to stand {nudge:g} m elsewhere")
+    return played
 
 
 def _as_a_player(attempt: Attempt, spread: Spread) -> list[Outcome]:

@@ -57,7 +57,7 @@ class Outcome:
     what: IntArray
     """(E, 3) kind and the two concerned, likewise"""
     state: FloatArray
-    """(N, 20) the end, likewise"""
+    """(N, 19) the end, likewise"""
     phase: IntArray
     """(N,) the last phase of each ball"""
     complete: bool
@@ -117,13 +117,13 @@ class Outcome:
         the end of a whole shot is to rest.
 
         Args:
-            times: (T,) s from the stroke on, in any order.
+            times: (T,) s from the stroke on, in any order; before it all are where they were struck.
 
         Raises:
             ValueError: ways were not asked for.
         """
         path, owner = self._ways()
-        times = np.asarray(times, dtype=np.float64)
+        times = np.maximum(np.asarray(times, dtype=np.float64), 0.0)
         places = np.empty((len(times), len(self.names), 2))
         for number in range(len(self.names)):
             legs = path[owner == number]
@@ -136,9 +136,14 @@ class Outcome:
         """Return points along a ball's way, (K, 2) m, no farther apart than asked for, its turns among them.
 
         Raises:
-            ValueError: ways were not asked for.
+            KeyError: no ball has that name.
+            ValueError: ways were not asked for, or the spacing is no length.
         """
         path, owner = self._ways()
+        if ball not in self.names:
+            raise KeyError(ball)
+        if not spacing > 0.0:
+            raise ValueError(f"a spacing of {spacing:g} m is not possible; more than 0")
         number = self.names.index(ball)
         legs = path[owner == number]
         ends = np.append(legs[1:, T], max(self.duration, float(legs[-1, T])))

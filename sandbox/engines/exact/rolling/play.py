@@ -61,7 +61,7 @@ def set_out(board: Board, t: float) -> None:
         for k in range(len(board.pockets)):
             hole = board.pockets[k]
             dx, dy = state[i, X] - hole[KX], state[i, Y] - hole[KY]
-            if dx * dx + dy * dy < hole[REACH] * hole[REACH]:
+            if inside < 0 and dx * dx + dy * dy < hole[REACH] * hole[REACH]:
                 inside = k
         if inside < 0 or tags[i, MEETS] == NOTHING:
             set_off(board, i)

@@ -2,7 +2,7 @@
 
 import math
 
-from sandbox.engines.exact.rolling.approach import fall, first_touch
+from sandbox.engines.exact.rolling.approach import DEPTH, fall, first_touch, leave
 from sandbox.engines.exact.rolling.board import (
     AX,
     AY,
@@ -38,12 +38,20 @@ from sandbox.engines.exact.rolling.board import (
 from sandbox.engines.floor.phase import CAPTURED, ROLLING, SLIDING
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.roster import ALL, NOTHING
+from sandbox.trajectory import FloatArray
 
 
 @kernel
 def moves(board: Board, i: int) -> bool:
     """Tell whether a ball's centre goes anywhere."""
     return bool(board.tags[i, PHASE] in (ROLLING, SLIDING))
+
+
+@kernel
+def faces(line: FloatArray, x: float, y: float) -> bool:
+    """Tell whether a point lies over a line, not beside its ends."""
+    along = (x - line[PX]) * line[UX] + (y - line[PY]) * line[UY]
+    return bool(0.0 <= along <= line[LENGTH] or line[LENGTH] == math.inf)
 
 
 @kernel
@@ -65,11 +73,12 @@ def alone(board: Board, i: int, now: float) -> None:
             rate, half = vx * nx + vy * ny, 0.5 * (ax * nx + ay * ny)
             if rate >= 0.0 and half >= 0.0:
                 continue
-            dt = fall(gap, rate, half)
+            # Far from the origin, and at great speeds, rounding lets who touches sink in by more than DEPTH.
+            sunk = -radius < gap < -DEPTH and faces(line, x, y)
+            dt = leave(rate, half) if sunk else fall(gap, rate, half)
             if now + dt < best:
                 px, py = x + (vx + 0.5 * ax * dt) * dt, y + (vy + 0.5 * ay * dt) * dt
-                along = (px - line[PX]) * line[UX] + (py - line[PY]) * line[UY]
-                if 0.0 <= along <= line[LENGTH] or line[LENGTH] == math.inf:
+                if faces(line, px, py):
                     best, kind, who = now + dt, LINE, k
         for k in range(len(board.knobs)):
             knob = board.knobs[k]

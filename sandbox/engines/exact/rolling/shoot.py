@@ -35,7 +35,7 @@ def shoot(board: Board, state: FloatArray, tags: IntArray, ball: int, motion: Fl
 
     Args:
         board: to play on; whatever it held is gone.
-        state: (N, 20) how all stand before it.
+        state: (N, 19) how all stand before it.
         tags: (N, 3) likewise.
         ball: who is struck, or `UNSTRUCK`.
         motion: (5,) that ball's velocity, m/s, and spin, rad/s, after the stroke.
@@ -66,8 +66,7 @@ def shoot(board: Board, state: FloatArray, tags: IntArray, ball: int, motion: Fl
     while status == PAUSED:
         status = play(board, until)
     if status == DONE and counts[AWAKE] != 0:
-        if until < math.inf:
-            arrive_all(board, until)
+        arrive_all(board, until if until < math.inf else board.world[NOW])
         status = CUT
     return status
 

@@ -11,12 +11,14 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Self
+from math import isfinite
+from threading import Event, Lock
+from typing import Any, Self
 
 import numpy as np
 
 from sandbox.engines.contract import Exhaustion, Refusal
-from sandbox.engines.exact.engine import ExactEngine
+from sandbox.engines.exact.engine import ExactEngine, overlap_of
 from sandbox.engines.exact.rolling.board import LIMIT, PHASE, RECORDING, ROWS, STEPS, TRACING, VX, WZ, Board, X, Y
 from sandbox.engines.exact.rolling.outcome import Outcome
 from sandbox.engines.exact.rolling.play import DONE, FULL, TOO_MANY
@@ -35,6 +37,11 @@ UNTIL = 120.0
 
 MOST_EVENTS = 2_000_000
 """of a shot"""
+
+BATCH = 256
+"""Shots of a fan after which Python sees to signals: some hundredths of a second."""
+
+NO_MOTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 ROOM = 512
 """Events, and motions, that there is room for at first, and no less than some for each ball."""
@@ -81,6 +88,8 @@ class Table:
         self._board = board
         self._state, self._tags = board.state.copy(), board.tags.copy()
         self._motion = np.zeros(5)
+        self._turn = Lock()
+        self._fixed = scene.bodies.fixed
         self._mass, self._radius = scene.bodies.mass.tolist(), scene.bodies.radius.tolist()
 
     @property
@@ -101,14 +110,14 @@ class Table:
 
         Raises:
             KeyError: no ball has that name.
+            ValueError: it is fixed, or lies in a pocket; or there is no such time.
             Exhaustion: more events than `MOST_EVENTS`.
         """
-        number = UNSTRUCK
-        if stroke is not None:
-            number = self._number[ball]
-            velocity, spin = struck(stroke, self._mass[number], self._radius[number])
-            self._motion[:] = (*velocity, *spin)
-        return self._play(number, self._motion, until, ways)
+        if stroke is None:
+            return self._play(UNSTRUCK, NO_MOTION, until, ways)
+        number = self._free(ball)
+        velocity, spin = struck(stroke, self._mass[number], self._radius[number])
+        return self._play(number, (*velocity, *spin), until, ways)
 
     def send(
         self,
@@ -123,18 +132,22 @@ class Table:
 
         Raises:
             KeyError: no ball has that name.
+            ValueError: as `shoot`, or that is no motion.
             Exhaustion: as `shoot`.
         """
-        self._motion[:] = (*velocity, *spin)
-        return self._play(self._number[ball], self._motion, until, ways)
+        motion = (*velocity, *spin)
+        if len(motion) != 5 or not all(map(isfinite, motion)):
+            raise ValueError(f"{motion} is no velocity and spin; two and three finite numbers")
+        return self._play(self._free(ball), motion, until, ways)
 
     def fan(self, strokes: Sequence[Stroke], ball: str = "cue", *, threads: int = 1, until: float = UNTIL) -> Fan:
         """Play many shots from where the balls stand, each for itself, on several threads.
 
         Raises:
             KeyError: no ball has that name.
+            ValueError: as `shoot`.
         """
-        number = self._number[ball]
+        number = self._free(ball)
         figures = self._mass[number], self._radius[number]
         motions = np.empty((len(strokes), 5))
         for k, stroke in enumerate(strokes):
@@ -143,18 +156,34 @@ class Table:
         return self.fan_of(motions, ball, threads=threads, until=until)
 
     def fan_of(self, motions: FloatArray, ball: str = "cue", *, threads: int = 1, until: float = UNTIL) -> Fan:
-        """Play many shots as `fan` does, from the velocity and spin of the ball after each stroke, (M, 5)."""
+        """Play many shots as `fan` does, from the velocity and spin of the ball after each stroke, (M, 5).
+
+        Raises:
+            KeyError: no ball has that name.
+            ValueError: as `shoot`, or those are no motions.
+        """
+        number = self._free(ball)
+        _check_time(until)
+        motions = np.ascontiguousarray(motions, dtype=np.float64)
+        if motions.ndim != 2 or motions.shape[1] != 5 or not np.isfinite(motions).all():
+            raise ValueError(f"an array {motions.shape} of motions is not possible; finite numbers, five in each row")
         count, balls = len(motions), len(self.names)
-        numbers = np.full(count, self._number[ball], dtype=np.int64)
+        numbers = np.full(count, number, dtype=np.int64)
         rest, pocket = np.empty((count, balls, 2)), np.empty((count, balls), np.int64)
         ends, events, status = np.empty(count), np.empty(count, np.int64), np.empty(count, np.int64)
 
+        stopped = Event()
+
         def part(low: int, high: int) -> None:
-            some = slice(low, high)
-            shoot_many(
-                self._own(), self._state, self._tags, numbers[some], motions[some], until,
-                rest[some], pocket[some], ends[some], events[some], status[some],
-            )  # fmt: skip
+            own = self._own()
+            for first in range(low, high, BATCH):
+                if stopped.is_set():
+                    return
+                some = slice(first, min(first + BATCH, high))
+                shoot_many(
+                    own, self._state, self._tags, numbers[some], motions[some], until,
+                    rest[some], pocket[some], ends[some], events[some], status[some],
+                )  # fmt: skip
 
         bounds = np.linspace(0, count, min(max(threads, 1), max(count, 1)) + 1).astype(int).tolist()
         parts = list(pairwise(bounds))
@@ -162,13 +191,20 @@ class Table:
             part(*parts[0])
         else:
             with ThreadPoolExecutor(len(parts)) as pool:
-                list(pool.map(lambda each: part(*each), parts))
+                try:
+                    list(pool.map(lambda each: part(*each), parts))
+                finally:
+                    stopped.set()  # an interrupt need not wait for the rest
         return Fan(rest, pocket, ends, events, status == DONE)
 
     def with_balls(self, position: dict[str, tuple[float, float]]) -> Self:
         """Return a table with balls at rest elsewhere, m; those that are not named stay.
 
         Who is put into a pocket lies in it.
+
+        Raises:
+            KeyError: no ball has that name.
+            ValueError: that is no place, or one where they overlap something.
         """
         other = self._copy()
         down = caught(self.scene, np.array(list(position.values()), dtype=float).reshape(-1, 2)) >= 0
@@ -177,10 +213,21 @@ class Table:
             other._state[number, X : Y + 1] = place
             other._state[number, VX : WZ + 1] = 0.0
             other._tags[number, PHASE] = CAPTURED if inside else RESTING
+        if not np.isfinite(other._state[:, X : Y + 1]).all():
+            raise ValueError("a place that is not finite is none")
+        overlap = overlap_of(self.scene, other.position)
+        if overlap is not None:
+            raise ValueError(overlap)
         return other
 
     def after(self, outcome: Outcome) -> Self:
-        """Return the table as a shot has left it."""
+        """Return the table as a shot has left it.
+
+        Raises:
+            ValueError: that was a shot of other balls.
+        """
+        if outcome.names != self.names:
+            raise ValueError("that shot was played with other balls")
         other = self._copy()
         other._state[:] = outcome.state
         other._state[:, 0] = 0.0
@@ -193,14 +240,36 @@ class Table:
         other._state, other._tags = self._state.copy(), self._tags.copy()
         return other
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in self.__dict__.items() if key != "_turn"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, _turn=Lock())
+
+    def _free(self, ball: str) -> int:
+        """Return the number of a ball that can be struck."""
+        number = self._number[ball]
+        if self._fixed[number]:
+            raise ValueError(f"{ball!r} is fixed; nothing can move it")
+        if self._tags[number, PHASE] == CAPTURED:
+            raise ValueError(f"{ball!r} lies in a pocket; put it elsewhere first")
+        return number
+
     def _own(self) -> Board:
         """Return a board for another thread, which logs nothing."""
-        own: Board = deepcopy(self._board)
+        with self._turn:
+            own: Board = deepcopy(self._board)
         own.counts[RECORDING] = own.counts[TRACING] = 0
         return own
 
-    def _play(self, number: int, motion: FloatArray, until: float, ways: bool) -> Outcome:
-        board = self._board
+    def _play(self, number: int, motion: tuple[float, ...], until: float, ways: bool) -> Outcome:
+        _check_time(until)
+        with self._turn:  # copies of a table share its board
+            self._motion[:] = motion
+            return self._played(number, until, ways)
+
+    def _played(self, number: int, until: float, ways: bool) -> Outcome:
+        board, motion = self._board, self._motion
         board.counts[TRACING] = ways
         while (status := shoot(board, self._state, self._tags, number, motion, until)) == FULL:
             if ways and board.counts[STEPS] + 2 > len(board.path):
@@ -222,3 +291,8 @@ class Table:
             board.path[:steps].copy() if ways else None,
             board.path_what[:steps, 0].copy() if ways else None,
         )
+
+
+def _check_time(until: float) -> None:
+    if not until >= 0.0:
+        raise ValueError(f"a shot until {until:g} s is not possible; 0 or later")
