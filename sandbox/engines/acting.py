@@ -32,7 +32,7 @@ from sandbox.scene.document import to_document
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import from_document
 from sandbox.scene.meetings import Meetings, meetings
-from sandbox.scene.model import Ball, Box, Capsule, Collides, Compound, Polygon, Scene, Single, default_name
+from sandbox.scene.model import Ball, Box, Capsule, Collides, Compound, Polygon, Post, Scene, Single, Wall, default_name
 from sandbox.scene.part import BACKING, MAX_BODIES
 from sandbox.trajectory import BoolArray, FloatArray
 
@@ -244,7 +244,17 @@ def _spawn(action: Spawn, cast: Cast) -> None:
         raise ActionError("; ".join(message for _, message in faults))
     x, y = alone.bodies.position[0].tolist()  # of its centre: an outline may be drawn far from its own position
     _check_place((x, y), float(alone.bodies.radius[0]), single.collides, cast)
+    if isinstance(single, Ball) and not single.fixed and single.collides != "none":
+        _check_noses(single.radius, scene)
     cast.add(single, name)
+
+
+def _check_noses(radius: float, scene: Scene) -> None:
+    """Refuse a ball, m, over which the nose of a cushion passes, as a scene's own are."""
+    for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):  # pockets come last among the names
+        height = thing.height if isinstance(thing, Wall | Post) else None
+        if height is not None and height >= 2.0 * radius:
+            raise ActionError(f"the nose of {name!r}, {height:g} m high, passes over a ball of radius {radius:g} m")
 
 
 def alone_in(scene: Scene, single: Single) -> Scene:

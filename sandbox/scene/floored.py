@@ -28,9 +28,6 @@ def floored(scene: Scene, bodies: Bodies) -> Iterator[Found]:
         for key in sorted(scene.contact_models.model_fields_set):
             yield ("contact_models", key), NEEDS_FLOOR
     yield from _noses(scene)
-    for k, pocket in enumerate(scene.pockets):
-        if any(pocket.position == other.position for other in scene.pockets[:k]):
-            yield ("pocket", k, "position"), "a second pocket lies there; state one, the larger"
     names: set[str] = set()
     for k, shot in enumerate(scene.shots):
         name = shot.name or default_name("shot", k)

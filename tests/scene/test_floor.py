@@ -90,3 +90,12 @@ def test_side_sends_the_ball_off_and_spins_it() -> None:
     assert right[0][1] > 0.0 > left[0][1]  # struck on its right it squirts to the left
     assert right[1][2] > 0.0 > left[1][2]  # and turns anti-clockwise
     assert right[0] == pytest.approx((left[0][0], -left[0][1]))
+
+
+def test_shot_at_a_ball_in_a_pocket_is_a_fault() -> None:
+    text = (
+        "[surface]\n[[pocket]]\nposition = [1.0, 0.0]\nradius = 0.06\n"
+        '[[ball]]\nname = "cue"\nposition = [1.01, 0.0]\nradius = 0.03\n[[shot]]\naim = 0\nspeed = 1\n'
+    )
+    with pytest.raises(SceneError, match=r"shot\[0\].ball: 'cue' lies in a pocket"):
+        loads(text)

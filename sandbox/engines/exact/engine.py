@@ -1,11 +1,11 @@
 """ExactEngine: what event-driven simulation can model. Light until started."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sandbox.engines.floor.level import unlevel
 from sandbox.scene.demands import BALLS, FLOOR, Demand, on_floor, unmodelled
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -48,7 +48,8 @@ class ExactEngine:
                 lacks.append(f"{key} {stated!r} is not a choice it has (it {why}; leave it out)")
         if settings.half_kick:
             lacks.append("half_kick is not a choice it has (it takes no steps; leave it out)")
-        lacks += _of_floors(scene)
+        if on_floor(scene):
+            lacks += unlevel(scene, scene.bodies)
         overlap = overlap_of(scene, scene.bodies.position)
         return (*lacks, overlap) if overlap else tuple(lacks)
 
@@ -74,19 +75,6 @@ class ExactEngine:
 
             return RollingSimulation(scene, settings)
         return ExactSimulation(scene, settings)
-
-
-def _of_floors(scene: Scene) -> Iterator[str]:
-    """Say what a scene on a floor has for which there is no closed form here."""
-    if not on_floor(scene):
-        return
-    if scene.world.gravity != (0.0, 0.0):
-        yield "it does not model world.gravity in the plane of a floor: what slides then goes no parabola"
-    bodies = scene.bodies
-    meets = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
-    radii = set(bodies.radius[meets].tolist())
-    if scene.surface is not None and len(radii) > 1:
-        yield "it does not model spheres of different radii that meet on a floor: their normal is not level"
 
 
 def overlap_of(scene: Scene, position: FloatArray) -> str | None:

@@ -4,8 +4,10 @@ import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.engines.exact.overlap import allowed, overlapping_things, told
+from sandbox.engines.floor.level import unlevel
 from sandbox.engines.floor.pockets import caught
 from sandbox.engines.roster import ALL, FIXED, MEETS, NOTHING, Roster
+from sandbox.scene.demands import on_floor
 from sandbox.scene.model import Ball, Scene, Single
 from sandbox.trajectory import BoolArray, FloatArray
 
@@ -29,12 +31,22 @@ class Troupe(Roster):
         self.renewed = False
 
     def set_velocity(self, number: int, velocity: FloatArray) -> None:
-        """Give a body a velocity, m/s."""
+        """Give a body a velocity, m/s.
+
+        Raises:
+            ActionError: it lies in a pocket.
+        """
+        self._check_in_play(number)
         super().set_velocity(number, velocity)
         self.kicked.add(number)
 
     def set_spin(self, number: int, spin: float) -> None:
-        """Give a body an angular velocity, rad/s."""
+        """Give a body an angular velocity, rad/s.
+
+        Raises:
+            ActionError: it lies in a pocket.
+        """
+        self._check_in_play(number)
         super().set_spin(number, spin)
         self.kicked.add(number)
 
@@ -66,10 +78,12 @@ class Troupe(Roster):
         """Go on with a scene that differs in gravity or coefficients alone.
 
         Raises:
-            ActionError: it has drag, or more surfaces than a scene may have.
+            ActionError: it has drag, or gravity along a floor, or more surfaces than a scene may have.
         """
         if scene.world.linear_drag or scene.world.quadratic_drag:
             raise ActionError("exact does not model drag; pymunk and reference do")
+        if on_floor(scene) and (lacks := next(unlevel(scene, self.bodies), None)):
+            raise ActionError(lacks)
         super().change(scene)
         self.renewed = True
 
@@ -77,17 +91,31 @@ class Troupe(Roster):
         """Add a body that was checked, and return its number.
 
         Raises:
-            ActionError: something stands there, it is no ball, or it makes more surfaces than a scene may have.
+            ActionError: something stands there, it is no ball, or not like those on a floor, or it makes more surfaces
+                than a scene may have.
         """
         if isinstance(single, Ball):
             others = np.ones(len(self.bodies), dtype=np.bool_)
             place, kind = np.asarray(single.position), MEETS[single.collides]
             self._check_free(name, place, single.radius, kind, single.fixed, others)
+            if on_floor(self.scene) and (lacks := next(unlevel(self.scene, self.bodies.joined_by(single, name)), None)):
+                raise ActionError(lacks)
         elif single.collides != "none":
             raise ActionError(f"exact models no polygons, such as {name!r}; pymunk and reference do")
         number = super().add(single, name)
         self.renewed = True
         return number
+
+    def _check_in_play(self, number: int) -> None:
+        """Refuse to set a ball in motion that lies in a pocket; one that is being put there is yet to fall.
+
+        Raises:
+            ActionError: it does.
+        """
+        if number in self.moved or self.meets[number] == NOTHING:
+            return
+        if caught(self.scene, self.position[number : number + 1])[0] >= 0:
+            raise ActionError(f"{self.bodies.names[number]!r} lies in a pocket; move it back into play first")
 
     def _check_free(
         self, name: str, position: FloatArray, radius: float, kind: int, fixed: bool, others: BoolArray

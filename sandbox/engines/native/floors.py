@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
+from sandbox.engines.floor.level import unlevel
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.demands import FLOOR, demands
 from sandbox.scene.model import Scene
@@ -18,14 +17,10 @@ def of_floors(scene: Scene, bodies: Bodies | None = None) -> Iterator[str]:
     """Say what a scene on a floor has, with its own bodies or with those it has come to have, that is not modelled."""
     bodies = scene.bodies if bodies is None else bodies
     world = scene.world
-    if world.gravity != (0.0, 0.0):
-        yield "it does not model world.gravity in the plane of a floor"
+    yield from unlevel(scene, bodies)
     if world.linear_drag or world.quadratic_drag:
         yield "it does not model drag on a floor"
     if len(scene.links) or scene.attractions or scene.thrusts:
         yield "it does not model joints, attraction or thrusts on a floor"
     if not bodies.round.all():
         yield "it does not model bodies other than balls on a floor"
-    meets = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
-    if scene.surface is not None and len(np.unique(bodies.radius[meets & bodies.round])) > 1:
-        yield "it does not model balls of different radii that meet on a floor: where they touch is not level"

@@ -51,7 +51,7 @@ PAUSE = 20_000
 def set_out(board: Board, t: float) -> None:
     """Let every ball go on from a time, by the velocity and spin that it has then, and look ahead.
 
-    Who stands in a pocket is captured at once.
+    Who stands in a pocket is captured at once; who lies in one and was put elsewhere in it slides back.
     """
     state, tags = board.state, board.tags
     for i in range(len(state)):
@@ -61,7 +61,7 @@ def set_out(board: Board, t: float) -> None:
         for k in range(len(board.pockets)):
             hole = board.pockets[k]
             dx, dy = state[i, X] - hole[KX], state[i, Y] - hole[KY]
-            if inside < 0 and dx * dx + dy * dy < hole[REACH] * hole[REACH]:
+            if (inside < 0 or (dx == 0.0 and dy == 0.0)) and dx * dx + dy * dy < hole[REACH] * hole[REACH]:
                 inside = k
         if inside < 0 or tags[i, MEETS] == NOTHING:
             set_off(board, i)
@@ -69,6 +69,8 @@ def set_out(board: Board, t: float) -> None:
             capture(board, i, inside, board.counts[SOLID])
             if board.counts[RECORDING] != 0:
                 board.log[board.counts[ROWS] - 1, EVENT_TIME] = t
+        else:
+            state[i, X], state[i, Y] = board.pockets[inside, KX], board.pockets[inside, KY]
     seek_all(board, t)
 
 
