@@ -40,6 +40,7 @@ HARMLESS: dict[str, Any] = {
 ALOOF: dict[str, dict[str, Any]] = {
     "plane": {"point": [0.0, -1e16], "normal": [0.0, 1.0]},
     "world": {"duration": 1e-6},
+    "pocket": {"position": [1e16, 1e16], "radius": 1e-9},
     **{kind: {"collides": "none"} for kind in Scene().kinds},
 }
 """What else a table with a fault is given, so that it makes nothing around it look wrong."""

@@ -99,3 +99,10 @@ def test_shot_at_a_ball_in_a_pocket_is_a_fault() -> None:
     )
     with pytest.raises(SceneError, match=r"shot\[0\].ball: 'cue' lies in a pocket"):
         loads(text)
+
+
+def test_pocket_that_is_wrong_swallows_no_ball_meanwhile() -> None:
+    document = {**TABLE, "pocket": [{"position": [0, 0], "radius": -1}], "shot": [{"aim": 0, "speed": 1}]}
+    with pytest.raises(SceneError) as caught:
+        from_document(document)
+    assert [fault.path for fault in caught.value.faults] == ["pocket[0].radius"]

@@ -125,7 +125,7 @@ def test_floor_without_balls_runs() -> None:
         (Spawn(time=0.0, ball=Ball(position=(0.7, 0.7), radius=0.5 * R)), "passes over|different radii"),
         (Spawn(time=0.0, ball=Ball(position=(0.7, 0.7), radius=0.5 * R, collides="fixed")), "'rail'.* passes over"),
         (Spawn(time=0.0, ball=Ball(position=(0.7, 0.7), radius=2.0 * R)), "different radii"),
-        (SetParameter(time=0.0, path="world.gravity", value=(0.0, -1.0)), "gravity in the plane"),
+        (SetParameter(time=0.0, path="world.gravity", value=[0.0, -1.0]), "gravity in the plane"),
     ],
 )
 def test_action_that_a_floor_does_not_allow_changes_nothing(engine: str, action: Action, words: str) -> None:
