@@ -45,22 +45,26 @@ def mathavan2010(
     p, q, r = radius * (wx * ny - wy * nx), radius * (wx * nx + wy * ny), radius * wz
     sin = height / radius - 1.0
     cos = math.sqrt(1.0 - sin * sin)
+    if cos == 0.0:  # the nose is at the very top or bottom, and cannot press
+        return a
     step = (1.0 + restitution) * y / (STEPS * cos)
+    most = 1.0 / (3.5 * step)
     work, wanted, pressed = 0.0, math.inf, 0.0
     for _ in range(100 * STEPS):
         along, up = x + q * sin - r * cos, p - y * sin
         slip = math.sqrt(along * along + up * up)
         ca, cu = (along / slip, up / slip) if slip > STILL else (0.0, 0.0)
+        rub = min(friction, most * slip)  # a step ends a slip at most, and never turns it round
         under_x, under_y = x - q, y + p
         under = math.sqrt(under_x * under_x + under_y * under_y)
         fx, fy = (under_x / under, under_y / under) if under > STILL else (0.0, 0.0)
-        weight = sin + friction * cu * cos  # what presses the ball onto the floor, of the impulse
-        weight = max(weight, 0.0)
-        dx = -friction * ca - sliding * fx * weight
-        dy = -cos + friction * sin * cu - sliding * fy * weight
-        dp = -2.5 * (friction * cu + sliding * fy * weight)
-        dq = -2.5 * (friction * ca * sin - sliding * fx * weight)
-        dr = 2.5 * friction * ca * cos
+        weight = sin + rub * cu * cos  # what presses the ball onto the floor, of the impulse
+        grip = min(sliding * max(weight, 0.0), most * under)
+        dx = -rub * ca - grip * fx
+        dy = -cos + rub * sin * cu - grip * fy
+        dp = -2.5 * (rub * cu + grip * fy)
+        dq = -2.5 * (rub * ca * sin - grip * fx)
+        dr = 2.5 * rub * ca * cos
         # The last step of pressing, and of giving back, is cut to where it ends.
         part = step
         ends = False
