@@ -12,7 +12,7 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 
-from sandbox.engines.exact.rolling.table import Fan
+from sandbox.engines.exact.rolling.fan import Fan
 from sandbox.measure.shots.odds import Odds
 from sandbox.measure.shots.study import Study
 from sandbox.report.colours import COLOURS

@@ -84,7 +84,7 @@ def rebound(
     nx: float,
     ny: float,
 ) -> Five:
-    """Return a ball after it has hit a cushion.
+    """Return a ball after it has hit a cushion, into which it goes no further.
 
     Args:
         model: `SIMPLE`, `HAN2005` or `MATHAVAN2010`.
@@ -98,12 +98,15 @@ def rebound(
         ny: likewise.
     """
     if model == HAN2005:
-        return _han2005(restitution, friction, a, radius, height, nx, ny)
-    if model == MATHAVAN2010:
-        return mathavan2010(restitution, friction, sliding, a, radius, height, nx, ny)
-    vx, vy, wx, wy, wz = a
-    push = (1.0 + restitution) * (vx * nx + vy * ny)
-    return vx - push * nx, vy - push * ny, wx, wy, wz
+        vx, vy, wx, wy, wz = _han2005(restitution, friction, a, radius, height, nx, ny)
+    elif model == MATHAVAN2010:
+        vx, vy, wx, wy, wz = mathavan2010(restitution, friction, sliding, a, radius, height, nx, ny)
+    else:
+        vx, vy, wx, wy, wz = a
+        push = (1.0 + restitution) * (vx * nx + vy * ny)
+        return vx - push * nx, vy - push * ny, wx, wy, wz
+    still = max(vx * nx + vy * ny, 0.0)  # a nose far above the centre leaves it some of its way
+    return vx - still * nx, vy - still * ny, wx, wy, wz
 
 
 @kernel

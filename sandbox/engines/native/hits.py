@@ -70,24 +70,6 @@ def put_back(balls: Balls, i: int, ago: float) -> Five:
 
 
 @kernel
-def off(
-    model: int,
-    restitution: float,
-    friction: float,
-    grip: float,
-    a: Five,
-    radius: float,
-    height: float,
-    nx: float,
-    ny: float,
-) -> Five:
-    """Return a ball after a cushion, into which it goes no further: a nose far above its centre would let it."""
-    vx, vy, wx, wy, wz = rebound(model, restitution, friction, grip, a, radius, height, nx, ny)
-    still = max(vx * nx + vy * ny, 0.0)
-    return vx - still * nx, vy - still * ny, wx, wy, wz
-
-
-@kernel
 def hit(
     balls: Balls,
     cushions: Cushions,
@@ -121,8 +103,8 @@ def hit(
         height = cushions.height[k] if cushions.height[k] > 0.0 else radius
         restitution = laws.restitution[balls.surface[i], cushions.surface[k]] if closing > CUT else 0.0
         friction = laws.friction[balls.surface[i], cushions.surface[k]]
-        smooth = energy(off(laws.cushion, restitution, 0.0, 0.0, mine, radius, height, nx, ny), light, radius)
-        after = off(laws.cushion, restitution, friction, laws.grip, mine, radius, height, nx, ny)
+        smooth = energy(rebound(laws.cushion, restitution, 0.0, 0.0, mine, radius, height, nx, ny), light, radius)
+        after = rebound(laws.cushion, restitution, friction, laws.grip, mine, radius, height, nx, ny)
         ended = energy(after, light, radius)
         redone = 0.0
     else:

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from sandbox.engines.exact.rolling.fan import Fan
 from sandbox.engines.exact.rolling.outcome import Outcome
-from sandbox.engines.exact.rolling.table import Fan, Table
+from sandbox.engines.exact.rolling.table import Table
 from sandbox.scene.cue import Stroke
 from sandbox.scene.model import Scene, default_name
 

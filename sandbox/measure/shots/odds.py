@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from sandbox.engines.exact.rolling.fan import Fan
 from sandbox.engines.exact.rolling.outcome import Outcome
-from sandbox.engines.exact.rolling.table import Fan
 from sandbox.interrupt import uninterrupted
 from sandbox.measure.shots.attempt import Attempt, attempt_of
 from sandbox.measure.shots.spread import Spread, sound, strayed

@@ -192,10 +192,6 @@ def hit_cushion(board: Board, i: int, kind: int, thing: int, coat: int, nx: floa
         before = motion_of(state, i)
         model, grip = board.counts[CUSHIONS_AS], board.figures.grip
         give(state, i, rebound(model, restitution, friction, grip, before, radius, height, nx, ny))
-        still = state[i, VX] * nx + state[i, VY] * ny
-        if still > 0.0:  # a nose far above the centre leaves it some of its way: the ball stays below it
-            state[i, VX] -= still * nx
-            state[i, VY] -= still * ny
         book_hit(board, i, before, -1, before, nx, ny)
         calm(board, i, closing)
     set_off(board, i)

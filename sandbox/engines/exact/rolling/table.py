@@ -9,7 +9,6 @@ A shot is one call of a kernel; a fan of them is one for each thread.
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
-from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite
 from threading import Event, Lock
@@ -20,6 +19,7 @@ import numpy as np
 from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.exact.engine import ExactEngine, overlap_of
 from sandbox.engines.exact.rolling.board import LIMIT, PHASE, RECORDING, ROWS, STEPS, TRACING, VX, WZ, Board, X, Y
+from sandbox.engines.exact.rolling.fan import Fan
 from sandbox.engines.exact.rolling.outcome import Outcome
 from sandbox.engines.exact.rolling.play import DONE, FULL, TOO_MANY
 from sandbox.engines.exact.rolling.record import too_many, with_paths, with_room
@@ -30,7 +30,7 @@ from sandbox.engines.floor.pockets import caught
 from sandbox.scene.cue import Stroke, struck
 from sandbox.scene.demands import on_floor
 from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray, IntArray
+from sandbox.trajectory import FloatArray
 
 UNTIL = 120.0
 """s: a shot takes no longer, whatever the floor."""
@@ -45,22 +45,6 @@ NO_MOTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 ROOM = 512
 """Events, and motions, that there is room for at first, and no less than some for each ball."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Fan:
-    """M shots of N balls from one state."""
-
-    position: FloatArray
-    """(M, N, 2) m, where the balls came to rest"""
-    pocket: IntArray
-    """(M, N) into which pocket each fell, −1 for none"""
-    duration: FloatArray
-    """(M,) s, until the last event"""
-    events: IntArray
-    """(M,) how many there were"""
-    complete: FloatArray
-    """(M,) whether everything came to rest"""
 
 
 class Table:
