@@ -41,8 +41,7 @@ def shot(ball_ball: str, cushion: str, aim: float, **more: Any) -> Scene:
 def test_engines_agree_over_the_first_hits(ball_ball: str, cushion: str, aim: float, **how: float) -> None:
     scene = shot(ball_ball, cushion, aim, **how)
     exact, native = run(scene, "exact", account=True), run(scene, "pymunk", account=True)
-    # m: both take hits at their own times; rounding grows tenfold a hit. Where two hits fall within rounding of each
-    # other, or a graze is seen by one alone, they may differ by what a graze moves.
+    # m: both take each hit at its own time, so that only rounding is left, which a hit of balls grows tenfold
     assert np.abs(exact.position - native.position).max() < 1e-8
     for trajectory in (exact, native):
         energy = trajectory.energy
