@@ -64,6 +64,7 @@ class Table:
             raise Refusal(engine.name, missing, ())
         self.scene = scene
         self.names = scene.bodies.names
+        self._fixed_names = scene.fixed_names
         self._number = {name: k for k, name in enumerate(self.names)}
         simulation = RollingSimulation(scene, scene.solver)
         count = len(scene.bodies)
@@ -249,7 +250,8 @@ class Table:
     def _play(self, number: int, motion: tuple[float, ...], until: float, ways: bool) -> Outcome:
         _check_time(until)
         with self._turn:  # copies of a table share its board
-            self._motion[:] = motion
+            if number != UNSTRUCK:
+                self._motion[:] = motion
             return self._played(number, until, ways)
 
     def _played(self, number: int, until: float, ways: bool) -> Outcome:
@@ -266,7 +268,7 @@ class Table:
         rows, steps = int(board.counts[ROWS]), int(board.counts[STEPS])
         return Outcome(
             self.names,
-            self.scene.fixed_names,
+            self._fixed_names,
             board.log[:rows].copy(),
             board.log_what[:rows].copy(),
             board.state.copy(),
