@@ -10,11 +10,9 @@ from typing import Any
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, USUAL, able, engine_named, usual
-from sandbox.games.billiards.layout import Layout
-from sandbox.games.billiards.rules.happening import GameError
-from sandbox.play.billiards.game import PLAYERS, Game, Players, plays
+from sandbox.play.billiards.game import PLAYERS, Game, Players
 from sandbox.play.billiards.gestures import Gestures
-from sandbox.play.billiards.person import Person
+from sandbox.play.billiards.seats import Seats, laid
 from sandbox.play.hands import Hands
 from sandbox.play.instruments.knob import Value
 from sandbox.play.knobs import turned
@@ -48,11 +46,7 @@ class Stage:
         self.path: Path | None = None
         self.file: Scene | None = None
         """the scene as its file has it"""
-        self.game: Game | None = None
-        """who plays at the table, where one is on"""
-        self.gestures: Gestures | None = None
-        """what a hand does at it"""
-        self._players: Players | None = None
+        self._seats = Seats()
         self._paused = False
         self.hands = Hands()
         self.messages = Messages()
@@ -70,6 +64,16 @@ class Stage:
     def live(self) -> Live | None:
         """What is on, where it can be changed."""
         return self.show if isinstance(self.show, Live) else None
+
+    @property
+    def game(self) -> Game | None:
+        """Who plays at the table, where one is on."""
+        return self._seats.game
+
+    @property
+    def gestures(self) -> Gestures | None:
+        """What a hand does at it."""
+        return self._seats.gestures
 
     @property
     def engine(self) -> str:
@@ -104,7 +108,7 @@ class Stage:
             same: it is the scene that was on.
             again: makes it anew for a restart, where scene and settings are not all of it, as of a recording.
         """
-        self._let_go_of_table()
+        self._seats.leave()
         if self.show is not None:
             self.show.close()
         self.show, self.path, self.file = show, path, file
@@ -116,30 +120,12 @@ class Stage:
             show.company.show_trust(few if self._trusting is None else self._trusting)
             if self._ghosted and not show.company.ghosted:
                 show.company.show_ghost(True)
-            self._sit_down(show, file)
+            self._seats.take(show, file, self.messages.tell)
         self.on_new(same)
-
-    def _sit_down(self, live: Live, file: Scene) -> None:
-        """Begin a game, where the scene is a table."""
-        if not plays(live.scene):
-            return
-        # A scene that starts by its own shot has been struck already.
-        shot = file.shots[0] if file.shots and not live.scene.shots else None
-        try:
-            self.game = Game(live, self._players, shot)
-        except GameError as error:
-            self.messages.tell(str(error), "warning")
-        else:
-            self.gestures = Gestures(Person(self.game))
-
-    def _let_go_of_table(self) -> None:
-        if self.game is not None:
-            self.game.close()
-        self.game = self.gestures = None
 
     def seat(self, players: Players) -> None:
         """Begin the game anew with other players."""
-        self._players = players
+        self._seats.players = players
         self.restart()
 
     def open(self, path: Path, same: bool = False, engine: str | None = None) -> bool:
@@ -155,8 +141,7 @@ class Stage:
     def _start(
         self, scene: Scene, path: Path | None, file: Scene, engine: str, settings: Settings | None, same: bool
     ) -> bool:
-        if scene.play.game is not None:
-            scene = Layout.of(scene).scene  # whose shots are the players'
+        scene = laid(scene)
         try:
             session = Session(scene, engine, settings)
         except Refusal as refusal:
@@ -292,8 +277,7 @@ class Stage:
         """Let real time pass, s."""
         if self.show is None:
             return
-        game = self.game
-        still = game is not None and game.waits and not self.hands.holding
+        game, still = self.game, self._seats.waits and not self.hands.holding
         self.show.go_on(elapsed, self.paused or still)
         if game is not None:
             self.act(lambda _: game.go_on(elapsed))
@@ -332,7 +316,7 @@ class Stage:
 
     def close(self) -> None:
         """Let go of what is on."""
-        self._let_go_of_table()
+        self._seats.leave()
         if self.show is not None:
             self.show.close()
             self.show = None
