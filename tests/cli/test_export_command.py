@@ -14,6 +14,7 @@ import pyarrow.parquet as parquet
 import pytest
 from calling import DROP, json_of, lines_of, process, written
 from films import gif_frames, mp4_frames
+from interruptible import interruptible
 from PIL import Image
 
 from sandbox.action import Impulse, Spawn
@@ -412,14 +413,6 @@ def test_table_loads_nothing_that_draws(stored: Path, tmp_path: Path) -> None:
     assert (done.stdout, done.stderr) == ("0\n", "")
 
 
-# A shell may start its children with SIGINT ignored, and they would inherit that.
-INTERRUPTIBLE = """
-import runpy, signal
-signal.signal(signal.SIGINT, signal.default_int_handler)
-runpy.run_module("sandbox", run_name="__main__", alter_sys=True)
-"""
-
-
 def long(trajectory: Trajectory) -> Trajectory:
     """The run 20,000 times over: minutes of work for whoever exports it."""
     times = 20_000
@@ -437,7 +430,7 @@ def test_interrupt_keeps_what_is_finished_and_leaves_no_half_file(suffix: str, t
     words = ["export", "run.npz", "--to", "out/first.png", "--to", f"out/film{suffix}", "--to", "out/last.png"]
     film = ["--fps", "2"] if suffix in (".gif", ".mp4") else []
     command = subprocess.Popen(
-        [sys.executable, "-c", INTERRUPTIBLE, *words, *film],
+        interruptible(*words, *film),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

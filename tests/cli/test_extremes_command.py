@@ -3,12 +3,12 @@
 import json
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
 from calling import json_of, lines_of, process
+from interruptible import interruptible
 
 SMALL = ("extremes", "--axes", "stiffness,restitution", "--engines", "pymunk,exact", "--quick", "--workers", "1")
 
@@ -95,14 +95,17 @@ def test_limits_out_of_range_are_faults(capfd: pytest.CaptureFixture[str], wrong
 
 @pytest.mark.slow
 def test_interrupted_run_keeps_what_is_finished(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "sandbox", "extremes", "--workers", "1"]  # minutes
-    running = subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(8.0)  # enough for some cells, and by far not for all; where none is finished, none is kept
-    for _ in range(2):  # the impatient press it twice
-        running.send_signal(signal.SIGINT)
-    out, errors = running.communicate(timeout=60.0)
+    words = ["extremes", "--workers", "1", "--json"]  # minutes
+    command = subprocess.Popen(interruptible(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        time.sleep(8.0)  # enough for some cells, and by far not for all; where none is finished, none is kept
+        for _ in range(2):  # the impatient press it twice
+            command.send_signal(signal.SIGINT)
+        out, errors = command.communicate(timeout=60.0)
+    finally:
+        command.kill()
     document = json.loads(out)
-    assert running.returncode == 130
+    assert command.returncode == 130
     assert document["interrupted"]
     assert errors == f"interrupted: {len(document['cells'])} cells are finished and kept\n"
     assert all(cell["verdict"] in ("exact", "degraded", "refused", "failed") for cell in document["cells"])

@@ -5,7 +5,6 @@ import shlex
 import signal
 import sqlite3
 import subprocess
-import sys
 import time
 from contextlib import closing
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from calling import DROP, document_of, json_of, lines_of, written
+from interruptible import interruptible
 
 from sandbox.batch.store import Store
 from sandbox.trajectory import Trajectory
@@ -149,21 +149,11 @@ def test_damaged_file_is_told_in_one_line(tmp_path: Path, capfd: pytest.CaptureF
     assert (status, again["runs"][0]["id"], again["runs"][0]["repeated"]) == (0, document["runs"][0]["id"], False)
 
 
-# A shell may start its children with SIGINT ignored, and they would inherit that.
-INTERRUPTIBLE = """
-import runpy, signal
-signal.signal(signal.SIGINT, signal.default_int_handler)
-runpy.run_module("sandbox", run_name="__main__", alter_sys=True)
-"""
-
-
 @pytest.mark.parametrize("flags", ["--json", "--quiet", ""])
 def test_interrupt_keeps_what_is_finished(flags: str, tmp_path: Path) -> None:
     scene, folder = written(tmp_path, DROP.replace("duration = 0.5", "duration = 20.0")), tmp_path / "runs"
     words = ["run", scene, "--seeds", "500", "--out", str(folder), *shlex.split(flags)]
-    command = subprocess.Popen(
-        [sys.executable, "-c", INTERRUPTIBLE, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    command = subprocess.Popen(interruptible(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         while len(list(folder.glob("*.npz"))) < 3:
             assert command.poll() is None

@@ -96,7 +96,10 @@ class Driven:
 
     def _do(self, *words: object) -> None:
         """Do something, and make sure that the server has taken it in: it may serve who comes later first."""
-        self._xdotool(*words, "getmouselocation")  # which it answers
+        done = self._run(*words, "getmouselocation")  # which it answers
+        # What is done may close the window, also while xdotool asks for what is under the mouse.
+        closed = "BadWindow" in done.stderr and words[0] != "windowfocus"
+        assert done.returncode == 0 or closed, f"xdotool {words}: {done.stderr}"
 
     # What a person does
 
