@@ -29,7 +29,7 @@ class Cause(StrEnum):
     JOINTS = "joints"
     """What holds joints, as far as it takes: ideally nothing"""
     DRIVES = "drives"
-    """Thrusts, motors, steady forces, hands"""
+    """Thrusts, motors, steady forces, hands; zones: whom they stop, and what their gravity gives beyond the world's"""
     CORRECTION = "position correction"
     """Positions that are shifted to undo overlaps, or what is off in joints"""
     INTEGRATOR = "integrator"

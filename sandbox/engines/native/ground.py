@@ -9,6 +9,7 @@ from sandbox.engines.limits import FARTHEST, FASTEST
 from sandbox.engines.native.space import SurfaceSetter, category, fixed_shapes, reach_of
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
+from sandbox.scene.zone import mask_of
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 MANY = 5_000
@@ -40,7 +41,7 @@ class Ground:
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
             shapes = list(fixed_shapes(thing, body, centre, reach))
             for shape in shapes:
-                shape.filter = category(True, "all")
+                shape.filter = category(True, "all", layers=mask_of(thing.layers, scene.layers))
                 self._setter.dress(shape, number)
             self._space.add(body)
             self._things.append((body, shapes))
