@@ -116,7 +116,11 @@ class Visiting:
 
     def _can_hold(self, number: int, zone: int) -> bool:
         """Tell whether a zone can hold a body: one at a time, and none that hangs on something."""
-        return not self._joined[number] and not (self.visits[:, zone] == HELD).any() and not (self.visits[number] == HELD).any()
+        return (
+            not self._joined[number]
+            and not (self.visits[:, zone] == HELD).any()
+            and not (self.visits[number] == HELD).any()
+        )
 
     def _hold(self, number: int, zone: int) -> None:
         self.visits[number, zone] = HELD
