@@ -1,5 +1,7 @@
 """Zones: faint tinted areas beneath everything that moves, with a thin outline."""
 
+from itertools import pairwise
+
 import numpy as np
 import pygame
 
@@ -51,7 +53,7 @@ def _distance(zone: Zone, camera: Camera) -> tuple[Distance, pygame.Rect]:
         return _outline(corners), _box(corners, 0.0)
     half = 0.5 * zone.thickness * camera.scale
     ends = [(x, y) for x, y in corners.tolist()]
-    parts = [capsule_distance(a, b, half) for a, b in zip(ends, ends[1:], strict=False)]
+    parts = [capsule_distance(a, b, half) for a, b in pairwise(ends)]
 
     def nearest(px: FloatArray, py: FloatArray) -> FloatArray:
         return np.asarray(np.minimum.reduce([part(px, py) for part in parts]))
@@ -60,9 +62,7 @@ def _distance(zone: Zone, camera: Camera) -> tuple[Distance, pygame.Rect]:
 
 
 def _outline(corners: FloatArray) -> Distance:
-    """Return the distance from a simple polygon (K, 2), px: how far its nearest side is; inside where a ray to the
-    right crosses an odd number of sides.
-    """
+    """Return the distance from a simple polygon (K, 2), px; inside, a ray crosses an odd number of sides."""
     sides = list(zip(corners.tolist(), np.roll(corners, -1, axis=0).tolist(), strict=True))
 
     def distance(px: FloatArray, py: FloatArray) -> FloatArray:
