@@ -66,6 +66,7 @@ class Audit:
         self._pairs: list[IntArray] = []
         self._looks = Looks()
         self._looks.add(np.empty((0, 2), np.int64))
+        self._on: IntArray = np.zeros((0, 0), np.int64)  # layers, as bits; without rows where there is one alone
         self._lay_out(scene.bodies if bodies is None else bodies)
 
     def joined(self, bodies: Bodies) -> None:
@@ -152,7 +153,7 @@ class Audit:
         self._time: list[float] = []
         self._start = np.empty((batch, len(self._core), 2))
         self._end = np.empty_like(self._start)
-        self._on = np.zeros((0, 0), np.int64)  # layers, as bits; without rows where there is one alone
+        self._on = np.zeros((0, 0), np.int64)
 
     def _examine(self) -> None:
         """Examine the substeps that wait."""
