@@ -159,7 +159,8 @@ def _noted(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArray:
     every = 0
     for zone in scene.zones:
         every |= mask_of(zone.layers, scene.layers)
-    return np.asarray(some & ((reached & every) != 0))
+    still_inside = bodies.visits.any(axis=1)  # of a zone whose layers it has left: that it goes out is noted too
+    return np.asarray(some & ((reached & every != 0) | still_inside))
 
 
 def _by_layers(scene: Scene) -> list[tuple[int, IntArray]]:

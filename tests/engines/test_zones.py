@@ -128,8 +128,8 @@ def test_gravity_of_a_zone_is_a_slope_up_and_down_again() -> None:
     run = sandbox.run(scene_of(slope, ball={"velocity": [1.5, 0.0]}))
     # It comes in up to h late, v·h farther; explicit Euler rises g·h·t/2 too high, with t = 0.75 s.
     assert run.position[:, 0, 0].max() == pytest.approx(0.5 + 0.5625, abs=1.5 * H + 2.0 * H * 0.75)
-    # The velocity is exact but for the substeps at the edge, in which it acts or not.
-    assert run.velocity[-1, 0, 0] == pytest.approx(-1.5, abs=2 * 2.0 * H)
+    # The velocity is exact but for the substeps at the edge, in which it acts or not, and by which it is late.
+    assert run.velocity[-1, 0, 0] == pytest.approx(-1.5, abs=3 * 2.0 * H)
 
 
 def test_gravity_of_a_zone_replaces_the_worlds_and_drag_goes_on_acting() -> None:
@@ -161,7 +161,7 @@ def started(scene: Scene, seconds: float) -> Relay:
 
 def test_held_body_stands_at_the_centre_whatever_comes() -> None:
     """Gravity pulls, and a heavy ball hits it: that one bounces off as off a wall, e = 1."""
-    heavy = {"name": "heavy", "position": [1.0, 1.5], "velocity": [0.0, -2.0], "radius": 0.1, "mass": 50.0}
+    heavy = {"name": "heavy", "position": [1.0, 3.0], "velocity": [0.0, -2.0], "radius": 0.1, "mass": 50.0}
     one = {"name": "ball", "position": [0.0, 0.0], "velocity": [1.0, 0.0], "radius": 0.05, "restitution": 1.0}
     scene = from_document(
         {
@@ -172,7 +172,7 @@ def test_held_body_stands_at_the_centre_whatever_comes() -> None:
         }
     )
     run = sandbox.run(scene)
-    late = run.time > 1.0
+    late = run.time > 1.05
     assert (run.position[late, 0] == [1.0, 0.0]).all()
     assert not run.velocity[late, 0].any()
     assert run.velocity[-1, 1, 1] == pytest.approx(2.0, rel=1e-12)  # against what does not move
