@@ -43,8 +43,8 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
     end the bouncing, which is right then. Before either, what a formula of the whole scene says of a body that does
     more than fly and bounce: that holds to its end.
 
-    A run that actions or zones interfered with has none; what zones only note ends a form as a contact does. Only a ball bounces by formula; other shapes have their flight up to
-    the first contact.
+    A run that actions or zones interfered with has none; what zones only note ends a form as a contact does. Only a
+    ball bounces by formula; other shapes have their flight up to the first contact.
     """
     bodies = scene.bodies
     if trajectory.info.get("actions") or trajectory.names.tolist() != list(bodies.names) or bodies.fixed[number]:
