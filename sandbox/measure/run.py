@@ -195,7 +195,7 @@ class Auditor:
         began = perf_counter()
         if (now := self._simulation.scene) is not self._scene:
             if now.fixed != self._scene.fixed:
-                self._audit.changed(now)
+                self._audit.changed(now, self._simulation.bodies)
             self._scene = now
         if len(end) != self._known:
             self._audit.joined(self._simulation.bodies)

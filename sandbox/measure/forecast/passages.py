@@ -142,7 +142,7 @@ def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
 
 
 def _kicked(meet: Meetings) -> float:
-    """Return how fast kicks make a body, m/s, that comes back as fast as it was sent; one kick where there is no end."""
+    """Return how fast kicks make a body, m/s, that always comes back; by one kick where there is no end."""
     surfaces, fastest = meet.surfaces, 0.0
     for b in np.flatnonzero(surfaces.kicks).tolist():
         kick = surfaces.surfaces[b].kick
