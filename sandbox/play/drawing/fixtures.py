@@ -23,7 +23,7 @@ from sandbox.scene.model import Plane, Post, Scene, Wall
 
 HATCH, HATCHES = 9.0, 600
 """px between two hatches of a plane, and the most of them"""
-WAYS = 36.0
+WAYS = 60.0
 """px between two arrows through a wall that lets pass from one side"""
 CAP = 5.0
 """px, the least radius at which a post that kicks shows its ring"""
@@ -145,19 +145,19 @@ def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, anti
 def _ways_through(
     surface: pygame.Surface, a: Pixel, b: Pixel, half: float, colour: Colour, unit: float, antialias: bool
 ) -> None:
-    """Draw small arrows across a wall, from its right to its left, the way that it lets pass."""
+    """Draw small arrows out of a wall's left, the way that it lets pass."""
     length = math.dist(a, b)
     if length < 2.0:
         return
     ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
     # On the screen y points down: a quarter turn to the left of (ux, uy) is (uy, −ux).
-    out, reach = (uy, -ux), half + 7.0 * unit
+    out, reach = (uy, -ux), half + 10.0 * unit
     count = max(1, min(round(length / (WAYS * unit)), HATCHES))
     for k in range(count):
         s = (k + 0.5) / count * length
         x, y = a[0] + s * ux, a[1] + s * uy
         tip = x + reach * out[0], y + reach * out[1]
-        tail = x - reach * out[0], y - reach * out[1]
+        tail = x + half * out[0], y + half * out[1]
         stroke(surface, tail, tip, colour, 1.5 * unit, antialias)
         for side in (-1.0, 1.0):
             barb = (
