@@ -12,6 +12,7 @@ from sandbox.scene.meetings import meetings
 WALL = {"points": [[0, 0], [1, 0]]}
 POST = {"position": [0, 0], "radius": 1}
 BALL = {"position": [5, 5], "radius": 0.1}
+NONE = {"restitution_falloff": 0}
 
 
 @pytest.mark.parametrize(
@@ -19,32 +20,32 @@ BALL = {"position": [5, 5], "radius": 0.1}
     [
         (
             {"post": [{**POST, "kick": {"speed": 1, "profile": "middle"}}]},
-            ("post", 0, "kick", "profile"),
+            "post[0].kick.profile",
             "a post has not",
         ),
-        ({"post": [{**POST, "kick": {}}]}, ("post", 0, "kick", "speed"), "is missing"),
-        ({"post": [{**POST, "kick": {"speed": -1}}]}, ("post", 0, "kick", "speed"), "0 or more"),
-        ({"post": [{**POST, "kick": {"speed": 1, "threshold": 0}}]}, ("post", 0, "kick", "threshold"), "0.001 or more"),
-        ({"post": [{**POST, "one_way": True}]}, ("post", 0, "one_way"), "unknown key"),
-        ({"wall": [{**WALL, "kick": {"speed": 1, "profile": "ends"}}]}, ("wall", 0, "kick", "profile"), "one of"),
-        ({"wall": [{**WALL, "solid": 1}]}, ("wall", 0, "solid"), "true or false"),
-        ({"ball": [{**BALL, "restitution_falloff": -0.1}]}, ("ball", 0, "restitution_falloff"), "0 or more"),
-        ({"surface": {}, "wall": [{**WALL, "solid": False}]}, ("wall", 0, "solid"), "not of a cushion"),
-        ({"surface": {}, "wall": [{**WALL, "one_way": True}]}, ("wall", 0, "one_way"), "not of a cushion"),
-        ({"surface": {}, "post": [{**POST, "kick": {"speed": 1}}]}, ("post", 0, "kick"), "not of a cushion"),
+        ({"post": [{**POST, "kick": {}}]}, "post[0].kick.speed", "is missing"),
+        ({"post": [{**POST, "kick": {"speed": -1}}]}, "post[0].kick.speed", "0 or more"),
+        ({"post": [{**POST, "kick": {"speed": 1, "threshold": 0}}]}, "post[0].kick.threshold", "0.001 or more"),
+        ({"post": [{**POST, "one_way": True}]}, "post[0].one_way", "unknown key"),
+        ({"wall": [{**WALL, "kick": {"speed": 1, "profile": "ends"}}]}, "wall[0].kick.profile", "one of"),
+        ({"wall": [{**WALL, "solid": 1}]}, "wall[0].solid", "true or false"),
+        ({"ball": [{**BALL, "restitution_falloff": -0.1}]}, "ball[0].restitution_falloff", "0 or more"),
+        ({"surface": {}, "wall": [{**WALL, "solid": False}]}, "wall[0].solid", "not of a cushion"),
+        ({"surface": {}, "wall": [{**WALL, "one_way": True}]}, "wall[0].one_way", "not of a cushion"),
+        ({"surface": {}, "post": [{**POST, "kick": {"speed": 1}}]}, "post[0].kick", "not of a cushion"),
         (
             {"surface": {}, "material": [{"name": "m", "restitution_falloff": 0.1}]},
-            ("material", 0, "restitution_falloff"),
+            "material[0].restitution_falloff",
             "rebound alike",
         ),
-        ({"surface": {}, "ball": [{**BALL, "restitution_falloff": 0.1}]}, ("ball", 0, "restitution_falloff"), "alike"),
+        ({"surface": {}, "ball": [{**BALL, "restitution_falloff": 0.1}]}, "ball[0].restitution_falloff", "alike"),
     ],
 )
-def test_fault_is_told_where_it_is(document: dict[str, Any], where: tuple[str | int, ...], what: str) -> None:
+def test_fault_is_told_where_it_is(document: dict[str, Any], where: str, what: str) -> None:
     with pytest.raises(SceneError) as caught:
         from_document(document)
     (fault,) = caught.value.faults
-    assert fault.location == where
+    assert fault.path == where
     assert what in fault.message
 
 
@@ -55,13 +56,9 @@ def test_fault_names_file_and_line() -> None:
 
 
 def test_materials_state_falloff_and_a_shape_outranks_its_own() -> None:
-    scene = from_document(
-        {
-            "material": [{"name": "rubber", "restitution": 0.8, "restitution_falloff": 0.3}],
-            "ball": [{**BALL, "material": "rubber"}, {**BALL, "position": [9, 9], "material": "rubber", "restitution_falloff": 0}],
-            "post": [{**POST, "restitution_falloff": 0.1}],
-        }
-    )  # fmt: skip
+    balls = [{**BALL, "material": "rubber"}, {"position": [9, 9], "radius": 0.1, "material": "rubber", **NONE}]
+    rubber = {"name": "rubber", "restitution": 0.8, "restitution_falloff": 0.3}
+    scene = from_document({"material": [rubber], "ball": balls, "post": [{**POST, "restitution_falloff": 0.1}]})
     surfaces = meetings(scene).surfaces
     first, second, post = *surfaces.of_body.tolist(), surfaces.of_fixed[0]
     assert surfaces.falloff[first, post] == pytest.approx(0.4, rel=1e-15)  # a sum
@@ -72,9 +69,8 @@ def test_materials_state_falloff_and_a_shape_outranks_its_own() -> None:
 
 def test_parts_of_a_body_take_over_its_falloff() -> None:
     part = {"position": [0, 0], "radius": 0.1}
-    scene = from_document(
-        {"body": [{"position": [5, 5], "restitution_falloff": 0.2, "ball": [part, {**part, "position": [0.5, 0], "restitution_falloff": 0.5}]}]}
-    )  # fmt: skip
+    parts = [part, {**part, "position": [0.5, 0], "restitution_falloff": 0.5}]
+    scene = from_document({"body": [{"position": [5, 5], "restitution_falloff": 0.2, "ball": parts}]})
     surfaces = meetings(scene).surfaces
     assert [surfaces.surfaces[k].falloff for k in surfaces.of_shape.tolist()] == [0.2, 0.5]
 
