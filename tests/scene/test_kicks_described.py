@@ -35,7 +35,7 @@ NONE = {"restitution_falloff": 0}
         ({"surface": {}, "post": [{**POST, "kick": {"speed": 1}}]}, "post[0].kick", "not of a cushion"),
         (
             {"surface": {}, "material": [{"name": "m", "restitution_falloff": 0.1}]},
-            "material[0].restitution_falloff",
+            "material.m.restitution_falloff",
             "rebound alike",
         ),
         ({"surface": {}, "ball": [{**BALL, "restitution_falloff": 0.1}]}, "ball[0].restitution_falloff", "alike"),
