@@ -94,6 +94,9 @@ def test_another_engine_takes_over_what_is_solid(engine: str, heir: str) -> None
     simulation.apply(Switch(time=0.0, engine=heir))
     assert [thing.solid for thing in (*simulation.scene.walls, *simulation.scene.posts)] == [False, True, False]
     assert advance(simulation, 900) == pytest.approx(R, abs=3e-3)  # on the floor; slop
+    toggle(simulation, "floor", False)
+    assert [wall.solid for wall in simulation.scene.walls] == [False, False]
+    assert advance(simulation, 300) < 0.0
 
 
 @pytest.mark.parametrize("engine", ENGINES)
