@@ -16,7 +16,9 @@ from sandbox.engines.rebound import kicked, rebound, share_at, stretches
 from sandbox.engines.relay import Relay, start
 from sandbox.scene.discs import Ball
 from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.floor import Floor
+from sandbox.scene.kick import Kick
+from sandbox.scene.model import Post, Scene
 
 ENGINES = ("pymunk", "exact", "reference")
 SURFACES = {
@@ -283,3 +285,42 @@ def test_account_books_kicks_as_a_cause_of_their_own() -> None:
     account.enter(Cause.KICKS, 2.0)
     assert account.entries()[Cause.KICKS] == 2.0
     assert account.entries()[Cause.PHANTOM] == 0.0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@settings(max_examples=10, deadline=None)
+@given(x=st.floats(-0.2, 0.2), vx=st.floats(-2, 2), vy=st.floats(-2, 2), g=st.floats(0, 2))
+def test_account_closes_in_a_box_that_kicks(engine: str, x: float, vx: float, vy: float, g: float) -> None:
+    rubber = {"restitution": 0.8, "restitution_falloff": 0.3, "friction": 0.6}
+    box = {"points": [[-0.3, 0.0], [0.3, 0.0], [0.3, 0.6], [-0.3, 0.6]], "closed": True, **rubber}
+    post = {"position": [0.0, 0.45], "radius": 0.05, **rubber, "kick": BUMPER}
+    scene = from_document(
+        {
+            "world": {"gravity": [0.0, -g]},
+            "solver": {"dt": 0.002},
+            "ball": [{**BALL, "position": [x, 0.2], "velocity": [vx, vy]}],
+            "wall": [{**box, "kick": {"speed": 0.5, "threshold": 0.1, "profile": "middle"}}],
+            "post": [post],
+        }
+    )
+    simulation = start(scene, engine)
+    simulation.account()
+    before = total_energy(simulation)
+    for _ in range(400):
+        simulation.step()
+    account = simulation.account()
+    scale = sum(abs(energy) for energy in account.values()) + before + 1e-6
+    assert total_energy(simulation) - before == pytest.approx(sum(account.values()), abs=1e-9 * scale)  # rounding
+    assert account[Cause.KICKS] >= 0.0 >= account[Cause.RESTITUTION]
+    # What hops on a post gives a little (exact); no law of a rebound gives anything by itself.
+    assert account[Cause.PHANTOM] <= 1e-6 * scale
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_floors_refuse_what_kicks_even_where_no_file_was_checked(engine: str) -> None:
+    post = Post(position=(1.0, 0.0), radius=0.1, kick=Kick(speed=1.0))
+    scene = Scene(
+        surface=Floor(sliding_friction=0.2), balls=(Ball(position=(0.0, 0.0), radius=0.03, mass=0.2),), posts=(post,)
+    )
+    with pytest.raises(Refusal, match=r"kicks on a floor|does not model"):
+        start(scene, engine)

@@ -142,6 +142,26 @@ def test_pymunk_pushes_out_what_stands_where_something_becomes_solid_and_exact_r
     assert advance(soft, 900) == pytest.approx(1.0 + R, abs=2e-3)
 
 
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"response": "penalty", "substeps": 20, "damping": 0.5},
+        {"detection": "bisect", "integrator": "velocity_verlet"},
+        {"detection": "swept", "integrator": "velocity_verlet"},
+        {"detection": "shrink"},
+        {"broad_phase": "grid"},
+    ],
+)
+def test_every_choice_of_the_reference_knows_what_is_solid(how: dict[str, Any]) -> None:
+    scene = shelf()
+    simulation = start(scene, "reference", scene.solver.replace(**how))
+    advance(simulation, 50)
+    toggle(simulation, "shelf", False)
+    assert advance(simulation, 250) < 0.8
+    toggle(simulation, "shelf", True)
+    assert advance(simulation, 600) == pytest.approx(R, abs=0.01)  # springs give way by some mm
+
+
 def test_what_is_toggled_must_be_there() -> None:
     simulation = start(shelf())
     for name in ("ball", "shelves"):
