@@ -53,14 +53,14 @@ def overlapping(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
             for number, hulls in solids.items():
                 deep = any(((h.corners - plane.point) @ normal < h.radius).any() for h in hulls)
                 found[number] |= on[number] and deep
-        for wall in scene.walls:
+        for wall in (wall for wall in scene.walls if wall.solid):
             on = lies & mask_of(wall.layers, layers) != 0
             points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
             for a, b in pairwise(points):
                 near = on & (_to_segment(position, a, b) < radius + wall.thickness / 2.0)
                 found |= near & lone
                 _meet_fixed(found, near, solids, Hull(np.asarray((a, b)), wall.thickness / 2.0))
-        for post in scene.posts:
+        for post in (post for post in scene.posts if post.solid):
             near = np.hypot(*(position - np.asarray(post.position)).T) < radius + post.radius
             near &= lies & mask_of(post.layers, layers) != 0
             found |= near & lone
