@@ -40,6 +40,8 @@ class Frame:
     """(N,) false once removed or retired: the body then stays where it was, with no velocity"""
     roll: FloatArray | None = None
     """(N, 2) rad/s, about x and y, of spheres on a floor; none where nothing rolls"""
+    drives: FloatArray | None = None
+    """(D, 2) level and torque, N·m, of the scene's drives; none where it has none"""
 
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""
@@ -52,7 +54,7 @@ class Frame:
         return None if self.roll is None else np.column_stack((self.roll, self.angular_velocity))
 
     def state_hash(self) -> str:
-        """Return a SHA-256 of time and every body's state, bit for bit."""
+        """Return a SHA-256 of time, every body's state and every drive's, bit for bit."""
         digest = hashlib.sha256(np.float64(self.time).tobytes())
         for array in self._arrays():
             digest.update(array.tobytes())
@@ -60,7 +62,7 @@ class Frame:
 
     def _arrays(self) -> tuple[npt.NDArray[Any], ...]:
         arrays = (self.position, self.velocity, self.angle, self.angular_velocity, self.present)
-        return arrays if self.roll is None else (*arrays, self.roll)
+        return (*arrays, *(more for more in (self.roll, self.drives) if more is not None))
 
 
 class ContactEvent(NamedTuple):

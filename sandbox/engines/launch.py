@@ -43,7 +43,8 @@ def launched(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tupl
     roll = frame.roll
     if roll is not None:  # what a generator makes does not roll yet
         roll = np.where(those[:, None], 0.0, roll)
-    return Frame(time=frame.time, present=frame.present | those, roll=roll, **columns), bodies, those
+    present = frame.present | those
+    return Frame(time=frame.time, present=present, roll=roll, drives=frame.drives, **columns), bodies, those
 
 
 def _first(scene: Scene, generator: Mover) -> int:

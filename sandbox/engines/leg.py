@@ -95,7 +95,7 @@ class Leg:
         if frame.roll is not None:
             roll = np.zeros((count, 2))
             roll[self.numbers] = frame.roll
-        return Frame(self.time, position, velocity, angle, spin, present, roll)
+        return Frame(self.time, position, velocity, angle, spin, present, roll, frame.drives)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call."""
@@ -165,7 +165,7 @@ def begun(
         Refusal: the engine lacks something.
         ActionError: it cannot take over a steady force.
     """
-    simulation = start_engine(scene.placed(cast(bodies, frame), frame.time, broken), engine, wanted)
+    simulation = start_engine(scene.placed(cast(bodies, frame), frame.time, broken, frame.drives), engine, wanted)
     for each in lasting:
         try:
             simulation.apply(each)

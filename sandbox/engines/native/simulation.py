@@ -120,12 +120,14 @@ class NativeSimulation(Running):
             self._retire()
             self._population.end()
             return
-        before = [array.copy() for array in self._state()]
+        before, drives = [array.copy() for array in self._state()], self._population.meeting.drives
+        driven = drives.told()
         self._substep(int(whole), look=False, share=rest)  # its contacts lie beyond the end
         self._part = part
         self._guard()
         for now, old in zip(self._state(), before, strict=True):
             now[...] = old + (now - old) * rest
+        drives.end(driven, rest)
         self._retire()
         self._population.end()
 
@@ -159,7 +161,9 @@ class NativeSimulation(Running):
             self._still = angle.copy(), angular_velocity.copy()
         angle, angular_velocity = self._still
         roll = None if population.felt is None else population.roll.copy()
-        return Frame(self.time, position, velocity, angle, angular_velocity, population.present.copy(), roll)
+        drives = population.meeting.drives.told() if population.scene.drives else None
+        present = population.present.copy()
+        return Frame(self.time, position, velocity, angle, angular_velocity, present, roll, drives)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
