@@ -134,7 +134,7 @@ class Population:
 
     @property
     def _driven(self) -> BoolArray:
-        """(N,) which only the space can move: with thrusts or drives; all where bodies attract each other, or on floors."""
+        """(N,) which only the space can move: with thrusts or drives; all where bodies attract, or on a floor."""
         field, drives = self.meeting.field, self.scene.drives
         if field.between_bodies or self.felt is not None:
             return np.ones(len(self.bodies), dtype=np.bool_)
