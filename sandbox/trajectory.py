@@ -41,7 +41,7 @@ class Frame:
     roll: FloatArray | None = None
     """(N, 2) rad/s, about x and y, of spheres on a floor; none where nothing rolls"""
     drives: FloatArray | None = None
-    """(D, 2) level and torque, N·m, of the scene's drives; none where it has none"""
+    """(D, 3) of the scene's drives: level; torque, N·m, of a plunger its pull, m, and how fast that grows, m/s"""
 
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""

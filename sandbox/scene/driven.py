@@ -144,5 +144,5 @@ def _least(mount: Mount, mass: float) -> float:
 
 
 def at_rest(scene: Scene) -> FloatArray:
-    """Return level and torque (N·m) of each drive as a scene starts, (D, 2)."""
-    return np.zeros((len(scene.drives), 2))
+    """Return the state of each drive as a scene starts, (D, 3): level, torque or pull, pace."""
+    return np.zeros((len(scene.drives), 3))

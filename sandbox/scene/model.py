@@ -209,7 +209,7 @@ class Scene(Part):
 
     @cached_property
     def driven(self) -> "FloatArray":
-        """(D, 2) level and torque (N·m) of each drive as this state of the scene begins."""
+        """(D, 3) of each drive, as this state of the scene begins: level, torque or pull, pace."""
         from sandbox.scene.driven import at_rest
 
         return at_rest(self)
@@ -229,7 +229,7 @@ class Scene(Part):
         """Return this scene with its bodies as they have come to be by a time, s: elsewhere, fewer, or more.
 
         Joints go with their bodies, and those that are broken, by their numbers, are left out; drives go on as they
-        are, (D, 2) level and torque. Only `bodies`, `links`, `driven` and `began` differ: the file that it would be
+        are, (D, 3). Only `bodies`, `links`, `driven` and `began` differ: the file that it would be
         written to is the same.
         """
         links = self.links.without(broken).among(bodies.names, self.bodies.names)

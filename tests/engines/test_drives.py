@@ -198,7 +198,8 @@ def test_two_balls_on_either_side_of_a_bat():
 def test_no_ball_passes_a_flapping_bat(throws):
     """Balls thrown onto a bat that flaps, at 1 kHz: none ever is with its centre inside, nor past it in one step."""
     balls = [
-        ball(0.005 + 0.065 * x, 0.06 + 0.05 * k + 0.02 * y, 0.0, -v, restitution=0.8, collides="all") | {"name": f"b{k}"}
+        ball(0.005 + 0.065 * x, 0.06 + 0.05 * k + 0.02 * y, 0.0, -v, restitution=0.8, collides="all")
+        | {"name": f"b{k}"}
         for k, (x, y, v) in enumerate(throws)
     ]
     running = start(scene(bat(), {"ball": balls}, gravity=(0.0, -0.77)))

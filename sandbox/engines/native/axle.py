@@ -5,12 +5,13 @@ from where it has to be by as much as that will carry it; what it meets, meets i
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import pymunk
 from pymunk._chipmunk_cffi import lib
 
 from sandbox.scene.driven import Mount
+from sandbox.scene.drives import PlungerDrive
 
 HEAVY = 2.0**100
 """kg, which nothing moves: the mass of what turns on a hinge. A power of 2, so that its weight is balanced exactly."""
@@ -34,17 +35,41 @@ def on_axle(mount: Mount, angle: float, place: tuple[float, float], kind: int, m
     return body
 
 
+class Start(NamedTuple):
+    """What a driven body begins with, or goes on with."""
+
+    number: int
+    """of the body"""
+    mount: Mount
+    body: pymunk.Body
+    """in the space"""
+    mass: float
+    """kg"""
+    place: tuple[float, float]
+    """of its centre of mass, m"""
+    velocity: tuple[float, float]
+    """m/s"""
+    angle: float
+    spin: float
+    """rad/s"""
+    state: tuple[float, float, float]
+    """of its drive: level, torque or pull, pace"""
+    h: float
+    """the substep, s"""
+
+
 class Axle:
     """A driven body: which one, and where it is, beside what the space knows of it."""
 
-    def __init__(self, number: int, mount: Mount, body: pymunk.Body) -> None:
-        self.number, self.mount, self.body = number, mount, body
-        self._record: Any = body._body
-        self.level, self.torque = 0.0, 0.0
-        self.angle, self.spin = float(body.angle), 0.0
-        self.place, self.velocity = (float(body.position[0]), float(body.position[1])), (0.0, 0.0)
+    def __init__(self, start: Start) -> None:
+        self.number, self.mount, self.body, self._h = start.number, start.mount, start.body, start.h
+        self._record: Any = start.body._body
+        self.level = start.state[0]
+        self.angle, self.spin = start.angle, start.spin
+        self.place, self.velocity = start.place, start.velocity
         """of its centre of mass, m and m/s"""
-        self._seat = body.local_to_world(mount.hinge)
+        drive = start.mount.drive
+        self._seat = start.mount.home if isinstance(drive, PlungerDrive) else drive.pivot
 
     def before(self) -> None:
         """Prepare the body for a substep."""
@@ -56,9 +81,10 @@ class Axle:
         """Ask for another level from now on."""
         self.level = level
 
-    def _turned(self, angle: float, spin: float) -> None:
-        """Note where a body on a hinge is."""
-        self.angle, self.spin = angle, spin
+    @property
+    def state(self) -> tuple[float, float, float]:
+        """Level, torque or pull, pace: as a frame tells them of a drive."""
+        return self.level, 0.0, 0.0
 
     def settle(self) -> None:
         """Work out where the centre of mass of a body on a hinge is, and how fast."""
@@ -66,8 +92,8 @@ class Axle:
         cos, sin = math.cos(self.angle), math.sin(self.angle)
         dx, dy = sin * y - cos * x, -sin * x - cos * y
         self.place = self._seat[0] + dx, self._seat[1] + dy
-        self.velocity = -self.spin * dy, self.spin * dx
+        self.velocity = 0.0 - self.spin * dy, 0.0 + self.spin * dx  # no −0, which is another state bit by bit
 
-    def _aim(self, angle: float, spin: float, h: float) -> None:
+    def _aim(self, angle: float, spin: float) -> None:
         """Have the next step bring the body to an angle, by a rate that it has meanwhile."""
-        lib.cpBodySetAngle(self._record, angle - spin * h)
+        lib.cpBodySetAngle(self._record, angle - spin * self._h)

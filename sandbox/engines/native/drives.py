@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pymunk
 
-from sandbox.engines.native.axle import Axle, on_axle
+from sandbox.engines.native.axle import Axle, Start, on_axle
 from sandbox.engines.native.hinge import Hinge
 from sandbox.engines.native.strokes import Plunger, Stroke
 from sandbox.scene.bodies import Bodies
@@ -26,7 +26,7 @@ class Drives:
         self._space, self._h = space, h
         self._mounts: dict[str, Mount] = mounts(scene)
         self.state: FloatArray = scene.driven.copy()
-        """(D, 2) level and torque, N·m, of each drive; of those that hold somebody as of their beginning"""
+        """(D, 3) of each drive, as a frame tells them; of those that hold somebody not up to date"""
         self._axles: dict[int, Axle] = {}
         self._hinges: dict[int, Hinge] = {}  # by the ids of their bodies
         self._watched: set[int] = set()
@@ -60,19 +60,18 @@ class Drives:
     def join(self, name: str, number: int, body: pymunk.Body, state: list[float]) -> None:
         """Take charge of a body that is in the space: state is x, y, angle, vx, vy, spin, mass."""
         mount = self._mounts[name]
-        level, torque = self.state[mount.number].tolist()
-        _, _, _, vx, vy, spin, mass, *_ = state
+        level, effort, pace = self.state[mount.number].tolist()
+        x, y, angle, vx, vy, spin, mass, *_ = state
+        own = level, effort, pace
+        start = Start(number, mount, body, mass, (x, y), (vx, vy), angle, spin, own, self._h)
         if isinstance(mount.drive, TorqueDrive):
-            own = level, torque, spin, mass
-            hinge = Hinge(number, mount, body, self._space.static_body, own, self._h)
+            hinge = Hinge(start, self._space.static_body)
             hinge.weigh(*self._gravity)
             self._space.add(hinge.limit)
             self._hinges[body.id] = hinge
             self._axles[mount.number] = hinge
-        elif isinstance(mount.drive, PlungerDrive):
-            self._axles[mount.number] = Plunger(number, mount, body, (level, vx, vy), self._h)
         else:
-            self._axles[mount.number] = Stroke(number, mount, body, (level, torque, spin, mass), self._h)
+            self._axles[mount.number] = Plunger(start) if isinstance(mount.drive, PlungerDrive) else Stroke(start)
 
     def leave(self, number: int) -> None:
         """Let go of a body, by its number, that leaves the space."""
@@ -131,7 +130,7 @@ class Drives:
             self._note(k, axle)
 
     def _note(self, number: int, axle: Axle) -> None:
-        self.state[number] = axle.level, axle.torque
+        self.state[number] = axle.state
 
     @property
     def axles(self) -> list[Axle]:
@@ -144,11 +143,11 @@ class Drives:
         return [axle.number for axle in self._axles.values()]
 
     def end(self, before: FloatArray, share: float) -> None:
-        """Stand for good as it was a share of the last substep after its beginning, (D, 2)."""
+        """Stand for good as it was a share of the last substep after its beginning, (D, 3)."""
         self._last = before + (self.told() - before) * share
 
     def told(self) -> FloatArray:
-        """Return level and torque (N·m) of each drive as they are, (D, 2)."""
+        """Return the drives as they are, (D, 3), as a frame tells them."""
         if self._last is not None:
             return self._last
         for k, axle in self._axles.items():

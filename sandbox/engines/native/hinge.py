@@ -13,9 +13,8 @@ from typing import Any
 import pymunk
 from pymunk._chipmunk_cffi import ffi, lib
 
-from sandbox.engines.native.axle import Axle
+from sandbox.engines.native.axle import Axle, Start
 from sandbox.engines.native.glide import glide
-from sandbox.scene.driven import Mount
 from sandbox.scene.drives import TorqueDrive
 
 WIDE = 1e12
@@ -31,29 +30,18 @@ STILL = 1e-9
 class Hinge(Axle):
     """A body on a hinge, driven by a torque."""
 
-    def __init__(
-        self, number: int, mount: Mount, body: pymunk.Body, ground: pymunk.Body, state: tuple[float, ...], h: float
-    ) -> None:
-        """Set up.
-
-        Args:
-            number: of the body.
-            mount: how it is held.
-            body: in the space, not yet moving.
-            ground: the space's own.
-            state: level, torque (N·m), spin (rad/s), mass (kg).
-            h: the substep, s.
-        """
-        super().__init__(number, mount, body)
-        assert isinstance(mount.drive, TorqueDrive)
-        self._drive, self._h, self.moment = mount.drive, h, float(body.moment)
-        self.level, self.torque, self.spin, self._mass = state
+    def __init__(self, start: Start, ground: pymunk.Body) -> None:
+        """Go on from a start; the ground is the space's own body."""
+        super().__init__(start)
+        assert isinstance(start.mount.drive, TorqueDrive)
+        self._drive, self.moment, self._mass = start.mount.drive, float(start.body.moment), start.mass
+        self.torque = start.state[1]
         rest, end = self._drive.stops
         self._sense, self._end = math.copysign(1.0, end - rest), abs(end - rest)
         self._rest = rest
         self._edge = max(self._end - self._drive.hold_within, 0.0)
         self._angles = rest - WIDE, rest + WIDE
-        self.limit = pymunk.RotaryLimitJoint(ground, body, *self._angles)
+        self.limit = pymunk.RotaryLimitJoint(ground, self.body, *self._angles)
         self.limit.max_bias = BARELY
         self._armed = 0
         self.at = 0
@@ -107,7 +95,7 @@ class Hinge(Axle):
         angle, spin = self._rest + sense * place, sense * speed
         if self.at > 0:  # to the bit, whatever was added up
             angle = self._drive.stops[1]
-        self._aim(angle, self.spin, h)
+        self._aim(angle, self.spin)
         self.kick = moment * (spin - self.spin) / h
         if self.at:
             self.kick += sense * ((driving if self.at > 0 else mean) + own)
@@ -191,6 +179,11 @@ class Hinge(Axle):
         if self._met or self._shifted:  # pymunk turns it out of what overlaps it, in the substep after
             lib.cpBodySetAngle(self._record, self.angle)
             self._shifted = self._met
+
+    @property
+    def state(self) -> tuple[float, float, float]:
+        """Level, torque in N·m, nothing."""
+        return self.level, self.torque, 0.0
 
     @property
     def given(self) -> float:

@@ -2,23 +2,20 @@
 
 import math
 
-import pymunk
 from pymunk._chipmunk_cffi import lib
 
-from sandbox.engines.native.axle import Axle
-from sandbox.scene.driven import Mount
+from sandbox.engines.native.axle import Axle, Start
 from sandbox.scene.drives import PlungerDrive, StrokeDrive
 
 
 class Stroke(Axle):
     """A body on a hinge that turns at a rate."""
 
-    def __init__(self, number: int, mount: Mount, body: pymunk.Body, state: tuple[float, ...], h: float) -> None:
-        """Set up a body that has level, torque, spin (rad/s) and mass of a state; h is the substep, s."""
-        super().__init__(number, mount, body)
-        assert isinstance(mount.drive, StrokeDrive)
-        self._drive, self._h = mount.drive, h
-        self.level, _, self.spin, _ = state
+    def __init__(self, start: Start) -> None:
+        """Go on from a start."""
+        super().__init__(start)
+        assert isinstance(start.mount.drive, StrokeDrive)
+        self._drive, self._arrives = start.mount.drive, False
         lib.cpBodySetAngularVelocity(self._record, self.spin)
 
     def before(self) -> None:
@@ -37,7 +34,7 @@ class Stroke(Axle):
             self.spin = spin
             lib.cpBodySetAngularVelocity(self._record, spin)
         self.angle = stop if self._arrives else self.angle + spin * self._h
-        self._aim(self.angle, spin, self._h)
+        self._aim(self.angle, spin)
 
     def after(self) -> None:
         """Stand still once a stop is reached."""
@@ -52,28 +49,17 @@ class Stroke(Axle):
 class Plunger(Axle):
     """A body that is drawn back along a line, and springs forward."""
 
-    def __init__(self, number: int, mount: Mount, body: pymunk.Body, state: tuple[float, ...], h: float) -> None:
-        """Set up.
-
-        Args:
-            number: of the body.
-            mount: how it is held.
-            body: in the space.
-            state: level, how fast it goes along x and y, m/s.
-            h: the substep, s.
-        """
-        super().__init__(number, mount, body)
-        assert isinstance(mount.drive, PlungerDrive)
-        self._drive, self._h = mount.drive, h
-        length = math.hypot(*self._drive.direction)
-        self._ux, self._uy = self._drive.direction[0] / length, self._drive.direction[1] / length
-        self.level, vx, vy = state
-        home = mount.home
-        self.pull = max((home[0] - self.place[0]) * self._ux + (home[1] - self.place[1]) * self._uy, 0.0)
-        """how far it is drawn back, m"""
-        self.rate = -(vx * self._ux + vy * self._uy)
-        """how fast it is drawn back, m/s"""
-        self._arrives = False
+    def __init__(self, start: Start) -> None:
+        """Go on from a start."""
+        super().__init__(start)
+        assert isinstance(start.mount.drive, PlungerDrive)
+        self._drive, self._arrives = start.mount.drive, False
+        x, y = self._drive.direction
+        length = math.hypot(x, y)
+        self._ux, self._uy = x / length, y / length
+        _, self.pull, self.rate = start.state
+        """how far it is drawn back, m, and how fast that grows, m/s"""
+        lib.cpBodySetVelocity(self._record, self.velocity)
 
     def set(self, level: float) -> None:
         """Ask for another level from now on; a hand that lets go has stood still."""
@@ -92,7 +78,7 @@ class Plunger(Axle):
         else:
             self._spring()
         x, y = self.mount.home
-        vx, vy = -self.rate * self._ux, -self.rate * self._uy
+        vx, vy = 0.0 - self.rate * self._ux, 0.0 - self.rate * self._uy  # never −0
         self.place, self.velocity = (x - self.pull * self._ux, y - self.pull * self._uy), (vx, vy)
         lib.cpBodySetPosition(self._record, (self.place[0] - vx * self._h, self.place[1] - vy * self._h))
         lib.cpBodySetVelocity(self._record, (vx, vy))
@@ -119,6 +105,11 @@ class Plunger(Axle):
         if self._arrives:
             self.rate, self.velocity = 0.0, (0.0, 0.0)
             lib.cpBodySetVelocity(self._record, (0.0, 0.0))
+
+    @property
+    def state(self) -> tuple[float, float, float]:
+        """Level, pull in m, and how fast that grows, m/s."""
+        return self.level, self.pull, self.rate
 
     def settle(self) -> None:
         """Its place is known at any time."""
