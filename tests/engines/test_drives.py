@@ -25,11 +25,7 @@ def program(time, begin, wanted):
 def stroke(begin, wanted, place, to, arm=0.0, pull=0.0):
     """Time and speed with which a bat reaches a stop first, by its equation of motion alone.
 
-    Args:
-        begin, wanted: torque, N·m.
-        place, to: from its rest, rad.
-        arm: of its weight, m, along the bat.
-        pull: its weight, N, downwards.
+    Torques in N·m, places from its rest in rad; its weight, N, pulls downwards at an arm, m, along the bat.
     """
 
     def motion(time, state):
@@ -198,8 +194,7 @@ def test_two_balls_on_either_side_of_a_bat():
 def test_no_ball_passes_a_flapping_bat(throws):
     """Balls thrown onto a bat that flaps, at 1 kHz: none ever is with its centre inside, nor past it in one step."""
     balls = [
-        ball(0.005 + 0.065 * x, 0.06 + 0.05 * k + 0.02 * y, 0.0, -v, restitution=0.8, collides="all")
-        | {"name": f"b{k}"}
+        ball(0.005 + 0.065 * x, 0.06 + 0.05 * k + 0.02 * y, 0.0, -v, restitution=0.8) | {"name": f"b{k}"}
         for k, (x, y, v) in enumerate(throws)
     ]
     running = start(scene(bat(), {"ball": balls}, gravity=(0.0, -0.77)))

@@ -142,7 +142,7 @@ def test_other_bodies_do_not_feel_that_there_is_a_drive():
     """A ball that meets no bat flies as in a scene without, bit for bit."""
     own = {
         "ball": [ball(0.05, 0.5, 1.0, restitution=0.9)],
-        "wall": [{"points": [[-5, 0.3], [5, 0.3]], "restitution": 1.0}],
+        "wall": [wall],
     }
     with_bat = sandbox.run(scene(bat(), own, gravity=(0.0, -0.77)))
     fixed = bat()
