@@ -140,10 +140,8 @@ def test_bat_can_be_taken_away_and_others_join():
 
 def test_other_bodies_do_not_feel_that_there_is_a_drive():
     """A ball that meets no bat flies as in a scene without, bit for bit."""
-    own = {
-        "ball": [ball(0.05, 0.5, 1.0, restitution=0.9)],
-        "wall": [wall],
-    }
+    wall = {"points": [[-5, 0.3], [5, 0.3]], "restitution": 1.0}
+    own = {"ball": [ball(0.05, 0.5, 1.0, restitution=0.9)], "wall": [wall]}
     with_bat = sandbox.run(scene(bat(), own, gravity=(0.0, -0.77)))
     fixed = bat()
     del fixed["drive"]
