@@ -83,7 +83,7 @@ def explain(details: Any) -> tuple[Location, str]:
 
 
 def place_of(details: Any) -> Location:
-    """Return where in a document one of pydantic's errors is: joints, and drives, are told apart by a tag, which is no key."""
+    """Return where in a document one of pydantic's errors is: of joints and drives one key is a tag."""
     location: Location = tuple(details["loc"])
     if len(location) > 2 and location[0] in TAGGED:
         return location[:2] + location[3:]
@@ -105,7 +105,7 @@ def _known_keys(location: Location) -> str:
 
 
 def model_at(location: Location) -> type[BaseModel]:
-    """Return the model of the table at a location of a scene document, the kind of a joint or drive standing after its number."""
+    """Return the model of a table by its location in a document; of joints and drives, the kind follows the number."""
     model: type[BaseModel] = Scene
     for key in location:
         if model is Scene and key in TAGGED:
