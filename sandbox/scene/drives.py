@@ -36,7 +36,8 @@ class TorqueDrive(Driven):
     """Turns a body about a hinge from one stop to another by a torque, and back by a weaker one: a flipper.
 
     What it meets pushes it about, as heavy as it is. At level 0 the wanted torque is `-return_ratio * torque`, else
-    `level * torque`; the torque goes there by `torque / ramp` a second. It starts without any.
+    `level * torque`; the torque goes there by `torque / ramp` a second. It starts without any, so that the first stroke
+    need not overcome what draws the body back.
     """
 
     kind: Literal["torque"]

@@ -112,7 +112,7 @@ def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
     By its own fall: from rest on the speed it starts with, until a level floor below it or the end of the run; in
     scenes with other bodies than balls, or joints, also the end of what it hangs on, or past all that could stop it.
     Where balls can meet, any may be hit by the fastest: an equal one takes over its speed, a lighter one gets up to
-    twice it. What springs, motors, attraction and thrusts add is left out.
+    twice it. What springs, motors, attraction, thrusts and drives add is left out.
     """
     bodies, world = scene.bodies, scene.world
     start = np.hypot(*bodies.velocity.T)
