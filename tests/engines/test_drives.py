@@ -234,3 +234,17 @@ def _energy(running):
     from sandbox.engines.energy import total_energy
 
     return total_energy(running)
+
+
+def test_pair_with_coefficients_of_its_own_keeps_them_at_a_bat():
+    """Coefficients that pymunk's factors cannot mix are set as two touch; a bat on its stop is a wall besides."""
+    tables = bar()
+    del tables["box"][0]["restitution"]
+    tables["box"][0]["material"] = "rubber"
+    materials = [{"name": "rubber", "restitution": 0.9}, {"name": "clay", "restitution": 0.0}]
+    pair = {"between": ["rubber", "clay"], "restitution": 0.7}
+    thrown = ball(0.05, 0.01 + BALL + 0.0015, 0.0, -3.0, material="clay")
+    running = start(scene(tables, {"ball": [thrown], "material": materials, "pair": [pair]}))
+    for _ in range(5):
+        running.step()
+    assert running.frame().velocity[0, 1] == pytest.approx(2.1, rel=1e-12)
