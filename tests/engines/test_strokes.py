@@ -139,3 +139,16 @@ def test_account_of_strokes_and_plungers_closes():
     assert sum(entries.values()) == pytest.approx(total_energy(running) - energy, abs=1e-13)
     assert entries["drives"] > 0.05  # J: the ball in the gate's way gets a third more than ½ · 80 g · (1.2 m/s)²
     assert entries["actions"] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_what_is_led_through_walls_is_no_missed_contact():
+    """A head of 40 mm that springs through a wall, its half a step: it passes by what it is, and nothing is amiss."""
+    import sandbox
+    from sandbox.action import Drive
+
+    walls = [{"points": [[-1.0, -0.15], [1.0, -0.15]]}]
+    made = scene(rod(travel=0.2, speed=40.0), {"wall": walls})
+    told = tuple(Drive(time=time, drive="flip", level=level) for time, level in ((0.0, 1.0), (0.4, 0.0)))
+    run = sandbox.run(made, actions=told)
+    assert run.position[:, 0, 1].min() == pytest.approx(-0.25, rel=1e-12)
+    assert (run.missed_contacts, len(run.contact_time)) == (0, 0)
