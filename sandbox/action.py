@@ -152,6 +152,14 @@ class Drive(Timed):
     """0 is at rest; of a torque the part of it, of a pull how far, of a stroke anything above 0 all the way"""
 
 
+class Toggle(Timed):
+    """Let a wall or post be met from now on, or let everything pass it: a drop target, a diverter."""
+
+    kind: Literal["toggle"] = "toggle"
+    thing: Name
+    solid: bool
+
+
 class Strike(Timed, Stroke):
     """Strike a ball on a floor with a cue: it has the velocity and the spin of the stroke, whatever it had before."""
 
@@ -170,7 +178,19 @@ class Switch(Timed):
 
 
 Action = Annotated[
-    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Throttle | Drive | Strike | Switch,
+    Impulse
+    | Force
+    | Move
+    | Spawn
+    | Remove
+    | SetParameter
+    | Pull
+    | Launch
+    | Throttle
+    | Drive
+    | Toggle
+    | Strike
+    | Switch,
     Field(discriminator="kind"),
 ]
 
