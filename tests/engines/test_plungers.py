@@ -1,4 +1,4 @@
-"""Drives that nothing stops: strokes and plungers, and the balls that they push."""
+"""Drives that nothing stops: plungers and strokes, and the balls that they push."""
 
 import math
 
