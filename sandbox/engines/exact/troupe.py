@@ -7,7 +7,7 @@ from sandbox.engines.exact.overlap import allowed, overlapping_things, told
 from sandbox.engines.floor.level import unlevel
 from sandbox.engines.floor.pockets import caught
 from sandbox.engines.roster import ALL, FIXED, MEETS, NOTHING, Roster
-from sandbox.scene.demands import on_floor
+from sandbox.scene.demands import Demand, demands, on_floor
 from sandbox.scene.model import Ball, Scene, Single
 from sandbox.trajectory import BoolArray, FloatArray
 
@@ -84,6 +84,8 @@ class Troupe(Roster):
             raise ActionError("exact does not model drag; pymunk and reference do")
         if on_floor(scene) and (lacks := next(unlevel(scene, self.bodies), None)):
             raise ActionError(lacks)
+        if Demand.CURL in demands(scene):
+            raise ActionError("exact models no curl; pymunk does")
         super().change(scene)
         self.renewed = True
 

@@ -30,7 +30,9 @@ class PymunkEngine:
 
     name: str = "pymunk"
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
-    capabilities: frozenset[Demand] = BALLS | JOINTS | FLOOR | {Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST}
+    capabilities: frozenset[Demand] = (
+        BALLS | JOINTS | FLOOR | {Demand.CURL, Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST}
+    )
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that pymunk lacks."""
