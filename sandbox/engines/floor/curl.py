@@ -2,13 +2,13 @@
 
     a = −μ·g·v̂ + κ·μ·g·sgn(ω)·ẑ×v̂
 
-An empirical law, which no model of the ice stands behind: real stones come to rest about 1 m beside their line over
-some 28 m, nearly whatever their spin, and nobody has yet derived that (Nyberg et al. 2013, "The asymmetrical friction
-mechanism that puts the curl in the curling stone", Wear 301; Lozowski & Shegelski 2019, "Three dimensional trajectories
-of curling rocks", Cold Regions Science and Technology). With it the speed falls as if nothing bent the way, and the
-direction turns by κ·ln(1/s), s the share of the speed that is left: most in the last metres, as on ice. What
-follows is ours: as complex numbers, along the way at first and to its left, v = v₀·s^(1−iκ), so that after
-s the puck is at (v₀² / μg)·(1 − s^(2−iκ)) / (2 − iκ).
+An empirical law, not derived from what ice does: real stones come to rest about 1 m beside their line over some 28 m,
+nearly whatever their spin (Penner 2019, "A scratch-guide model for the motion of a curling rock"; Maeno 2014, "Dynamics
+and curl ratio of a curling stone", Sports Engineering 17), and why they do is still argued about (Nyberg, Hogmark &
+Jacobson 2013, "Calculated trajectories of curling stones sliding under asymmetrical friction"). With it the speed falls
+as if nothing bent the way, and the direction turns by κ·ln(1/s), s the share of the speed that is left: most in the
+last metres, as on ice. So, as complex numbers, along the way at first and to its left, v = v₀·s^(1−iκ), and the puck
+is at (v₀² / μg)·(1 − s^(2−iκ)) / (2 − iκ).
 """
 
 import math
