@@ -176,7 +176,10 @@ SETTABLE = (
 def is_settable(path: str) -> bool:
     """Tell whether a running scene's value may be changed."""
     world = {f"world.{key}" for key in ("gravity", "wind", "linear_drag", "quadratic_drag")}
-    return path in world | {"surface.sliding_friction", "surface.curl"} or path.rpartition(".")[2] in ("restitution", "friction")
+    return path in world | {"surface.sliding_friction", "surface.curl"} or path.rpartition(".")[2] in (
+        "restitution",
+        "friction",
+    )
 
 
 def actions_from_json(text: str) -> tuple[Action, ...]:
