@@ -176,7 +176,8 @@ SETTABLE = (
 def is_settable(path: str) -> bool:
     """Tell whether a running scene's value may be changed."""
     world = {f"world.{key}" for key in ("gravity", "wind", "linear_drag", "quadratic_drag")}
-    return path in world | {"surface.sliding_friction", "surface.curl"} or path.rpartition(".")[2] in (
+    swept = {"surface.sliding_friction", "surface.curl"}
+    return path in world | swept or path.rpartition(".")[2] in (
         "restitution",
         "friction",
     )

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.faults import Location
+from sandbox.scene.marking import unclear
 from sandbox.scene.model import Mover, Scene, Single, default_name
 
 
@@ -18,6 +19,13 @@ def claimed(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
     area, spots = scene.play.area, [spot.name for spot in scene.play.spots]
     if area is not None and not all(low < high for low, high in zip(*area, strict=True)):
         yield ("play", "area"), "encloses nothing; give the lower left and then the upper right corner"
+    view = scene.play.view
+    if view is not None and not all(low < high for low, high in zip(*view, strict=True)):
+        yield ("play", "view"), "encloses nothing; give the lower left and then the upper right corner"
+    for k, marking in enumerate(scene.play.markings):
+        why = unclear(marking)
+        if why is not None:
+            yield ("play", "marking", k), why
     for k, name in enumerate(spots):
         if name in spots[:k]:
             yield ("play", "spot", k, "name"), f"a second spot is called {name!r}; names are unique"

@@ -16,6 +16,7 @@ from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
 from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
+from sandbox.scene.marking import Marking
 from sandbox.scene.part import Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
@@ -122,6 +123,9 @@ class Play(Part):
     area: tuple[Point, Point] | None = None
     """lower left and upper right corner of a table's playing area, m"""
     spots: tuple[Spot, ...] = Field((), alias="spot")
+    view: tuple[Point, Point] | None = None
+    """lower left and upper right corner of what is seen at first, m; by default where things are and fly"""
+    markings: tuple[Marking, ...] = Field((), alias="marking")
 
 
 class Scene(Part):

@@ -2,9 +2,9 @@
 
     sliding → rolling → spinning → resting
 
-A puck, which never rolls, has fewer: gliding → spinning → resting. In each phase velocity and spin change at constant rates, so that every path is a parabola. Contact slip is
-u = (v_x − Rω_y, v_y + Rω_x). ω_z falls by 5·μ_sp·g / (2R) in every phase, of pucks by 2·μ_sp·g / R. Where a floor
-curls, a gliding puck's path is no parabola: `floor.curl` has it.
+A puck, which never rolls, has fewer: gliding → spinning → resting. In each phase velocity and spin change at constant
+rates, so that every path is a parabola; but where a floor curls, a gliding puck's is none: `floor.curl` has it. Contact
+slip of a sphere is u = (v_x − Rω_y, v_y + Rω_x). ω_z falls by 5·μ_sp·g / (2R) in every phase, of pucks by 2·μ_sp·g / R.
 
 Source: Leckie & Greenspan 2006; Marlow 1995.
 """

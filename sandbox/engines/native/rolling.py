@@ -1,7 +1,8 @@
 """Rolling: spheres or pucks on a floor, advanced through a time in closed form, across the ends of their phases.
 
 Exact for a ball that meets nothing, whatever the time: within a phase its path is a parabola, and where a phase ends
-within the time the next one begins there; where a puck curls, the path is no parabola, but has a closed form too. What has come to rest is at rest to the bit.
+within the time the next one begins there; where a puck curls, the path is no parabola, but has a closed form too. What
+has come to rest is at rest to the bit.
 """
 
 import math
