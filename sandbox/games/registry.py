@@ -2,11 +2,14 @@
 
 from collections.abc import Callable
 
+from sandbox.games.landing import Landing
 from sandbox.games.rules import Rules
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 
-RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {}
+RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {
+    "landing": Landing,
+}
 """Each begins a game. A game is one line here, and its name in `scene.spots.Game`."""
 
 
@@ -16,6 +19,9 @@ def rules_of(scene: Scene, bodies: Bodies | None = None) -> Rules | None:
     Args:
         scene: as it is played.
         bodies: its bodies; by default as it starts them.
+
+    Raises:
+        UnfitError: the scene lacks what the game needs.
     """
     begin = RULES.get(scene.play.game or "")
     return None if begin is None else begin(scene, scene.bodies if bodies is None else bodies)
