@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 
+from sandbox.games.curling.rules import Curling
 from sandbox.games.landing import Landing
 from sandbox.games.rules import Rules
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 
 RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {
+    "curling": Curling,
     "landing": Landing,
 }
 """Each begins a game. A game is one line here, and its name in `scene.spots.Game`."""

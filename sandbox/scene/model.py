@@ -12,6 +12,7 @@ from pydantic import Field, StringConstraints
 
 from sandbox.scene.billiards.described import Billiards
 from sandbox.scene.cue import Shot
+from sandbox.scene.curling import CurlingMatch
 from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
 from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
@@ -123,6 +124,8 @@ class Play(Part):
     area: tuple[Point, Point] | None = None
     """lower left and upper right corner of a table's playing area, m"""
     spots: tuple[Spot, ...] = Field((), alias="spot")
+    curling: CurlingMatch | None = None
+    """of a match of curling"""
     view: tuple[Point, Point] | None = None
     """lower left and upper right corner of what is seen at first, m; by default where things are and fly"""
     markings: tuple[Marking, ...] = Field((), alias="marking")
