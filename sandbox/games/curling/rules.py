@@ -122,7 +122,7 @@ class Curling:
         """Follow the stones, take out what is out of play, count ends, and bring the next stone."""
         elapsed, self._time, self._frame = seen.time - self._time, seen.time, seen.frame
         if self._running:
-            return self._follow(seen)
+            return self._follow(seen, elapsed)
         if not self._ready:
             return self._next(seen) if seen.time - self._since >= PAUSE else ()
         if not self._by_itself:
@@ -174,10 +174,10 @@ class Curling:
             *sweeps,
         )
 
-    def _follow(self, seen: Seen) -> Sequence[Action]:
+    def _follow(self, seen: Seen, elapsed: float) -> Sequence[Action]:
         """See where the stones are, take out who leaves, and judge the shot once all rest."""
         frame, moves = seen.frame, list[Action]()
-        self._hear(seen)
+        self._hear(seen, elapsed)
         for k in tuple(self._places):
             x, y = frame.position[self._numbers[k]].tolist()
             self._places[k] = (x, y)
@@ -188,11 +188,11 @@ class Curling:
         moving = [k for k in self._places if frame.velocity[self._numbers[k]].any()]
         return moves if moving else [*moves, *self._judge(seen)]
 
-    def _hear(self, seen: Seen) -> None:
+    def _hear(self, seen: Seen, elapsed: float) -> None:
         """Note whether the delivered stone, or any, has struck another."""
         stones = set(self._numbers)
-        hits = [pair for pair in seen.contacts.pair if stones.issuperset(pair)]
-        if hits:
+        pairs = seen.contacts.pair[seen.contacts.time > self._time - elapsed].tolist()  # others only touch on
+        if any(stones.issuperset(pair) for pair in pairs):
             self._struck = True
             self._cues.append("hit")
 

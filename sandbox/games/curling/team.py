@@ -63,12 +63,15 @@ class Team:
         return self._freest(DRAW, stones)
 
     def _hit(self, stones: Stones) -> Delivery | None:
-        """Return a free way that takes out the stone that counts most against it, if there is one."""
-        target = min((place for team, place in stones if team != self._team and in_house(place)), key=_off)
-        speed = self._ice.speed_for(math.dist(target, (RELEASE, 0.0)) + PAST)
-        ways = [self._ice.through(target, turn, speed) for turn in (1, -1)]
-        free = [way for way in ways if self._room(way, stones, target) > GAP]
-        return free[0] if free else None
+        """Return a free way to the stone that counts most against it of those that there is one to."""
+        theirs = [place for team, place in stones if team != self._team and in_house(place)]
+        for target in sorted(theirs, key=lambda place: math.hypot(*place)):
+            speed = self._ice.speed_for(math.dist(target, (RELEASE, 0.0)) + PAST)
+            for turn in (1, -1):
+                way = self._ice.through(target, turn, speed)
+                if self._room(way, stones, target) > GAP:
+                    return way
+        return None
 
     def _freest(self, target: Point, stones: Stones) -> Delivery:
         """Return the delivery to a place on whose way there is most room."""
@@ -85,7 +88,3 @@ class Team:
         if target is not None:
             places = places[places.real < target[0] - 2.0 * STONE]
         return float(np.abs(places[:, None] - others).min(initial=math.inf)) - 2.0 * STONE
-
-
-def _off(place: Point) -> float:
-    return math.hypot(*place)
