@@ -17,10 +17,12 @@ from sandbox.games.rules import Control, Seen, UnfitError
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.forces import Thrust
 from sandbox.scene.model import Plane, Post, Scene, Wall, default_name
+from sandbox.scene.part import Point
 from sandbox.scene.shapes import form_of
 from sandbox.trajectory import Frame
 
 SHIP, PAD = "ship", "pad"
+LANDED = "landed"
 TANK = 45.0
 """N·s per kg of ship: the speed, m/s, that a full tank would give it in empty space"""
 DOWN, ASIDE, TILT = 2.0, 1.0, math.radians(15.0)
@@ -31,6 +33,8 @@ FALLEN = math.radians(45.0)
 """rad, of tilt on the pad from which nothing stands up again"""
 FOR_LANDING, FOR_FUEL = 100, 900
 """points: for landing at all, and for a full tank"""
+FOR_A_CRASH, FAR, FAST = 50, 50.0, 15.0
+"""points for a crash on the pad at no speed; there are none so far from its middle, m, nor so fast, m/s"""
 ELSEWHERE, FASTER = 18.0, 3.0
 """m and m/s, to either side: by how much more or less than in the scene a game begins aside, by its seed"""
 STREAM = 0x6C616E64
@@ -61,7 +65,7 @@ class Landing:
         self.score = 0
         self.over: str | None = None
         self._ship, self._pad = bodies.names.index(SHIP), -1 - scene.fixed_names.index(PAD)
-        self._top = _top(scene)
+        self._place = _place(scene)
         form = form_of(bodies.elements[int(bodies.element[self._ship])])
         self._corners = [(x, y, piece.radius) for piece in form.pieces for x, y in piece.corners]
         self._tank = self._full = TANK * float(bodies.mass[self._ship])
@@ -87,7 +91,8 @@ class Landing:
         stopped = self._burn(seen, elapsed)
         self.over = self._ended(seen, elapsed)
         if self.over is not None:
-            self._cues.append("win" if self.score else "lose")
+            self.score = self.score or self._consolation()
+            self._cues.append("win" if self.over == LANDED else "lose")
             return tuple(Throttle(time=0.0, thrust=name, level=0.0) for name, level in self._levels.items() if level)
         return stopped
 
@@ -129,7 +134,7 @@ class Landing:
         if self._still < STANDING:
             return None
         self.score = FOR_LANDING + round(FOR_FUEL * self._tank / self._full)
-        return "landed"
+        return LANDED
 
     def _hard(self) -> str | None:
         """Return why a first touch is a crash, by the state before it; None where it is none."""
@@ -143,6 +148,13 @@ class Landing:
         return (
             f"crashed: tilted by {math.degrees(tilt):.0f}°, {math.degrees(TILT):.0f}° at most" if tilt > TILT else None
         )
+
+    def _consolation(self) -> int:
+        """Return the points of a crash: more where it was near and slow."""
+        assert self._before is not None
+        place, speed = self._before.position[self._ship], float(np.hypot(*self._before.velocity[self._ship]))
+        near = max(1.0 - math.dist(place.tolist(), self._place) / FAR, 0.0)
+        return round(FOR_A_CRASH * near * max(1.0 - speed / FAST, 0.0))
 
     def _tilt(self, frame: Frame) -> float:
         return math.remainder(float(frame.angle[self._ship]), math.tau)
@@ -166,7 +178,7 @@ class Landing:
         """Return how far the lowest point of the ship is above the pad, m."""
         sine, cosine = math.sin(frame.angle[self._ship]), math.cos(frame.angle[self._ship])
         lowest = min(x * sine + y * cosine - radius for x, y, radius in self._corners)
-        return float(frame.position[self._ship, 1]) + lowest - self._top
+        return float(frame.position[self._ship, 1]) + lowest - self._place[1]
 
     def cues(self) -> Sequence[str]:
         """Return the names of the sounds since the last call."""
@@ -179,16 +191,17 @@ def _control(name: str, thrust: Thrust) -> Control:
     return Control(name, f"fire {name}", (thrust.key,), PADS.get(thrust.key), analogue=True)
 
 
-def _top(scene: Scene) -> float:
-    """Return how high the pad is, m."""
+def _place(scene: Scene) -> Point:
+    """Return the middle of the pad's top, m."""
     pad = dict(zip(scene.fixed_names, chain(scene.planes, scene.walls, scene.posts), strict=False)).get(PAD)
     match pad:
         case Wall():
-            return max(y for _, y in pad.points) + 0.5 * pad.thickness
+            across, up = zip(*pad.points, strict=True)
+            return 0.5 * (min(across) + max(across)), max(up) + 0.5 * pad.thickness
         case Post():
-            return pad.position[1] + pad.radius
+            return pad.position[0], pad.position[1] + pad.radius
         case Plane():
-            return pad.point[1]
+            return pad.point
     raise UnfitError(f"landing needs a pad that is a plane, a wall or a post, called {PAD!r}")
 
 
