@@ -23,6 +23,7 @@ MEETING = {Demand.TRANSLATION, Demand.BALL_BALL, Demand.RESTITUTION}
 BOX = {*FALLING, Demand.POLYGONS, Demand.FRICTION, Demand.ROTATION}
 PENDULUM = {*FALLING, Demand.RODS}
 ROLLING = {*MEETING, Demand.SURFACE, Demand.SPIN}
+ICE = {*MEETING, Demand.SURFACE, Demand.PUCKS, Demand.CURL, Demand.FRICTION, Demand.ROTATION}
 CAROM = {*ROLLING, Demand.BALL_SEGMENT, Demand.FRICTION, Demand.ROTATION}
 POCKETED = {*CAROM, Demand.BALL_POST, Demand.POCKETS}
 DEMANDED = {
@@ -72,6 +73,7 @@ DEMANDED = {
     "billiards/stun_draw_follow": ROLLING,
     "billiards/three-cushion": CAROM,
     "billiards/throw": {*ROLLING, Demand.ROTATION},
+    "games/curling": ICE,
     "joints/bridge": {
         *FALLING,
         Demand.BALL_SEGMENT,

@@ -86,4 +86,7 @@ class Ice(NamedTuple):
 
     def _turned(self, delivery: Delivery, far: complex, share: float) -> Delivery:
         """Return a delivery headed so that its way leads to a place."""
-        return delivery._replace(heading=cmath.phase(far) - cmath.phase(self.way(delivery, share)))
+        way = self.way(delivery, share)
+        # not `cmath.phase`, which raises where an angle is too small for a float
+        heading = math.atan2(far.imag, far.real) - math.atan2(way.imag, way.real)
+        return delivery._replace(heading=heading)

@@ -26,8 +26,8 @@ from sandbox.trajectory import Frame
 BROOM = "broom"
 SIDEWAYS, HARDER = 0.5, 2.5
 """m/s at which the broom moves, and at which the weight grows, while a key is held"""
-WEIGHTS = -4.5, 14.0
-"""m, the least and the most that a delivery is meant for, beyond the tee"""
+WEIGHTS = -8.0, 14.0
+"""m, the least and the most that a delivery is meant for, beyond the tee; the least stays short of the hog line"""
 WIDEST = 0.5 * WIDTH - 0.2
 """m, how far the broom goes to either side"""
 SWEPT, STRAIGHTER = 0.88, 0.6
