@@ -31,7 +31,7 @@ FAR = 20.0
 def framing(scene: Scene) -> Box:
     """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there.
 
-    Of a table that is the table; and where the scene says what is to be seen, it is that.
+    Of a table that is the table; a scene may state its own.
     """
     if scene.play.view is not None:
         return scene.play.view

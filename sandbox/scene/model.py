@@ -123,11 +123,11 @@ class Play(Part):
     """whose rules are kept: of billiards, at a table in the window; of any other, also headless"""
     area: tuple[Point, Point] | None = None
     """lower left and upper right corner of a table's playing area, m"""
+    view: tuple[Point, Point] | None = None
+    """lower left and upper right corner of what the window shows at first, m; by default what the bodies may reach"""
     spots: tuple[Spot, ...] = Field((), alias="spot")
     curling: CurlingMatch | None = None
     """of a match of curling"""
-    view: tuple[Point, Point] | None = None
-    """lower left and upper right corner of what is seen at first, m; by default where things are and fly"""
     markings: tuple[Marking, ...] = Field((), alias="marking")
 
 
