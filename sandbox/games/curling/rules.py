@@ -254,7 +254,7 @@ class Curling:
             shown += [
                 (f"{TEAMS[score.team]} throws", f"stone {score.number + 1} of {STONES}"),
                 ("weight", _weight(self._weight)),
-                ("turn", "anti-clockwise, curls left" if self._turn > 0 else "clockwise, curls right"),
+                ("curls", "left" if self._turn > 0 else "right"),
             ]
         return [*shown, ("", self._told)] if self._told else shown
 

@@ -15,7 +15,7 @@ from sandbox.scene.model import Scene
 from sandbox.scene.part import Point
 
 BEYOND = 16_000.0
-"""px outside the picture to which corners of a polygon are cut: SDL counts in 32 bits"""
+"""px to which corners of a polygon and widths of lines are cut: SDL counts in 32 bits, and draws all of it"""
 
 
 def draw_markings(
@@ -31,8 +31,9 @@ def draw_markings(
             fill(surface, [(x, y) for x, y in corners.tolist()], colour, antialias)
         else:
             places: list[Pixel] = [(x, y) for x, y in camera.to_screen(np.asarray(marking.points)).tolist()]
+            width = min(max(marking.width * camera.scale, unit), BEYOND)
             for a, b in pairwise(places):
-                stroke(surface, a, b, colour, max(marking.width * camera.scale, unit), antialias)
+                stroke(surface, a, b, colour, width, antialias)
 
 
 def _circle(
