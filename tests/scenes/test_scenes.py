@@ -87,6 +87,16 @@ DEMANDED = {
         Demand.ROTARY_LIMITS,
         Demand.ROTATION,
     },
+    "games/landing": {
+        Demand.TRANSLATION,
+        Demand.ROTATION,
+        Demand.GRAVITY,
+        Demand.POLYGONS,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.THRUST,
+        Demand.BOUNDS,
+    },
     "joints/bridge": {
         *FALLING,
         Demand.BALL_SEGMENT,

@@ -21,7 +21,7 @@ from sandbox.engines.native.space import (
 )
 from sandbox.engines.native.steady import Steady
 from sandbox.engines.native.tethers import Tethers
-from sandbox.engines.touching import NOTHING, Touching
+from sandbox.engines.touching import NOTHING, ComplexArray, Touching
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import Links
 from sandbox.scene.meetings import Meetings
@@ -44,7 +44,7 @@ class MeetingBodies:
         self._scene, self._settings, self._skin = scene, settings, skin
         self._space = new_space(scene, settings)
         self._reader = Reader(self._space)
-        self._setter = SurfaceSetter(self._space)
+        self._setter = SurfaceSetter(self._space, settings.h)
         self._members: dict[int, Member] = {}
         self._ground = Ground(self._space, self._setter)
         self._surface_of: IntArray = np.empty(0, np.int64)
@@ -189,7 +189,7 @@ class MeetingBodies:
                 self._setter.dress(shape, int(self._surface_of[piece]))
             if meet.turnable[number] and math.isinf(body.moment):
                 body.moment = float(self._moments[number])
-        self._ground.dress(self._surface_of_fixed)
+        self._ground.renew(scene, self._surface_of_fixed)
 
     def step(self, time: float) -> None:
         """Advance by one substep, from a time, s."""
@@ -197,6 +197,8 @@ class MeetingBodies:
             return
         self.field.time = time
         self._apply_forces()
+        if self._setter.gates.walls:
+            self._setter.gates.tick += 1
         self._space.step(self._settings.h)
         self._state = None
 
@@ -233,13 +235,20 @@ class MeetingBodies:
         position[at], velocity[at] = state[:, 0:2], state[:, 3:5]
         angle[at], angular_velocity[at] = state[:, 2], state[:, 5]
 
-    def touching(self) -> Touching:
-        """Return who touches whom now, and how (`Reader.touching`); from the first call on, all impulses add up."""
+    def touching(self, steady: bool = False) -> Touching | ComplexArray:
+        """Return who touches whom now, and how; from the first call on, all impulses add up.
+
+        Args:
+            steady: where it is who touched at the last call, in the same order, their impulses alone will do.
+        """
         if not self._moving:
             return NOTHING
-        found = self._reader.touching(self._polygons)
+        same = self._reader.look(self._polygons)
         remembered = self._remember()
+        if same and steady and remembered.pairs and not remembered.found:
+            return self._reader.impulses()
         remembered.pairs = True
+        found = self._reader.touching()
         ids, impulses = remembered.take()
         return without(found, self._reader.numbers(ids), impulses) if len(ids) else found
 
@@ -251,7 +260,7 @@ class MeetingBodies:
     def points(self) -> Points:
         """Return the contact points of the last substep; from the first call on, their impulses add up."""
         if self._points is None:
-            self._points = PointReader(self._space, self._remember())
+            self._points = PointReader(self._space, self._remember(), self._setter.laws)
         return self._points.read(self._reader.records)
 
     def beyond(self) -> tuple[int, str] | None:

@@ -15,6 +15,7 @@ from sandbox.engines.expiry import Expiry
 from sandbox.engines.native.books import Books
 from sandbox.engines.native.population import Population
 from sandbox.engines.running import Running
+from sandbox.engines.touching import Touching
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -257,10 +258,15 @@ class NativeSimulation(Running):
     def _record(self, time: float) -> None:
         if self._ledger is not None:
             felt = self._population.felt
-            now = self._population.meeting.touching() if felt is None else felt.told()
-            self._work["contacts"] += len(now.a)
-            self._work["contact_iterations"] += len(now.a) * self._settings.iterations
-            self._ledger.record(time, now)
+            now = self._population.meeting.touching(self._ledger.steady) if felt is None else felt.told()
+            if isinstance(now, Touching):
+                self._ledger.record(time, now)
+                count = len(now.a)
+            else:
+                self._ledger.go_on(now)
+                count = len(now)
+            self._work["contacts"] += count
+            self._work["contact_iterations"] += count * self._settings.iterations
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the present arrays in scene order; they belong to the population."""
