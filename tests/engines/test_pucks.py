@@ -139,10 +139,10 @@ def test_energy_never_rises_and_a_mirror_shows_the_same(
     assert here.angular_velocity == pytest.approx(-there.angular_velocity, abs=1e-7)
 
 
-@every_engine
-def test_the_account_of_pucks_adds_up(engine: str) -> None:
+@pytest.mark.parametrize(("engine", "curl"), [("pymunk", 0.0), ("pymunk", 0.4), ("exact", 0.0)])
+def test_the_account_of_pucks_adds_up(engine: str, curl: float) -> None:
     wall = {"points": [[2.0, -2.0], [2.0, 2.0]], "restitution": 0.5, "friction": 0.5}
-    simulation = start(ice(puck("a", 0, 0, 2.0, 0.1, 3.0), puck("b", 1.0, 0.1), wall=[wall]), engine)
+    simulation = start(ice(puck("a", 0, 0, 2.0, 0.1, 3.0), puck("b", 1.0, 0.1), wall=[wall], curl=curl), engine)
     simulation.account()
     before = total_energy(simulation)
     for _ in range(200):

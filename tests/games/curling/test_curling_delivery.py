@@ -41,7 +41,7 @@ def test_a_takeout_passes_where_it_is_meant_or_just_comes_there(x: float, y: flo
     ways = np.asarray([RELEASE + ICE.way(delivery, k / 2000) - complex(x, y) for k in range(2001)])
     steps = np.diff(ways)
     along = np.clip(-(ways[:-1] * steps.conj()).real / np.abs(steps) ** 2, 0.0, 1.0)
-    # chords of 13 cm at most, of a way whose radius is 50 m even in its last metre
+    # Chords are 13 cm at most. The radius is 2/κ times the way that is left, and so are they shorter towards its end.
     assert np.abs(ways[:-1] + along * steps).min() < 1e-4
     assert delivery.speed >= min(speed, ICE.to_rest((x, y), turn).speed) - 1e-12
 

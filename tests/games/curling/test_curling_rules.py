@@ -7,14 +7,14 @@ import pytest
 from ice import Rink, sheet
 
 import sandbox
-from sandbox.action import Move, actions_from_json
+from sandbox.action import Move, SetParameter, actions_from_json
 from sandbox.games.bout import Bout
 from sandbox.games.curling.rules import Curling
 from sandbox.games.curling.score import Score
 from sandbox.games.curling.sheet import RELEASE, gone, waiting
-from sandbox.games.policies import Nobody
+from sandbox.games.policies import Nobody, Script
 from sandbox.games.registry import rules_of
-from sandbox.games.rules import UnfitError
+from sandbox.games.rules import Press, UnfitError
 from sandbox.scene.file import from_document, load
 from sandbox.scene.shipped import find
 
@@ -141,6 +141,20 @@ def test_an_end_of_two_teams_that_play_by_themselves_replays_to_score_and_state(
     assert again.info["game"]["lines"] == played.info["game"]["lines"]
     thrown = [action for action in played.info["actions"] if action["kind"] == "impulse"]
     assert len(thrown) == 5  # in 120 s
+
+
+def test_what_a_person_did_is_done_again_with_sweeping_and_all() -> None:
+    scene = sheet("world.duration=60.0")
+    script = [Press(0.5, "right", 1.0), Press(1.5, "right", 0.0), Press(2.0, "throw", 1.0), Press(6.0, "sweep", 1.0)]
+    script += [Press(14.0, "sweep", 0.0), Press(31.0, "throw", 1.0)]
+    played = sandbox.run(scene, bout=Bout(Curling(scene, scene.bodies), Script(script), "script"), audit=False)
+    actions = actions_from_json(json.dumps(played.info["actions"]))
+    assert sum(isinstance(action, SetParameter) for action in actions) == 4  # two figures, twice
+    rules = Curling(scene, scene.bodies)
+    again = sandbox.run(scene, actions=actions, bout=Bout(rules, None, "script", script), audit=False)
+    assert again.info["state_hash"] == played.info["state_hash"]
+    assert again.info["game"]["otherwise"] is None
+    assert rules._score.thrown == 2
 
 
 @pytest.mark.slow
