@@ -161,15 +161,12 @@ class Recorder:
         wide = bodies + bodies // 2  # more are to be expected
         if len(self.time) * wide * BYTES_PER_BODY > free_memory() * SHARE:
             raise Exhaustion(f"the frames of {bodies:,} bodies do not fit into memory; use solver.record_every")
-        for name in ("position", "velocity", "angle", "angular_velocity", "spin"):
+        for name in ("position", "velocity", "angle", "angular_velocity", "spin", "layer"):
             old = getattr(self, name)
             if old is not None:
-                new = np.full((len(old), wide, *old.shape[2:]), np.nan)
+                new = np.full((len(old), wide, *old.shape[2:]), -1 if name == "layer" else np.nan, old.dtype)
                 new[: self._count, : old.shape[1]] = old[: self._count]
                 setattr(self, name, new)
-        if self.layer is not None:
-            more = np.full((len(self.layer), wide - self.layer.shape[1]), -1, np.int16)
-            self.layer = np.hstack((self.layer, more))
 
     def layers(self, bodies: int) -> IntArray:
         """Return the layers of the first so many bodies, (T, n); (0, 0) where there is one alone."""
