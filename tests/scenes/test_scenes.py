@@ -97,6 +97,18 @@ DEMANDED = {
         Demand.THRUST,
         Demand.BOUNDS,
     },
+    "joints/flipper": {
+        *FALLING,
+        Demand.ROTATION,
+        Demand.BALL_SEGMENT,
+        Demand.BALL_POST,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.POLYGONS,
+        Demand.FALLOFF,
+        Demand.KICKS,
+        Demand.DRIVES,
+    },
     "joints/bridge": {
         *FALLING,
         Demand.BALL_SEGMENT,
