@@ -196,13 +196,20 @@ Action = Annotated[
 
 _ACTIONS: TypeAdapter[tuple[Action, ...]] = TypeAdapter(tuple[Action, ...])
 
-SETTABLE = "world.gravity, world.wind, world.linear_drag, world.quadratic_drag, and any restitution or friction"
+SETTABLE = (
+    "world.gravity, world.wind, world.linear_drag, world.quadratic_drag, surface.sliding_friction, surface.curl, "
+    "and any restitution or friction"
+)
 
 
 def is_settable(path: str) -> bool:
     """Tell whether a running scene's value may be changed."""
     world = {f"world.{key}" for key in ("gravity", "wind", "linear_drag", "quadratic_drag")}
-    return path in world or path.rpartition(".")[2] in ("restitution", "friction")
+    swept = {"surface.sliding_friction", "surface.curl"}
+    return path in world | swept or path.rpartition(".")[2] in (
+        "restitution",
+        "friction",
+    )
 
 
 def actions_from_json(text: str) -> tuple[Action, ...]:

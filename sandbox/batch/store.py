@@ -111,11 +111,12 @@ def run_id(
     """Return the id of a run, 20 hex digits: a hash of everything that decides how it goes.
 
     The settings are the resolved ones; what the scene's own `[solver]` says does not count beside them. What `[play]`
-    says does not either, but for a game that is played: `game` tells which, and who plays.
+    says does not either, unless a game is played: then it may say how; `game` tells which, and who plays.
     """
     document = to_document(scene)
     document.pop("solver", None)
-    document.pop("play", None)
+    if game is None:
+        document.pop("play", None)
     decides = {
         "scene": document,
         "engine": engine,

@@ -30,6 +30,7 @@ from sandbox.scene.address import AddressError, assign
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.crosscheck import MAX_SURFACES, crosscheck
 from sandbox.scene.cue import MISCUE, miscues, struck
+from sandbox.scene.demands import on_floor
 from sandbox.scene.document import to_document
 from sandbox.scene.driven import names_of
 from sandbox.scene.faults import SceneError
@@ -238,6 +239,8 @@ def _strike(action: Strike, cast: Cast) -> None:
     number = _mover(action.ball, cast)
     if cast.scene.surface is None or not cast.bodies.round[number]:
         raise ActionError(f"{action.ball!r} cannot be struck; a cue strikes balls on a [surface]")
+    if cast.scene.surface.bodies == "pucks":
+        raise ActionError(f"{action.ball!r} cannot be struck; it is a puck, which an impulse sends off")
     if miscues(action):
         raise ActionError(f"the tip slips: side and height are together at most {MISCUE:g} of the radius off")
     velocity, spin = struck(action, float(cast.bodies.mass[number]), float(cast.bodies.radius[number]))
@@ -339,4 +342,6 @@ def _set(action: SetParameter, cast: Cast) -> None:
         raise ActionError(str(error)) from None
     except SceneError as error:
         raise ActionError("; ".join(f"{f.path}: {f.message}" for f in error.faults)) from None
+    if on_floor(scene) != on_floor(cast.scene):
+        raise ActionError(f"{action.path}: a floor cannot begin to rub, nor cease to, while a scene runs")
     cast.change(_going_on(scene, cast.scene))

@@ -36,7 +36,8 @@ def engine_named(name: str) -> Engine:
 
 def usual(scene: Scene) -> str:
     """Return the engine that a scene is played on where nobody has said: of a table the one that is exact."""
-    return "exact" if scene.surface is not None else USUAL
+    bends = scene.surface is not None and scene.surface.curl != 0.0  # which has no parabolas
+    return "exact" if scene.surface is not None and not bends else USUAL
 
 
 def able(scene: Scene, settings: Settings | None = None) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from sandbox.games.curling.rules import Curling
 from sandbox.games.landing import Landing
 from sandbox.games.rules import Rules, UnfitError
 from sandbox.scene.bodies import Bodies
@@ -10,6 +11,7 @@ from sandbox.scene.faults import Fault, Lines, SceneError
 from sandbox.scene.model import Scene
 
 RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {
+    "curling": Curling,
     "landing": Landing,
 }
 """Each begins a game. A game is one line here, and its name in `scene.spots.Game`."""

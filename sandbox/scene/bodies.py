@@ -131,7 +131,8 @@ def expand(scene: Scene) -> Bodies:
             layout, stem = layout_of(each, scene.world.seed, k, scene.world.gravity), each.name or default_name(kind, k)
             layouts.append(layout)
             names += [f"{stem}-{ending}" for ending in layout.endings or range(1, len(layout) + 1)]
-    bodies = _joined(names, scene.elements, layouts, scene.surface is not None, scene.layers, len(scene.zones))
+    spheres = scene.surface is not None and scene.surface.bodies == "spheres"
+    bodies = _joined(names, scene.elements, layouts, spheres, scene.layers, len(scene.zones))
     for shot in scene.shots:
         if shot.ball in names:
             strike(bodies, names.index(shot.ball), shot)

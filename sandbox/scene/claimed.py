@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.faults import Location
+from sandbox.scene.marking import unclear
 from sandbox.scene.model import Mover, Scene, Single, default_name
 
 
@@ -19,6 +20,10 @@ def claimed(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
     for key, box in (("area", scene.play.area), ("view", scene.play.view)):
         if box is not None and not all(low < high for low, high in zip(*box, strict=True)):
             yield ("play", key), "encloses nothing; give the lower left and then the upper right corner"
+    for k, marking in enumerate(scene.play.markings):
+        why = unclear(marking)
+        if why is not None:
+            yield ("play", "marking", k), why
     for k, name in enumerate(spots):
         if name in spots[:k]:
             yield ("play", "spot", k, "name"), f"a second spot is called {name!r}; names are unique"

@@ -49,6 +49,8 @@ class Demand(StrEnum):
     SURFACE = "surface"
     SPIN = "spin"
     POCKETS = "pockets"
+    PUCKS = "pucks"
+    CURL = "curl"
     LAYERS = "layers"
     ZONES = "zones"
 
@@ -74,8 +76,8 @@ BALLS = frozenset(
 SURFACES = frozenset({Demand.FALLOFF, Demand.KICKS, Demand.ONE_WAY, Demand.PASSABLE})
 """What surfaces can do beyond restitution and friction."""
 
-FLOOR = frozenset({Demand.SURFACE, Demand.SPIN, Demand.POCKETS})
-"""What only spheres on a floor demand."""
+FLOOR = frozenset({Demand.SURFACE, Demand.SPIN, Demand.POCKETS, Demand.PUCKS})
+"""What only spheres and pucks on a floor demand; whether the ways of pucks bend is another matter."""
 
 OF_LINKS = {
     LinkKind.ROD: Demand.RODS,
@@ -204,9 +206,15 @@ def _floor(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
         figures = (floor.sliding_friction, floor.rolling_friction, floor.spinning_friction)
         why = "friction: sliding {:g}, rolling {:g}, spinning {:g}".format(*figures)
     yield Demand.SURFACE, rubs, why
-    rolls = floor is not None and (floor.sliding_friction > 0 or models.spins or bool(scene.bodies.roll.any()))
+    pucks = floor is not None and floor.bodies == "pucks"
+    slides = floor is not None and floor.sliding_friction > 0
+    rolls = floor is not None and not pucks and (slides or models.spins or bool(scene.bodies.roll.any()))
     yield Demand.SPIN, rolls, "spheres turn about three axes" if rolls else "nothing turns but about z"
     yield Demand.POCKETS, bool(scene.pockets), f"{len(scene.pockets):,}" if scene.pockets else "none"
+    flat = "flat discs slide, and never roll" if rubs else "on a surface that does not rub, discs are discs"
+    yield Demand.PUCKS, pucks and rubs, flat if pucks else "no surface has pucks"
+    curl = floor.curl if floor is not None and slides and pucks else 0.0
+    yield Demand.CURL, curl != 0.0, f"κ = {curl:g}: what turns bends its way" if curl else "nothing bends its way"
 
 
 def _count(n: int, one: str, many: str, none: str) -> str:

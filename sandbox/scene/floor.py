@@ -1,6 +1,7 @@
 """Floor: what lies under a top-down scene, `[surface]`; how balls on it meet, and the pockets that they fall into.
 
-Balls on a floor are spheres that slide, roll and spin: ω has three components, right-handed, z up.
+Balls on a floor are spheres that slide, roll and spin: ω has three components, right-handed, z up. Or they are pucks:
+flat discs, which slide and turn about z alone.
 """
 
 from typing import Annotated, Literal
@@ -14,6 +15,7 @@ Spin = tuple[AngularVelocity, AngularVelocity, AngularVelocity]
 
 BallBall = Literal["elastic", "frictional"]
 Cushion = Literal["simple", "han2005", "mathavan2010"]
+Kind = Literal["spheres", "pucks"]
 
 
 class Floor(Part):
@@ -22,11 +24,17 @@ class Floor(Part):
     gravity: Annotated[float, Field(gt=0, le=1e9)] = 9.81
     """m/s², into the floor"""
     sliding_friction: Friction = 0.0
-    """μ_s: while the point of contact slides, at u, a = −μ_s·g·û"""
+    """μ_s: while the point of contact slides, at u, a = −μ_s·g·û; of pucks a = −μ_s·g·v̂"""
     rolling_friction: Friction = 0.0
     """μ_r: what rolls has a = −μ_r·g·v̂"""
     spinning_friction: Friction = 0.0
-    """μ_sp: ω_z falls by 5·μ_sp·g / (2R) rad/s²"""
+    """μ_sp: the torque μ_sp·m·g·R is against ω_z, which of spheres falls by 5·μ_sp·g / (2R) rad/s², of pucks by
+    2·μ_sp·g / R"""
+    bodies: Kind = "spheres"
+    """what its balls are: `spheres`, or `pucks`, flat discs that never roll"""
+    curl: Annotated[float, Field(ge=-10, le=10)] = 0.0
+    """κ: what slides and turns anti-clockwise is pushed to the left of its way by κ·μ_s·g, clockwise to the right; of
+    pucks alone. An empirical law of curling stones, not derived from anything"""
 
     @property
     def rubs(self) -> bool:

@@ -1,4 +1,4 @@
-"""Checks of what a floor brings with it: spins, noses of cushions, shots."""
+"""Checks of what a floor brings with it: spins, noses of cushions, shots; and of what pucks have not."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -6,15 +6,21 @@ from collections.abc import Iterator, Sequence
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.cue import MISCUE, Shot, miscues
 from sandbox.scene.faults import Location
+from sandbox.scene.floor import Floor
 from sandbox.scene.model import Ball, Post, Scene, Wall, default_name
 
 Found = tuple[Location, str]
+
+OR_SPHERES = 'Leave this out, or state bodies = "spheres" of the [surface]'
+"""What would be right where a floor has pucks."""
 
 NEEDS_FLOOR = "is of a ball on a floor; give the scene a [surface]"
 
 
 def floored(scene: Scene, bodies: Bodies) -> Iterator[Found]:
     """Yield the faults of what only a scene with a `[surface]` can have."""
+    if scene.surface is not None:
+        yield from _of_kind(scene, scene.surface)
     for k, ball in enumerate(scene.balls):
         if ball.spin is None:
             continue
@@ -35,6 +41,28 @@ def floored(scene: Scene, bodies: Bodies) -> Iterator[Found]:
             yield ("shot", k, "name"), f"a second shot is called {name!r}; names are unique"
         names.add(name)
         yield from _shot(scene, bodies, k, shot)
+
+
+def _of_kind(scene: Scene, floor: Floor) -> Iterator[Found]:
+    """Check that nothing is stated of spheres where a floor has pucks, nor the other way round."""
+    if floor.bodies == "spheres":
+        if floor.curl:
+            yield ("surface", "curl"), 'bends the ways of pucks alone; state bodies = "pucks", or leave this out'
+        return
+    if floor.rolling_friction:
+        yield ("surface", "rolling_friction"), "pucks never roll; leave this out"
+    for key in sorted(scene.contact_models.model_fields_set):
+        yield ("contact_models", key), f"is of spheres; pucks meet by restitution and friction. {OR_SPHERES}"
+    for k, ball in enumerate(scene.balls):
+        if ball.spin is not None:
+            yield ("ball", k, "spin"), "is of a sphere; a puck turns about z alone: state `angular_velocity`"
+    noses: dict[str, Sequence[Wall | Post]] = {"wall": scene.walls, "post": scene.posts}
+    for kind, things in noses.items():
+        for k, thing in enumerate(things):
+            if thing.height is not None:
+                yield (kind, k, "height"), f"is of a nose that spheres meet; pucks have upright sides. {OR_SPHERES}"
+    for k in range(len(scene.shots)):
+        yield ("shot", k), f"a cue strikes spheres; give the puck a velocity. {OR_SPHERES}"
 
 
 def _noses(scene: Scene) -> Iterator[Found]:

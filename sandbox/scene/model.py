@@ -12,12 +12,14 @@ from pydantic import Field, StringConstraints
 
 from sandbox.scene.billiards.described import Billiards
 from sandbox.scene.cue import Shot
+from sandbox.scene.curling import CurlingMatch
 from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
 from sandbox.scene.drives import Drive
 from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
 from sandbox.scene.kick import Kick
+from sandbox.scene.marking import Marking
 from sandbox.scene.part import Acceleration, Falloff, Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
@@ -146,6 +148,9 @@ class Play(Part):
     view: tuple[Point, Point] | None = None
     """lower left and upper right corner of what the window shows at first, m; by default what the bodies may reach"""
     spots: tuple[Spot, ...] = Field((), alias="spot")
+    curling: CurlingMatch | None = None
+    """of a match of curling"""
+    markings: tuple[Marking, ...] = Field((), alias="marking")
 
 
 class Scene(Part):

@@ -23,6 +23,7 @@ MEETING = {Demand.TRANSLATION, Demand.BALL_BALL, Demand.RESTITUTION}
 BOX = {*FALLING, Demand.POLYGONS, Demand.FRICTION, Demand.ROTATION}
 PENDULUM = {*FALLING, Demand.RODS}
 ROLLING = {*MEETING, Demand.SURFACE, Demand.SPIN}
+ICE = {*MEETING, Demand.SURFACE, Demand.PUCKS, Demand.CURL, Demand.FRICTION, Demand.ROTATION}
 CAROM = {*ROLLING, Demand.BALL_SEGMENT, Demand.FRICTION, Demand.ROTATION}
 POCKETED = {*CAROM, Demand.BALL_POST, Demand.POCKETS}
 DEMANDED = {
@@ -72,6 +73,30 @@ DEMANDED = {
     "billiards/stun_draw_follow": ROLLING,
     "billiards/three-cushion": CAROM,
     "billiards/throw": {*ROLLING, Demand.ROTATION},
+    "games/curling": ICE,
+    "games/rube_goldberg": {
+        *FALLING,
+        *MEETING,
+        Demand.BALL_PLANE,
+        Demand.BALL_SEGMENT,
+        Demand.FRICTION,
+        Demand.GEARS,
+        Demand.PIVOTS,
+        Demand.POLYGONS,
+        Demand.RODS,
+        Demand.ROTARY_LIMITS,
+        Demand.ROTATION,
+    },
+    "games/landing": {
+        Demand.TRANSLATION,
+        Demand.ROTATION,
+        Demand.GRAVITY,
+        Demand.POLYGONS,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.THRUST,
+        Demand.BOUNDS,
+    },
     "joints/flipper": {
         *FALLING,
         Demand.ROTATION,
@@ -83,16 +108,6 @@ DEMANDED = {
         Demand.FALLOFF,
         Demand.KICKS,
         Demand.DRIVES,
-    },
-    "games/landing": {
-        Demand.TRANSLATION,
-        Demand.ROTATION,
-        Demand.GRAVITY,
-        Demand.POLYGONS,
-        Demand.RESTITUTION,
-        Demand.FRICTION,
-        Demand.THRUST,
-        Demand.BOUNDS,
     },
     "joints/bridge": {
         *FALLING,

@@ -8,7 +8,7 @@ from sandbox.engines.fixtures import fixtures_of
 from sandbox.engines.floor.level import unlevel
 from sandbox.engines.floor.pockets import caught
 from sandbox.engines.roster import ALL, FIXED, MEETS, NOTHING, Roster
-from sandbox.scene.demands import on_floor
+from sandbox.scene.demands import Demand, demands, on_floor
 from sandbox.scene.model import Ball, Scene, Single
 from sandbox.trajectory import BoolArray, FloatArray
 
@@ -86,6 +86,8 @@ class Troupe(Roster):
             raise ActionError("exact does not model drag; pymunk and reference do")
         if on_floor(scene) and (lacks := next(unlevel(scene, self.bodies), None)):
             raise ActionError(lacks)
+        if Demand.CURL in demands(scene):
+            raise ActionError("exact models no curl; pymunk does")
         meets = np.flatnonzero((self.meets != NOTHING) & self.moving)
         if len(meets) and any(new is not old for new, old in zip(scene.fixed, self.scene.fixed, strict=True)):
             found = overlapping_things(self.position[meets], self.radius[meets], fixtures_of(scene))

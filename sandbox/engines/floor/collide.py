@@ -18,6 +18,8 @@ CUSHION: dict[Cushion, int] = {"simple": SIMPLE, "han2005": HAN2005, "mathavan20
 Five = tuple[float, float, float, float, float]
 """v_x, v_y, m/s; ω_x, ω_y, ω_z, rad/s"""
 
+STILL: Five = (0.0, 0.0, 0.0, 0.0, 0.0)
+
 
 @kernel
 def rubbing(slip: float) -> float:

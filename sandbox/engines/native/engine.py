@@ -32,7 +32,7 @@ class PymunkEngine:
 
     name: str = "pymunk"
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
-    capabilities: frozenset[Demand] = BALLS | JOINTS | FLOOR | SURFACES | OWN
+    capabilities: frozenset[Demand] = BALLS | JOINTS | FLOOR | SURFACES | OWN | {Demand.CURL}
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that pymunk lacks."""

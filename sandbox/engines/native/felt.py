@@ -57,7 +57,6 @@ class Felt:
         assert settings.slop is not None and settings.bias is not None
         self._h = settings.h
         self._slop, self._mend = settings.slop, 1.0 - settings.bias**settings.h
-        self._floor = figures_of(scene.surface)
         self._solid = len(scene.fixed)
         self._pockets = np.asarray([[*p.position, p.radius] for p in scene.pockets], dtype=np.float64).reshape(-1, 3)
         self.pocket: IntArray = np.empty(0, np.int64)
@@ -72,6 +71,7 @@ class Felt:
     def renew(self, scene: Scene, meet: Meetings) -> None:
         """Go on with a scene's changed coefficients, or with more surfaces."""
         surfaces, models = meet.surfaces, scene.contact_models
+        self._floor = figures_of(scene.surface)
         self._laws = Laws(
             BALL_BALL[models.ball_ball],
             CUSHION[models.cushion],

@@ -8,7 +8,8 @@ third, or into a cushion, is found here, against all others.
 
 from typing import NamedTuple
 
-from sandbox.engines.floor.collide import ELASTIC, Five, meet, rebound
+from sandbox.engines.floor.collide import ELASTIC, STILL, Five, meet, rebound
+from sandbox.engines.floor.knock import knock
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.native.cushions import Cushions
 from sandbox.engines.native.overlaps import (
@@ -53,10 +54,10 @@ class Laws(NamedTuple):
 
 
 @kernel
-def energy(motion: Five, lightness: float, radius: float) -> float:
-    """Return the energy of a sphere, J; of what never moves 0."""
+def energy(motion: Five, lightness: float, radius: float, inertia: float) -> float:
+    """Return the energy of a ball with a moment of inertia, of m·r², J; of what never moves 0."""
     vx, vy, wx, wy, wz = motion
-    squared = vx * vx + vy * vy + 0.4 * radius * radius * (wx * wx + wy * wy + wz * wz)
+    squared = vx * vx + vy * vy + inertia * radius * radius * (wx * wx + wy * wy + wz * wz)
     return 0.5 * squared / lightness if lightness > 0.0 else 0.0
 
 
@@ -94,36 +95,51 @@ def hit(
             the way that is gone otherwise now; added to.
     """
     _, nx, ny, closing = approach(balls, cushions, i, other, ago)
-    radius, light = balls.radius[i], balls.lightness[i]
-    undone = energy(motion_of(balls, i), light, radius)
+    radius, light, floor = balls.radius[i], balls.lightness[i], balls.floor
+    share = floor.inertia
+    undone = energy(motion_of(balls, i), light, radius, share)
     mine = put_back(balls, i, ago)
-    began = energy(mine, light, radius)
+    began = energy(mine, light, radius, share)
     if other < 0:
         k = -1 - other
         height = cushions.height[k] if cushions.height[k] > 0.0 else radius
         restitution = laws.restitution[balls.surface[i], cushions.surface[k]] if closing > CUT else 0.0
         friction = laws.friction[balls.surface[i], cushions.surface[k]]
-        smooth = energy(rebound(laws.cushion, restitution, 0.0, 0.0, mine, radius, height, nx, ny), light, radius)
-        after = rebound(laws.cushion, restitution, friction, laws.grip, mine, radius, height, nx, ny)
-        ended = energy(after, light, radius)
+        if floor.pucks:
+            alone = (light, 0.0), (radius, 0.0)
+            after, _ = knock(restitution, 0.0, mine, STILL, *alone, nx, ny)
+            smooth = energy(after, light, radius, share)
+            after, _ = knock(restitution, friction, mine, STILL, *alone, nx, ny)
+        else:
+            after = rebound(laws.cushion, restitution, 0.0, 0.0, mine, radius, height, nx, ny)
+            smooth = energy(after, light, radius, share)
+            after = rebound(laws.cushion, restitution, friction, laws.grip, mine, radius, height, nx, ny)
+        ended = energy(after, light, radius, share)
         redone = 0.0
     else:
         gone = motion_of(balls, other)
         theirs = put_back(balls, other, ago) if balls.plays[other] else gone
-        heft = balls.lightness[other]
-        undone += energy(gone, heft, radius)
-        began += energy(theirs, heft, radius)
+        heft, wide = balls.lightness[other], balls.radius[other]
+        undone += energy(gone, heft, wide, share)
+        began += energy(theirs, heft, wide, share)
         restitution = laws.restitution[balls.surface[i], balls.surface[other]] if closing > CUT else 0.0
-        both = light, heft
-        after, more = meet(ELASTIC, restitution, mine, theirs, both, radius, nx, ny)
-        smooth = energy(after, light, radius) + energy(more, heft, radius)
-        after, more = meet(laws.ball_ball, restitution, mine, theirs, both, radius, nx, ny)
-        ended = energy(after, light, radius) + energy(more, heft, radius)
+        both, radii = (light, heft), (radius, wide)
+        friction = laws.friction[balls.surface[i], balls.surface[other]]
+        if floor.pucks:
+            after, more = knock(restitution, 0.0, mine, theirs, both, radii, nx, ny)
+        else:
+            after, more = meet(ELASTIC, restitution, mine, theirs, both, radius, nx, ny)
+        smooth = energy(after, light, radius, share) + energy(more, heft, wide, share)
+        if floor.pucks:
+            after, more = knock(restitution, friction, mine, theirs, both, radii, nx, ny)
+        else:
+            after, more = meet(laws.ball_ball, restitution, mine, theirs, both, radius, nx, ny)
+        ended = energy(after, light, radius, share) + energy(more, heft, wide, share)
         if balls.plays[other]:
             give(balls, other, more)
             roll_on(balls, other, ago)
             more = motion_of(balls, other)
-        redone = energy(more, heft, radius)
+        redone = energy(more, heft, wide, share)
     if row[IMPULSE_X] == 0.0 and row[IMPULSE_Y] == 0.0:
         row[NORMAL_X], row[NORMAL_Y] = nx, ny
         row[POINT_X], row[POINT_Y] = balls.position[i, 0] + radius * nx, balls.position[i, 1] + radius * ny
@@ -133,7 +149,7 @@ def hit(
     taken[1] += ended - smooth
     give(balls, i, after)
     roll_on(balls, i, ago)
-    taken[2] += began - undone + redone + energy(motion_of(balls, i), light, radius) - ended
+    taken[2] += began - undone + redone + energy(motion_of(balls, i), light, radius, share) - ended
 
 
 @kernel

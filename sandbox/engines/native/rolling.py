@@ -1,14 +1,16 @@
-"""Rolling: spheres on a floor, advanced through a time in closed form, across the ends of their phases.
+"""Rolling: spheres or pucks on a floor, advanced through a time in closed form, across the ends of their phases.
 
 Exact for a ball that meets nothing, whatever the time: within a phase its path is a parabola, and where a phase ends
-within the time the next one begins there. What has come to rest is at rest to the bit.
+within the time the next one begins there; where a puck curls, the path is no parabola, but has a closed form too. What
+has come to rest is at rest to the bit.
 """
 
 import math
 from typing import NamedTuple
 
 from sandbox.engines.floor.collide import Five
-from sandbox.engines.floor.phase import ROLLING, SLIDING, SPINNING, Figures, fallen, phase_of, rates
+from sandbox.engines.floor.curl import curled
+from sandbox.engines.floor.phase import GLIDING, RESTING, ROLLING, SLIDING, SPINNING, Figures, fallen, phase_of, rates
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
@@ -17,7 +19,7 @@ PHASES = 3
 
 
 class Balls(NamedTuple):
-    """N spheres, for kernels. The first five are the population's own arrays."""
+    """N spheres or pucks, for kernels. The first five are the population's own arrays."""
 
     position: FloatArray
     """(N, 2) m"""
@@ -77,21 +79,24 @@ def rolled(motion: Five, radius: float, floor: Figures, time: float) -> tuple[fl
     vx, vy, wx, wy, wz = motion
     x = y = 0.0
     left = time
+    fall = floor.spinning / radius
+    turning = min(time, abs(wz) / fall) if fall > 0.0 else time
+    if floor.curl != 0.0 and wz != 0.0 and floor.sliding > 0.0 and (vx != 0.0 or vy != 0.0):
+        x, y, vx, vy = curled(vx, vy, floor.sliding, math.copysign(floor.curl, floor.curl * wz), turning)
+        left -= turning
     for _ in range(PHASES):
-        phase = phase_of(vx, vy, wx, wy, wz, radius)
-        if phase <= SPINNING or left <= 0.0:
+        phase = phase_of(vx, vy, wx, wy, wz, radius, floor.pucks)
+        if phase in (RESTING, SPINNING) or left <= 0.0:
             break
         ax, ay, bx, by, lasts = rates(phase, vx, vy, wx, wy, wz, radius, floor)
         t = min(left, lasts)
         x, y = x + (vx + 0.5 * ax * t) * t, y + (vy + 0.5 * ay * t) * t
         vx, vy, wx, wy = vx + ax * t, vy + ay * t, wx + bx * t, wy + by * t
-        if phase == ROLLING and lasts <= left:
+        if phase in (ROLLING, GLIDING) and lasts <= left:
             vx = vy = 0.0
         if phase == ROLLING or (phase == SLIDING and lasts <= left):
             wx, wy = 0.0 - vy / radius, vx / radius  # no −0.0 at rest
         left -= t
-    fall = floor.spinning / radius
-    turning = min(time, abs(wz) / fall) if fall > 0.0 else time
     angle = (wz - math.copysign(0.5 * fall * turning, wz)) * turning
     return x, y, angle, (vx, vy, wx, wy, fallen(wz, fall * time))
 

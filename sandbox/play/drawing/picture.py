@@ -11,10 +11,12 @@ from sandbox.play.drawing.decks import draw_deck, layers_among, on_layer
 from sandbox.play.drawing.discs import Discs, spokes
 from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
 from sandbox.play.drawing.grid import draw_grid, draw_scale
+from sandbox.play.drawing.markings import draw_markings
 from sandbox.play.drawing.overlays import Overlays
 from sandbox.play.drawing.palette import BACKGROUND, CLEAR, TOUCHING, ColourArray, colour_of
 from sandbox.play.drawing.points import LARGEST, Packed, Points, packed
 from sandbox.play.drawing.polygons import Polygons
+from sandbox.play.drawing.pucks import draw_pucks
 from sandbox.play.drawing.table.aiming import draw_aim, draw_ways
 from sandbox.play.drawing.table.balls import Balls
 from sandbox.play.drawing.table.cloth import draw_table
@@ -124,7 +126,10 @@ class Picture:
         if sight.aim is not None:
             draw_ways(view, sight.aim, self._colours)
         if "shapes" in sight.overlays and sight.scene.surface is not None and not sizes.side:
-            self._balls.draw(view)
+            if sight.scene.surface.bodies == "pucks" and sight.bodies.round.all():
+                draw_pucks(view, self._discs)
+            else:
+                self._balls.draw(view)
         elif "shapes" in sight.overlays:
             self._draw_layers(view, np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None)
         self._overlays.above(view)
@@ -224,6 +229,7 @@ class Picture:
             area = sight.scene.play.area
             if area is None:
                 draw_grid(drawn, camera, unit)
+                draw_markings(drawn, camera, sight.scene, unit, antialias)
                 draw_zones(drawn, camera, sight.scene, unit, antialias)
                 ground = sight.scene if len(sight.scene.layers) == 1 else on_layer(sight.scene, 0)
                 draw_fixtures(drawn, camera, ground, unit, antialias)

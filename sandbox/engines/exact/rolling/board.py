@@ -158,11 +158,13 @@ def renewed(board: Board, roster: Roster) -> Board:
         board = board._replace(**grown)
     state, tags = board.state, board.tags
     state[:, RADIUS], state[:, MASS], state[:, LIGHTNESS] = roster.radius, roster.bodies.mass, roster.inverse_mass
-    state[:, FALL] = board.figures.spinning / state[:, RADIUS]
+    figures = figures_of(roster.scene.surface)
+    state[:, FALL] = figures.spinning / state[:, RADIUS]
     tags[:, MEETS], tags[:, SURFACE] = roster.meets, roster.surface
     for things in (board.line_tags, board.knob_tags):
         things[:, COAT] = roster.fixed_surface[things[:, THING]]
-    return board._replace(coefficients=np.stack((roster.restitution, roster.friction)))
+    coefficients = np.stack((roster.restitution, roster.friction))
+    return board._replace(coefficients=coefficients, figures=figures)
 
 
 def exposed(knobs: FloatArray) -> IntArray:

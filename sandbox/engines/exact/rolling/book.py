@@ -24,7 +24,7 @@ from sandbox.engines.exact.rolling.board import (
 )
 from sandbox.engines.exact.rolling.motion import bring
 from sandbox.engines.floor.collide import Five
-from sandbox.engines.floor.phase import ROLLING, SLIDING, fallen
+from sandbox.engines.floor.phase import GLIDING, ROLLING, SLIDING, fallen
 from sandbox.engines.kernel import bare_kernel as kernel
 
 
@@ -35,7 +35,7 @@ def changed(board: Board, i: int, before: Five, nx: float, ny: float) -> tuple[f
     if state[i, LIGHTNESS] == 0.0:
         return 0.0, 0.0
     vx, vy, wx, wy, wz = before
-    mass, inertia = state[i, MASS], 0.4 * state[i, MASS] * state[i, RADIUS] ** 2
+    mass, inertia = state[i, MASS], board.figures.inertia * state[i, MASS] * state[i, RADIUS] ** 2
     out, was = state[i, VX] * nx + state[i, VY] * ny, vx * nx + vy * ny
     left, had = state[i, VY] * nx - state[i, VX] * ny, vy * nx - vx * ny
     turning = (
@@ -83,9 +83,12 @@ def floor_work(board: Board, i: int, t: float) -> float:
     elif phase == ROLLING:
         speed = (state[i, VX] ** 2 + state[i, VY] ** 2) ** 0.5
         took = 1.4 * mass * floor.rolling * (speed - floor.rolling * middle) * span
+    elif phase == GLIDING:
+        speed = (state[i, VX] ** 2 + state[i, VY] ** 2) ** 0.5
+        took = mass * floor.sliding * (speed - floor.sliding * middle) * span
     fall = floor.spinning / radius
     first, last = fallen(state[i, WZ], fall * begin), fallen(state[i, WZ], fall * end)
-    return float(-took - 0.2 * mass * radius * radius * (first - last) * (first + last))
+    return float(-took - 0.5 * floor.inertia * mass * radius * radius * (first - last) * (first + last))
 
 
 @kernel

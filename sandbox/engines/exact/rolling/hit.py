@@ -48,7 +48,8 @@ from sandbox.engines.exact.rolling.board import (
 )
 from sandbox.engines.exact.rolling.book import book_hit, book_hop, changed
 from sandbox.engines.exact.rolling.motion import give, go_on, motion_of, set_off
-from sandbox.engines.floor.collide import meet, rebound
+from sandbox.engines.floor.collide import STILL, meet, rebound
+from sandbox.engines.floor.knock import knock
 from sandbox.engines.floor.phase import CAPTURED, SLIDING
 from sandbox.engines.kernel import bare_kernel as kernel
 
@@ -90,7 +91,8 @@ def drive(board: Board, i: int, nx: float, ny: float) -> float:
 def calm(board: Board, i: int, closing: float) -> None:
     """Lay a ball to rest where a slow hit has left it next to nothing; the floor takes that. It may spin on."""
     state = board.state
-    if closing > CUT or state[i, LIGHTNESS] == 0.0 or board.figures.rolling == 0.0:
+    slows = board.figures.sliding if board.figures.pucks else board.figures.rolling
+    if closing > CUT or state[i, LIGHTNESS] == 0.0 or slows == 0.0:
         return
     moving = state[i, VX] ** 2 + state[i, VY] ** 2
     rolling = (state[i, WX] ** 2 + state[i, WY] ** 2) * state[i, RADIUS] ** 2
@@ -129,7 +131,12 @@ def hit_ball(board: Board, i: int, k: int) -> None:
     closing = (state[i, VX] - state[k, VX]) * nx + (state[i, VY] - state[k, VY]) * ny
     if closing > 0.0:
         restitution = board.coefficients[0, tags[i, SURFACE], tags[k, SURFACE]] if closing > CUT else 1.0
-        a, b = meet(board.counts[BALLS_AS], restitution, mine, theirs, (li, lk), state[i, RADIUS], nx, ny)
+        if board.figures.pucks:
+            friction = board.coefficients[1, tags[i, SURFACE], tags[k, SURFACE]]
+            radii = state[i, RADIUS], state[k, RADIUS]
+            a, b = knock(restitution, friction, mine, theirs, (li, lk), radii, nx, ny)
+        else:
+            a, b = meet(board.counts[BALLS_AS], restitution, mine, theirs, (li, lk), state[i, RADIUS], nx, ny)
         give(state, i, a)
         give(state, k, b)
         book_hit(board, i, mine, k, theirs, nx, ny)
@@ -191,7 +198,11 @@ def hit_cushion(board: Board, i: int, kind: int, thing: int, coat: int, nx: floa
         friction = board.coefficients[1, surface, coat]
         before = motion_of(state, i)
         model, grip = board.counts[CUSHIONS_AS], board.figures.grip
-        give(state, i, rebound(model, restitution, friction, grip, before, radius, height, nx, ny))
+        if board.figures.pucks:
+            after, _ = knock(restitution, friction, before, STILL, (state[i, LIGHTNESS], 0.0), (radius, 0.0), nx, ny)
+        else:
+            after = rebound(model, restitution, friction, grip, before, radius, height, nx, ny)
+        give(state, i, after)
         book_hit(board, i, before, -1, before, nx, ny)
         calm(board, i, closing)
     set_off(board, i)

@@ -26,7 +26,7 @@ from sandbox.engines.exact.rolling.board import (
     Y,
 )
 from sandbox.engines.floor.collide import Five
-from sandbox.engines.floor.phase import CAPTURED, RESTING, ROLLING, SLIDING, SPINNING, fallen, phase_of, rates
+from sandbox.engines.floor.phase import CAPTURED, GLIDING, RESTING, ROLLING, SLIDING, SPINNING, fallen, phase_of, rates
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.trajectory import FloatArray
 
@@ -99,7 +99,7 @@ def set_off(board: Board, i: int) -> None:
     state = board.state
     if state[i, LIGHTNESS] > 0.0:
         vx, vy, wx, wy, wz = motion_of(state, i)
-        go_on(board, i, phase_of(vx, vy, wx, wy, wz, state[i, RADIUS]))
+        go_on(board, i, phase_of(vx, vy, wx, wy, wz, state[i, RADIUS], board.figures.pucks))
 
 
 @kernel
@@ -111,7 +111,7 @@ def end_phase(board: Board, i: int) -> None:
         if state[i, VX] != 0.0 or state[i, VY] != 0.0:
             go_on(board, i, ROLLING)
             return
-    elif phase == ROLLING:
+    elif phase in (ROLLING, GLIDING):
         state[i, VX], state[i, VY], state[i, WX], state[i, WY] = 0.0, 0.0, 0.0, 0.0
     else:
         state[i, WZ] = 0.0

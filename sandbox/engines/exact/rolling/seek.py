@@ -35,7 +35,7 @@ from sandbox.engines.exact.rolling.board import (
     X,
     Y,
 )
-from sandbox.engines.floor.phase import CAPTURED, ROLLING, SLIDING
+from sandbox.engines.floor.phase import CAPTURED, GLIDING, ROLLING, SLIDING
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.roster import ALL, NOTHING
 from sandbox.trajectory import FloatArray
@@ -44,7 +44,7 @@ from sandbox.trajectory import FloatArray
 @kernel
 def moves(board: Board, i: int) -> bool:
     """Tell whether a ball's centre goes anywhere."""
-    return bool(board.tags[i, PHASE] in (ROLLING, SLIDING))
+    return bool(board.tags[i, PHASE] in (ROLLING, SLIDING, GLIDING))
 
 
 @kernel

@@ -1,0 +1,272 @@
+"""Curling: the rules of a match, between the steps of a scene with sixteen stones on ice.
+
+The scene has a [surface] of pucks, stones `red-1` to `red-8` and `yellow-1` to `yellow-8`, and a body `broom` that
+meets nothing: it stands on the tee line where the skip holds it, and stones are let go towards it. A stone curls away
+from that line, so the broom is held beside the place that is meant.
+
+Not modelled: stones that are touched by people, time clocks, and the measuring of ends that are nearly even.
+"""
+
+import math
+from collections.abc import Sequence
+
+from sandbox.action import Action, Impulse, Move, SetParameter
+from sandbox.games.curling.count import PROTECTED, beyond, counted, guards, short
+from sandbox.games.curling.delivery import Delivery, Ice
+from sandbox.games.curling.score import Score
+from sandbox.games.curling.sheet import RELEASE, STONES, TEAMS, WIDTH, gone, stone, waiting
+from sandbox.games.curling.team import Team
+from sandbox.games.rules import Control, Seen, UnfitError
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.curling import CurlingMatch
+from sandbox.scene.model import Scene
+from sandbox.scene.part import Point
+from sandbox.trajectory import Frame
+
+BROOM = "broom"
+SIDEWAYS, HARDER = 0.5, 2.5
+"""m/s at which the broom moves, and at which the weight grows, while a key is held"""
+WEIGHTS = -8.0, 14.0
+"""m, the least and the most that a delivery is meant for, beyond the tee; the least stays short of the hog line"""
+WIDEST = 0.5 * WIDTH - 0.2
+"""m, how far the broom goes to either side"""
+SWEPT, STRAIGHTER = 0.88, 0.6
+"""Of the friction and of the curl, what sweeping leaves: figures of this game, for some 3 m more."""
+PAUSE, THINKS = 1.5, 1.0
+"""s between two stones, and that a team that plays by itself holds its broom before it delivers"""
+
+CONTROLS = (
+    Control("left", "hold the broom further to the left", ("left",), "left -leftx"),
+    Control("right", "hold it further to the right", ("right",), "right +leftx"),
+    Control("harder", "more weight", ("up",), "up -lefty"),
+    Control("softer", "less weight", ("down",), "down +lefty"),
+    Control("turn", "let it turn the other way", ("t",), "y"),
+    Control("throw", "let it go", ("space",), "a"),
+    Control("sweep", "sweep: further and straighter", ("s", "left shift"), "b rt"),
+)
+
+
+class Curling:
+    """The rules of one match."""
+
+    controls = CONTROLS
+
+    def __init__(self, scene: Scene, bodies: Bodies) -> None:
+        """Begin.
+
+        Raises:
+            UnfitError: the scene has no ice, or lacks stones or the broom.
+        """
+        floor, match = scene.surface, scene.play.curling or CurlingMatch()
+        self._names = [stone(team, k) for team in (0, 1) for k in range(STONES)]
+        lacking = [name for name in (*self._names, BROOM) if name not in bodies.names]
+        if floor is None or floor.bodies != "pucks" or not floor.sliding_friction or lacking:
+            raise UnfitError(
+                'curling needs a [surface] with bodies = "pucks" and a sliding_friction, the bodies red-1 … red-8 and '
+                f"yellow-1 … yellow-8, and a {BROOM!r}" + (f"; it lacks {', '.join(lacking)}" if lacking else "")
+            )
+        self._numbers = [bodies.names.index(name) for name in self._names]
+        self._moment = [float(bodies.moment[number]) for number in self._numbers]
+        self._floor, self._ice = floor, Ice.of(floor)
+        self._teams = [Team(team, self._ice, match.error, scene.world.seed) for team in (0, 1)]
+        self._people = match.people
+        self._score = Score(match.ends)
+        self._places: dict[int, Point] = {}  # of the stones that are in play, by their places in `_names`
+        self._before: dict[int, Point] = {}  # as they lay before the last delivery
+        self._struck = False
+        self._running, self._ready = False, False
+        self._broom, self._weight, self._turn = 0.0, 0.0, 1
+        self._meant: Delivery | None = None
+        self._held: set[str] = set()
+        self._time, self._since = 0.0, -PAUSE
+        self._frame: Frame | None = None
+        self._told = ""
+        self._cues: list[str] = []
+
+    @property
+    def score(self) -> int:
+        """Of the red team where one person plays, else of the best."""
+        red, yellow = self._score.points
+        return red if self._people == 1 else max(red, yellow)
+
+    @property
+    def over(self) -> str | None:
+        """Why the match is over; None while it goes on."""
+        return self._score.over
+
+    @property
+    def _current(self) -> int:
+        """The stone whose turn it is."""
+        return self._score.team * STONES + self._score.number
+
+    @property
+    def _by_itself(self) -> bool:
+        return self._score.team >= self._people
+
+    def control(self, name: str, value: float) -> Sequence[Action]:
+        """Press or let go a control; a team that plays by itself cannot be helped."""
+        (self._held.add if value > 0.0 else self._held.discard)(name)
+        if name == "sweep":
+            return self._sweep(value > 0.0) if self._running and not self._by_itself else ()
+        if value <= 0.0 or not self._ready or self._by_itself:
+            return ()
+        if name == "turn":
+            self._turn = -self._turn
+        if name == "throw":
+            heading = math.atan2(self._broom, -RELEASE)
+            speed = self._ice.speed_for(self._weight - RELEASE)
+            return self._let_go(Delivery(speed, heading, self._turn))
+        return ()
+
+    def look(self, seen: Seen) -> Sequence[Action]:
+        """Follow the stones, take out what is out of play, count ends, and bring the next stone."""
+        elapsed, self._time, self._frame = seen.time - self._time, seen.time, seen.frame
+        if self._running:
+            return self._follow(seen, elapsed)
+        if not self._ready:
+            return self._next(seen) if seen.time - self._since >= PAUSE else ()
+        if not self._by_itself:
+            return self._aim(elapsed)
+        if self._meant is None:
+            return self._choose()
+        return self._let_go(self._meant) if seen.time - self._since >= THINKS else ()
+
+    def _next(self, seen: Seen) -> Sequence[Action]:
+        """Bring the next stone to where it is let go; at the beginning of an end, all others to where they wait."""
+        moves: list[Action] = []
+        if self._score.thrown == 0:
+            self._places = {}
+            moves = [self._put(k, waiting(*divmod(k, STONES))) for k in range(2 * STONES)]
+        moves.append(self._put(self._current, (RELEASE, 0.0)))
+        self._ready, self._meant, self._since, self._weight = True, None, seen.time, 0.0
+        self._cues.append("next")
+        return (*moves, self._hold(0.0))
+
+    def _aim(self, elapsed: float) -> Sequence[Action]:
+        """Move broom and weight as long as their keys are held."""
+        held = self._held
+        self._weight += HARDER * elapsed * (("harder" in held) - ("softer" in held))
+        self._weight = min(max(self._weight, WEIGHTS[0]), WEIGHTS[1])
+        aside = ("left" in held) - ("right" in held)
+        return (self._hold(self._broom + SIDEWAYS * elapsed * aside),) if aside else ()
+
+    def _choose(self) -> Sequence[Action]:
+        """Let a team that plays by itself choose, and show its broom."""
+        stones = [(k // STONES, place) for k, place in self._places.items()]
+        last = self._score.hammer == self._score.team
+        self._meant = self._teams[self._score.team].delivery(stones, self._score.thrown, last)
+        self._turn = self._meant.turn
+        self._weight = self._meant.speed**2 / self._ice.speed_for(1.0) ** 2 + RELEASE
+        return (self._hold(-RELEASE * math.tan(self._meant.heading)),)
+
+    def _let_go(self, delivery: Delivery) -> Sequence[Action]:
+        assert self._frame is not None
+        name, moment = self._names[self._current], self._moment[self._current]
+        spin = delivery.spin - float(self._frame.angular_velocity[self._numbers[self._current]])
+        self._before = dict(self._places)
+        self._places[self._current] = (RELEASE, 0.0)
+        self._running, self._ready, self._struck, self._told = True, False, False, ""
+        self._cues.append("throw")
+        sweeps = self._sweep(True) if "sweep" in self._held and not self._by_itself else ()
+        return (
+            Move(time=0.0, body=name, position=(RELEASE, 0.0), velocity=delivery.velocity),
+            Impulse(time=0.0, body=name, impulse=(0.0, 0.0), angular=moment * spin),
+            *sweeps,
+        )
+
+    def _follow(self, seen: Seen, elapsed: float) -> Sequence[Action]:
+        """See where the stones are, take out who leaves, and judge the shot once all rest."""
+        frame, moves = seen.frame, list[Action]()
+        self._hear(seen, elapsed)
+        for k in tuple(self._places):
+            x, y = frame.position[self._numbers[k]].tolist()
+            self._places[k] = (x, y)
+            if beyond((x, y)):
+                del self._places[k]
+                moves.append(self._put(k, gone(*divmod(k, STONES))))
+                self._cues.append("gone")
+        moving = [k for k in self._places if frame.velocity[self._numbers[k]].any()]
+        return moves if moving else [*moves, *self._judge(seen)]
+
+    def _hear(self, seen: Seen, elapsed: float) -> None:
+        """Note whether the delivered stone, or any, has struck another."""
+        stones = set(self._numbers)
+        pairs = seen.contacts.pair[seen.contacts.time > self._time - elapsed].tolist()  # others only touch on
+        if any(stones.issuperset(pair) for pair in pairs):
+            self._struck = True
+            self._cues.append("hit")
+
+    def _judge(self, seen: Seen) -> Sequence[Action]:
+        """Judge a shot that has come to rest: hog line, free guard zone; and the end, where that was its last."""
+        moves: list[Action] = []
+        current, places = self._current, self._places
+        if current in places and short(places[current]) and not self._struck:
+            del places[current]
+            moves.append(self._put(current, gone(*divmod(current, STONES))))
+            self._told = "short of the hog line"
+        theirs = [k for k in self._before if k // STONES != self._score.team and guards(self._before[k])]
+        if self._score.thrown < PROTECTED and any(k not in places for k in theirs):
+            moves += [self._put(k, place) for k, place in self._before.items()]
+            moves.append(self._put(current, gone(*divmod(current, STONES))))
+            self._places = dict(self._before)
+            self._told = "a guard was taken out too soon"
+        if "sweep" in self._held:
+            moves += self._sweep(False)
+        self._running, self._since = False, seen.time
+        self._score = self._score.after_stone()
+        if self._score.full:
+            self._count()
+        return moves
+
+    def _count(self) -> None:
+        team, points = counted([(k // STONES, place) for k, place in self._places.items()])
+        self._score = self._score.after_end(team, points)
+        self._told = "a blank end" if team is None else f"{TEAMS[team]} scores {points}"
+        self._cues.append("score" if points else "blank")
+        if self._score.over is not None:
+            self._cues.append("win" if self._people != 1 or self._score.points[0] > self._score.points[1] else "lose")
+
+    def _sweep(self, on: bool) -> Sequence[Action]:
+        """Return what sweeping does to the ice, or that it is as it was."""
+        friction, curl = self._floor.sliding_friction, self._floor.curl
+        values = {"sliding_friction": friction * (SWEPT if on else 1.0), "curl": curl * (STRAIGHTER if on else 1.0)}
+        if not curl:
+            del values["curl"]
+        return [SetParameter(time=0.0, path=f"surface.{key}", value=value) for key, value in values.items()]
+
+    def _put(self, k: int, place: Point) -> Move:
+        return Move(time=0.0, body=self._names[k], position=place, velocity=(0.0, 0.0))
+
+    def _hold(self, aside: float) -> Move:
+        """Hold the broom at a place on the tee line, m to the left."""
+        self._broom = min(max(aside, -WIDEST), WIDEST)
+        return Move(time=0.0, body=BROOM, position=(0.0, self._broom))
+
+    def lines(self) -> Sequence[tuple[str, str]]:
+        """Return the score, the end, whose turn it is and how it aims."""
+        score = self._score
+        red, yellow = score.points
+        end = f"{min(score.played + 1, max(score.ends, score.played))} of {score.ends}"
+        if score.played >= score.ends and score.over is None:
+            end = "an extra one"
+        shown = [("red : yellow", f"{red} : {yellow}"), ("end", end)]
+        if score.over is None:
+            shown += [
+                (f"{TEAMS[score.team]} throws", f"stone {score.number + 1} of {STONES}"),
+                ("weight", _weight(self._weight)),
+                ("curls", "left" if self._turn > 0 else "right"),
+            ]
+        return [*shown, ("", self._told)] if self._told else shown
+
+    def cues(self) -> Sequence[str]:
+        """Return the names of the sounds since the last call."""
+        cues, self._cues = self._cues, []
+        return cues
+
+
+def _weight(beyond_tee: float) -> str:
+    if beyond_tee < -1.9:
+        return f"guard, {-beyond_tee:.1f} m before the tee"
+    if beyond_tee <= 1.9:
+        return f"draw, tee {beyond_tee:+.1f} m"
+    return f"take-out, {beyond_tee:.1f} m past the tee"

@@ -1,0 +1,107 @@
+"""What stones count, and which are in play, by their places."""
+
+import math
+
+import pytest
+
+from sandbox.games.curling.count import beyond, counted, guards, in_house, short
+from sandbox.games.curling.score import Score
+from sandbox.games.curling.sheet import (
+    BACK,
+    HOG,
+    LENGTH,
+    RELEASE,
+    RINGS,
+    STONE,
+    STONES,
+    TEES,
+    WIDTH,
+    gone,
+    stone,
+    waiting,
+)
+from sandbox.scene.part import Point
+
+RED, YELLOW = 0, 1
+FOOT = 0.3048
+
+
+def test_the_sheet_is_that_of_the_rules() -> None:
+    # in feet, as it was laid out before it was metric, to the millimetre of the rules
+    lengths = [LENGTH, HOG, BACK, TEES, TEES - 2 * HOG, *RINGS]
+    assert lengths == pytest.approx([feet * FOOT for feet in (150, 21, 6, 114, 72, 6, 4, 2, 0.5)], abs=1e-3)
+    assert math.tau * STONE == pytest.approx(0.9144, rel=1e-15)
+
+
+def test_stones_that_wait_or_are_gone_lie_apart_and_off_the_sheet() -> None:
+    places = [where(team, k) for where in (waiting, gone) for team in (RED, YELLOW) for k in range(STONES)]
+    for n, place in enumerate(places):
+        assert abs(place[1]) - STONE > WIDTH / 2
+        assert all(math.dist(place, other) > 2 * STONE for other in places[:n])
+    assert stone(YELLOW, 7) == "yellow-8"
+    assert pytest.approx(HOG - TEES) == RELEASE + STONE  # its front at the nearer hog line
+
+
+@pytest.mark.parametrize(
+    ("stones", "team", "points"),
+    [
+        ([], None, 0),
+        ([(RED, (0.0, 0.0))], RED, 1),
+        ([(RED, (0.0, 0.5)), (YELLOW, (0.3, 0.0))], YELLOW, 1),
+        ([(RED, (0.0, 0.5)), (YELLOW, (0.3, 0.0)), (YELLOW, (0.0, -0.4))], YELLOW, 2),
+        ([(RED, (0.0, 0.5)), (YELLOW, (0.3, 0.0)), (YELLOW, (0.0, -0.6))], YELLOW, 1),
+        ([(RED, (0.0, 1.9)), (RED, (0.0, -1.9)), (RED, (1.0, 1.0))], RED, 3),  # the rim of a stone is enough
+        ([(RED, (0.0, 2.0))], None, 0),
+        ([(RED, (-3.0, 0.0)), (YELLOW, (0.0, 1.0))], YELLOW, 1),  # a guard counts nothing
+        ([(RED, (0.5, 0.0)), (YELLOW, (0.0, 0.5))], None, 0),  # nobody can tell
+        ([(RED, (0.1 * k, 0.0)) for k in range(8)], RED, 8),
+        ([(RED, (0.1 * k, 0.0)) for k in range(8)] + [(YELLOW, (0.0, 0.35))], RED, 4),
+    ],
+)
+def test_an_end_is_worth(stones: list[tuple[int, Point]], team: int | None, points: int) -> None:
+    assert counted(stones) == (team, points)
+    assert counted(stones[::-1]) == (team, points)
+    swapped = [(1 - whose, place) for whose, place in stones]
+    assert counted(swapped) == (None if team is None else 1 - team, points)
+
+
+def test_who_is_out_of_play() -> None:
+    eps = 1e-9
+    assert beyond((0.0, WIDTH / 2 - STONE))  # the side line is touched
+    assert not beyond((0.0, -WIDTH / 2 + STONE + eps))
+    assert beyond((BACK + STONE + eps, 0.0))  # wholly past the back line
+    assert not beyond((BACK + STONE - eps, 0.0))
+    assert short((-HOG + STONE - eps, 0.0))  # not wholly past the hog line
+    assert not short((-HOG + STONE + eps, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("place", "guard"),
+    [
+        ((-3.0, 0.0), True),
+        ((-6.4, 0.0), False),  # not past the hog line
+        ((-1.9, 0.0), False),  # it touches the house
+        ((-2.0, 0.0), True),
+        ((-0.16, 2.2), True),  # beside the house
+        ((-0.1, 2.2), False),  # on the tee line
+        ((1.0, 2.2), False),
+    ],
+)
+def test_the_free_guard_zone_lies_before_the_tee_line_and_outside_the_house(place: Point, guard: bool) -> None:
+    assert guards(place) is guard
+    assert not (guards(place) and in_house(place))
+
+
+def test_turns_alternate_and_the_hammer_goes_to_who_did_not_score() -> None:
+    score = Score(ends=2)
+    teams = []
+    for _ in range(16):
+        teams.append(score.team)
+        score = score.after_stone()
+    assert teams == [RED, YELLOW] * 8  # the hammer is yellow's
+    assert score.full
+    assert score.after_end(None, 0).hammer == YELLOW
+    won = score.after_end(YELLOW, 2)
+    assert (won.points, won.hammer, won.team, won.over) == ((0, 2), RED, YELLOW, None)
+    assert won.after_end(RED, 2).over is None  # even: another end
+    assert won.after_end(RED, 3).over == "red wins 3 : 2"

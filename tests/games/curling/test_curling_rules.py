@@ -1,0 +1,181 @@
+"""A match of curling: deliveries, stones out of play, guards, ends, sweeping, teams that play by themselves."""
+
+import copy
+import json
+
+import pytest
+from ice import Rink, sheet
+
+import sandbox
+from sandbox.action import Move, SetParameter, actions_from_json
+from sandbox.games.bout import Bout
+from sandbox.games.curling.rules import Curling
+from sandbox.games.curling.score import Score
+from sandbox.games.curling.sheet import RELEASE, gone, waiting
+from sandbox.games.policies import Nobody, Script
+from sandbox.games.registry import rules_of
+from sandbox.games.rules import Press, UnfitError
+from sandbox.scene.file import from_document, load
+from sandbox.scene.shipped import find
+
+
+@pytest.fixture
+def rink() -> Rink:
+    rink = Rink(sheet())
+    rink.until("next")
+    return rink
+
+
+def lay(rink: Rink, **stones: tuple[float, float]) -> None:
+    """Put stones where they would have been thrown to."""
+    for name, place in stones.items():
+        name = name.replace("_", "-")
+        rink.simulation.apply(Move(time=0.0, body=name, position=place))
+        rink.rules._places[rink.rules._names.index(name)] = place
+
+
+def test_a_stone_is_thrown_towards_the_broom_and_curls_away_from_it(rink: Rink) -> None:
+    assert rink.place("red-1") == (RELEASE, 0.0)
+    rink.throw(aside=-1.05)
+    x, y = rink.place("red-1")
+    assert abs(x) < 0.1  # the weight is for the tee
+    assert abs(y) < 0.2  # and the curl about 1 m
+    assert rink.place("yellow-1") == (RELEASE, 0.0)
+
+
+def test_the_other_turn_is_the_mirror_of_the_first(rink: Rink) -> None:
+    other = Rink(sheet())
+    other.until("next")
+    rink.throw(aside=0.5, weight=1.0)
+    other.throw(aside=-0.5, weight=1.0, turn=-1)
+    (x, y), (u, v) = rink.place("red-1"), other.place("red-1")
+    assert (x, y) == pytest.approx((u, -v), abs=1e-9)  # rounding
+
+
+def test_a_stone_short_of_the_hog_line_is_taken_away(rink: Rink) -> None:
+    rink.throw(weight=-8.0)
+    assert rink.place("red-1") == gone(0, 0)
+    assert ("", "short of the hog line") in rink.rules.lines()
+
+
+def test_a_stone_past_the_back_line_is_taken_away_as_it_passes(rink: Rink) -> None:
+    rink.throw(weight=10.0)
+    assert rink.place("red-1") == gone(0, 0)
+
+
+def test_a_guard_that_is_taken_out_too_soon_is_put_back(rink: Rink) -> None:
+    lay(rink, yellow_1=(-4.0, -0.55))
+    rink.rules._score = Score(2, thrown=2)
+    rink.rules._ready = False
+    rink.until("next")
+    rink.rules._broom = rink.rules._ice.through((-4.0, -0.55), 1, 3.2).heading * -RELEASE
+    rink.throw(weight=14.0)
+    assert rink.place("yellow-1") == (-4.0, -0.55)
+    assert rink.place("red-2") == gone(0, 1)
+    assert ("", "a guard was taken out too soon") in rink.rules.lines()
+
+
+def test_the_sixth_stone_may_take_out_a_guard(rink: Rink) -> None:
+    lay(rink, red_1=(-4.0, -0.55))
+    rink.rules._score = Score(2, thrown=5)
+    rink.rules._ready = False
+    rink.until("next")
+    rink.rules._broom = rink.rules._ice.through((-4.0, -0.55), 1, 3.2).heading * -RELEASE
+    rink.throw(weight=14.0)
+    assert rink.place("red-1") == gone(0, 0)
+
+
+def test_sweeping_takes_a_stone_further_and_straighter(rink: Rink) -> None:
+    plain = Rink(sheet())
+    plain.until("next")
+    plain.throw(weight=-3.0)
+    rink.hold("softer", 3.0 / 2.5)
+    rink.step(("throw", 1.0), ("throw", 0.0))
+    rink.step(("sweep", 1.0))
+    rink.until("next")
+    (x, y), (u, v) = rink.place("red-1"), plain.place("red-1")
+    assert 2.0 < x - u < 4.5  # some 3 m for one that is swept all the way
+    assert 0.0 < y < v
+    scene = rink.simulation.scene
+    assert scene.surface == sheet().surface  # the ice is as it was
+
+
+def test_the_end_is_counted_and_the_next_one_begins(rink: Rink) -> None:
+    lay(rink, yellow_1=(0.5, 0.0), yellow_2=(0.0, -0.7), red_1=(0.0, 1.2))
+    rink.rules._score = Score(2, thrown=15)
+    rink.rules._ready = False
+    rink.until("next")
+    rink.throw(weight=14.0, aside=2.2)
+    assert rink.rules._score.points == (0, 2)
+    assert rink.rules._score.hammer == 0
+    assert rink.place("yellow-1") == (RELEASE, 0.0)
+    assert rink.place("yellow-2") == waiting(1, 1)
+    assert rink.place("red-1") == waiting(0, 0)
+
+
+def test_nothing_but_sweeping_helps_while_stones_run(rink: Rink) -> None:
+    rink.step(("throw", 1.0))
+    assert rink.rules.control("throw", 1.0) == ()
+    assert [action.kind for action in rink.rules.control("sweep", 1.0)] == ["set", "set"]
+
+
+def test_a_copy_goes_on_by_itself(rink: Rink) -> None:
+    rules = copy.deepcopy(rink.rules)
+    rink.throw()
+    assert rules._score.thrown == 0
+    assert rink.rules._score.thrown == 1
+
+
+def test_an_end_of_two_teams_that_play_by_themselves_replays_to_score_and_state() -> None:
+    scene = sheet("play.curling.people=0", "play.curling.ends=1", "world.duration=120.0")
+    played = sandbox.run(scene, bout=Bout(Curling(scene, scene.bodies), Nobody(), "none"), audit=False)
+    again = sandbox.run(
+        scene,
+        actions=actions_from_json(json.dumps(played.info["actions"])),
+        bout=Bout(Curling(scene, scene.bodies), None, "none", ()),
+        audit=False,
+    )
+    assert again.info["state_hash"] == played.info["state_hash"]
+    assert again.info["game"]["score"] == played.info["game"]["score"]
+    assert again.info["game"]["otherwise"] is None
+    assert again.info["game"]["lines"] == played.info["game"]["lines"]
+    thrown = [action for action in played.info["actions"] if action["kind"] == "impulse"]
+    assert len(thrown) == 5  # in 120 s
+
+
+def test_what_a_person_did_is_done_again_with_sweeping_and_all() -> None:
+    scene = sheet("world.duration=60.0")
+    script = [Press(0.5, "right", 1.0), Press(1.5, "right", 0.0), Press(2.0, "throw", 1.0), Press(6.0, "sweep", 1.0)]
+    script += [Press(14.0, "sweep", 0.0), Press(31.0, "throw", 1.0)]
+    played = sandbox.run(scene, bout=Bout(Curling(scene, scene.bodies), Script(script), "script"), audit=False)
+    actions = actions_from_json(json.dumps(played.info["actions"]))
+    assert sum(isinstance(action, SetParameter) for action in actions) == 4  # two figures, twice
+    rules = Curling(scene, scene.bodies)
+    again = sandbox.run(scene, actions=actions, bout=Bout(rules, None, "script", script), audit=False)
+    assert again.info["state_hash"] == played.info["state_hash"]
+    assert again.info["game"]["otherwise"] is None
+    assert rules._score.thrown == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_a_match_between_teams_comes_to_an_end(seed: int) -> None:
+    scene = sheet("play.curling.people=0", "play.curling.ends=2", f"world.seed={seed}")
+    run = sandbox.run(scene, bout=Bout(Curling(scene, scene.bodies), Nobody(), "none"), audit=False)
+    assert " wins " in run.info["game"]["over"]
+    assert run.status == "ok"
+
+
+def test_a_person_plays_red_and_its_score_is_theirs() -> None:
+    scene = load(find("games/curling"))
+    rules = rules_of(scene)
+    assert isinstance(rules, Curling)
+    rules._score = rules._score._replace(points=(1, 4))
+    assert rules.score == 1
+
+
+def test_a_scene_without_stones_is_refused() -> None:
+    with pytest.raises(UnfitError, match="red-1"):
+        rules_of(from_document({"play": {"game": "curling"}, "surface": {"bodies": "pucks", "sliding_friction": 0.01}}))
+    with pytest.raises(UnfitError, match="pucks"):
+        rules_of(from_document({"play": {"game": "curling"}}))
