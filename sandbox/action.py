@@ -143,6 +143,15 @@ class Throttle(Timed):
     """share of its force, from now on"""
 
 
+class Drive(Timed):
+    """Ask a drive of the scene for a level from now on."""
+
+    kind: Literal["drive"] = "drive"
+    drive: Name
+    level: Annotated[float, Field(ge=0, le=1)]
+    """0 is at rest; of a torque the part of it, of a pull how far, of a stroke anything above 0 all the way"""
+
+
 class Toggle(Timed):
     """Let a wall or post be met from now on, or let everything pass it: a drop target, a diverter."""
 
@@ -169,7 +178,19 @@ class Switch(Timed):
 
 
 Action = Annotated[
-    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Throttle | Toggle | Strike | Switch,
+    Impulse
+    | Force
+    | Move
+    | Spawn
+    | Remove
+    | SetParameter
+    | Pull
+    | Launch
+    | Throttle
+    | Drive
+    | Toggle
+    | Strike
+    | Switch,
     Field(discriminator="kind"),
 ]
 

@@ -72,6 +72,18 @@ DEMANDED = {
     "billiards/stun_draw_follow": ROLLING,
     "billiards/three-cushion": CAROM,
     "billiards/throw": {*ROLLING, Demand.ROTATION},
+    "joints/flipper": {
+        *FALLING,
+        Demand.ROTATION,
+        Demand.BALL_SEGMENT,
+        Demand.BALL_POST,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.POLYGONS,
+        Demand.FALLOFF,
+        Demand.KICKS,
+        Demand.DRIVES,
+    },
     "games/landing": {
         Demand.TRANSLATION,
         Demand.ROTATION,
