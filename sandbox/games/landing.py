@@ -65,7 +65,7 @@ class Landing:
         self.score = 0
         self.over: str | None = None
         self._ship, self._pad = bodies.names.index(SHIP), -1 - scene.fixed_names.index(PAD)
-        self._place = _place(scene)
+        self._place, self._solid = _place(scene), len(scene.fixed)
         form = form_of(bodies.elements[int(bodies.element[self._ship])])
         self._corners = [(x, y, piece.radius) for piece in form.pieces for x, y in piece.corners]
         self._tank = self._full = TANK * float(bodies.mass[self._ship])
@@ -116,7 +116,7 @@ class Landing:
         if not frame.present[ship]:
             return "lost in space"
         touched = {int(pair[1]) if pair[0] == ship else int(pair[0]) for pair in seen.contacts.pair if ship in pair}
-        if touched - {self._pad}:
+        if any(number >= -self._solid for number in touched - {self._pad}):  # the others are no more than zones
             return "crashed beside the pad"
         if self._pad not in touched:
             self._still = 0.0

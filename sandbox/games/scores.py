@@ -10,7 +10,7 @@ import numpy as np
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """of games, whose scores are no more than the quantiles"""
 MOST_BINS = 10
-"""and one more, where bins do not begin at the least score"""
+"""and up to two more, as bins begin and end at round figures, not at the least and the most score"""
 
 
 @dataclass(frozen=True)

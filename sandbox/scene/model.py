@@ -131,7 +131,7 @@ class Post(Surfaced):
 
 
 class Play(Part):
-    """How the window plays a scene. No engine reads it, and no run depends on it."""
+    """How a scene is played. No engine reads it, and no run depends on it but by the game that is played."""
 
     arrows: Name | None = None
     """a body that the arrow keys move"""

@@ -20,7 +20,7 @@ from sandbox.trajectory import Trajectory
 
 COLUMNS = (
     "id scene_hash scene_title engine settings seed versions status reason created steps seconds energy_start "
-    "energy_end contacts missed_contacts path"
+    "energy_end contacts missed_contacts path score"
 )
 
 
