@@ -17,6 +17,7 @@ from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
 from sandbox.scene.part import Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
+from sandbox.scene.parts import PlayPart
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule, Compound, Polygon
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc",
-    "Emitter", "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Pocket",
-    "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust",
+    "Emitter", "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "PlayPart",
+    "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust",
     "Wall", "World", "default_name",
 ]  # fmt: skip
 
@@ -122,6 +123,8 @@ class Play(Part):
     area: tuple[Point, Point] | None = None
     """lower left and upper right corner of a table's playing area, m"""
     spots: tuple[Spot, ...] = Field((), alias="spot")
+    parts: tuple[PlayPart, ...] = Field((), alias="part")
+    """which thing is what to the rules of the game"""
 
 
 class Scene(Part):
