@@ -143,6 +143,14 @@ class Throttle(Timed):
     """share of its force, from now on"""
 
 
+class Toggle(Timed):
+    """Let a wall or post be met from now on, or let everything pass it: a drop target, a diverter."""
+
+    kind: Literal["toggle"] = "toggle"
+    thing: Name
+    solid: bool
+
+
 class Strike(Timed, Stroke):
     """Strike a ball on a floor with a cue: it has the velocity and the spin of the stroke, whatever it had before."""
 
@@ -161,7 +169,7 @@ class Switch(Timed):
 
 
 Action = Annotated[
-    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Throttle | Strike | Switch,
+    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Throttle | Toggle | Strike | Switch,
     Field(discriminator="kind"),
 ]
 
