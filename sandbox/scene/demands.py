@@ -48,6 +48,8 @@ class Demand(StrEnum):
     SURFACE = "surface"
     SPIN = "spin"
     POCKETS = "pockets"
+    LAYERS = "layers"
+    ZONES = "zones"
 
 
 BALLS = frozenset(
@@ -155,6 +157,9 @@ def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
     yield from _surfaces(scene, meet)
     yield from _joints(scene)
     yield from _floor(scene)
+    apart = len(scene.layers) > 1
+    yield Demand.LAYERS, apart, ", ".join(scene.layers) if apart else "all are on the ground"
+    yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     mortal = int(np.isfinite(bodies.lifetime).sum())
     yield Demand.LIFETIMES, mortal > 0, _count(mortal, "body lives for a time", "bodies live for a time", "all stay")

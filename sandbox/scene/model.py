@@ -17,15 +17,16 @@ from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
 from sandbox.scene.kick import Kick
-from sandbox.scene.part import Falloff, Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
+from sandbox.scene.part import Acceleration, Falloff, Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
 from sandbox.scene.parts import PlayPart
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule, Compound, Polygon
 from sandbox.scene.spots import Game, Spot
 from sandbox.scene.stacks import Stack
-from sandbox.scene.surfaced import Collides, Mover, Single, Surfaced
+from sandbox.scene.surfaced import GROUND, Collides, Mover, Single, Surfaced
 from sandbox.scene.weaves import Cloth, Rope
+from sandbox.scene.zone import Layers, Zone
 
 if TYPE_CHECKING:
     from sandbox.scene.bodies import Bodies
@@ -35,11 +36,9 @@ __all__ = [
     "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc",
     "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Pair", "Plane", "Play",
     "PlayPart", "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack",
-    "Surfaced", "Thrust",
-    "Wall", "World", "default_name",
+    "Surfaced", "Thrust", "Wall", "World", "Zone", "default_name",
 ]  # fmt: skip
 
-Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
 Drag = Annotated[float, Field(ge=0, le=1e9)]
 Height = Annotated[float, Field(gt=0, le=1e9)]
 
@@ -90,6 +89,8 @@ class Plane(Surfaced):
     """any point of the surface, m"""
     normal: Vector
     """out of the solid; any length"""
+    layers: Layers | None = None
+    """on which it is solid; without, on all"""
 
 
 class Wall(Surfaced):
@@ -100,6 +101,8 @@ class Wall(Surfaced):
     """full thickness, m"""
     closed: bool = False
     """Join the last point to the first."""
+    layers: Layers = (GROUND,)
+    """on which it is solid"""
     height: Height | None = None
     """of the nose above a floor, m"""
     kick: Kick | None = None
@@ -114,6 +117,8 @@ class Post(Surfaced):
 
     position: Point
     radius: Radius
+    layers: Layers = (GROUND,)
+    """on which it is solid"""
     height: Height | None = None
     """of the nose above a floor, m"""
     kick: Kick | None = None
@@ -160,6 +165,7 @@ class Scene(Part):
     walls: tuple[Wall, ...] = Field((), alias="wall")
     posts: tuple[Post, ...] = Field((), alias="post")
     pockets: tuple[Pocket, ...] = Field((), alias="pocket")
+    zones: tuple[Zone, ...] = Field((), alias="zone")
     balls: tuple[Ball, ...] = Field((), alias="ball")
     grids: tuple[Grid, ...] = Field((), alias="grid")
     scatters: tuple[Scatter, ...] = Field((), alias="scatter")
@@ -243,17 +249,25 @@ class Scene(Part):
 
     @property
     def fixed(self) -> tuple[Plane | Wall | Post, ...]:
-        """The solid fixed things, in the order of their numbers: planes, walls, posts. Pockets come after them."""
+        """The solid fixed things, in the order of their numbers: planes, walls, posts. Pockets and zones follow."""
         return self.planes + self.walls + self.posts
 
     @cached_property
+    def layers(self) -> tuple[str, ...]:
+        """The layers that the scene speaks of, in the order of their numbers: the ground first."""
+        from sandbox.scene.zone import layers_of
+
+        return layers_of(self)
+
+    @cached_property
     def fixed_names(self) -> tuple[str, ...]:
-        """A name for each fixed thing, pockets last; one without a name is called by its kind and place in the file."""
-        kinds: dict[str, Sequence[Surfaced | Pocket]] = {
+        """A name for each fixed thing, then pockets, then zones; without one, it is its kind and place in the file."""
+        kinds: dict[str, Sequence[Surfaced | Pocket | Zone]] = {
             "plane": self.planes,
             "wall": self.walls,
             "post": self.posts,
             "pocket": self.pockets,
+            "zone": self.zones,
         }
         return tuple(
             thing.name or default_name(kind, k) for kind, things in kinds.items() for k, thing in enumerate(things)
