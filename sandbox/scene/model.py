@@ -17,8 +17,10 @@ from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
 from sandbox.scene.kick import Kick
+from sandbox.scene.paint import Paint
 from sandbox.scene.part import Acceleration, Falloff, Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
 from sandbox.scene.parts import PlayPart
+from sandbox.scene.pinball.described import Pinball
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule, Compound, Polygon
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc",
-    "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Pair", "Plane", "Play",
+    "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Paint", "Pair", "Plane", "Play",
     "PlayPart", "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack",
     "Surfaced", "Thrust", "Wall", "World", "Zone", "default_name",
 ]  # fmt: skip
@@ -144,6 +146,8 @@ class Play(Part):
     spots: tuple[Spot, ...] = Field((), alias="spot")
     parts: tuple[PlayPart, ...] = Field((), alias="part")
     """which thing is what to the rules of the game"""
+    paints: tuple[Paint, ...] = Field((), alias="paint")
+    """what the window draws below everything"""
 
 
 class Scene(Part):
@@ -157,6 +161,8 @@ class Scene(Part):
     play: Play = Field(default_factory=Play)
     billiards: Billiards | None = None
     """None once the scene was read: by then it is written out"""
+    pinball: Pinball | None = None
+    """None once the scene was read, likewise"""
     surface: Floor | None = None
     contact_models: ContactModels = Field(default_factory=ContactModels)
     materials: tuple[Material, ...] = Field((), alias="material")

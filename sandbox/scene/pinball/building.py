@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sandbox.scene.faults import Location
-from sandbox.scene.model import Ball, Drive, Paint, PlayPart, Polygon, Post, Wall, Zone
+from sandbox.scene.model import Ball, Paint, PlayPart, Polygon, Post, Wall, Zone
 from sandbox.scene.part import Point
 from sandbox.scene.parts import Role
 from sandbox.scene.pinball.element import Corner, Scoring
@@ -33,7 +33,6 @@ class Building:
     balls: list[Ball] = field(default_factory=list)
     boxes: list[Box] = field(default_factory=list)
     polygons: list[Polygon] = field(default_factory=list)
-    drives: list[Drive] = field(default_factory=list)
     parts: list[PlayPart] = field(default_factory=list)
     paints: list[Paint] = field(default_factory=list)
     origins: dict[str, Location] = field(default_factory=dict)
