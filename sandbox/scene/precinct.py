@@ -69,9 +69,7 @@ def _holds(piece: Piece, place: Point) -> bool:
     corners = piece.corners
     if len(corners) > 2:
         sides = zip(corners, (*corners[1:], corners[0]), strict=True)
-        return all(
-            (bx - ax) * (place[1] - ay) - (by - ay) * (place[0] - ax) >= 0.0 for (ax, ay), (bx, by) in sides
-        )
+        return all((bx - ax) * (place[1] - ay) - (by - ay) * (place[0] - ax) >= 0.0 for (ax, ay), (bx, by) in sides)
     (ax, ay), (bx, by) = corners[0], corners[-1]
     x, y = bx - ax, by - ay
     length2 = x * x + y * y

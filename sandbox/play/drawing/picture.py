@@ -11,6 +11,7 @@ from sandbox.play.drawing.discs import Discs, spokes
 from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
 from sandbox.play.drawing.grid import draw_grid, draw_scale
 from sandbox.play.drawing.overlays import Overlays
+from sandbox.play.drawing.painted import draw_painted
 from sandbox.play.drawing.palette import BACKGROUND, CLEAR, TOUCHING, ColourArray, colour_of
 from sandbox.play.drawing.points import LARGEST, Packed, Points, packed
 from sandbox.play.drawing.polygons import Polygons
@@ -207,7 +208,9 @@ class Picture:
             drawn = pygame.Surface(surface.get_size(), 0, surface)
             drawn.fill(BACKGROUND)
             area = sight.scene.play.area
-            if area is None:
+            if sight.scene.play.paints:
+                draw_painted(drawn, camera, sight.scene, unit, antialias)
+            elif area is None:
                 draw_grid(drawn, camera, unit)
                 draw_fixtures(drawn, camera, sight.scene, unit, antialias)
             else:

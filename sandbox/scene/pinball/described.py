@@ -51,4 +51,3 @@ class Pinball(Part):
     flippers: tuple[Flipper, ...] = Field((), alias="flipper")
     plungers: tuple[Plunger, ...] = Field((), alias="plunger")
     balls: tuple[PinballBall, ...] = Field((), alias="ball")
-

@@ -18,6 +18,7 @@ Corner = Annotated[tuple[Coordinate, ...], Field(min_length=2, max_length=3)]
 """x and y, m; and, of a corner that is round, the radius of the arc that rounds it, m"""
 Corners = Annotated[tuple[Corner, ...], Field(min_length=2, max_length=1000)]
 
+
 class Element(Part):
     """Anything that a table is built of."""
 
@@ -49,4 +50,3 @@ class Line(Element):
     closed: bool = False
     """Join the last point to the first."""
     layers: Layers = (GROUND,)
-

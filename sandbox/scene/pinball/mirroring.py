@@ -54,5 +54,5 @@ def middle_of(element: Element) -> Point:
         place = getattr(element, key, None)
         if place is not None:
             return float(place[0]), float(place[1])
-    points = getattr(element, "points")
+    points = element.points
     return sum(p[0] for p in points) / len(points), sum(p[1] for p in points) / len(points)

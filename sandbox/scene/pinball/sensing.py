@@ -58,7 +58,13 @@ def ramp(to: Building, name: str, of: Ramp) -> None:
 
     deep, half_deep = LEAST_DEPTH, 0.5 * LEAST_DEPTH
     mouth = deep + GAP + half_deep
-    to.zone(f"{name} foot", points=_across(line, half_deep, of.width - deep), thickness=deep, layers=(layer,), to_layer=GROUND)
+    to.zone(
+        f"{name} foot",
+        points=_across(line, half_deep, of.width - deep),
+        thickness=deep,
+        layers=(layer,),
+        to_layer=GROUND,
+    )
     to.zone(name, points=_across(line, mouth, of.width - deep), thickness=deep, to_layer=layer)
     for k, (a, b) in enumerate(pairwise(part_of(line, mouth, of.climb))):
         steep = 9.81 * ROLLING * of.rise / of.climb / math.dist(a, b)
@@ -67,7 +73,9 @@ def ramp(to: Building, name: str, of: Ramp) -> None:
         outline = (*beside(strip, half), *reversed(beside(strip, -half)))
         to.zone(f"{name} climb {k + 1}", points=outline, layers=(layer,), gravity=pull)
     end = f"{name} exit"
-    to.zone(end, points=_across(line, whole - half_deep, of.width - deep), thickness=deep, layers=(layer,), to_layer=GROUND)
+    to.zone(
+        end, points=_across(line, whole - half_deep, of.width - deep), thickness=deep, layers=(layer,), to_layer=GROUND
+    )
     group = of.group or name
     to.part(name, "ramp", group=group, step=0)
     to.part(end, "ramp", group=group, step=1, score=of.score, light=of.light or line[0])
