@@ -77,10 +77,8 @@ def place_of(location: Location, document: dict[str, Any], stated: dict[str, Any
         return (KEYS[0],)
     from sandbox.scene.pinball.expanding import origins
 
-    here: Any = document
-    for key in location[:2]:
-        here = here[key] if isinstance(here, dict) or (isinstance(here, list) and isinstance(key, int)) else {}
-    name = here.get("name") if isinstance(here, dict) else None
+    those, number = document.get(str(location[0])), location[1] if len(location) > 1 else None
+    name = those[number].get("name") if isinstance(those, list) and isinstance(number, int) else None
     return origins(read_model(stated)).get(str(name), ("pinball",))
 
 

@@ -1,5 +1,7 @@
 """Painted: a scene with paint on its ground, as a playfield has: paint, lamps, shadows of what is fixed, caps."""
 
+from itertools import pairwise
+
 import numpy as np
 import pygame
 
@@ -73,7 +75,7 @@ def _shadow_of_wall(surface: pygame.Surface, camera: Camera, wall: Wall, antiali
     area = surface.get_clip()
     distances = [
         capsule_distance((ax, ay), (bx, by), half)
-        for (ax, ay), (bx, by) in zip(ends, ends[1:], strict=False)
+        for (ax, ay), (bx, by) in pairwise(ends)
         if clipped((ax, ay), (bx, by), area, half + 4.0) is not None
     ]
     if not distances:

@@ -25,7 +25,7 @@ class Element(Part):
     name: Name | None = None
     """one without a name is called by its kind and its place in the file"""
     mirrored: bool = False
-    """Build it a second time beyond the table's axis: names and groups of the two begin with `left` and `right`."""
+    """Build it a second time beyond the table's axis; the names of the two begin with `left` and `right`."""
     colour: Colour | None = None
 
 

@@ -1,6 +1,5 @@
 """Expanding: `[pinball]` to walls, posts, zones, bodies, drives and the parts they play."""
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
@@ -13,16 +12,13 @@ from sandbox.scene.pinball.described import Pinball
 from sandbox.scene.pinball.faulting import elements_of, faults_of
 from sandbox.scene.pinball.materials import MATERIALS, pairs
 from sandbox.scene.pinball.mirroring import both
+from sandbox.scene.pinball.rolling import rolling_gravity
 from sandbox.scene.pinball.rounding import rounded
 
 __all__ = ["expanded", "faults_of", "origins"]
 
 Stated = TypeVar("Stated", bound=Part)
 
-G = 9.81
-"""m/s²"""
-ROLLING = 5.0 / 7.0
-"""of gravity down the slope that speeds up a solid sphere which rolls: see `rolling_gravity`"""
 SUBSTEPS = 10
 """for engines that step: at 1 kHz a ball at 8 m/s covers less than its radius in one"""
 DURATION = 60.0
@@ -47,17 +43,6 @@ BUILD: dict[str, Callable[[Building, str, Any], None]] = {
     "ball": driving.ball,
 }
 """How each kind of element is built."""
-
-
-def rolling_gravity(slope: float) -> tuple[float, float]:
-    """Return the acceleration of a ball that rolls down a slope, rad, as gravity in the plane of the table, m/s².
-
-    Friction F at the point of contact turns a sphere of radius r and moment I = (2/5) m r²: F r = I a / r, so that
-    F = (2/5) m a, and m a = m g sin θ − F gives a = (5/7) g sin θ: it is as if the sphere were 7/5 as heavy along its
-    way. A disc that lies flat in the plane, as bodies here do, cannot roll on it, so gravity itself is made smaller.
-    Limits: speeds that collisions change are those of a sphere that rolls again at once.
-    """
-    return 0.0, -ROLLING * G * math.sin(slope)
 
 
 def expanded(scene: Scene) -> Scene:

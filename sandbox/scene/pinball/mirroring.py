@@ -21,9 +21,7 @@ def both(element: Built, kind: str, number: int, axis: float) -> Iterator[tuple[
         yield name, element
         return
     for one in (element, reflected(element, axis)):
-        side = "left" if middle_of(one)[0] < axis else "right"
-        group = getattr(one, "group", None)
-        yield f"{side} {name}", one if group is None else one.model_copy(update={"group": f"{side} {group}"})
+        yield f"{'left' if middle_of(one)[0] < axis else 'right'} {name}", one
 
 
 def reflected(element: Built, axis: float) -> Built:

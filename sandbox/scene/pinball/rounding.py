@@ -6,6 +6,7 @@ a rectangle whose two upper corners are rounded by half its width has a semicirc
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from sandbox.scene.part import Point, Vector
@@ -110,7 +111,7 @@ def beside(points: Sequence[Point], distance: float) -> tuple[Point, ...]:
 
     Limits: corners are mitred, and a distance beyond the radius of a bend makes loops.
     """
-    ways = [_way(a, b, k) for k, (a, b) in enumerate(zip(points, points[1:], strict=False))]
+    ways = [_way(a, b, k) for k, (a, b) in enumerate(pairwise(points))]
     moved: list[Point] = []
     for k, (x, y) in enumerate(points):
         (ax, ay), (bx, by) = ways[max(k - 1, 0)], ways[min(k, len(ways) - 1)]
@@ -122,14 +123,14 @@ def beside(points: Sequence[Point], distance: float) -> tuple[Point, ...]:
 
 def length_of(points: Sequence[Point]) -> float:
     """Return the length of a polyline, m."""
-    return math.fsum(math.dist(a, b) for a, b in zip(points, points[1:], strict=False))
+    return math.fsum(math.dist(a, b) for a, b in pairwise(points))
 
 
 def part_of(points: Sequence[Point], begin: float, end: float) -> tuple[Point, ...]:
     """Return the part of a polyline between two lengths along it, m."""
     cut: list[Point] = []
     gone = 0.0
-    for a, b in zip(points, points[1:], strict=False):
+    for a, b in pairwise(points):
         size = math.dist(a, b)
         low, high = max(begin - gone, 0.0), min(end - gone, size)
         if high - low > 0.0:

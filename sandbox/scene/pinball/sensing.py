@@ -2,18 +2,17 @@
 
 import math
 from itertools import pairwise
+from typing import Any
 
 from sandbox.scene.part import Point
 from sandbox.scene.pinball.building import Building
+from sandbox.scene.pinball.rolling import ROLLING, G
 from sandbox.scene.pinball.rounding import beside, length_of, part_of
 from sandbox.scene.pinball.sensed import LEAST_DEPTH, Drain, Kicker, Ramp, Rollover, Spinner
 from sandbox.scene.surfaced import GROUND
 
 GAP = 0.006
 """m, between the strips at the mouth of a ramp of which one lifts the ball and the other lets it down"""
-
-ROLLING = 5.0 / 7.0
-"""of the acceleration that a frictionless ball would have: of a solid sphere that rolls"""
 
 
 def rollover(to: Building, name: str, of: Rollover) -> None:
@@ -49,12 +48,15 @@ def ramp(to: Building, name: str, of: Ramp) -> None:
     layer = of.layer or name
     line = to.line(of.points)
     whole, half = length_of(line), 0.5 * (of.width + of.thickness)
-    rail = {"thickness": of.thickness, "material": "wall", "colour": of.colour}
-    for side, by in (("left", half), ("right", -half)):
-        to.wall(f"{name} {side} rail", beside(line, by), layers=(layer,), **rail)
+    rail: dict[str, Any] = {"thickness": of.thickness, "material": "wall", "colour": of.colour}
+    for side, aside in (("left", half), ("right", -half)):
+        to.wall(f"{name} {side} rail", beside(line, aside), layers=(layer,), **rail)
     climb = part_of(line, 0.0, of.climb)
     left, right = beside(climb, half), beside(climb, -half)
-    to.wall(f"{name} sides", (*left, *reversed(right)), **rail)
+    (ax, ay), (bx, by) = climb[-2:]
+    ahead = half / math.dist((ax, ay), (bx, by))
+    ridge = bx + (bx - ax) * ahead, by + (by - ay) * ahead  # on a straight top a ball from above could come to rest
+    to.wall(f"{name} sides", (*left, ridge, *reversed(right)), **rail)
 
     deep, half_deep = LEAST_DEPTH, 0.5 * LEAST_DEPTH
     mouth = deep + GAP + half_deep
@@ -67,7 +69,7 @@ def ramp(to: Building, name: str, of: Ramp) -> None:
     )
     to.zone(name, points=_across(line, mouth, of.width - deep), thickness=deep, to_layer=layer)
     for k, (a, b) in enumerate(pairwise(part_of(line, mouth, of.climb))):
-        steep = 9.81 * ROLLING * of.rise / of.climb / math.dist(a, b)
+        steep = G * ROLLING * of.rise / of.climb / math.dist(a, b)
         pull = to.gravity[0] - steep * (b[0] - a[0]), to.gravity[1] - steep * (b[1] - a[1])
         strip = (a, b)
         outline = (*beside(strip, half), *reversed(beside(strip, -half)))
@@ -84,7 +86,8 @@ def ramp(to: Building, name: str, of: Ramp) -> None:
 def _across(line: tuple[Point, ...], along: float, width: float) -> tuple[Point, Point]:
     """Return the ends of a piece of a width across a line, a length along it, m."""
     hair = 1e-4
-    a, b = part_of(line, along - hair, along + hair)[:: max(len(part_of(line, along - hair, along + hair)) - 1, 1)]
+    piece = part_of(line, along - hair, along + hair)
+    a, b = piece[0], piece[-1]
     return beside((a, b), 0.5 * width)[0], beside((a, b), -0.5 * width)[0]
 
 
