@@ -256,6 +256,8 @@ def _spawn(action: Spawn, cast: Cast) -> None:
     name = single.name or default_name("spawned", len(cast.bodies))
     if name in cast.bodies.names or name in scene.fixed_names:
         raise ActionError(f"a body or fixed thing is called {name!r} already")
+    if single.layer not in scene.layers:
+        raise ActionError(f"no layer is named {single.layer!r}; the scene speaks of {', '.join(scene.layers)}")
     if len(cast.bodies) >= MAX_BODIES:
         raise ActionError(f"the scene holds {MAX_BODIES:,} bodies already")
     alone = alone_in(scene, single)

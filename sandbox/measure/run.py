@@ -1,6 +1,7 @@
 """Running: a scene on an engine from start to end, recorded and audited."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -103,6 +104,7 @@ def run(
     if account:
         info["causes"] = [cause.value for cause in Cause]
     trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, broken, missed, info)
+    trajectory = replace(trajectory, layer=recorder.layers(len(bodies)))
     total = energies(trajectory.at([0, -1]), scene, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     info["joint_error"] = joint_error(trajectory, scene)

@@ -77,7 +77,7 @@ class Books:
             account.enter(Cause.INTEGRATOR, self._fallen(share))
         if before is None:
             return
-        counts = p.moving
+        counts = p.yielding
         if p.free.even:
             counts[p.free.numbers] = False
         whole = self._state()

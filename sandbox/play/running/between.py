@@ -31,7 +31,17 @@ def between(before: Frame, after: Frame, share: float) -> Frame:
         if before.angle is not after.angle:  # which those share who cannot turn
             angle = after.angle.copy()
             angle[:known] -= (after.angle[:known] - before.angle[:known]) * (flew * (1.0 - share))
-    return Frame(time, position, after.velocity, angle, after.angular_velocity, after.present, after.roll)
+    return Frame(
+        time,
+        position,
+        after.velocity,
+        angle,
+        after.angular_velocity,
+        after.present,
+        after.roll,
+        after.layer,
+        after.visits,
+    )
 
 
 def _squared(vectors: FloatArray) -> FloatArray:
