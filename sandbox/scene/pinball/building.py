@@ -69,7 +69,12 @@ class Building:
         stated = {} if element is None else {key: getattr(element, key) for key in ("score", "group", "step", "light")}
         self.parts.append(PlayPart(name=name, role=role, **{**stated, **more}))
 
-    def paint(self, points: Sequence[Point], colour: str | None) -> None:
+    def paint(self, colour: str | None, points: Sequence[Point]) -> None:
         """Paint an area, if it has a colour."""
         if colour is not None:
             self.paints.append(Paint(points=tuple(points), colour=colour))
+
+    def dot(self, colour: str | None, position: Point, radius: float) -> None:
+        """Paint a disc, if it has a colour."""
+        if colour is not None:
+            self.paints.append(Paint(position=position, radius=radius, colour=colour))

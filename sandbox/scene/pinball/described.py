@@ -7,6 +7,7 @@ from pydantic import Field
 from sandbox.scene.part import Colour, Coordinate, Mass, Part, Radius, Restitution
 from sandbox.scene.pinball.element import Corners
 from sandbox.scene.pinball.moving import Flipper, PinballBall, Plunger
+from sandbox.scene.pinball.painted import Art
 from sandbox.scene.pinball.sensed import Drain, Kicker, Ramp, Rollover, Spinner
 from sandbox.scene.pinball.solids import Bumper, DropTargets, Gate, PinballPost, PinballWall, Rubber, Slingshot, Standup
 
@@ -35,6 +36,7 @@ class Pinball(Part):
     """of the playfield"""
     outline: Corners | None = None
     """of the playfield, which is painted within it, m; corners may be rounded"""
+    arts: tuple[Art, ...] = Field((), alias="art")
     walls: tuple[PinballWall, ...] = Field((), alias="wall")
     rubbers: tuple[Rubber, ...] = Field((), alias="rubber")
     posts: tuple[PinballPost, ...] = Field((), alias="post")

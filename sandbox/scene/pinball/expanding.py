@@ -13,7 +13,6 @@ from sandbox.scene.pinball.faulting import elements_of, faults_of
 from sandbox.scene.pinball.materials import MATERIALS, pairs
 from sandbox.scene.pinball.mirroring import both
 from sandbox.scene.pinball.rolling import rolling_gravity
-from sandbox.scene.pinball.rounding import rounded
 
 __all__ = ["expanded", "faults_of", "origins"]
 
@@ -25,6 +24,7 @@ DURATION = 60.0
 """s"""
 
 BUILD: dict[str, Callable[[Building, str, Any], None]] = {
+    "art": fixing.art,
     "wall": fixing.wall,
     "rubber": fixing.wall,
     "post": fixing.post,
@@ -78,7 +78,7 @@ def origins(scene: Scene) -> dict[str, Location]:
 def _built(pinball: Pinball, gravity: tuple[float, float]) -> Building:
     to = Building(pinball.axis, pinball.tolerance, pinball.ball_radius, pinball.ball_mass, gravity)
     if pinball.outline is not None:
-        to.paint(rounded(pinball.outline, True, pinball.tolerance), pinball.colour)
+        to.paint(pinball.colour, to.line(pinball.outline, closed=True))
     for kind, those in elements_of(pinball):
         for k, element in enumerate(those):
             to.here = ("pinball", kind, k)

@@ -6,10 +6,23 @@ from sandbox.scene.kick import Kick
 from sandbox.scene.part import Point, Vector
 from sandbox.scene.pinball.building import Building
 from sandbox.scene.pinball.element import Line
+from sandbox.scene.pinball.painted import Art
 from sandbox.scene.pinball.solids import Bumper, DropTargets, Gate, PinballPost, PinballWall, Slingshot, Standup
 
 AHEAD = 0.032
 """m, from the face of a target to the middle of its lamp"""
+
+
+DARK = "#0a0f18"
+"""what shadows and plastics lean to"""
+
+
+def art(to: Building, _: str, of: Art) -> None:
+    """Paint an area."""
+    if of.points is not None:
+        to.paint(of.colour, to.line(of.points, closed=True))
+    elif of.position is not None and of.radius is not None:
+        to.dot(of.colour, of.position, of.radius)
 
 
 def wall(to: Building, name: str, of: Line) -> None:
@@ -36,6 +49,7 @@ def bumper(to: Building, name: str, of: Bumper) -> None:
     """Add a post that kicks."""
     kick = Kick(speed=of.speed, threshold=of.threshold)
     to.post(name, of.position, of.radius, material="wall", colour=of.colour, kick=kick)
+    to.dot(darker(of.colour, 0.6), of.position, 1.45 * of.radius)  # its skirt
     to.part(name, "bumper", of, light=of.light or of.position)
 
 
@@ -45,6 +59,7 @@ def slingshot(to: Building, name: str, of: Slingshot) -> None:
     alike = {"thickness": of.thickness, "material": "rubber", "colour": of.colour}
     to.wall(name, (first, second), kick=Kick(speed=of.speed, threshold=of.threshold, profile="middle"), **alike)
     to.wall(f"{name} back", (second, behind, first), **alike)
+    to.paint(darker(of.colour, 0.45), of.points)
     middle = sum(x for x, _ in of.points) / 3.0, sum(y for _, y in of.points) / 3.0
     to.part(name, "slingshot", of, light=of.light or middle)
 
@@ -65,6 +80,14 @@ def drops(to: Building, name: str, of: DropTargets) -> None:
         to.wall(f"{name} {k + 1}", _plate(place, out, of.width, of.thickness), **_target(of))
         light = _moved(place, out, AHEAD)
         to.part(f"{name} {k + 1}", "drop", of, group=of.group or name, step=k, light=light)
+
+
+def darker(colour: str | None, share: float) -> str | None:
+    """Return a colour so much of the way to the dark."""
+    if colour is None:
+        return None
+    parts = zip((colour[1:3], colour[3:5], colour[5:7]), (DARK[1:3], DARK[3:5], DARK[5:7]), strict=True)
+    return "#" + "".join(f"{round(int(a, 16) + (int(b, 16) - int(a, 16)) * share):02x}" for a, b in parts)
 
 
 def unit(way: Vector) -> Vector:

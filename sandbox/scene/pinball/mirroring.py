@@ -52,5 +52,5 @@ def middle_of(element: Element) -> Point:
         place = getattr(element, key, None)
         if place is not None:
             return float(place[0]), float(place[1])
-    points = element.points
+    points: tuple[tuple[float, ...], ...] = getattr(element, "points", None) or ((0.0, 0.0),)
     return sum(p[0] for p in points) / len(points), sum(p[1] for p in points) / len(points)

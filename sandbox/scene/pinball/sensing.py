@@ -6,6 +6,7 @@ from typing import Any
 
 from sandbox.scene.part import Point
 from sandbox.scene.pinball.building import Building
+from sandbox.scene.pinball.fixing import DARK
 from sandbox.scene.pinball.rolling import ROLLING, G
 from sandbox.scene.pinball.rounding import beside, length_of, part_of
 from sandbox.scene.pinball.sensed import LEAST_DEPTH, Drain, Kicker, Ramp, Rollover, Spinner
@@ -30,6 +31,8 @@ def spinner(to: Building, name: str, of: Spinner) -> None:
 def kicker(to: Building, name: str, of: Kicker) -> None:
     """Add a hole that holds."""
     to.zone(name, position=of.position, radius=of.radius, colour=of.colour, holds=True)
+    to.dot(of.colour, of.position, 1.25 * of.radius)
+    to.dot(DARK, of.position, of.radius)
     to.part(name, "kicker", of, out=of.out, at=of.position)
 
 
