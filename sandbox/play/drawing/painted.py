@@ -8,11 +8,12 @@ import pygame
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.fixtures import draw_fixtures
 from sandbox.play.drawing.palette import BACKGROUND, INK, Colour, colour_of_fixed, hex_colour, mixed
-from sandbox.play.drawing.shade import Look, capsule_distance, disc_distance, paint
-from sandbox.play.drawing.strokes import clipped, fill
-from sandbox.scene.model import Post, Scene, Wall
+from sandbox.play.drawing.shade import Look, disc_distance, paint
+from sandbox.play.drawing.strokes import Pixel, clipped, fill, stroke
+from sandbox.scene.model import Post, Scene
 from sandbox.scene.paint import Paint
 from sandbox.scene.part import Point
+from sandbox.scene.surfaced import GROUND
 
 DARK: Colour = (5, 8, 14)
 AMBER: Colour = (255, 196, 84)
@@ -20,6 +21,8 @@ LAMP = 0.0065
 """m, radius of a lamp that nobody lit"""
 SHADOW = (0.003, -0.005)
 """m, from what is fixed to its shadow"""
+SHADE, NOTHING = 90, (255, 0, 255)
+"""how dark shadows are, of 255; and the colour that stands for none"""
 RAISED = 0.62
 """of the radius of a post that kicks: its cap"""
 
@@ -30,12 +33,7 @@ def draw_painted(
     """Draw the ground of a painted scene and what is fixed on it, as far as it is in sight."""
     for area in scene.play.paints:
         _area(surface, camera, area, antialias)
-    for wall in scene.walls:
-        if wall.solid:
-            _shadow_of_wall(surface, camera, wall, antialias)
-    for post in scene.posts:
-        at = post.position[0] + SHADOW[0], post.position[1] + SHADOW[1]
-        _disc(surface, camera, at, post.radius, Look(DARK, DARK, 0.0, 0.35, antialias))
+    _shadows(surface, camera, scene)
     for part in scene.play.parts:
         if part.light is not None:
             lit = AMBER if part.colour is None else hex_colour(part.colour)
@@ -68,23 +66,29 @@ def _cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antia
     _disc(surface, camera, glint, 0.2 * post.radius, Look(INK, INK, 0.0, 0.35, antialias))
 
 
-def _shadow_of_wall(surface: pygame.Surface, camera: Camera, wall: Wall, antialias: bool) -> None:
-    points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points) + SHADOW
-    half = max(0.5 * wall.thickness * camera.scale, 1.0)
-    ends = camera.to_screen(points).tolist()
-    area = surface.get_clip()
-    distances = [
-        capsule_distance((ax, ay), (bx, by), half)
-        for (ax, ay), (bx, by) in pairwise(ends)
-        if clipped((ax, ay), (bx, by), area, half + 4.0) is not None
-    ]
-    if not distances:
-        return
-    low, high = np.min(ends, axis=0) - half - 2.0, np.max(ends, axis=0) + half + 2.0
-    box = pygame.Rect(*np.floor(low).astype(int).tolist(), *np.ceil(high - low).astype(int).tolist()).clip(area)
-    look = Look(DARK, DARK, 0.0, 0.35, antialias)
-    # As one shape: the shadows of two segments would be darker where they meet.
-    paint(surface, lambda x, y: np.minimum.reduce([each(x, y) for each in distances]), look, box)
+def _shadows(surface: pygame.Surface, camera: Camera, scene: Scene) -> None:
+    """Darken the ground beside what is fixed on it, once where shadows overlap."""
+    layer = pygame.Surface(surface.get_size(), 0, surface)
+    layer.fill(NOTHING)
+    layer.set_colorkey(NOTHING)
+    layer.set_alpha(SHADE)
+    for wall in scene.walls:
+        if not wall.solid or GROUND not in wall.layers:
+            continue
+        points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points) + SHADOW
+        half = max(0.5 * wall.thickness * camera.scale, 1.0)
+        ends: list[Pixel] = [(x, y) for x, y in camera.to_screen(points).tolist()]
+        for a, b in pairwise(ends):
+            stroke(layer, a, b, DARK, 2.0 * half, antialias=False)
+        for x, y in ends:
+            if half > 1.0 and clipped((x, y), (x, y), layer.get_rect(), half) is not None:
+                pygame.draw.circle(layer, DARK, (x, y), half)
+    for post in scene.posts:
+        at = camera.to_screen(np.asarray(post.position) + SHADOW).tolist()
+        size = post.radius * camera.scale
+        if clipped((at[0], at[1]), (at[0], at[1]), layer.get_rect(), size) is not None:
+            pygame.draw.circle(layer, DARK, at, size)
+    surface.blit(layer, (0, 0))
 
 
 def _disc(surface: pygame.Surface, camera: Camera, at: Point, radius: float, look: Look) -> None:
