@@ -288,7 +288,7 @@ def alone_in(scene: Scene, single: Single) -> Scene:
 
 
 def _going_on(scene: Scene, running: Scene) -> Scene:
-    """Return a scene with the bodies and joints of a running one that differs in air, gravity or coefficients alone.
+    """Return a scene, changed as `Cast.change` allows, with the bodies and joints of the running one.
 
     Laid out anew they would be those of the file: with who is gone, with what is broken, and hanging along the new
     gravity.

@@ -238,6 +238,8 @@ class MeetingBodies:
             return
         self.field.time = time
         self._apply_forces()
+        if self._setter.gates.walls:
+            self._setter.gates.tick += 1
         self._space.step(self._settings.h)
         self._state = None
 

@@ -13,7 +13,8 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.native.coefficients import factors, wrong_pairs
-from sandbox.engines.native.laws import Gates, Laws
+from sandbox.engines.native.gates import Gates
+from sandbox.engines.native.laws import Laws
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Collides, Plane, Post, Scene, Wall
@@ -131,8 +132,10 @@ class SurfaceSetter:
     """Gives shapes their elasticity and friction, so that every pair has exactly its own coefficients."""
 
     def __init__(self, space: pymunk.Space, h: float) -> None:
-        self.laws, self.gates = Laws(space), Gates(space, h)
-        """what no factors can serve, and walls that let pass"""
+        self.gates = Gates(space, h)
+        """walls that let pass from one side"""
+        self.laws = Laws(space, self.gates)
+        """what no factors can serve"""
         self._elasticity: list[float] = []
         self._friction: list[float] = []
 
@@ -145,7 +148,7 @@ class SurfaceSetter:
         wrong = {
             *wrong_pairs(surfaces.restitution, touching, self._elasticity),
             *wrong_pairs(surfaces.friction, touching, self._friction),
-            *_pairs(touching & ~surfaces.fixed_coefficients),
+            *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
         }
         self.laws.renew(surfaces, wrong)
         if surfaces.one_way.any():

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.engines.kernel import kernel
-from sandbox.engines.rebound import kicked, rebound, share_at, stretches
+from sandbox.engines.rebound import compiled_rebound, kicked, share_at, stretches
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.roster import Roster
 from sandbox.scene.kick import Kick
@@ -90,4 +90,4 @@ def _away(a: Point, b: Point, point: Point) -> float:
 @kernel
 def _rebounds(restitution: FloatArray, falloff: FloatArray, approach: FloatArray, out: FloatArray) -> None:
     for k in range(len(out)):
-        out[k] = -rebound(restitution[k], falloff[k], -approach[k])
+        out[k] = -compiled_rebound(restitution[k], falloff[k], -approach[k])

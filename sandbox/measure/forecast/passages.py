@@ -79,6 +79,8 @@ def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
         found.append(Passage(bodies.names[movers[k]], thing, float(speeds[k]), float(reach[k])))
 
     for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):
+        if not isinstance(thing, Plane) and not thing.solid:
+            continue
         worst(half + _half_depth(thing), speed, name)
     among = meet_each_other(bodies)[movers]
     fixed = np.flatnonzero(bodies.fixed & meet.touches)

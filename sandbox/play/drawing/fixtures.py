@@ -23,7 +23,7 @@ from sandbox.scene.model import Plane, Post, Scene, Wall
 
 HATCH, HATCHES = 9.0, 600
 """px between two hatches of a plane, and the most of them"""
-WAYS = 36.0
+WAYS = 60.0
 """px between two arrows through a wall that lets pass from one side"""
 CAP = 5.0
 """px, the least radius at which a post that kicks shows its ring"""
@@ -125,11 +125,12 @@ def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, anti
     pixels = camera.to_screen(points).tolist()
     parts = [part for a, b in pairwise(pixels) if (part := clipped((a[0], a[1]), (b[0], b[1]), area, half + 4.0))]
     if not wall.solid:
-        dashes(surface, parts, mixed(BACKGROUND, edge, ABSENT), 5.0 * unit, antialias)
+        ends = (((a[0], a[1]), (b[0], b[1])) for a, b in pairwise(pixels))
+        dashes(surface, ends, mixed(BACKGROUND, edge, ABSENT), 5.0 * unit, antialias)
         return
     if wall.one_way:
-        for a, b in parts:
-            _ways_through(surface, a, b, half, edge, unit, antialias)
+        for a, b in pairwise(pixels):
+            _ways_through(surface, (a[0], a[1]), (b[0], b[1]), half, edge, unit, antialias)
     plain = len(parts) > MOST_ROUND
     rim = 0.0 if thin else min(1.5 * unit, half)
     # The outline of all segments first and then the filling of all, so that no outline shows inside a corner.
@@ -145,25 +146,21 @@ def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, anti
 def _ways_through(
     surface: pygame.Surface, a: Pixel, b: Pixel, half: float, colour: Colour, unit: float, antialias: bool
 ) -> None:
-    """Draw small arrows across a wall, from its right to its left, the way that it lets pass."""
-    length = math.dist(a, b)
-    if length < 2.0:
+    """Draw small arrows out of a wall's left, the way that it lets pass; they stay where they are on it."""
+    part, length = clipped(a, b, surface.get_clip(), half + 12.0 * unit), math.dist(a, b)
+    if part is None or length < 2.0:
         return
     ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
-    # On the screen y points down: a quarter turn to the left of (ux, uy) is (uy, −ux).
-    out, reach = (uy, -ux), half + 7.0 * unit
-    count = max(1, min(round(length / (WAYS * unit)), HATCHES))
-    for k in range(count):
-        s = (k + 0.5) / count * length
-        x, y = a[0] + s * ux, a[1] + s * uy
-        tip = x + reach * out[0], y + reach * out[1]
-        tail = x - reach * out[0], y - reach * out[1]
-        stroke(surface, tail, tip, colour, 1.5 * unit, antialias)
-        for side in (-1.0, 1.0):
-            barb = (
-                tip[0] - 4.0 * unit * (out[0] + side * ux),
-                tip[1] - 4.0 * unit * (out[1] + side * uy),
-            )
+    out = uy, -ux  # on the screen y points down: so it is to the left
+    step = length / max(1, round(length / (WAYS * unit)))
+    first = math.floor(math.dist(a, part[0]) / step)
+    for k in range(first, min(math.ceil(math.dist(a, part[1]) / step), first + HATCHES)):
+        s = (k + 0.5) * step
+        x, y = a[0] + s * ux + half * out[0], a[1] + s * uy + half * out[1]
+        tip = x + 10.0 * unit * out[0], y + 10.0 * unit * out[1]
+        stroke(surface, (x, y), tip, colour, 1.5 * unit, antialias)
+        for side in (-4.0 * unit, 4.0 * unit):
+            barb = tip[0] - 4.0 * unit * out[0] + side * ux, tip[1] - 4.0 * unit * out[1] + side * uy
             stroke(surface, tip, barb, colour, 1.5 * unit, antialias)
 
 
