@@ -43,7 +43,7 @@ class Frame:
     layer: IntArray | None = None
     """(N,) on which each is, by its number in the scene's `layers`; none where there is one alone"""
     visits: IntArray | None = None
-    """(N, Z) how each is with each zone: not in it, in it, held there, let go; as in `scene.zone`, none without zones"""
+    """(N, Z) how each is with each zone, by the words of `scene.zone`; none where there are none"""
 
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""
@@ -108,6 +108,11 @@ class Contacts:
         """Return contacts one after the other."""
         columns = ("time", "pair", "point", "normal", "impulse")
         return cls(*(np.concatenate([getattr(part, column) for part in parts]) for column in columns))
+
+    def some(self, which: BoolArray) -> Self:
+        """Return some of them, (C,)."""
+        vectors = (self.point[which], self.normal[which], self.impulse[which])
+        return type(self)(self.time[which], self.pair[which], *vectors)
 
     def __len__(self) -> int:
         return len(self.time)

@@ -93,7 +93,14 @@ class Bodies:
         both = {key: np.concatenate((getattr(self, key), getattr(more, key))) for key in COLUMNS}
         element = np.append(self.element, len(self.elements))
         elements = (*self.elements, single)
-        return replace(self, names=(*self.names, name), element=element, elements=elements, **both)
+        return Bodies(
+            names=(*self.names, name),
+            element=element,
+            elements=elements,
+            spheres=self.spheres,
+            layers=self.layers,
+            **both,
+        )
 
     def some(self, which: IntArray) -> "Bodies":
         """Return some of them, numbered anew."""

@@ -98,10 +98,10 @@ def meetings(scene: Scene, bodies: Bodies | None = None) -> Meetings:
     touching[surface[rows], surface[columns]] = True
     rubs = surfaces.friction > 0
     ground = [(moving & ((kinds.layers & mask) != 0), rows) for mask, rows in _by_layers(scene)]
-    meets = pair.any(axis=1)
+    meets: BoolArray = np.asarray(pair.any(axis=1))
     for able, _ in ground:
         meets |= able
-    turned = (pair & rubs[np.ix_(surface, surface)]).any(axis=1) | (meets & ~kinds.ball)
+    turned = np.asarray((pair & rubs[np.ix_(surface, surface)]).any(axis=1)) | (meets & ~kinds.ball)
 
     for able, rows in ground:
         fixed_surface = np.unique(surfaces.of_fixed[rows])
@@ -143,7 +143,12 @@ def reach(scene: Scene, bodies: Bodies) -> IntArray:
         for mask, to in mouths:
             of_layer = [bits | to if bits & mask else bits for bits in of_layer]
     goes = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.fixed
-    return np.where(goes, np.asarray(of_layer)[bodies.layer], 1 << bodies.layer)
+    return np.asarray(np.where(goes, np.asarray(of_layer)[bodies.layer], 1 << bodies.layer))
+
+
+def bits_of(layer: IntArray | None, count: int) -> IntArray:
+    """Return the layers that bodies are on as bits, (N,), from a frame's numbers; without any, all on the ground."""
+    return np.ones(count, np.int64) if layer is None else 1 << layer
 
 
 def _noted(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArray:
@@ -154,7 +159,8 @@ def _noted(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArray:
     every = 0
     for zone in scene.zones:
         every |= mask_of(zone.layers, scene.layers)
-    return np.asarray(some & ((reached & every) != 0))
+    still_inside = bodies.visits.any(axis=1)  # of a zone whose layers it has left: that it goes out is noted too
+    return np.asarray(some & ((reached & every != 0) | still_inside))
 
 
 def _by_layers(scene: Scene) -> list[tuple[int, IntArray]]:

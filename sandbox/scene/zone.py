@@ -14,6 +14,7 @@ from sandbox.scene.surfaced import GROUND
 
 if TYPE_CHECKING:
     from sandbox.scene.model import Scene
+    from sandbox.scene.near import BoolArray, IntArray
 
 Layers = Annotated[tuple[Name, ...], Field(min_length=1, max_length=10)]
 """On which layers something is; things meet where they share one."""
@@ -51,6 +52,12 @@ class Zone(Part):
     gravity: tuple[Acceleration, Acceleration] | None = None
     """m/s², instead of the world's, of whom is inside and on one of its layers; where several are, of the last"""
     colour: Colour | None = None
+
+
+def notes(pair: "IntArray", scene: "Scene") -> "BoolArray":
+    """Tell which contacts, by their pairs (C, 2), are notes of a scene's zones and no collisions, (C,)."""
+    found: BoolArray = pair[:, 1] < -len(scene.fixed) - len(scene.pockets)
+    return found
 
 
 def layers_of(scene: "Scene") -> tuple[str, ...]:

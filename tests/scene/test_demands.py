@@ -129,6 +129,10 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.SPIN, False, {"surface": {"rolling_friction": 0.1}, "ball": [{**BALL, "spin": [0, 0, 1]}]}, "but about z"),
     (Demand.POCKETS, True, {"ball": [BALL], "pocket": [{"position": [9, 9], "radius": 1}]}, "1"),
     (Demand.POCKETS, False, {"ball": [BALL]}, "none"),
+    (Demand.LAYERS, True, {"ball": [{**BALL, "layer": "ramp"}]}, "ground, ramp"),
+    (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all are on the ground"),
+    (Demand.ZONES, True, {"ball": [BALL], "zone": [{"position": [9, 9], "radius": 1}]}, "1"),
+    (Demand.ZONES, False, {"ball": [BALL]}, "none"),
 ]
 
 
