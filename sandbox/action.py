@@ -151,6 +151,15 @@ class Toggle(Timed):
     solid: bool
 
 
+class Drive(Timed):
+    """Ask a drive of the scene for a level from now on."""
+
+    kind: Literal["drive"] = "drive"
+    drive: Name
+    level: Annotated[float, Field(ge=0, le=1)]
+    """0 is at rest; of a torque the part of it, of a pull how far, of a stroke anything above 0 all the way"""
+
+
 class Strike(Timed, Stroke):
     """Strike a ball on a floor with a cue: it has the velocity and the spin of the stroke, whatever it had before."""
 
@@ -169,7 +178,19 @@ class Switch(Timed):
 
 
 Action = Annotated[
-    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Throttle | Toggle | Strike | Switch,
+    Impulse
+    | Force
+    | Move
+    | Spawn
+    | Remove
+    | SetParameter
+    | Pull
+    | Launch
+    | Throttle
+    | Toggle
+    | Drive
+    | Strike
+    | Switch,
     Field(discriminator="kind"),
 ]
 

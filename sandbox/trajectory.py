@@ -44,6 +44,8 @@ class Frame:
     """(N,) on which each is, by its number in the scene's `layers`; none where there is one alone"""
     visits: IntArray | None = None
     """(N, Z) how each is with each zone, by the words of `scene.zone`; none where there are none"""
+    drives: FloatArray | None = None
+    """(D, 3) of the scene's drives: level; torque, N·m, of a plunger its pull, m, and how fast that grows, m/s"""
 
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""
@@ -56,7 +58,7 @@ class Frame:
         return None if self.roll is None else np.column_stack((self.roll, self.angular_velocity))
 
     def state_hash(self) -> str:
-        """Return a SHA-256 of time and every body's state, bit for bit."""
+        """Return a SHA-256 of time, every body's state and every drive's, bit for bit."""
         digest = hashlib.sha256(np.float64(self.time).tobytes())
         for array in self._arrays():
             digest.update(array.tobytes())
@@ -64,7 +66,7 @@ class Frame:
 
     def _arrays(self) -> tuple[npt.NDArray[Any], ...]:
         arrays = (self.position, self.velocity, self.angle, self.angular_velocity, self.present)
-        more = (self.roll, self.layer, self.visits)
+        more = (self.roll, self.layer, self.visits, self.drives)
         return (*arrays, *(array for array in more if array is not None))
 
 

@@ -50,7 +50,8 @@ def launched(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tupl
     if visits is not None:
         visits = np.where(those[:, None], AWAY, visits)
     present = frame.present | those
-    return Frame(frame.time, present=present, roll=roll, layer=layer, visits=visits, **columns), bodies, those
+    begun = Frame(frame.time, present=present, roll=roll, layer=layer, visits=visits, drives=frame.drives, **columns)
+    return begun, bodies, those
 
 
 def _first(scene: Scene, generator: Mover) -> int:

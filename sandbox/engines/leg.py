@@ -97,7 +97,7 @@ class Leg:
             roll[self.numbers] = frame.roll
         layer = self._whole(frame.layer, self.bodies.layer, self.before.layer)
         visits = self._whole(frame.visits, np.zeros_like(self.bodies.visits))
-        return Frame(self.time, position, velocity, angle, spin, present, roll, layer, visits)
+        return Frame(self.time, position, velocity, angle, spin, present, roll, layer, visits, frame.drives)
 
     def _whole(self, own: IntArray | None, everyone: IntArray, before: IntArray | None = None) -> IntArray | None:
         """Return an array of the simulation with a row for everyone; who is gone is as before."""
@@ -177,7 +177,7 @@ def begun(
         Refusal: the engine lacks something.
         ActionError: it cannot take over a steady force.
     """
-    simulation = start_engine(scene.placed(cast(bodies, frame), frame.time, broken), engine, wanted)
+    simulation = start_engine(scene.placed(cast(bodies, frame), frame.time, broken, frame.drives), engine, wanted)
     for each in lasting:
         try:
             simulation.apply(each)

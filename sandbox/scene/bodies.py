@@ -137,6 +137,10 @@ def expand(scene: Scene) -> Bodies:
     for shot in scene.shots:
         if shot.ball in names:
             strike(bodies, names.index(shot.ball), shot)
+    if scene.drives:
+        from sandbox.scene.driven import weighed  # which looks at bodies itself
+
+        return weighed(scene, bodies)
     return bodies
 
 

@@ -43,6 +43,7 @@ class Demand(StrEnum):
     ROTARY_SPRINGS = "rotary springs"
     ATTRACTION = "attraction"
     THRUST = "thrust"
+    DRIVES = "drives"
     BOUNDS = "bounds"
     LIFETIMES = "lifetimes"
     SURFACE = "surface"
@@ -187,7 +188,11 @@ def _joints(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
     for kind, demand in OF_LINKS.items():
         count = int(np.count_nonzero(scene.links.kind == kind))
         yield demand, count > 0, f"{count:,}" if count else "none"
-    for demand, things in ((Demand.ATTRACTION, scene.attractions), (Demand.THRUST, scene.thrusts)):
+    for demand, things in (
+        (Demand.ATTRACTION, scene.attractions),
+        (Demand.THRUST, scene.thrusts),
+        (Demand.DRIVES, scene.drives),
+    ):
         yield demand, bool(things), f"{len(things):,}" if things else "none"
 
 

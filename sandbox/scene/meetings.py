@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.scene.bodies import Bodies
+from sandbox.scene.driven import driven_in
 from sandbox.scene.model import Plane, Post, Scene, Wall
 from sandbox.scene.near import BoolArray, IntArray
 from sandbox.scene.shapes import form_of
@@ -31,7 +32,7 @@ class Meetings:
     noted: BoolArray
     """(N,) can come into a zone"""
     turnable: BoolArray
-    """(N,) can be turned: by what rubs it; of other shapes than balls by all they meet; by joints and thrusts"""
+    """(N,) can be turned: by what rubs it; of other shapes than balls by all they meet; by joints, thrusts, drives"""
     mutual: bool
     """Some two bodies can meet."""
     ball_ball: bool
@@ -117,7 +118,7 @@ def meetings(scene: Scene, bodies: Bodies | None = None) -> Meetings:
         touches=_any_of(body, meets[kinds.of_piece], len(bodies)),
         held=links.held(len(bodies)),
         noted=_noted(scene, bodies, reached),
-        turnable=(turnable | _thrust_turned(scene, bodies)) & ~bodies.fixed,
+        turnable=(turnable | _thrust_turned(scene, bodies) | driven_in(scene, bodies, turning=True)) & ~bodies.fixed,
         mutual=bool(pair.any()),
         ball_ball=bool((pair & np.outer(kinds.ball, kinds.ball)).any()),
         solids=bool((meets & ~kinds.ball).any()),

@@ -13,6 +13,7 @@ from pydantic import Field, StringConstraints
 from sandbox.scene.billiards.described import Billiards
 from sandbox.scene.cue import Shot
 from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
+from sandbox.scene.drives import Drive
 from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
@@ -33,11 +34,12 @@ from sandbox.scene.zone import Layers, Zone
 if TYPE_CHECKING:
     from sandbox.scene.bodies import Bodies
     from sandbox.scene.links import Links
+    from sandbox.scene.near import FloatArray
 
 __all__ = [
     "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc",
-    "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Paint", "Pair", "Plane", "Play",
-    "PlayPart", "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack",
+    "Drive", "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Paint", "Pair", "Plane",
+    "Play", "PlayPart", "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack",
     "Surfaced", "Thrust", "Wall", "World", "Zone", "default_name",
 ]  # fmt: skip
 
@@ -187,6 +189,7 @@ class Scene(Part):
     joints: tuple[Joint, ...] = Field((), alias="joint")
     attractions: tuple[Attraction, ...] = Field((), alias="attraction")
     thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
+    drives: tuple[Drive, ...] = Field((), alias="drive")
     shots: tuple[Shot, ...] = Field((), alias="shot")
 
     @cached_property
@@ -234,23 +237,40 @@ class Scene(Part):
         return tuple(element for mover in self.movers for element in elements_of(mover))
 
     @cached_property
+    def driven(self) -> "FloatArray":
+        """(D, 3) of each drive, as this state of the scene begins: level, torque or pull, pace."""
+        from sandbox.scene.driven import at_rest
+
+        return at_rest(self)
+
+    @cached_property
     def began(self) -> float:
         """The time at which this state of the scene begins, s: 0, but of one that goes on (`placed`)."""
         return 0.0
 
-    def placed(self, bodies: "Bodies", time: float = 0.0, broken: Collection[int] = ()) -> "Scene":
+    def placed(
+        self,
+        bodies: "Bodies",
+        time: float = 0.0,
+        broken: Collection[int] = (),
+        driven: "FloatArray | None" = None,
+    ) -> "Scene":
         """Return this scene with its bodies as they have come to be by a time, s: elsewhere, fewer, or more.
 
-        Joints go with their bodies, and those that are broken, by their numbers, are left out. Only `bodies`, `links`
-        and `began` differ: the file that it would be written to is the same.
+        Joints go with their bodies, and those that are broken, by their numbers, are left out; drives go on as they
+        are, (D, 3). Only `bodies`, `links`, `driven` and `began` differ: the file that it would be
+        written to is the same.
         """
         links = self.links.without(broken).among(bodies.names, self.bodies.names)
-        return self.holding(bodies, links, time)
+        return self.holding(bodies, links, time, driven)
 
-    def holding(self, bodies: "Bodies", links: "Links", began: float = 0.0) -> "Scene":
+    def holding(
+        self, bodies: "Bodies", links: "Links", began: float = 0.0, driven: "FloatArray | None" = None
+    ) -> "Scene":
         """Return this scene with bodies, and joints between them, that it does not lay out itself."""
         scene = self.model_copy()
-        scene.__dict__.update(bodies=bodies, links=links, began=began)  # where cached_property looks first
+        state = {} if driven is None else {"driven": driven}
+        scene.__dict__.update(bodies=bodies, links=links, began=began, **state)  # where cached_property looks first
         return scene
 
     @property

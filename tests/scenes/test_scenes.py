@@ -72,6 +72,16 @@ DEMANDED = {
     "billiards/stun_draw_follow": ROLLING,
     "billiards/three-cushion": CAROM,
     "billiards/throw": {*ROLLING, Demand.ROTATION},
+    "joints/flipper": {
+        *FALLING,
+        Demand.ROTATION,
+        Demand.BALL_SEGMENT,
+        Demand.BALL_POST,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.POLYGONS,
+        Demand.DRIVES,
+    },
     "joints/bridge": {
         *FALLING,
         Demand.BALL_SEGMENT,

@@ -19,7 +19,9 @@ PERSISTENCE = 3
 """pymunk's own."""
 
 
-OWN = frozenset({Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.LAYERS, Demand.ZONES})
+OWN = frozenset(
+    {Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.DRIVES, Demand.LAYERS, Demand.ZONES}
+)
 
 
 @dataclass(frozen=True)
@@ -55,10 +57,12 @@ class PymunkEngine:
             lacks.append("stretch is for joints held by relaxation, which it has not")
         if settings.half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has drag")
-        if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts):
+        if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
             lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has other forces")
         if settings.half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
             lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has zones that change it")
+        if scene.drives and scene.attractions:
+            lacks.append("it does not model attraction and drives together")
         if on_floor(scene):
             lacks += of_floors(scene)
         return tuple(lacks)

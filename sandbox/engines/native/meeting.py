@@ -6,6 +6,7 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.limits import BEYOND, FARTHEST
+from sandbox.engines.native.drives import Drives
 from sandbox.engines.native.field import Field
 from sandbox.engines.native.ground import Ground, shuffled
 from sandbox.engines.native.member import Member
@@ -63,6 +64,8 @@ class MeetingBodies:
         self._remembered: RememberedImpulses | None = None
         self._points: PointReader | None = None
         self.field = Field(scene)
+        self.drives = Drives(scene, self._space, settings.h)
+        self.drives.weigh(scene.world.gravity, gravity_of(scene))
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.steady = Steady()
         self._moving = 0
@@ -92,29 +95,40 @@ class MeetingBodies:
         for number, state in zip(numbers[order].tolist(), states[order].tolist(), strict=True):
             self._add(number, bodies, state)
         self._register()
+        self.drives.watch(self._kinds)
+
+    def _kinds(self, number: int) -> set[int]:
+        """Return the collision types of a body's shapes."""
+        return {shape.collision_type for _, shape in self._members[number].shapes}
 
     def _add(self, number: int, bodies: Bodies, state: list[float]) -> None:
         """Add a body with its state: x, y, angle, vx, vy, ω, mass, moment."""
         x, y, angle, vx, vy, spin, mass, moment = state
-        fixed = bool(bodies.fixed[number])
-        body = pymunk.Body(mass, moment, body_type=pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC)
-        body.position = x, y
-        if angle:
-            body.angle = angle
-        if not fixed:
-            body.velocity = vx, vy
-            if spin:
-                body.angular_velocity = spin
+        fixed, name = bool(bodies.fixed[number]), bodies.names[number]
+        driven = self.drives.holds(name)
+        if driven:
+            body = self.drives.body(name, number, bodies, state)
             self._moving += 1
+        else:
+            body = pymunk.Body(mass, moment, body_type=pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC)
+            body.position = x, y
+            if angle:
+                body.angle = angle
+            if not fixed:
+                body.velocity = vx, vy
+                if spin:
+                    body.angular_velocity = spin
+                self._moving += 1
         self._space.add(body)
         self._members[number] = Member(body, ())
         if self._touches[number] or fixed:
             self._give_shapes(number, bodies)
         if self._noted[number]:
             self.probes.add(number, body)
-        name = bodies.names[number]
         self._named[name], self._name_of[number] = body, name
-        if not fixed and (self.field.attracts or self.field.thrusted(name)):
+        if driven:
+            self.drives.join(name, number, body, state)
+        elif not fixed and (self.field.attracts or self.field.thrusted(name)):
             self.field.drive(name, body, self._named)
 
     def _give_shapes(self, number: int, bodies: Bodies) -> None:
@@ -180,6 +194,7 @@ class MeetingBodies:
             self.tethers.untie(number)
             self.probes.drop(number)
             self._resting.pop(number, None)
+            self.drives.leave(number)
             member = self._members.pop(number)
             self._moving -= member.moves
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
@@ -228,8 +243,12 @@ class MeetingBodies:
         for number, (_, own) in self._members.items():
             for piece, shape in own:
                 self._setter.dress(shape, int(self._surface_of[piece]))
-            if meet.turnable[number] and math.isinf(self.moment(number)):
+            heavy = meet.turnable[number] and math.isinf(self.moment(number))
+            if heavy and number not in self.drives.numbers:
                 self.give_moment(number, float(self._moments[number]))
+        if self.drives:
+            self.drives.weigh(scene.world.gravity, gravity_of(scene))
+            self.drives.watch(self._kinds)
         self._ground.renew(scene, self._surface_of_fixed)
 
     def step(self, time: float) -> None:
@@ -240,7 +259,12 @@ class MeetingBodies:
         self._apply_forces()
         if self._setter.gates.walls:
             self._setter.gates.tick += 1
-        self._space.step(self._settings.h)
+        if self.drives:
+            self.drives.before()
+            self._space.step(self._settings.h)
+            self.drives.after()
+        else:
+            self._space.step(self._settings.h)
         self._state = None
 
     def drive(self, velocity: FloatArray) -> None:
@@ -275,6 +299,8 @@ class MeetingBodies:
         at = self._reader.slots
         position[at], velocity[at] = state[:, 0:2], state[:, 3:5]
         angle[at], angular_velocity[at] = state[:, 2], state[:, 5]
+        if self.drives:
+            self.drives.write(position, velocity, angle, angular_velocity)
 
     def touching(self) -> Touching:
         """Return who touches whom now, and how (`Reader.touching`); from the first call on, all impulses add up."""

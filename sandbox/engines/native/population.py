@@ -161,13 +161,14 @@ class Population:
 
     @property
     def _driven(self) -> BoolArray:
-        """(N,) which only the space can move: with thrusts, and all where bodies attract each other, or on a floor."""
-        field = self.meeting.field
+        """(N,) which only the space can move: with thrusts or drives; all where bodies attract, or on a floor."""
+        field, drives = self.meeting.field, self.scene.drives
         if field.between_bodies or self.felt is not None:
             return np.ones(len(self.bodies), dtype=np.bool_)
-        if not field.level:
+        if not (field.level or drives):
             return np.zeros(len(self.bodies), dtype=np.bool_)
-        return np.asarray([field.thrusted(name) for name in self.bodies.names], dtype=np.bool_)
+        driven = self.meeting.drives.holds
+        return np.asarray([field.thrusted(name) or driven(name) for name in self.bodies.names], dtype=np.bool_)
 
     def change(self, scene: Scene) -> None:
         """Go on with a scene that differs alone in air, gravity, coefficients, or in which walls and posts are solid.
@@ -286,6 +287,10 @@ class Population:
     def throttle(self, number: int, level: float) -> None:
         """Open the scene's thrust of that number to a share of its force."""
         self.meeting.field.level[number] = level
+
+    def drive(self, number: int, level: float) -> None:
+        """Ask the scene's drive of that number for a level."""
+        self.meeting.drives.set(number, level)
 
     def add(self, single: Single, name: str) -> int:
         """Add a body and return its number.

@@ -121,12 +121,14 @@ class NativeSimulation(Running):
             self._retire()
             self._population.end()
             return
-        before = [array.copy() for array in self._state()]
+        before, drives = [array.copy() for array in self._state()], self._population.meeting.drives
+        driven = drives.told()
         self._substep(int(whole), look=False, share=rest)  # its contacts lie beyond the end
         self._part = part
         self._guard()
         for now, old in zip(self._state(), before, strict=True):
             now[...] = old + (now - old) * rest
+        drives.end(driven, rest)
         self._retire()
         self._population.end()
 
@@ -163,7 +165,9 @@ class NativeSimulation(Running):
         scene, present = population.scene, population.present.copy()
         layer = population.layer.copy() if len(scene.layers) > 1 else None
         visits = population.visits.copy() if scene.zones else None
-        return Frame(self.time, position, velocity, angle, angular_velocity, present, roll, layer, visits)
+        drives = population.meeting.drives.told() if scene.drives else None
+        state = present, roll, layer, visits, drives
+        return Frame(self.time, position, velocity, angle, angular_velocity, *state)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""

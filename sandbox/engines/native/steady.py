@@ -83,6 +83,7 @@ class Steady:
         """
         numbers, figures = state
         mass = np.asarray([members[n].body.mass for n in numbers.tolist()])[:, None]
+        mass[np.isinf(mass)] = 0.0  # of what a drive moves whatever acts on it
         push = np.zeros((len(numbers), 2))
         for row, number in enumerate(numbers.tolist()):
             if number in self._of:

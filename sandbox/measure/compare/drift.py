@@ -59,8 +59,8 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
     """Return the momentum at the end that nothing explains, as a share of the largest sum of |m v| of any frame.
 
     Explained are gravity, and the recorded impulses between bodies that move and things that do not; joints and
-    attraction between bodies that move keep momentum. None with drag, thrust, a joint to what stands still or an
-    attraction towards it, or zones that stop or lift, whose impulses are not recorded; where a body was retired, and
+    attraction between bodies that move keep momentum. None with drag, thrust, drives, a joint to what stands still or
+    an attraction towards it, or zones that stop or lift, whose impulses are not recorded; where a body was retired, and
     took its momentum along; where the run did not reach its end, or ended within a step, of whose contacts there is no
     record.
     """
@@ -69,7 +69,7 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
         return None
     if frame_count(scene, Settings.model_validate(run.info["settings"]))[1] > 0.0:
         return None
-    if world.linear_drag or world.quadratic_drag or scene.thrusts or _anchored(scene):
+    if world.linear_drag or world.quadratic_drag or scene.thrusts or scene.drives or _anchored(scene):
         return None
     if any(zone.holds or zone.gravity is not None for zone in scene.zones):
         return None

@@ -121,7 +121,7 @@ def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
     scenes with other bodies than balls, or joints, also the end of what it hangs on, or past all that could stop it.
     Where balls can meet, any may be hit by the fastest: an equal one takes over its speed, a lighter one gets up to
     twice it. Who is kicked gets up to the speed at which each hit takes as much as it brings. What springs, motors,
-    attraction and thrusts add is left out.
+    attraction, thrusts and drives add is left out.
     """
     bodies, world = scene.bodies, scene.world
     start = np.hypot(*bodies.velocity.T)
