@@ -19,9 +19,7 @@ PERSISTENCE = 3
 """pymunk's own."""
 
 
-OWN = frozenset(
-    {Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.DRIVES, Demand.LAYERS, Demand.ZONES}
-)
+OWN = frozenset({Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.DRIVES, Demand.LAYERS, Demand.ZONES})
 
 
 @dataclass(frozen=True)

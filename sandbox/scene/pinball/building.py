@@ -5,12 +5,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sandbox.scene.faults import Location
-from sandbox.scene.model import Ball, Paint, PlayPart, Polygon, Post, Wall, Zone
+from sandbox.scene.model import Ball, Drive, Paint, PlayPart, Polygon, Post, Wall, Zone
 from sandbox.scene.part import Point
 from sandbox.scene.parts import Role
 from sandbox.scene.pinball.element import Corner, Scoring
 from sandbox.scene.pinball.rounding import rounded
-from sandbox.scene.solids import Box
 
 
 @dataclass
@@ -31,8 +30,8 @@ class Building:
     posts: list[Post] = field(default_factory=list)
     zones: list[Zone] = field(default_factory=list)
     balls: list[Ball] = field(default_factory=list)
-    boxes: list[Box] = field(default_factory=list)
     polygons: list[Polygon] = field(default_factory=list)
+    drives: list[Drive] = field(default_factory=list)
     parts: list[PlayPart] = field(default_factory=list)
     paints: list[Paint] = field(default_factory=list)
     origins: dict[str, Location] = field(default_factory=dict)
@@ -56,11 +55,9 @@ class Building:
         self.zones.append(Zone(name=name, **more))
         self.origins[name] = self.here
 
-    def body(self, body: Ball | Box | Polygon) -> None:
+    def body(self, body: Ball | Polygon) -> None:
         """Add a body."""
-        those: list[Any] = (
-            self.balls if isinstance(body, Ball) else self.boxes if isinstance(body, Box) else self.polygons
-        )
+        those: list[Any] = self.balls if isinstance(body, Ball) else self.polygons
         those.append(body)
         self.origins[str(body.name)] = self.here
 

@@ -65,7 +65,7 @@ def expanded(scene: Scene) -> Scene:
             update={"parts": _added(scene.play.parts, to.parts), "paints": (*to.paints, *scene.play.paints)}
         ),
     }
-    for key in ("walls", "posts", "zones", "balls", "polygons"):
+    for key in ("walls", "posts", "zones", "balls", "polygons", "drives"):
         changes[key] = _added(getattr(scene, key), getattr(to, key))
     return scene.model_copy(update=changes)
 
