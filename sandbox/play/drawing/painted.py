@@ -6,10 +6,12 @@ import numpy as np
 import pygame
 
 from sandbox.play.camera import Camera
+from sandbox.play.drawing.decks import on_layer
 from sandbox.play.drawing.fixtures import draw_fixtures
 from sandbox.play.drawing.palette import BACKGROUND, INK, Colour, colour_of_fixed, hex_colour, mixed
 from sandbox.play.drawing.shade import Look, disc_distance, paint
 from sandbox.play.drawing.strokes import Pixel, clipped, fill, stroke
+from sandbox.play.drawing.zones import draw_zones
 from sandbox.scene.model import Post, Scene
 from sandbox.scene.paint import Paint
 from sandbox.scene.part import Point
@@ -39,10 +41,16 @@ def draw_painted(
             lit = AMBER if part.colour is None else hex_colour(part.colour)
             look = Look(mixed(BACKGROUND, lit, 0.35), mixed(BACKGROUND, lit, 0.7), 1.2 * unit, 1.0, antialias)
             _disc(surface, camera, part.light, LAMP, look)
-    draw_fixtures(surface, camera, scene, unit, antialias)
+    draw_zones(surface, camera, _coloured(scene), unit, antialias)
+    draw_fixtures(surface, camera, on_layer(scene, 0), unit, antialias)
     for post in scene.posts:
         if post.kick is not None:
             _cap(surface, camera, post, unit, antialias)
+
+
+def _coloured(scene: Scene) -> Scene:
+    """Return a scene with only those zones that have a colour of their own; paint and lamps mark the others."""
+    return scene.model_copy(update={"zones": tuple(zone for zone in scene.zones if zone.colour is not None)})
 
 
 def _area(surface: pygame.Surface, camera: Camera, area: Paint, antialias: bool) -> None:

@@ -54,6 +54,7 @@ def ramp(to: Building, name: str, of: Ramp) -> None:
     rail: dict[str, Any] = {"thickness": of.thickness, "material": "wall", "colour": of.colour}
     for side, aside in (("left", half), ("right", -half)):
         to.wall(f"{name} {side} rail", beside(line, aside), layers=(layer,), **rail)
+    to.paint(of.floor, (*beside(line, half), *reversed(beside(line, -half))))
     climb = part_of(line, 0.0, of.climb)
     left, right = beside(climb, half), beside(climb, -half)
     (ax, ay), (bx, by) = climb[-2:]
