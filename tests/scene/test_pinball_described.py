@@ -229,6 +229,18 @@ def test_faults_are_told_where_they_are(changes: dict[str, Any], path: str, word
     assert words in fault.message
 
 
+def test_fault_is_told_with_file_line_and_path() -> None:
+    with pytest.raises(SceneError) as caught:
+        loads(TEXT.replace("[0.0, 1.0, 0.2]", "[0.0, 1.0, 2.0]").replace("[0.2, 0.7]", '"high"'), "two.toml")
+    assert [str(fault).split(": ")[:2] for fault in caught.value.faults] == [
+        ["two.toml:9", "pinball.bumper.pop.position"]
+    ]
+    with pytest.raises(SceneError) as caught:
+        loads(TEXT.replace("[0.0, 1.0, 0.2]", "[0.0, 1.0, 2.0]"), "two.toml")
+    (fault,) = caught.value.faults
+    assert str(fault).startswith("two.toml:14: pinball.wall.side.points[1]: is rounded by too much: its arcs take 2 m")
+
+
 def test_faults_of_what_is_written_out_point_at_the_element() -> None:
     with pytest.raises(SceneError) as caught:
         loads(TEXT.replace('name = "side"', 'name = "right pop"'), "two.toml")
