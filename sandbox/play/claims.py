@@ -11,6 +11,8 @@ from sandbox.play import cue_keys
 from sandbox.play.billiards.gestures import Gestures
 from sandbox.play.cue_keys import Deed
 from sandbox.play.hands import Hands
+from sandbox.play.hosting import control_keys
+from sandbox.play.hosting.host import Host
 from sandbox.play.running.live import Live
 from sandbox.scene.driven import names_of
 from sandbox.scene.model import Scene, default_name
@@ -52,8 +54,8 @@ class Claims(NamedTuple):
         return None if again and (key not in ARROWS or key in self.releases) else self.deeds.get(key)
 
 
-def claims(scene: Scene, hands: Hands, gestures: Gestures | None = None) -> Claims:
-    """Return the keys that a scene claims, those of a table among them."""
+def claims(scene: Scene, hands: Hands, gestures: Gestures | None = None, host: Host | None = None) -> Claims:
+    """Return the keys that a scene claims, those of a table or of a game's controls among them."""
     deeds: dict[int, Deed] = {}
     told: list[tuple[str, str]] = []
     body, step, generator = scene.play.arrows, scene.play.arrow_step, scene.play.relaunch
@@ -65,11 +67,18 @@ def claims(scene: Scene, hands: Hands, gestures: Gestures | None = None) -> Clai
         deeds[pygame.K_SPACE] = partial(_relaunch, generator=generator)
         told.append(("Space", f"launch {generator} again"))
     releases: dict[int, Deed] = {}
+    played, played_out = ({}, {}) if host is None else control_keys.deeds(host)
     for called, verb, pressed, released in held(scene):
         key = KEYS[called]
+        if key in played:  # it is the rules' to press
+            continue
         deeds[key] = partial(_act, action=pressed, also=deeds.get(key))
         releases[key] = partial(_act, action=released, also=releases.get(key))
         told.append((called.capitalize(), verb))
+    if host is not None:
+        deeds |= played
+        releases |= played_out
+        told += control_keys.told(host.controls)
     if gestures is not None:
         cue, let_go = cue_keys.deeds(gestures)
         deeds |= cue

@@ -10,6 +10,7 @@ from sandbox.play.breaks import BreakNotes, broken_by
 from sandbox.play.footage.film import Film
 from sandbox.play.picking import overlapping
 from sandbox.play.running.between import between
+from sandbox.play.running.burning import burning
 from sandbox.play.running.company import Company
 from sandbox.play.running.journey import Journey
 from sandbox.play.running.pace import Pace
@@ -157,6 +158,17 @@ class Live:
         self._check_there()
         done = self.session.act(action)
         self.company.did(done)
+        self._hear()
+
+    def press(self, control: str, value: float) -> None:
+        """Set a control of the game now.
+
+        Raises:
+            ActionError: it cannot be done. Then it was not pressed.
+        """
+        self._check_there()
+        for action in self.session.press(control, value):
+            self.company.did(action)
         self._hear()
 
     def _hear(self) -> None:
@@ -307,6 +319,9 @@ class Live:
             picked=picked,
             pull=pull,
             broken=broken_by(session.breaks, frame.time),
+            flames=burning(session.scene, self.bodies, session.relay.throttles, session.time)
+            if present and session.scene.thrusts
+            else (),
         )
 
     def close(self) -> None:
