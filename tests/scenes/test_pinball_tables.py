@@ -10,7 +10,7 @@ import shapely
 import shapely.affinity
 from shapely import LineString, Point, Polygon, unary_union
 
-from sandbox.action import Drive
+from sandbox.action import Drive, Toggle
 from sandbox.engines.rebound import rebound
 from sandbox.engines.registry import start
 from sandbox.scene.document import to_document
@@ -233,6 +233,41 @@ def test_ramp_takes_who_is_fast_enough_to_the_inlane_on_its_side(share: float, m
     assert (f"{ramp} exit" in seen) == made
     if not made:
         assert f"{ramp} foot" in seen
+
+
+@pytest.mark.parametrize("up", [True, False])
+def test_target_that_fell_lets_the_ball_pass_to_the_wall_behind(up: bool) -> None:
+    scene = table("pinball/full")
+    target = next(wall for wall in scene.walls if wall.name == "left drops 2")
+    middle = np.mean(target.points, axis=0)
+    out = np.array([-0.462, -0.8868])  # as the bank faces
+    (x, y), (u, v) = (middle + 0.03 * out).tolist(), (-2.0 * out).tolist()
+    simulation, _ = shot("pinball/full", (x, y), (u, v))
+    simulation.contacts()
+    simulation.apply(Toggle(time=0.0, thing="left drops 2", solid=up))
+    seen = set[str]()
+    for _ in range(4):
+        simulation.step()
+        seen |= {scene.fixed_names[-1 - other] for _, other in simulation.contacts().pair.tolist() if other < 0}
+    simulation.close()
+    assert seen & {"left drops 2", "left roof"} == ({"left drops 2"} if up else {"left roof"})
+
+
+@every_table
+def test_same_actions_give_the_same_states_to_the_bit(name: str) -> None:
+    scene = table(name)
+    acts = {20: ("plunger", 1.0), 130: ("plunger", 0.0), 250: ("left flipper", 1.0)}
+    ends = []
+    for _ in range(2):
+        simulation = start(scene, "pymunk", scene.solver)
+        for k in range(300):
+            if k in acts:
+                simulation.apply(Drive(time=simulation.time, drive=acts[k][0], level=acts[k][1]))
+            simulation.step()
+        ends.append(simulation.frame())
+        simulation.close()
+    assert np.array_equal(ends[0].position, ends[1].position)
+    assert np.array_equal(ends[0].velocity, ends[1].velocity)
 
 
 @pytest.mark.slow
