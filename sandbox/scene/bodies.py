@@ -119,6 +119,8 @@ def expand(scene: Scene) -> Bodies:
     """
     if scene.billiards is not None:
         raise ValueError("its [billiards] is not written out; sandbox.scene.billiards.expanding.expanded does that")
+    if scene.pinball is not None:
+        raise ValueError("its [pinball] is not written out; sandbox.scene.pinball.expanding.expanded does that")
     names: list[str] = []
     layouts: list[Layout] = []
     for kind, those in scene.kinds.items():

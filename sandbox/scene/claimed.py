@@ -27,6 +27,18 @@ def claimed(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
     for k, name in enumerate(spots):
         if name in spots[:k]:
             yield ("play", "spot", k, "name"), f"a second spot is called {name!r}; names are unique"
+    yield from _parts(scene, bodies)
+
+
+def _parts(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
+    """Check that parts are of things that there are, each once."""
+    there, seen = {*bodies.names, *scene.fixed_names}, set[str]()
+    for k, part in enumerate(scene.play.parts):
+        if part.name not in there:
+            yield ("play", "part", k, "name"), f"no body, fixed thing or zone is named {part.name!r}"
+        if part.name in seen:
+            yield ("play", "part", k, "name"), f"{part.name!r} plays a part already; state it once"
+        seen.add(part.name)
 
 
 def generator_names(scene: Scene) -> tuple[str, ...]:

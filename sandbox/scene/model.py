@@ -20,7 +20,10 @@ from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
 from sandbox.scene.kick import Kick
 from sandbox.scene.marking import Marking
+from sandbox.scene.paint import Paint
 from sandbox.scene.part import Acceleration, Falloff, Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
+from sandbox.scene.parts import PlayPart
+from sandbox.scene.pinball.described import Pinball
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule, Compound, Polygon
@@ -37,10 +40,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc",
-    "Drive", "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Pair", "Plane", "Play",
-    "Pocket",
-    "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust",
-    "Wall", "World", "Zone", "default_name",
+    "Drive", "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Paint", "Pair", "Plane",
+    "Play", "PlayPart", "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack",
+    "Surfaced", "Thrust", "Wall", "World", "Zone", "default_name",
 ]  # fmt: skip
 
 Drag = Annotated[float, Field(ge=0, le=1e9)]
@@ -151,6 +153,10 @@ class Play(Part):
     curling: CurlingMatch | None = None
     """of a match of curling"""
     markings: tuple[Marking, ...] = Field((), alias="marking")
+    parts: tuple[PlayPart, ...] = Field((), alias="part")
+    """which thing is what to the rules of the game"""
+    paints: tuple[Paint, ...] = Field((), alias="paint")
+    """what the window draws below everything"""
 
 
 class Scene(Part):
@@ -164,6 +170,8 @@ class Scene(Part):
     play: Play = Field(default_factory=Play)
     billiards: Billiards | None = None
     """None once the scene was read: by then it is written out"""
+    pinball: Pinball | None = None
+    """None once the scene was read, likewise"""
     surface: Floor | None = None
     contact_models: ContactModels = Field(default_factory=ContactModels)
     materials: tuple[Material, ...] = Field((), alias="material")

@@ -11,6 +11,7 @@ Game = Literal[
     TableGame,
     "curling",
     "landing",
+    "pinball",
 ]
 """All games; those that need no table are in `games.registry.RULES` too."""
 

@@ -140,6 +140,8 @@ def test_row_tells_what_fell_and_the_spins_of_a_scene_that_has_them() -> None:
         "spin": [0.0, 0.0, 0.0],
     }
     assert row["final"]["b"]["spin"] == [0.0, 0.0, 9.0]  # nothing stops what only spins
+    zoned = loads(f"{balls.replace('spin = [0, 0, 9]', '')}[[zone]]\nposition = [0.5, 0.0]\nradius = 0.06\n")
+    assert execute(Job("label", zoned, "pymunk")).row()["pocketed"] == {}
     plain = execute(JOB).row()
     assert plain["pocketed"] == {}
     assert "spin" not in plain["final"]["a"]
