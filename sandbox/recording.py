@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from pydantic import ValidationError
 
@@ -18,6 +18,16 @@ from sandbox.whole import whole
 
 FORMAT = 1
 MAX_DURATION = 1e9  # s, as of a scene
+
+
+class Press(NamedTuple):
+    """A control that was set at a time, before the step that starts then."""
+
+    time: float
+    """s"""
+    control: str
+    value: float
+    """0 lets it go"""
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ class Play(Part):
     show: Literal["overlap"] | None = None
     """Colour bodies by whether they overlap anything."""
     game: Game | None = None
-    """whose rules the window keeps, of a table"""
+    """whose rules are kept: of billiards, at a table in the window; of any other, also headless"""
     area: tuple[Point, Point] | None = None
     """lower left and upper right corner of a table's playing area, m"""
     spots: tuple[Spot, ...] = Field((), alias="spot")

@@ -1,10 +1,17 @@
-"""Spots: the named points of a table, which rules speak of and the window draws; and which games it can play."""
+"""Spots: the named points of a table, which rules speak of and the window draws; and the games there are."""
 
 from typing import Literal
 
 from sandbox.scene.part import Name, Part, Point
 
-Game = Literal["8-ball", "9-ball", "three-cushion", "straight-rail", "snooker", "free"]
+TableGame = Literal["8-ball", "9-ball", "three-cushion", "straight-rail", "snooker", "free"]
+"""Games of billiards, which need a table."""
+
+Game = Literal[
+    TableGame,
+    "landing",
+]
+"""All games; those that need no table are in `games.registry.RULES` too."""
 
 
 class Spot(Part):

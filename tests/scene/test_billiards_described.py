@@ -12,7 +12,7 @@ from sandbox.scene.billiards.expanding import RACKS, expanded
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import dumps, from_document, loads
 from sandbox.scene.model import Scene
-from sandbox.scene.spots import Game
+from sandbox.scene.spots import TableGame
 
 EIGHT: dict[str, Any] = {"billiards": {"table": "pool-9ft", "game": "8-ball"}}
 SHOT = {"name": "break", "aim": 1.5, "speed": 8.0}
@@ -52,7 +52,7 @@ def test_preset_becomes_a_scene_of_primitives(table: str, game: str) -> None:
 
 
 def test_every_game_has_rules_for_the_balls_it_is_racked_with() -> None:
-    assert set(RULES) == set(get_args(Game)) == set(RACKS)
+    assert set(RULES) == set(get_args(TableGame)) == set(RACKS)
     for name, rules in RULES.items():
         if name != "free":
             assert rules.rack == RACKS[name]  # type: ignore[index]

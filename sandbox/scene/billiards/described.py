@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from sandbox.scene.part import Friction, Mass, Name, Part, Point, Radius, Restitution
-from sandbox.scene.spots import Game
+from sandbox.scene.spots import TableGame
 
 TableName = Literal["pool-7ft", "pool-8ft", "pool-9ft", "snooker-12ft", "carom-10ft"]
 RackName = Literal["8-ball", "9-ball", "snooker", "carom", "none"]
@@ -21,7 +21,7 @@ class Billiards(Part):
 
     table: TableName | None = None
     """without one, the scene's own walls, posts and pockets are it, and its `[[play.spot]]`s say where to rack"""
-    game: Game = "free"
+    game: TableGame = "free"
     """which the window plays"""
     rack: RackName | None = None
     """without one, the game's"""

@@ -14,12 +14,12 @@ from sandbox.scene.faults import Location
 from sandbox.scene.floor import Floor
 from sandbox.scene.model import Material, Pair, Scene
 from sandbox.scene.part import Part, Point
-from sandbox.scene.spots import Game, Spot
+from sandbox.scene.spots import Spot, TableGame
 
 BALL = "phenolic"
 """The material of the balls."""
 
-RACKS: dict[Game, RackName] = {
+RACKS: dict[TableGame, RackName] = {
     "8-ball": "8-ball",
     "9-ball": "9-ball",
     "three-cushion": "carom",
