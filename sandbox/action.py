@@ -143,6 +143,23 @@ class Throttle(Timed):
     """share of its force, from now on"""
 
 
+class Toggle(Timed):
+    """Make a wall or a post solid, or let everything pass it."""
+
+    kind: Literal["toggle"] = "toggle"
+    thing: Name
+    solid: bool
+
+
+class Drive(Timed):
+    """Switch a drive of the scene on, or off."""
+
+    kind: Literal["drive"] = "drive"
+    drive: Name
+    level: Annotated[float, Field(ge=0, le=1)]
+    """share of what it can do, from now on"""
+
+
 class Strike(Timed, Stroke):
     """Strike a ball on a floor with a cue: it has the velocity and the spin of the stroke, whatever it had before."""
 
@@ -161,7 +178,19 @@ class Switch(Timed):
 
 
 Action = Annotated[
-    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Throttle | Strike | Switch,
+    Impulse
+    | Force
+    | Move
+    | Spawn
+    | Remove
+    | SetParameter
+    | Pull
+    | Launch
+    | Throttle
+    | Toggle
+    | Drive
+    | Strike
+    | Switch,
     Field(discriminator="kind"),
 ]
 

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 
+from sandbox.games.pinball.pinball import Pinball
 from sandbox.games.rules import Rules
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 
-RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {}
+RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {"pinball": Pinball}
 """Each begins a game. A game is one line here, and its name in `scene.spots.Game`."""
 
 

@@ -123,6 +123,8 @@ class Play(Part):
     area: tuple[Point, Point] | None = None
     """lower left and upper right corner of a table's playing area, m"""
     spots: tuple[Spot, ...] = Field((), alias="spot")
+    players: Annotated[int, Field(ge=1, le=4)] = 1
+    """of a game that they play in turn, such as pinball"""
     parts: tuple[PlayPart, ...] = Field((), alias="part")
     """which thing is what to the rules of the game"""
 
