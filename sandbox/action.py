@@ -144,7 +144,7 @@ class Throttle(Timed):
 
 
 class Toggle(Timed):
-    """Make a wall or a post solid, or let everything pass it."""
+    """Let a wall or post be met from now on, or let everything pass it: a drop target, a diverter."""
 
     kind: Literal["toggle"] = "toggle"
     thing: Name

@@ -21,6 +21,7 @@ from sandbox.action import (
     Strike,
     Switch,
     Throttle,
+    Toggle,
     is_settable,
     speed_limit,
 )
@@ -86,7 +87,7 @@ class Cast(Protocol):
         """
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs in air, gravity or coefficients alone.
+        """Go on with a scene that differs alone in air, gravity, coefficients, or in which walls and posts are solid.
 
         Raises:
             ActionError: it asks for what the settings or the engine cannot go on with.
@@ -128,6 +129,8 @@ def perform(action: Action, cast: Cast) -> int | None:
             _set(action, cast)
         case Throttle():
             cast.throttle(_thrust_number(action.thrust, cast.scene), action.level)
+        case Toggle():
+            _toggle(action, cast)
         case Strike():
             _strike(action, cast)
         case Pull() | Launch() | Switch():
@@ -222,6 +225,23 @@ def _strike(action: Strike, cast: Cast) -> None:
     cast.set_velocity(number, np.asarray(velocity))
     cast.set_spin(number, spin[2])
     cast.set_roll(number, spin[:2])
+
+
+def _toggle(action: Toggle, cast: Cast) -> None:
+    scene = cast.scene
+    begin = len(scene.planes)
+    names = scene.fixed_names[begin : len(scene.fixed)]
+    if action.thing not in names:
+        raise ActionError(f"no wall or post is named {action.thing!r}; there are {', '.join(names) or 'none'}")
+    if scene.surface is not None or scene.pockets:
+        raise ActionError("cushions of a table on a floor are solid; none can be toggled")
+    number = names.index(action.thing)
+    things: list[Wall | Post] = [*scene.walls, *scene.posts]
+    if things[number].solid == action.solid:
+        return
+    things[number] = things[number].model_copy(update={"solid": action.solid})
+    walls, posts = tuple(things[: len(scene.walls)]), tuple(things[len(scene.walls) :])
+    cast.change(_going_on(scene.model_copy(update={"walls": walls, "posts": posts}), scene))
 
 
 def _thrust_number(name: str, scene: Scene) -> int:

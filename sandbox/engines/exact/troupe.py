@@ -4,6 +4,7 @@ import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.engines.exact.overlap import allowed, overlapping_things, told
+from sandbox.engines.fixtures import fixtures_of
 from sandbox.engines.floor.level import unlevel
 from sandbox.engines.floor.pockets import caught
 from sandbox.engines.roster import ALL, FIXED, MEETS, NOTHING, Roster
@@ -75,15 +76,21 @@ class Troupe(Roster):
         self.moved.add(number)
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs in gravity or coefficients alone.
+        """Go on with a scene that differs alone in gravity, coefficients, or in which walls and posts are solid.
 
         Raises:
-            ActionError: it has drag, or gravity along a floor, or more surfaces than a scene may have.
+            ActionError: it has drag, or gravity along a floor, or more surfaces than a scene may have; or a ball
+                stands where something becomes solid.
         """
         if scene.world.linear_drag or scene.world.quadratic_drag:
             raise ActionError("exact does not model drag; pymunk and reference do")
         if on_floor(scene) and (lacks := next(unlevel(scene, self.bodies), None)):
             raise ActionError(lacks)
+        meets = np.flatnonzero((self.meets != NOTHING) & self.moving)
+        if len(meets) and any(new is not old for new, old in zip(scene.fixed, self.scene.fixed, strict=True)):
+            found = overlapping_things(self.position[meets], self.radius[meets], fixtures_of(scene))
+            if found is not None:
+                raise ActionError(told(self.bodies.names[meets[found[0]]], scene.fixed_names[found[1]], found[2]))
         super().change(scene)
         self.renewed = True
 
