@@ -178,9 +178,13 @@ def _elements(scene: Scene, bodies: Bodies, ball: int) -> Iterator[Element]:
         where = part.at or _where(thing)
         least, reach, outline = 0.0, 0.0, tuple[Point, ...]()
         if thing is not None and part.role in FIRES:
-            mine, its = surfaces.of_body[ball], surfaces.of_fixed[numbers[part.name]]
-            # A ball that comes with v leaves with e·v: the impulse tells v, whatever else the step has done to it.
-            least = (1.0 + float(surfaces.restitution[mine, its])) * FIRES[part.role]
+            pair = surfaces.of_body[ball], surfaces.of_fixed[numbers[part.name]]
+            kick = None if isinstance(thing, Plane) else thing.kick
+            least = _least(
+                FIRES[part.role] if kick is None else kick.threshold,
+                float(surfaces.restitution[pair]),
+                float(surfaces.falloff[pair]),
+            )
         if isinstance(thing, Wall):
             outline = (*thing.points, thing.points[0]) if thing.closed else thing.points
             reach = thing.thickness / 2.0
@@ -188,6 +192,14 @@ def _elements(scene: Scene, bodies: Bodies, ball: int) -> Iterator[Element]:
         yield Element(
             part.name, part.role, part.group, part.step, part.score, where, out, least, outline, reach
         )  # fmt: skip
+
+
+def _least(speed: float, restitution: float, falloff: float) -> float:
+    """Return the impulse over mass, m/s, of a ball that comes with a speed, m/s, and leaves with e(v)·v.
+
+    As `engines.rebound` has it, which is not imported for one line: it wakes the compiler.
+    """
+    return speed * (1.0 + restitution / (1.0 + falloff * speed))
 
 
 def _where(thing: Fixed | None) -> Point:

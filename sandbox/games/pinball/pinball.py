@@ -41,7 +41,7 @@ SAID = 3.0
 EXTRA = 250_000
 """points that give an extra ball"""
 
-Phase = Literal["play", "count", "over"]
+Phase = Literal["start", "play", "count", "over"]
 
 
 class Pinball:
@@ -66,7 +66,7 @@ class Pinball:
         )  # fmt: skip
         self.sheets = [Sheet() for _ in range(board.players)]
         self.turn = 0
-        self.phase: Phase = "count"
+        self.phase: Phase = "start"
         self.until = 0.0
         """when counting ends and the next ball begins, s"""
         self.up: set[str] = set()
@@ -204,9 +204,10 @@ class Pinball:
                 if not self.nudge.tilted and self.sheet.bonus:
                     yield Cue("bonus")
                     yield Say(f"bonus {self.sheet.bonus * self.sheet.times:,}")
+        elif self.phase == "start":
+            yield from self._begun(now)
         elif self.phase == "count" and now.time >= self.until:
-            if trough.flown or now.time > 0.0:
-                self._counted()
+            self._counted()
             yield from self._begun(now)
 
     def _counted(self) -> None:
