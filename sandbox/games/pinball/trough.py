@@ -53,10 +53,12 @@ class Trough:
         self.live.remove(ball)
         self.flown.discard(ball)
         self.lying.pop(ball, None)
-        self.idle.append(ball)
         taken = set(self.home.values())
         place = next((k for k in range(len(self.board.homes)) if k not in taken), None)
-        if place is not None:
+        if place is None:
+            self.idle.insert(0, ball)  # it lies where others would be served, so it is the next
+        else:
+            self.idle.append(ball)
             self.home[ball] = place
         where = self.board.serve if place is None else self.board.homes[place]
         yield Move(time=now.time, body=self.board.names[ball], position=where, velocity=(0.0, 0.0))

@@ -2,6 +2,7 @@
 
 import copy
 
+import numpy as np
 import pytest
 from pinball_by_hand import OPEN, SERVE, Table, drives, moves, table
 
@@ -56,7 +57,7 @@ def test_ball_that_drains_soon_after_the_launch_comes_back_by_itself(after: floa
     done = game.look(("drain", 0.0)) + game.wait(1.0)
     served = [action for action in done if isinstance(action, Move) and action.position == SERVE]
     assert ("save" in game.cues) is saved
-    assert [each.velocity for each in served] == ([(0.0, 3.0)] if saved else [])
+    assert [each.velocity for each in served] == [(0.0, 0.0)] + ([(0.0, 3.0)] if saved else [])
     game.wait(WAIT)
     assert game.lines()["Ball"] == ("1 of 3" if saved else "2 of 3")
 
@@ -73,6 +74,24 @@ def test_bonus_counts_at_the_end_as_often_as_lanes_say() -> None:
     game.wait(0.15)
     assert game.game.score == before + 2 * 2_500
     assert (sheet.bonus, sheet.times) == (0, 1)
+
+
+@pytest.mark.parametrize("balls", [1, 2, 3])
+def test_no_two_balls_are_ever_put_onto_each_other(balls: int) -> None:
+    game = Table(table(balls=balls))
+    for _ in range(3):
+        game.wait(1.0)
+        for saved in (True, False):
+            (ball,) = game.game.trough.live
+            game.put(ball, OPEN)
+            game.wait(0.5 if saved else 9.0)
+            game.look(("drain", 0.0, ball))
+            for _ in range(200):
+                game.look()
+                gaps = np.hypot(*(game.position[:, None] - game.position[None]).T) + np.eye(balls)
+                assert gaps.min() > 2.0 * game.game.board.radius
+            if game.game.over:
+                return
 
 
 def test_three_balls_are_a_game() -> None:
