@@ -20,6 +20,10 @@ AGAIN = 4
 """times that the bonus counts, with which an extra ball comes"""
 
 
+LEAST = {"rollover": 3, "standup": 2}
+"""of a set: a pair of rollovers is of inlanes or outlanes, which have no lamps"""
+
+
 class Lamps(Machine):
     """The lights of one group of rollovers or standing targets.
 
@@ -67,9 +71,10 @@ class Lamps(Machine):
 
 def lamps_of(board: Board) -> tuple[Lamps, ...]:
     """Return the sets of a table; what stands alone has no lamp."""
+    roles: tuple[Literal["rollover", "standup"], ...] = ("rollover", "standup")
     return tuple(
         Lamps(name, members)
-        for role in ("rollover", "standup")
-        for name, members in board.groups("rollover" if role == "rollover" else "standup").items()
-        if len(members) > 1
+        for role in roles
+        for name, members in board.groups(role).items()
+        if len(members) >= LEAST[role]
     )
