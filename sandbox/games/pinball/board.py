@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Self
 
+from sandbox.games.rules import UnfitError
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Ball, Plane, Post, Scene, Wall
 from sandbox.scene.part import Point, Vector
@@ -13,7 +14,7 @@ from sandbox.scene.surfaces import surfaces_of
 
 Fixed = Plane | Wall | Post
 
-FIRES = {"bumper": 0.054, "slingshot": 0.054, "standup": 0.108, "drop": 0.108}
+FIRES: dict[Role, float] = {"bumper": 0.054, "slingshot": 0.054, "standup": 0.108, "drop": 0.108}
 """m/s, the normal approach speed above which a switch closes. Source: Visual Pinball's defaults, in its unit of
 .53975 mm a centisecond: bumpers and slingshots 1, targets 2."""
 
@@ -46,6 +47,8 @@ class Element:
     """of a wall, m"""
     reach: float = 0.0
     """from the outline to its surface, m"""
+    span: float = 0.0
+    """of a body, from its centre to its farthest point, m"""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         return self
@@ -89,14 +92,14 @@ class Board:
         """Read a scene.
 
         Raises:
-            ValueError: it has no ball.
+            UnfitError: it has no ball.
         """
         parts = scene.play.parts
         numbers = {name: k for k, name in enumerate(bodies.names)}
         stated = {numbers[part.name]: part for part in parts if part.role == "ball" and part.name in numbers}
         balls = tuple(stated) or tuple(k for k, each in enumerate(bodies.element) if _is_ball(bodies, int(each)))
         if not balls:
-            raise ValueError("pinball needs a ball")
+            raise UnfitError('pinball needs a ball: a `[[play.part]]` with role "ball"')
         starts = {k: _start(bodies, k, stated.get(k)) for k in balls}
         up, plunger = _up(scene), next((part for part in parts if part.role == "plunger"), None)
         elements = tuple(_elements(scene, bodies, balls[0]))
@@ -168,38 +171,51 @@ def _up(scene: Scene) -> Vector:
 
 def _elements(scene: Scene, bodies: Bodies, ball: int) -> Iterator[Element]:
     """Yield what plays a part, but balls."""
-    things: dict[str, Fixed] = dict(zip(scene.fixed_names, scene.fixed, strict=False))  # zones and pockets come after
-    numbers = {name: k for k, name in enumerate(scene.fixed_names)}
-    surfaces, middle = surfaces_of(scene, bodies), _middle(scene)
-    for part in scene.play.parts:
-        if part.role == "ball":
-            continue
-        thing = things.get(part.name)
-        where = part.at or _where(thing)
-        least, reach, outline = 0.0, 0.0, tuple[Point, ...]()
-        if thing is not None and part.role in FIRES:
-            pair = surfaces.of_body[ball], surfaces.of_fixed[numbers[part.name]]
-            kick = None if isinstance(thing, Plane) else thing.kick
-            least = _least(
-                FIRES[part.role] if kick is None else kick.threshold,
-                float(surfaces.restitution[pair]),
-                float(surfaces.falloff[pair]),
-            )
-        if isinstance(thing, Wall):
-            outline = (*thing.points, thing.points[0]) if thing.closed else thing.points
-            reach = thing.thickness / 2.0
-        out = part.out or _towards(where, middle)
+    things: dict[str, Fixed] = dict(zip(scene.fixed_names, scene.fixed, strict=False))  # pockets and zones come after
+    fires, middle = _thresholds(scene, bodies, ball), _middle(scene)
+    those = {name: k for k, name in enumerate(bodies.names)}
+    for part in (each for each in scene.play.parts if each.role != "ball"):
+        thing, body = things.get(part.name), those.get(part.name)
+        where, span = part.at or _where(thing), 0.0
+        if body is not None:
+            (x, y), span = bodies.position[body].tolist(), float(bodies.radius[body])
+            where = part.at or (x, y)
         yield Element(
-            part.name, part.role, part.group, part.step, part.score, where, out, least, outline, reach
-        )  # fmt: skip
+            name=part.name,
+            role=part.role,
+            group=part.group,
+            step=part.step,
+            score=part.score,
+            where=where,
+            out=part.out or _towards(where, middle),
+            least=fires.get(part.name, 0.0),
+            outline=_outline(thing) if isinstance(thing, Wall) else (),
+            reach=thing.thickness / 2.0 if isinstance(thing, Wall) else 0.0,
+            span=span,
+        )
 
 
-def _least(speed: float, restitution: float, falloff: float) -> float:
-    """Return the impulse over mass, m/s, of a ball that comes with a speed, m/s, and leaves with e(v)·v.
+def _thresholds(scene: Scene, bodies: Bodies, ball: int) -> dict[str, float]:
+    """Return the impulse over mass, m/s, above which the switch of each struck thing closes, by name.
 
-    As `engines.rebound` has it, which is not imported for one line: it wakes the compiler.
+    A ball that comes with v leaves with e(v)·v, so the impulse tells v, whatever else the step has done to the ball.
+    The law is that of `engines.rebound`, which is not imported for one line: it wakes the compiler.
     """
-    return speed * (1.0 + restitution / (1.0 + falloff * speed))
+    surfaces, roles = surfaces_of(scene, bodies), {part.name: part.role for part in scene.play.parts}
+    fires = {}
+    for number, (name, thing) in enumerate(zip(scene.fixed_names, scene.fixed, strict=False)):
+        if roles.get(name) not in FIRES:
+            continue
+        pair = surfaces.of_body[ball], surfaces.of_fixed[number]
+        restitution, falloff = float(surfaces.restitution[pair]), float(surfaces.falloff[pair])
+        kick = None if isinstance(thing, Plane) else thing.kick
+        speed = FIRES[roles[name]] if kick is None else kick.threshold
+        fires[name] = speed * (1.0 + restitution / (1.0 + falloff * speed))
+    return fires
+
+
+def _outline(wall: Wall) -> tuple[Point, ...]:
+    return (*wall.points, wall.points[0]) if wall.closed else wall.points
 
 
 def _where(thing: Fixed | None) -> Point:

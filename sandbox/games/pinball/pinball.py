@@ -53,7 +53,7 @@ class Pinball:
         """Begin a game.
 
         Raises:
-            ValueError: there is no ball.
+            UnfitError: there is no ball.
         """
         self.board = board = Board.of(scene, bodies)
         self.switches, self.trough, self.holes = Switches(board), Trough(board), Holes(board)
