@@ -7,7 +7,7 @@ import pytest
 from pinball_by_hand import OPEN, SERVE, Table, drives, moves, table
 
 from sandbox.action import Move
-from sandbox.games.pinball.pinball import COUNT, SAVED
+from sandbox.games.pinball.course import COUNT, SAVED
 
 WAIT = COUNT + 0.05
 """s, until the next ball is there"""
@@ -119,7 +119,7 @@ def test_players_play_in_turn_with_scores_of_their_own() -> None:
     assert seen[:4] == [("1 of 3", "1 of 3"), ("2 of 3", "1 of 3"), ("3 of 3", "1 of 3"), ("1 of 3", "2 of 3")]
     bonus = [100 * (1 + 4 + 7), 100 * (2 + 5 + 8), 100 * (3 + 6 + 9)]
     scores = [7_000 * (1 + 4 + 7), 7_000 * (2 + 5 + 8), 7_000 * (3 + 6 + 9)]
-    assert [each.score for each in game.game.sheets] == [a + b for a, b in zip(scores, bonus, strict=True)]
+    assert [each.score for each in game.game.course.sheets] == [a + b for a, b in zip(scores, bonus, strict=True)]
     assert game.game.over
     assert game.game.score == scores[2] + bonus[2]  # the best
 
