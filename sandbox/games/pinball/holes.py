@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from sandbox.action import Move
 from sandbox.games.pinball.board import Board, Element
+from sandbox.games.pinball.coil import Coil
 from sandbox.games.pinball.effects import Award, Cue, Effect, Machine, Now, points_of
 from sandbox.games.pinball.switches import Hit
 
@@ -16,6 +17,7 @@ class Holes(Machine):
 
     def __init__(self, board: Board) -> None:
         self.board = board
+        self.coil = Coil(board.seed, 1)
         self.held: dict[int, tuple[Element, float]] = {}
         """ball → its hole, and when it is thrown out, s"""
 
@@ -37,7 +39,7 @@ class Holes(Machine):
         hole, _ = self.held.pop(ball)
         x, y = now.frame.position[ball].tolist()
         yield Cue("eject")
-        yield Move(time=now.time, body=self.board.names[ball], position=(x, y), velocity=hole.out)
+        yield Move(time=now.time, body=self.board.names[ball], position=(x, y), velocity=self.coil.throw(hole.out))
 
     def forget(self, ball: int) -> None:
         """Hold a ball no more: it was taken elsewhere."""

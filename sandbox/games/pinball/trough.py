@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from sandbox.action import Move
 from sandbox.games.pinball.board import Board
+from sandbox.games.pinball.coil import Coil
 from sandbox.games.pinball.effects import Cue, Effect, Now
 from sandbox.trajectory import Frame
 
@@ -37,6 +38,7 @@ class Trough:
         """balls that were launched, and have not come back into the lane"""
         self.lying: dict[int, float] = {}
         """ball that should fly by itself → since when it lies in the lane, s"""
+        self.coil = Coil(board.seed, 0)
         self.next = 0.0
         """when the next ball may be served, s"""
 
@@ -89,7 +91,9 @@ class Trough:
         """Launch a ball from where it lies, without the plunger."""
         x, y = now.frame.position[ball].tolist()
         yield Cue("launch")
-        yield Move(time=now.time, body=self.board.names[ball], position=(x, y), velocity=self.board.launch)
+        yield Move(
+            time=now.time, body=self.board.names[ball], position=(x, y), velocity=self.coil.throw(self.board.launch)
+        )
 
     def _served(self, now: Now) -> Iterator[Effect]:
         ball, alone = self.idle.pop(0), self.queue.pop(0)
@@ -98,7 +102,7 @@ class Trough:
         self.next = now.time + GAP
         if alone:
             self.lying[ball] = now.time
-        velocity = self.board.launch if alone else (0.0, 0.0)
+        velocity = self.coil.throw(self.board.launch) if alone else (0.0, 0.0)
         yield Cue("launch" if alone else "serve")
         yield Move(time=now.time, body=self.board.names[ball], position=self.board.serve, velocity=velocity)
 

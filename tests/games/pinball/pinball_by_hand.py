@@ -165,6 +165,14 @@ def contacts(rows: Iterable[tuple[float, tuple[int, int], float]]) -> Contacts:
     )
 
 
+def thrown(action: Action, velocity: tuple[float, float]) -> bool:
+    """Tell whether a ball gets a velocity, as nearly as coils throw."""
+    if not isinstance(action, Move) or action.velocity is None:
+        return False
+    share = np.dot(action.velocity, velocity) / np.dot(velocity, velocity)
+    return bool(0.95 <= share <= 1.0 and np.allclose(action.velocity, np.multiply(share, velocity), atol=1e-12))
+
+
 def toggles(actions: Iterable[Action]) -> list[tuple[str, bool]]:
     """Return what was made solid, or not."""
     return [(action.thing, action.solid) for action in actions if isinstance(action, Toggle)]
