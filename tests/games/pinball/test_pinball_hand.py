@@ -40,9 +40,11 @@ def test_ball_within_reach_is_flipped_once_and_the_flipper_let_go() -> None:
     assert up - down == pytest.approx(HELD, abs=0.0101)  # the first step after it
 
 
-@pytest.mark.parametrize("game", [at_bat((0.0, 1.0)), Table(table())], ids=["rising", "elsewhere"])
-def test_other_balls_are_let_be(game: Table) -> None:
-    game.put(0, game.position[0] if game.step > 100 else OPEN, (0.0, 1.0))
+@pytest.mark.parametrize(("where", "velocity"), [(None, (0.0, 1.0)), (OPEN, (0.0, -0.1))], ids=["rising", "far"])
+def test_other_balls_are_let_be(where: tuple[float, float] | None, velocity: tuple[float, float]) -> None:
+    game = at_bat(velocity)
+    if where is not None:
+        game.put(0, where, velocity)
     assert not watch(game, Hand(1, 1.0), 1.0)
 
 
