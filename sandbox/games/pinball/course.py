@@ -41,6 +41,8 @@ class Course:
         """until when drained balls come back, s"""
         self.fresh = True
         """whether the ball has not left the lane yet"""
+        self.touched = False
+        """whether it has closed a switch since it was served"""
 
     @property
     def sheet(self) -> Sheet:
@@ -119,6 +121,8 @@ class Course:
         trough, tilted, sheet = self.trough, self.nudge.tilted, self.sheet
         if self.fresh and trough.flown:
             self.save(now.time + SAVED)
+        elif trough.live and not trough.flown and not self.touched:
+            self.fresh = True  # a weak shot, which fell back into the lane
         if trough.live or (trough.queue and trough.idle):
             return
         trough.queue.clear()
@@ -142,7 +146,7 @@ class Course:
             self.phase = "over"
             yield Cue("over")
             return
-        self.phase, self.fresh, self.saved = "play", True, 0.0
+        self.phase, self.fresh, self.touched, self.saved = "play", True, False, 0.0
         now.sheet = self.sheet
         for machine in self.machines:
             yield from machine.begin(now)

@@ -145,6 +145,7 @@ class Pinball:
     def _hit(self, hit: Hit, now: Now) -> Iterator[Effect]:
         if hit.ball not in self.trough.live:  # an earlier hit of this step has taken it
             return
+        self.course.touched = True
         if hit.element.role == "drain":
             yield from self.course.drained(hit.ball, now)
             return

@@ -61,6 +61,33 @@ def test_ball_that_drains_soon_after_the_launch_comes_back_by_itself(after: floa
     assert game.lines()["Ball"] == ("1 of 3" if saved else "2 of 3")
 
 
+def test_save_begins_anew_with_a_shot_that_fell_back() -> None:
+    game = Table(table())
+    game.wait(0.02)
+    game.put(0, OPEN)
+    game.wait(0.5)
+    game.put(0, SERVE)
+    game.wait(20.0)
+    game.put(0, OPEN)
+    game.wait(SAVED - 0.5)
+    game.look(("drain", 0.0))
+    assert "save" in game.cues
+
+
+def test_saved_ball_is_not_saved_for_longer() -> None:
+    game = Table(table())
+    game.wait(0.02)
+    game.put(0, OPEN)
+    game.wait(SAVED - 1.0)
+    game.look(("drain", 0.0))
+    game.wait(1.5)
+    ball = next_ball(game)
+    game.put(ball, OPEN)
+    game.wait(0.1)
+    game.look(("drain", 0.0, ball))
+    assert game.cues.count("save") == 1
+
+
 def test_bonus_counts_at_the_end_as_often_as_lanes_say() -> None:
     game = Table(table())
     game.play()
