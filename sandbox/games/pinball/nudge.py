@@ -62,7 +62,7 @@ class Nudge(Machine):
         self.warnings += 1
         if self.warnings <= WARNINGS:
             yield Cue("warning")
-            yield Say("danger" if self.warnings < WARNINGS else "danger, danger")
+            yield Say("danger!" if self.warnings < WARNINGS else "danger, danger!")
         else:
             self.tilted = True
             yield Cue("tilt")

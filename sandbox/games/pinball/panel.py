@@ -9,7 +9,7 @@ Line = tuple[str, str]
 
 
 def panel(sheets: Sequence[Sheet], turn: int, modes: Modes, saved: float, message: str) -> list[Line]:
-    """Return labels and texts, the most important first.
+    """Return labels and texts, the most important first, without the score: whoever shows them has that.
 
     Args:
         sheets: of the players.
@@ -19,12 +19,11 @@ def panel(sheets: Sequence[Sheet], turn: int, modes: Modes, saved: float, messag
         message: the last news; empty for none.
     """
     sheet = sheets[turn]
-    lines = [("Score", f"{sheet.score:,}")]
-    if len(sheets) > 1:
-        lines += [(f"Player {k + 1}", f"{each.score:,}") for k, each in enumerate(sheets) if k != turn]
-        lines.insert(0, ("Player", f"{turn + 1} of {len(sheets)}"))
     ball = f"{min(sheet.ball, BALLS)} of {BALLS}"
-    lines.append(("Ball", f"{ball}, shoot again" if sheet.again else ball))
+    lines = [("Ball", f"{ball}, shoot again" if sheet.again else ball)]
+    if len(sheets) > 1:
+        lines.insert(0, ("Player", f"{turn + 1} of {len(sheets)}"))
+        lines += [(f"Player {k + 1}", f"{each.score:,}") for k, each in enumerate(sheets) if k != turn]
     lines.append(("Bonus", f"{sheet.bonus:,} × {sheet.times}"))
     if sheet.locked or sheet.lit:
         lit = ["lock is lit"] if sheet.lit else []

@@ -119,7 +119,7 @@ class Pinball:
         course, time = self.course, 0.0 if self._now is None else self._now.time
         message, until = self.said
         if self.nudge.tilted:
-            message, until = "TILT", time + SAID
+            message, until = "TILT!", time + SAID
         saved = 0.0 if course.fresh else course.saved - time
         return panel(course.sheets, course.turn, self.modes, saved, message if time < until else "")
 

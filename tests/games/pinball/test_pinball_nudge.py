@@ -64,7 +64,7 @@ def test_whole_nudge_warns_and_the_third_tilts(played: Table) -> None:
     done = played.wait(0.1)
     assert played.cues[-1] == "tilt"
     assert drives(done) == [("left bat", 0.0)]
-    assert played.lines()[""] == "TILT"
+    assert played.lines()[""] == "TILT!"
 
 
 def test_light_nudges_cost_nothing(played: Table) -> None:
