@@ -62,6 +62,8 @@ class Toy:
         if self.score >= self.ends_at:
             self.over = "enough"
         acts: list[Action] = []
+        if seen.time == 0.0:
+            acts.append(Impulse(time=0.0, body="a", impulse=(self._chance.uniform(-0.1, 0.1), 0.0)))
         for contact in seen.contacts:
             if contact.pair == (0, -1) and contact.time > self._last:
                 self._last, self._bounces = contact.time, self._bounces + 1

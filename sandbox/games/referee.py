@@ -45,6 +45,11 @@ class Referee:
         return tuple(self._presses[: self._pressed])
 
     @property
+    def coming(self) -> tuple[Press, ...]:
+        """What was pressed later than now, in a game that is seen again."""
+        return tuple(self._presses[self._pressed :])
+
+    @property
     def all_presses(self) -> tuple[Press, ...]:
         """What was pressed, also later than now in a game that is seen again."""
         return tuple(self._presses)

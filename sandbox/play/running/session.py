@@ -73,7 +73,8 @@ class Session(Course):
 
     @property
     def _known(self) -> bool:
-        return self._step <= self.history.furthest or super()._known
+        seen = self.history.known(0) is not None and self._step <= self.history.furthest
+        return seen or super()._known
 
     def bodies_in(self, frame: Frame) -> Bodies:
         """Return the bodies by number, with those of a state that was seen; it may lie ahead and have more."""
