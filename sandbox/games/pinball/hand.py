@@ -16,6 +16,9 @@ LEAD = 0.03
 HELD = 0.15
 """s, a flipper is held up"""
 
+PAUSE, FLIGHT = 0.05, 1.0
+"""s, at least, before a flipper is pressed again, and before the plunger is: the ball has to get away"""
+
 PULL = 1.2
 """s, a plunger is drawn"""
 
@@ -51,6 +54,7 @@ class Hand:
         self._chance = np.random.default_rng([STREAM, seed])
         self._due: dict[str, float] = {}  # by control: when it is pressed, s
         self._until: dict[str, float] = {}  # by control: when it is let go, s
+        self._rests: dict[str, float] = {}  # by control: until when it is not pressed again, s
         self._judged: dict[str, bool] = {}  # by control: whether the ball that is within reach was thought about
 
     def decide(self, seen: Seen, rules: Rules) -> Sequence[tuple[str, float]]:
@@ -64,12 +68,13 @@ class Hand:
         found = [(control, 0.0) for control, until in sorted(self._until.items()) if until <= seen.time]
         for control, _ in found:
             del self._until[control]
+            self._rests[control] = seen.time + (FLIGHT if control == PLUNGER else PAUSE)
         for control, side in FLIPPERS.items():
             self._flip(control, rules.board.flippers(side), seen, rules)
         self._plunge(seen, rules)
         for control in sorted(control for control, due in self._due.items() if due <= seen.time):
             del self._due[control]
-            if control not in self._until:
+            if control not in self._until and self._rests.get(control, 0.0) <= seen.time:
                 plunges = control == PLUNGER
                 self._until[control] = seen.time + (PULL if plunges else HELD)
                 found.append((control, float(self._chance.uniform(*STRENGTH)) if plunges else 1.0))

@@ -58,11 +58,12 @@ def test_skill_is_the_part_of_balls_that_is_seen() -> None:
 
 def test_waiting_ball_is_plunged() -> None:
     game = Table(table())
-    pressed = watch(game, Hand(1, 1.0), PULL + 0.2)
+    pressed = watch(game, Hand(1, 1.0), PULL + 0.9)
     (down, control, strength), (up, *_) = pressed[:2]
     assert control == "plunger"
     assert 0.85 <= strength <= 1.0
     assert up - down == pytest.approx(PULL, abs=0.0101)  # the first step after it
+    assert len(pressed) == 2  # the spring gets time
 
 
 def test_hand_is_by_its_seed_alone() -> None:
