@@ -16,6 +16,9 @@ JACKPOT = 50_000
 SAVED = 12.0
 """s, in which drained balls come back at first"""
 
+NEXT = 6.0
+"""s, in which the ball that follows a locked one comes back"""
+
 LOCKS = "lock"
 """the group of the holes that lock"""
 
@@ -56,6 +59,7 @@ class Multiball(Machine):
                 yield Say(f"ball {now.sheet.locked} of {self.size} locked")
                 yield Take(award.ball)
                 yield Serve(1)
+                yield Save(NEXT)
             else:
                 yield from self._begun(now)
 
