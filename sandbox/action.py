@@ -152,12 +152,12 @@ class Toggle(Timed):
 
 
 class Drive(Timed):
-    """Switch a drive of the scene on, or off."""
+    """Ask a drive of the scene for a level from now on."""
 
     kind: Literal["drive"] = "drive"
     drive: Name
     level: Annotated[float, Field(ge=0, le=1)]
-    """share of what it can do, from now on"""
+    """0 is at rest; of a torque the part of it, of a pull how far, of a stroke anything above 0 all the way"""
 
 
 class Strike(Timed, Stroke):

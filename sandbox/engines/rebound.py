@@ -15,7 +15,6 @@ from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.scene.part import Point
 
 
-@kernel
 def rebound(restitution: float, falloff: float, closing: float) -> float:
     """Return how fast two part by themselves, m/s, that meet at `closing`, m/s; `falloff` is in s/m."""
     if closing <= 0.0:
@@ -23,7 +22,6 @@ def rebound(restitution: float, falloff: float, closing: float) -> float:
     return restitution / (1.0 + falloff * closing) * closing
 
 
-@kernel
 def kicked(speed: float, threshold: float, middle: bool, share: float, closing: float) -> float:
     """Return what a kick adds to that, m/s.
 
@@ -37,6 +35,10 @@ def kicked(speed: float, threshold: float, middle: bool, share: float, closing: 
     if closing <= threshold:
         return 0.0
     return speed * 4.0 * share * (1.0 - share) if middle else speed
+
+
+compiled_rebound, compiled_kicked = kernel(rebound), kernel(kicked)
+"""The same for kernels; whoever asks for one contact at a time would wait longer for the compiler."""
 
 
 def stretches(points: Sequence[Point], closed: bool) -> list[tuple[float, float]]:

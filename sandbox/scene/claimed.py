@@ -30,7 +30,7 @@ def _parts(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
     there, seen = {*bodies.names, *scene.fixed_names}, set[str]()
     for k, part in enumerate(scene.play.parts):
         if part.name not in there:
-            yield ("play", "part", k, "name"), f"no body or fixed thing is named {part.name!r}"
+            yield ("play", "part", k, "name"), f"no body, fixed thing or zone is named {part.name!r}"
         if part.name in seen:
             yield ("play", "part", k, "name"), f"{part.name!r} plays a part already; state it once"
         seen.add(part.name)

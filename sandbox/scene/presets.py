@@ -1,5 +1,6 @@
 """Presets: what of a document stands for other parts of it, written out before anything else is made of it."""
 
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from sandbox.scene.address import AddressError, assign, parse_path
@@ -7,23 +8,41 @@ from sandbox.scene.document import read_model, to_document
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene
 
-KEY = "billiards"
+KEYS = ("billiards", "pinball")
+"""Their tables."""
 
 Assignment = tuple[str, Any]
 
-_LISTS = {field.alias for field in Scene.model_fields.values() if field.alias is not None}
+_LISTS = {field.alias for name, field in Scene.model_fields.items() if field.alias is not None}
 """Tables of which there are many: a preset may add to them."""
 
 
+def has_preset(document: dict[str, Any], paths: Iterable[str] = ()) -> bool:
+    """Tell whether a document has a preset, or gets one by what is set in it."""
+    return any(key in document for key in KEYS) or any(path.startswith(KEYS) for path in paths)
+
+
 def written_out(document: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the document of primitives that one with a preset stands for; None where it has faults."""
-    from sandbox.scene.billiards.expanding import expanded, faults_of  # few scenes need it
+    """Return the document of primitives that one with presets stands for; None where it has faults."""
+    from sandbox.scene.billiards.expanding import expanded  # few scenes need these
+    from sandbox.scene.pinball.expanding import expanded as built
 
     try:
         scene = read_model(document)
     except (RecursionError, ValueError):  # told, with all others, by who reads it next
         return None
-    return None if any(faults_of(scene)) else to_document(expanded(scene))
+    return None if any(faults_of(scene)) else to_document(built(expanded(scene)))
+
+
+def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
+    """Yield why a scene's presets stand for nothing."""
+    from sandbox.scene.billiards.expanding import faults_of as of_billiards
+    from sandbox.scene.pinball.faulting import faults_of as of_pinball
+
+    if scene.billiards is not None and scene.pinball is not None:
+        yield ("pinball",), "stands beside [billiards]; a scene is one table or the other"
+    yield from of_billiards(scene)
+    yield from of_pinball(scene)
 
 
 def set_first(
@@ -47,7 +66,23 @@ def set_first(
     return document, changed, later
 
 
-def is_written(location: Location, stated: dict[str, Any]) -> bool:
+def place_of(location: Location, document: dict[str, Any], stated: dict[str, Any]) -> Location:
+    """Return where in a stated document stands what a location of the written one is of.
+
+    That is the location itself, but of what a preset wrote: then it is the preset, or its element.
+    """
+    if not _is_written(location, stated):
+        return location
+    if "pinball" not in stated:
+        return (KEYS[0],)
+    from sandbox.scene.pinball.expanding import origins
+
+    those, number = document.get(str(location[0])), location[1] if len(location) > 1 else None
+    name = those[number].get("name") if isinstance(those, list) and isinstance(number, int) else None
+    return origins(read_model(stated)).get(str(name), ("pinball",))
+
+
+def _is_written(location: Location, stated: dict[str, Any]) -> bool:
     """Tell whether a location is of what a preset wrote into a document, not of what was stated in it."""
     if not location:
         return False

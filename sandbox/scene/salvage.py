@@ -10,7 +10,7 @@ from sandbox.scene.document import read_model
 from sandbox.scene.explain import model_at
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene
-from sandbox.scene.presets import written_out
+from sandbox.scene.presets import KEYS, has_preset, written_out
 
 HARMLESS: dict[str, Any] = {
     "position": [0.0, 0.0],
@@ -48,7 +48,7 @@ ALOOF: dict[str, dict[str, Any]] = {
 _TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - {"title", "about"}
 
 
-REFERRING = {("joint",), ("attraction",), ("thrust",), ("shot",)}
+REFERRING = {("joint",), ("attraction",), ("thrust",), ("drive",), ("shot",)}
 """Tables that speak of bodies, of which nobody speaks: one that is faulty is left out."""
 
 PARTS = ("ball", "box", "capsule", "polygon")
@@ -67,7 +67,7 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
     document = copy.deepcopy(document)
     touched: set[Location] = set()
     wrong = list(wrong)
-    if () in wrong or any(location[:1] == ("billiards",) for location in wrong):
+    if () in wrong or any(location[:1] == (key,) for location in wrong for key in KEYS):
         return []  # the document as a whole cannot be read, or what stands for most of it
     kept = _without_faulty(document, wrong)
     for location in wrong:
@@ -93,7 +93,7 @@ def crosscheck_the_rest(document: dict[str, Any], wrong: Iterable[Location]) -> 
         for name, field in model_at(location[:depth]).model_fields.items():
             if field.is_required() and name not in holder and name in HARMLESS:
                 holder[name] = HARMLESS[name]
-    if "billiards" in document:
+    if has_preset(document):
         document = written_out(document) or {}
     try:
         scene = read_model(document)

@@ -19,6 +19,9 @@ POST: dict[str, Any] = {"position": [0, 0], "radius": 1}
 SPARKS: dict[str, Any] = {"position": [0, 0], "count": 3, "velocity_min": [0, 0], "velocity_max": [1, 1], "lifetime": 2}
 BOX: dict[str, Any] = {"position": [0, 0], "size": [1, 1]}
 NAMED: dict[str, Any] = {**BALL, "name": "a"}
+NAMED_BOX = {"name": "a", "position": [0, 0], "size": [1, 1]}
+PLUNGER = {"kind": "plunger", "body": "a", "direction": [0, 1], "travel": 1, "speed": 1}
+STROKE = {"kind": "stroke", "body": "a", "pivot": [0, 0], "stops": [0, 1], "rate": 1}
 OFF: dict[str, Any] = {"kind": "rod", "between": ["a"], "anchors": [[0, 1], [5, 5]]}
 JOINTED: dict[Demand, dict[str, Any]] = {
     Demand.RODS: {"kind": "rod", "anchors": [[0, 0], [5, 5]]},
@@ -78,6 +81,21 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
         {"ball": [{**GHOST, "friction": 1}], "plane": [{**PLANE, "friction": 1}]},
         "nothing can meet",
     ),
+    (
+        Demand.FALLOFF,
+        True,
+        {"ball": [{**BALL, "restitution": 1, "restitution_falloff": 0.5}], "post": [POST]},
+        "0.5 s/m",
+    ),
+    (Demand.FALLOFF, False, {"ball": [{**BALL, "restitution_falloff": 0.5}], "post": [POST]}, "the same at all speeds"),
+    (Demand.FALLOFF, False, {"ball": [{**GHOST, "restitution": 1, "restitution_falloff": 0.5}]}, "the same at all"),
+    (Demand.KICKS, True, {"ball": [BALL], "post": [{**POST, "kick": {"speed": 1}}]}, "1 wall or post kicks"),
+    (Demand.KICKS, False, {"ball": [GHOST], "post": [{**POST, "kick": {"speed": 1}}]}, "nothing kicks"),
+    (Demand.KICKS, False, {"title": "t"}, "nothing kicks"),
+    (Demand.ONE_WAY, True, {"ball": [BALL], "wall": [{**WALL, "one_way": True}] * 2}, "2 walls let pass"),
+    (Demand.ONE_WAY, False, {"ball": [BALL], "wall": [WALL]}, "none"),
+    (Demand.PASSABLE, True, {"ball": [BALL], "post": [{**POST, "solid": False}]}, "1 wall or post"),
+    (Demand.PASSABLE, False, {"ball": [BALL], "post": [POST]}, "all are solid"),
     (Demand.BOUNDS, True, {"world": {"bounds": [[-1, -1], [1, 1]]}, "ball": [BALL]}, "given"),
     (Demand.BOUNDS, False, {"ball": [BALL]}, "no bounds"),
     (Demand.POLYGONS, True, {"box": [BOX], "plane": [PLANE]}, "1 body is no ball, 1 of them can meet something"),
@@ -103,6 +121,10 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.ATTRACTION, False, {"ball": [BALL]}, "none"),
     (Demand.THRUST, True, {"ball": [NAMED], "thrust": [{"body": "a", "force": [1, 0]}]}, "1"),
     (Demand.THRUST, False, {"ball": [BALL]}, "none"),
+    (Demand.DRIVES, True, {"box": [NAMED_BOX], "drive": [PLUNGER]}, "1"),
+    (Demand.DRIVES, False, {"ball": [BALL]}, "none"),
+    (Demand.ROTATION, False, {"box": [{**NAMED_BOX, "collides": "none"}], "drive": [PLUNGER]}, "nothing can turn"),
+    (Demand.ROTATION, True, {"box": [{**NAMED_BOX, "collides": "none"}], "drive": [STROKE]}, "1 body can be turned"),
     (Demand.LIFETIMES, True, {"emitter": [SPARKS]}, "3 bodies live for a time"),
     (Demand.LIFETIMES, False, {"ball": [BALL]}, "all stay"),
     (Demand.SURFACE, True, {"surface": {"sliding_friction": 0.2}, "ball": [BALL]}, "sliding 0.2"),
@@ -114,6 +136,10 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.SPIN, False, {"surface": {"rolling_friction": 0.1}, "ball": [{**BALL, "spin": [0, 0, 1]}]}, "but about z"),
     (Demand.POCKETS, True, {"ball": [BALL], "pocket": [{"position": [9, 9], "radius": 1}]}, "1"),
     (Demand.POCKETS, False, {"ball": [BALL]}, "none"),
+    (Demand.LAYERS, True, {"ball": [{**BALL, "layer": "ramp"}]}, "ground, ramp"),
+    (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all are on the ground"),
+    (Demand.ZONES, True, {"ball": [BALL], "zone": [{"position": [9, 9], "radius": 1}]}, "1"),
+    (Demand.ZONES, False, {"ball": [BALL]}, "none"),
 ]
 
 

@@ -38,7 +38,7 @@ from sandbox.engines.exact.log import add_impulse, log_rest, open_row
 from sandbox.engines.exact.motion import place, turned
 from sandbox.engines.exact.roots import NOISE
 from sandbox.engines.kernel import bare_kernel as kernel
-from sandbox.engines.rebound import kicked, rebound
+from sandbox.engines.rebound import compiled_kicked, compiled_rebound
 from sandbox.trajectory import FloatArray, IntArray
 
 ALMOST_STILL = 1e-9
@@ -114,7 +114,7 @@ def parting_speed(hop: float, closing: float, restitution: float, falloff: float
     e times the closing speed; all of it where that is next to nothing; and where gravity presses them together, no
     less than a hop's speed: there is no rest on anything round.
     """
-    parting = rebound(restitution, falloff, closing)
+    parting = compiled_rebound(restitution, falloff, closing)
     if closing <= max(hop, ALMOST_STILL):
         parting = max(closing, 0.0)
     if press > 0.0:
@@ -137,7 +137,7 @@ def hit_knob(arena: Arena, i: int, k: int) -> None:
     mine, its = arena.tags[i, SURFACE], arena.knob_tags[k, COAT]
     restitution, falloff = arena.surfaces[RESTITUTION, mine, its], arena.surfaces[FALLOFF, mine, its]
     parting = parting_speed(arena.world[HOP], closing, restitution, falloff, press)
-    kick = kicked(arena.knobs[k, KICKS], arena.knobs[k, ABOVE], False, 0.5, closing)
+    kick = compiled_kicked(arena.knobs[k, KICKS], arena.knobs[k, ABOVE], False, 0.5, closing)
     jx, jy = strike(arena, i, -nx, -ny, parting, kick, arena.surfaces[FRICTION, mine, its])
     r = arena.state[i, RADIUS]
     row = open_row(arena, i, -1 - arena.knob_tags[k, THING], state[i, X] + r * nx, state[i, Y] + r * ny, nx, ny)

@@ -57,7 +57,7 @@ from sandbox.engines.exact.log import add_impulse, open_rest, open_row
 from sandbox.engines.exact.predict import parallel
 from sandbox.engines.exact.roots import NOISE
 from sandbox.engines.kernel import bare_kernel as kernel
-from sandbox.engines.rebound import kicked, rebound
+from sandbox.engines.rebound import compiled_kicked, compiled_rebound
 from sandbox.trajectory import FloatArray
 
 REST_TIME = 1e-13
@@ -82,7 +82,7 @@ def hit_flat(arena: Arena, i: int, f: int) -> None:
     restitution, friction = arena.surfaces[RESTITUTION, mine, its], arena.surfaces[FRICTION, mine, its]
     closing = max(-(state[i, VX] * nx + state[i, VY] * ny), 0.0)
     press = -(state[i, AX] * nx + state[i, AY] * ny)
-    parting = rebound(restitution, arena.surfaces[FALLOFF, mine, its], closing)
+    parting = compiled_rebound(restitution, arena.surfaces[FALLOFF, mine, its], closing)
     kick = 0.0
     if arena.flats[f, KICK] > 0.0:
         kick = flat_kick(arena.flats, f, state[i, X], state[i, Y], closing)
@@ -110,7 +110,7 @@ def flat_kick(flats: FloatArray, f: int, x: float, y: float, closing: float) -> 
     """Return what a flat that is hit from (x, y) kicks with, m/s."""
     share = ((x - flats[f, PX]) * flats[f, UX] + (y - flats[f, PY]) * flats[f, UY]) / flats[f, WHOLE]
     share = flats[f, BEGIN] + flats[f, SPAN] * min(max(share, 0.0), 1.0)
-    return kicked(flats[f, KICK], flats[f, THRESHOLD], flats[f, MIDDLE] != 0.0, share, closing)
+    return compiled_kicked(flats[f, KICK], flats[f, THRESHOLD], flats[f, MIDDLE] != 0.0, share, closing)
 
 
 @kernel

@@ -10,6 +10,7 @@ from sandbox.engines.native.space import SurfaceSetter, category, fixed_shapes, 
 from sandbox.engines.rebound import stretches
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Plane, Post, Scene, Wall
+from sandbox.scene.zone import mask_of
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 MANY = 5_000
@@ -41,7 +42,7 @@ class Ground:
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
             shapes = list(fixed_shapes(thing, body, centre, reach))
             for shape in shapes:
-                shape.filter = _filter(thing)
+                shape.filter = _filter(thing, scene)
                 self._setter.dress(shape, number)
             if isinstance(thing, Wall) and thing.kick is not None:
                 parts = stretches(thing.points, thing.closed)
@@ -59,7 +60,7 @@ class Ground:
     def renew(self, scene: Scene, surface: IntArray) -> None:
         """Give the fixed things their surfaces (F,) anew, and let those be met that now are solid."""
         for (_, shapes), thing, number in zip(self._things, scene.fixed, surface.tolist(), strict=False):
-            passes = _filter(thing)
+            passes = _filter(thing, scene)
             for shape in shapes:
                 self._setter.dress(shape, number)
                 if shape.filter != passes:
@@ -84,9 +85,10 @@ class Ground:
         return bool((np.abs(place - self._middle[0:2]) <= self.reach).all())
 
 
-def _filter(thing: Plane | Wall | Post) -> pymunk.ShapeFilter:
+def _filter(thing: Plane | Wall | Post, scene: Scene) -> pymunk.ShapeFilter:
     """Return whom a fixed thing meets."""
-    return category(True, "all" if isinstance(thing, Plane) or thing.solid else "none")
+    solid = isinstance(thing, Plane) or thing.solid
+    return category(True, "all" if solid else "none", layers=mask_of(thing.layers, scene.layers))
 
 
 def shuffled(count: int) -> list[int]:

@@ -2,20 +2,22 @@
 
 Munk2D parts two by e times their approach before the substep's forces. So one that is to part at another speed is given
 the restitution that comes to it, in `pre_solve`, which is called between the two. What rests does not approach, and is
-neither kicked nor told anything new. Two that a one-way wall keeps apart, or lets pass, are told in `begin`.
+neither kicked nor told anything new.
 """
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pymunk
 
+from sandbox.engines.native.approach import closing_speed
+from sandbox.engines.native.gates import Gates
 from sandbox.engines.native.record import address_of
 from sandbox.engines.rebound import kicked, rebound, share_at
 from sandbox.scene.kick import Kick
 from sandbox.scene.surfaces import Surfaces
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.trajectory import FloatArray
 
 Stretches = dict[pymunk.Shape, tuple[float, float]]
 """At which shares of its whole wall each segment of one that kicks begins and ends."""
@@ -58,6 +60,7 @@ class Laws:
     """The laws of a space, by pairs of surfaces, and what they were found to be at the last contacts."""
 
     space: pymunk.Space
+    gates: Gates
     stretches: Stretches = field(default_factory=dict)
     told: dict[int, Given] | None = None
     """what kicked in the last substep, by the addresses of arbiters; where a dict is put here"""
@@ -75,7 +78,10 @@ class Laws:
             self.space.on_collision(a + 1, b + 1, pre_solve=self._tell, data=known)
 
     def _tell(self, arbiter: pymunk.Arbiter, _: pymunk.Space, known: list[Law]) -> None:
-        if not known or not arbiter.process_collision:
+        if not known:
+            return
+        if not arbiter.process_collision:
+            self.gates.passed(arbiter)
             return
         law = known[0]
         arbiter.restitution, arbiter.friction = law.restitution, law.friction
@@ -103,92 +109,6 @@ class Laws:
             y = sum(point.point_a.y + point.point_b.y for point in points) / (2 * len(points))
             share = share_at(segment.a, segment.b, self.stretches[segment], (x, y))
         return kicked(kick.speed, kick.threshold, middle, share, closing)
-
-
-def closing_speed(arbiter: pymunk.Arbiter) -> float:
-    """Return how fast two approach along their normal, m/s; of two points that of the faster one."""
-    a, b = arbiter.shapes
-    first, second, n = a.body, b.body, arbiter.normal
-    assert first is not None and second is not None
-    along = (first.velocity - second.velocity).dot(n)
-    if not (_turns(a) or _turns(b)):
-        return float(along)
-    return float(
-        max(
-            along + _turning(first, point.point_a, n) - _turning(second, point.point_b, n)
-            for point in arbiter.contact_point_set.points
-        )
-    )
-
-
-def _turns(shape: pymunk.Shape) -> bool:
-    """Tell whether the spin of a body moves its surface along a normal there: not that of a disc about its centre."""
-    body = shape.body
-    assert body is not None
-    return body.angular_velocity != 0.0 and not (isinstance(shape, pymunk.Circle) and shape.offset == (0.0, 0.0))
-
-
-def _turning(body: pymunk.Body, point: pymunk.Vec2d, normal: pymunk.Vec2d) -> float:
-    """Return how fast a body's spin moves a point of it along a normal, m/s."""
-    arm = point - body.position
-    return float(body.angular_velocity * (arm.x * normal.y - arm.y * normal.x))
-
-
-class Gates:
-    """One-way walls: whoever comes from the right of one is let through, for as long as the two overlap."""
-
-    def __init__(self, space: pymunk.Space, h: float) -> None:
-        self._space, self._h = space, h
-        self.walls: set[pymunk.Shape] = set()
-        """the segments of those that let pass"""
-        self._handled: set[tuple[int, int]] = set()
-        self._passing: dict[tuple[int, int], set[tuple[pymunk.Shape, pymunk.Shape]]] = {}
-
-    def renew(self, surfaces: Surfaces, touching: BoolArray) -> None:
-        """Watch the pairs (S, S) of surfaces of which one may be such a wall's."""
-        for a, b in np.argwhere(np.triu(touching & (surfaces.one_way | surfaces.one_way[:, None]))).tolist():
-            if (a, b) not in self._handled:
-                self._handled.add((a, b))
-                self._space.on_collision(a + 1, b + 1, begin=self._begin, separate=self._separate)
-
-    def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
-        wall, shape = self._told_apart(arbiter)
-        if wall is None:  # surfaces are numbered anew as bodies come
-            return
-        # Another segment of the same wall may be letting it through, and where two join it touches both.
-        passing = self._passing.setdefault(_who(shape, wall), set())
-        keeps = not passing and self._keeps(arbiter, wall, shape)
-        arbiter.process_collision = keeps
-        if not keeps:
-            passing.add((shape, wall))
-
-    def _separate(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
-        wall, shape = self._told_apart(arbiter)
-        if wall is not None and (passing := self._passing.get(_who(shape, wall))) is not None:
-            passing.discard((shape, wall))
-
-    def _told_apart(self, arbiter: pymunk.Arbiter) -> tuple[pymunk.Shape | None, pymunk.Shape]:
-        """Return the wall that lets pass, if one of the two is such, and the other."""
-        a, b = arbiter.shapes
-        if a in self.walls:
-            return a, b
-        return (b if b in self.walls else None), a
-
-    def _keeps(self, arbiter: pymunk.Arbiter, wall: pymunk.Shape, shape: pymunk.Shape) -> bool:
-        """Tell whether what has just come to touch a wall came from its left, and does not leave it already.
-
-        Positions have moved on by the velocity that a body still has, so where it was a substep ago is known.
-        """
-        assert isinstance(wall, pymunk.Segment) and shape.body is not None
-        along = wall.b - wall.a
-        side = shape.bb.center() - shape.body.velocity * self._h - wall.a
-        return bool(along.cross(side) >= 0.0 and closing_speed(arbiter) >= 0.0)
-
-
-def _who(shape: pymunk.Shape, wall: pymunk.Shape) -> tuple[int, int]:
-    """Return the ids of a body and a wall."""
-    assert shape.body is not None and wall.body is not None
-    return shape.body.id, wall.body.id
 
 
 def worths(told: dict[int, Given], where: list[int], counts: list[int]) -> FloatArray:

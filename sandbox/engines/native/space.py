@@ -13,7 +13,8 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.native.coefficients import factors, wrong_pairs
-from sandbox.engines.native.laws import Gates, Laws
+from sandbox.engines.native.gates import Gates
+from sandbox.engines.native.laws import Laws
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Collides, Plane, Post, Scene, Wall
@@ -23,6 +24,9 @@ from sandbox.scene.settings import Settings
 
 FIXED, LOOSE, SOLITARY = 0b001, 0b010, 0b100
 """Collision categories: what never moves, bodies that meet everything, bodies that meet only what is fixed."""
+
+KINDS = 3
+"""how many of these there are on each layer: the bits of layer k are theirs, shifted by 3·k"""
 
 SHORTEST_REACH, LONGEST_REACH = 5e3, 5e6
 """m; pymunk's half-planes are segments, whose noise grows with their length: 3e-13 m at a reach of 5e3."""
@@ -50,13 +54,16 @@ def gravity_of(scene: Scene) -> tuple[float, float]:
 
 
 @cache
-def category(fixed: bool, collides: Collides, group: int = 0) -> pymunk.ShapeFilter:
-    """Return the filter of a body; those of one group other than 0 pass through each other."""
+def category(fixed: bool, collides: Collides, group: int = 0, layers: int = 1) -> pymunk.ShapeFilter:
+    """Return the filter of what is on some layers, as bits; those of one group other than 0 pass through each other."""
     if fixed:
-        return pymunk.ShapeFilter(group, categories=FIXED, mask=LOOSE | SOLITARY if collides == "all" else 0)
-    if collides == "all":
-        return pymunk.ShapeFilter(group, categories=LOOSE, mask=FIXED | LOOSE)
-    return pymunk.ShapeFilter(group, categories=SOLITARY, mask=FIXED)
+        own, others = FIXED, LOOSE | SOLITARY if collides == "all" else 0
+    elif collides == "all":
+        own, others = LOOSE, FIXED | LOOSE
+    else:
+        own, others = SOLITARY, FIXED
+    each = sum(1 << KINDS * k for k in range(layers.bit_length()) if layers >> k & 1)
+    return pymunk.ShapeFilter(group, categories=own * each, mask=others * each)
 
 
 def reach_of(scene: Scene, starts: FloatArray, speeds: FloatArray) -> tuple[FloatArray, float]:
@@ -125,8 +132,10 @@ class SurfaceSetter:
     """Gives shapes their elasticity and friction, so that every pair has exactly its own coefficients."""
 
     def __init__(self, space: pymunk.Space, h: float) -> None:
-        self.laws, self.gates = Laws(space), Gates(space, h)
-        """what no factors can serve, and walls that let pass"""
+        self.gates = Gates(space, h)
+        """walls that let pass from one side"""
+        self.laws = Laws(space, self.gates)
+        """what no factors can serve"""
         self._elasticity: list[float] = []
         self._friction: list[float] = []
 
@@ -139,7 +148,7 @@ class SurfaceSetter:
         wrong = {
             *wrong_pairs(surfaces.restitution, touching, self._elasticity),
             *wrong_pairs(surfaces.friction, touching, self._friction),
-            *_pairs(touching & ~surfaces.fixed_coefficients),
+            *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
         }
         self.laws.renew(surfaces, wrong)
         if surfaces.one_way.any():

@@ -53,7 +53,7 @@ class Audit:
     that lies inside it, for the radius: what passes through that was surely missed, so that there is no false alarm,
     but what only clips a corner is not counted. A body whose core is 0, as its centre of mass lies outside of it, is
     left out. Pairs that a joint keeps from meeting, and bodies of one
-    group, miss nothing.
+    group, miss nothing; nor does who is on different layers, or changes its own within the substep.
 
     Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
     planes), and among balls with the pairs that are near.
@@ -66,6 +66,7 @@ class Audit:
         self._pairs: list[IntArray] = []
         self._looks = Looks()
         self._looks.add(np.empty((0, 2), np.int64))
+        self._on: IntArray = np.zeros((0, 0), np.int64)  # layers, as bits; without rows where there is one alone
         self._lay_out(scene.bodies if bodies is None else bodies)
 
     def joined(self, bodies: Bodies) -> None:
@@ -73,7 +74,15 @@ class Audit:
         self._examine()
         self._lay_out(bodies)
 
-    def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
+    def changed(self, scene: Scene, bodies: Bodies) -> None:
+        """Take note that other things are solid now; `bodies` are all there are."""
+        self._examine()
+        self._obstacles = Obstacles.of(scene)
+        self._lay_out(bodies)
+
+    def __call__(
+        self, time: float, start: FloatArray, end: FloatArray, touching: IntArray, on: IntArray | None = None
+    ) -> None:
         """Take note of one substep; they are examined some at a time. The arrays are copied.
 
         Args:
@@ -81,6 +90,8 @@ class Audit:
             start: centres (N, 2), m.
             end: centres (N, 2), m.
             touching: pairs (K, 2) in contact at the end, numbered as in `Contacts`.
+            on: (N,) the layers on which each was all the while, as bits, where there are several; who shares none
+                with another misses it rightly.
 
         Raises:
             ValueError: N is not the number of bodies; `joined` tells of new ones.
@@ -92,6 +103,10 @@ class Audit:
         row = len(self._time)
         self._start[row] = start[self._part]
         self._end[row] = end[self._part]
+        if on is not None:
+            if not len(self._on):
+                self._on = np.zeros(self._start.shape[:2], np.int64)
+            self._on[row] = on[self._part]
         self._looks.add(touching)
         self._time.append(time)
         if len(self._time) == len(self._start):
@@ -144,6 +159,7 @@ class Audit:
         self._time: list[float] = []
         self._start = np.empty((batch, len(self._core), 2))
         self._end = np.empty_like(self._start)
+        self._on = np.zeros((0, 0), np.int64)
 
     def _examine(self) -> None:
         """Examine the substeps that wait."""
@@ -175,7 +191,8 @@ class Audit:
     def _fixed(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
         """Return when (M,) which pairs (M, 2) of a body and a fixed thing were missed."""
         when, who = np.nonzero(fast & self._moves)
-        paths = Paths(when, who + self._offset, start[when, who], end[when, who], self._core[who])
+        on = self._on[when, who] if len(self._on) else None
+        paths = Paths(when, who + self._offset, start[when, who], end[when, who], self._core[who], on)
         return self._obstacles.missed(paths, self._looks)
 
     def _meet(self, i: IntArray, j: IntArray) -> BoolArray:
@@ -193,6 +210,9 @@ class Audit:
     def _balls(self, start: FloatArray, end: FloatArray, fast: BoolArray, nearing: float) -> tuple[IntArray, IntArray]:
         """Return when (M,) which pairs (M, 2) of bodies were missed; none comes nearer by more than `nearing`."""
         when, i, j = self._neighbours.encounters(start, end, fast)
+        if len(self._on):
+            near = (self._on[when, i] & self._on[when, j]) != 0
+            when, i, j = when[near], i[near], j[near]
         parts = len(when) // CHUNK + 1
         at = np.concatenate(
             [

@@ -39,7 +39,7 @@ class Given:
     meet: Meetings
     links: Links
     thrust: BoolArray
-    """(N,) carries a thrust"""
+    """(N,) carries a thrust, or has a drive"""
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
@@ -91,10 +91,9 @@ class Given:
 
 
 def thrust_on(scene: Scene, bodies: Bodies) -> BoolArray:
-    """Return which bodies carry a thrust, (N,)."""
-    if not scene.thrusts:
-        return np.zeros(len(bodies), np.bool_)
-    return np.isin(bodies.names, [thrust.body for thrust in scene.thrusts])
+    """Return which bodies carry a thrust or have a drive, (N,)."""
+    movers = [each.body for each in (*scene.thrusts, *scene.drives)]
+    return np.isin(bodies.names, movers) if movers else np.zeros(len(bodies), np.bool_)
 
 
 def direction(vector: FloatArray) -> FloatArray:

@@ -87,7 +87,9 @@ def impacts(given: Given) -> Impacts | None:
     scene, bodies = given.scene, given.bodies
     if not 2 <= len(bodies) <= MOST_BALLS or not bodies.round.all() or bodies.fixed.any() or scene.fixed:
         return None
-    if len(given.links) or scene.attractions or scene.thrusts or not given.airless or scene.world.bounds is not None:
+    if len(given.links) or scene.attractions or scene.thrusts or scene.drives:
+        return None
+    if not given.airless or scene.world.bounds is not None:
         return None
     if np.isfinite(bodies.lifetime).any() or any(element.collides != "all" for element in bodies.elements):
         return None
@@ -115,6 +117,8 @@ def _followed(given: Given) -> Impacts | None:
     restitution, friction = (each[np.ix_(numbers, numbers)] for each in (surfaces.restitution, surfaces.friction))
     mass, reach = bodies.mass, bodies.radius[:, None] + bodies.radius
     apart = np.triu(np.ones((len(bodies), len(bodies)), np.bool_), 1)
+    if not surfaces.fixed_coefficients[np.ix_(numbers, numbers)][apart].all():
+        return None  # restitution falls with speed
     passes_on = bool((mass == mass[0]).all() and (restitution[apart] == 1.0).all())
 
     away = np.hypot(*np.moveaxis(bodies.position[:, None] - bodies.position, 2, 0))

@@ -13,7 +13,7 @@ Place = tuple[str, int]
 """A table of a document: its kind, and which of them."""
 
 FIXED = ("plane", "wall", "post")
-BONDS = ("joint", "attraction", "thrust")
+BONDS = ("joint", "attraction", "thrust", "drive")
 SURFACE = (
     "material", "restitution", "restitution_falloff", "friction", "colour", "mass", "density", "collides",
 )  # fmt: skip

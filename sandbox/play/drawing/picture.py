@@ -7,10 +7,12 @@ import pygame
 
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.ageing import Ageing
+from sandbox.play.drawing.decks import draw_deck, layers_among, on_layer
 from sandbox.play.drawing.discs import Discs, spokes
 from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
 from sandbox.play.drawing.grid import draw_grid, draw_scale
 from sandbox.play.drawing.overlays import Overlays
+from sandbox.play.drawing.painted import draw_painted
 from sandbox.play.drawing.palette import BACKGROUND, CLEAR, TOUCHING, ColourArray, colour_of
 from sandbox.play.drawing.points import LARGEST, Packed, Points, packed
 from sandbox.play.drawing.polygons import Polygons
@@ -18,6 +20,7 @@ from sandbox.play.drawing.table.aiming import draw_aim, draw_ways
 from sandbox.play.drawing.table.balls import Balls
 from sandbox.play.drawing.table.cloth import draw_table
 from sandbox.play.drawing.view import View
+from sandbox.play.drawing.zones import draw_zones
 from sandbox.play.sight import Sight
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import meetings
@@ -124,11 +127,24 @@ class Picture:
         if "shapes" in sight.overlays and sight.scene.surface is not None and not sizes.side:
             self._balls.draw(view)
         elif "shapes" in sight.overlays:
-            self._draw_bodies(view, np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None)
+            self._draw_layers(view, np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None)
         self._overlays.above(view)
         if sight.aim is not None:
             draw_aim(view, sight.aim)
         draw_scale(surface, camera, unit, foot)
+
+    def _draw_layers(self, view: View, which: IntArray | None) -> None:
+        """Draw the bodies that are no points, from the ground up, with what is fixed on each layer above it."""
+        scene = view.sight.scene
+        if len(scene.layers) == 1:
+            self._draw_bodies(view, which)
+            return
+        which = np.arange(len(view.shown)) if which is None else which
+        layer = layers_among(view.sight.frame, view.shown[which])
+        for k in range(len(scene.layers)):
+            if k > 0:
+                draw_deck(view.surface, view.camera, on_layer(scene, k), view.unit, view.antialias)
+            self._draw_bodies(view, which[layer == k])
 
     def _draw_bodies(self, view: View, which: IntArray | None) -> None:
         """Draw the bodies that are no points: all, or those at some places of the view."""
@@ -207,9 +223,13 @@ class Picture:
             drawn = pygame.Surface(surface.get_size(), 0, surface)
             drawn.fill(BACKGROUND)
             area = sight.scene.play.area
-            if area is None:
+            if sight.scene.play.paints:
+                draw_painted(drawn, camera, sight.scene, unit, antialias)
+            elif area is None:
                 draw_grid(drawn, camera, unit)
-                draw_fixtures(drawn, camera, sight.scene, unit, antialias)
+                draw_zones(drawn, camera, sight.scene, unit, antialias)
+                ground = sight.scene if len(sight.scene.layers) == 1 else on_layer(sight.scene, 0)
+                draw_fixtures(drawn, camera, ground, unit, antialias)
             else:
                 draw_table(drawn, camera, sight.scene, area, unit, antialias)
             if wanted.bounds:

@@ -1,0 +1,99 @@
+"""Painted: a scene with paint on its ground, as a playfield has: paint, lamps, shadows of what is fixed, caps."""
+
+from itertools import pairwise
+
+import numpy as np
+import pygame
+
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.fixtures import draw_fixtures
+from sandbox.play.drawing.palette import BACKGROUND, INK, Colour, colour_of_fixed, hex_colour, mixed
+from sandbox.play.drawing.shade import Look, disc_distance, paint
+from sandbox.play.drawing.strokes import Pixel, clipped, fill, stroke
+from sandbox.scene.model import Post, Scene
+from sandbox.scene.paint import Paint
+from sandbox.scene.part import Point
+from sandbox.scene.surfaced import GROUND
+
+DARK: Colour = (5, 8, 14)
+AMBER: Colour = (255, 196, 84)
+LAMP = 0.0065
+"""m, radius of a lamp that nobody lit"""
+SHADOW = (0.003, -0.005)
+"""m, from what is fixed to its shadow"""
+SHADE, NOTHING = 90, (255, 0, 255)
+"""how dark shadows are, of 255; and the colour that stands for none"""
+RAISED = 0.62
+"""of the radius of a post that kicks: its cap"""
+
+
+def draw_painted(
+    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
+) -> None:
+    """Draw the ground of a painted scene and what is fixed on it, as far as it is in sight."""
+    for area in scene.play.paints:
+        _area(surface, camera, area, antialias)
+    _shadows(surface, camera, scene)
+    for part in scene.play.parts:
+        if part.light is not None:
+            lit = AMBER if part.colour is None else hex_colour(part.colour)
+            look = Look(mixed(BACKGROUND, lit, 0.35), mixed(BACKGROUND, lit, 0.7), 1.2 * unit, 1.0, antialias)
+            _disc(surface, camera, part.light, LAMP, look)
+    draw_fixtures(surface, camera, scene, unit, antialias)
+    for post in scene.posts:
+        if post.kick is not None:
+            _cap(surface, camera, post, unit, antialias)
+
+
+def _area(surface: pygame.Surface, camera: Camera, area: Paint, antialias: bool) -> None:
+    colour = hex_colour(area.colour)
+    if area.points is not None:
+        fill(surface, [(x, y) for x, y in camera.to_screen(np.asarray(area.points)).tolist()], colour, antialias)
+    elif area.position is not None and area.radius is not None:
+        _disc(surface, camera, area.position, area.radius, Look(colour, colour, 0.0, 1.0, antialias))
+
+
+def _cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
+    """Draw the cap of a bumper: a bright ring, a lid in its colour, a light on it."""
+    colour = colour_of_fixed(post)
+    for share, inner, rim in (
+        (1.0, mixed(DARK, colour, 0.45), mixed(colour, INK, 0.35)),
+        (RAISED + 0.12, INK, mixed(INK, colour, 0.3)),
+        (RAISED, colour, mixed(colour, DARK, 0.35)),
+    ):
+        _disc(surface, camera, post.position, share * post.radius, Look(inner, rim, 1.5 * unit, 1.0, antialias))
+    glint = post.position[0] - 0.2 * post.radius, post.position[1] + 0.22 * post.radius
+    _disc(surface, camera, glint, 0.2 * post.radius, Look(INK, INK, 0.0, 0.35, antialias))
+
+
+def _shadows(surface: pygame.Surface, camera: Camera, scene: Scene) -> None:
+    """Darken the ground beside what is fixed on it, once where shadows overlap."""
+    layer = pygame.Surface(surface.get_size(), 0, surface)
+    layer.fill(NOTHING)
+    layer.set_colorkey(NOTHING)
+    layer.set_alpha(SHADE)
+    for wall in scene.walls:
+        if not wall.solid or GROUND not in wall.layers:
+            continue
+        points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points) + SHADOW
+        half = max(0.5 * wall.thickness * camera.scale, 1.0)
+        ends: list[Pixel] = [(x, y) for x, y in camera.to_screen(points).tolist()]
+        for a, b in pairwise(ends):
+            stroke(layer, a, b, DARK, 2.0 * half, antialias=False)
+        for x, y in ends:
+            if half > 1.0 and clipped((x, y), (x, y), layer.get_rect(), half) is not None:
+                pygame.draw.circle(layer, DARK, (x, y), half)
+    for post in scene.posts:
+        at = camera.to_screen(np.asarray(post.position) + SHADOW).tolist()
+        size = post.radius * camera.scale
+        if clipped((at[0], at[1]), (at[0], at[1]), layer.get_rect(), size) is not None:
+            pygame.draw.circle(layer, DARK, at, size)
+    surface.blit(layer, (0, 0))
+
+
+def _disc(surface: pygame.Surface, camera: Camera, at: Point, radius: float, look: Look) -> None:
+    ((x, y),), size = camera.to_screen(np.asarray([at])).tolist(), radius * camera.scale
+    if clipped((x, y), (x, y), surface.get_clip(), size + 4.0) is None:
+        return
+    within = pygame.Rect(int(x - size) - 3, int(y - size) - 3, int(2.0 * size) + 7, int(2.0 * size) + 7)
+    paint(surface, disc_distance(x, y, size), look, within)

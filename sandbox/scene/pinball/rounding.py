@@ -1,0 +1,159 @@
+"""Rounding: lines with rounded corners, flattened to short straight pieces.
+
+A corner is rounded by the arc that touches both its edges, so that line and arc go over into each other without a kink:
+a rectangle whose two upper corners are rounded by half its width has a semicircular arch.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+from sandbox.scene.part import Point, Vector
+
+NEAREST = 1e-7
+"""m: points that are nearer than this are one"""
+
+Corner = tuple[float, ...]
+"""x and y, m, and the radius by which the corner is rounded, m, if any"""
+
+
+class RoundingError(ValueError):
+    """A corner cannot be rounded; `corner` is its number."""
+
+    def __init__(self, corner: int, message: str) -> None:
+        super().__init__(message)
+        self.corner = corner
+
+
+class Arc(NamedTuple):
+    """What rounds a corner."""
+
+    centre: Point
+    radius: float
+    """m"""
+    begin: float
+    """direction from the centre to where the arc begins, rad"""
+    turn: float
+    """how far it turns, rad, positive to the left"""
+
+    @property
+    def reach(self) -> float:
+        """From the corner to where the arc touches the edges, m."""
+        return self.radius * math.tan(0.5 * abs(self.turn))
+
+    def at(self, share: float) -> Point:
+        """Return the point a share of the way along."""
+        angle = self.begin + share * self.turn
+        return self.centre[0] + self.radius * math.cos(angle), self.centre[1] + self.radius * math.sin(angle)
+
+
+def rounded(corners: Sequence[Corner], closed: bool = False, tolerance: float = 2e-5) -> tuple[Point, ...]:
+    """Return a line with rounded corners as a polyline whose vertices lie on it.
+
+    Args:
+        corners: of the line, in order; of one that is not closed, the ends are not rounded.
+        closed: whether the last is joined to the first.
+        tolerance: how far a chord may lie from its arc, m.
+
+    Raises:
+        RoundingError: an edge is too short for the arcs at its ends, or a corner turns right back.
+    """
+    arcs = [arc_at(corners, k, closed) for k in range(len(corners))]
+    _fit(corners, arcs, closed)
+    points: list[Point] = []
+    for corner, arc in zip(corners, arcs, strict=True):
+        for point in [(corner[0], corner[1])] if arc is None else flattened(arc, tolerance):
+            if not points or math.dist(point, points[-1]) > NEAREST:
+                points.append(point)
+    if closed and math.dist(points[0], points[-1]) <= NEAREST:
+        points.pop()
+    return tuple(points)
+
+
+def arc_at(corners: Sequence[Corner], k: int, closed: bool = False) -> Arc | None:
+    """Return the arc that rounds a corner, or None where it stays sharp.
+
+    Raises:
+        RoundingError: the line turns right back there.
+    """
+    radius = corners[k][2] if len(corners[k]) > 2 else 0.0
+    if radius == 0.0 or (not closed and k in (0, len(corners) - 1)):
+        return None
+    before, here, after = (corners[n % len(corners)] for n in (k - 1, k, k + 1))
+    come, go = _way(before, here, k), _way(here, after, k)
+    turn = math.atan2(come[0] * go[1] - come[1] * go[0], come[0] * go[0] + come[1] * go[1])
+    if abs(turn) < 1e-9:
+        return None
+    if abs(turn) > math.pi - 1e-6:
+        raise RoundingError(k, "turns right back, which no arc can round; leave out its radius")
+    side = math.copysign(1.0, turn)
+    reach = radius * math.tan(0.5 * abs(turn))
+    centre = (
+        here[0] - come[0] * reach - come[1] * side * radius,
+        here[1] - come[1] * reach + come[0] * side * radius,
+    )
+    return Arc(centre, radius, math.atan2(-come[0] * side, come[1] * side), turn)
+
+
+def flattened(arc: Arc, tolerance: float) -> Iterator[Point]:
+    """Yield points of an arc, its ends included, so that no chord lies farther than a tolerance from it, m.
+
+    Of a chord over the angle δ the middle lies r (1 − cos δ/2) inside the arc.
+    """
+    widest = 2.0 * math.acos(max(1.0 - tolerance / arc.radius, 0.0))
+    pieces = max(math.ceil(abs(arc.turn) / widest), 1)
+    return (arc.at(k / pieces) for k in range(pieces + 1))
+
+
+def beside(points: Sequence[Point], distance: float) -> tuple[Point, ...]:
+    """Return a polyline that runs beside another, to its left by a distance, m; to its right where that is negative.
+
+    Limits: corners are mitred, and a distance beyond the radius of a bend makes loops.
+    """
+    ways = [_way(a, b, k) for k, (a, b) in enumerate(pairwise(points))]
+    moved: list[Point] = []
+    for k, (x, y) in enumerate(points):
+        (ax, ay), (bx, by) = ways[max(k - 1, 0)], ways[min(k, len(ways) - 1)]
+        nx, ny = -(ay + by), ax + bx
+        scale = 2.0 * distance / max(nx * nx + ny * ny, 1e-3)
+        moved.append((x + nx * scale, y + ny * scale))
+    return tuple(moved)
+
+
+def length_of(points: Sequence[Point]) -> float:
+    """Return the length of a polyline, m."""
+    return math.fsum(math.dist(a, b) for a, b in pairwise(points))
+
+
+def part_of(points: Sequence[Point], begin: float, end: float) -> tuple[Point, ...]:
+    """Return the part of a polyline between two lengths along it, m."""
+    cut: list[Point] = []
+    gone = 0.0
+    for a, b in pairwise(points):
+        size = math.dist(a, b)
+        low, high = max(begin - gone, 0.0), min(end - gone, size)
+        if high - low > 0.0:
+            ends = [(a[0] + (b[0] - a[0]) * s / size, a[1] + (b[1] - a[1]) * s / size) for s in (low, high)]
+            cut += ends if not cut else ends[1:]
+        gone += size
+    return tuple(cut)
+
+
+def _fit(corners: Sequence[Corner], arcs: Sequence[Arc | None], closed: bool) -> None:
+    """Refuse arcs that take more of an edge than there is."""
+    for k in range(len(corners) if closed else len(corners) - 1):
+        n = (k + 1) % len(corners)
+        room = math.dist(corners[k][:2], corners[n][:2])
+        wanted = sum(arc.reach for arc in (arcs[k], arcs[n]) if arc is not None)
+        if wanted > room + NEAREST:
+            which = k if arcs[k] is not None else n
+            message = f"is rounded by too much: its arcs take {wanted:.4g} m of an edge that is {room:.4g} m long"
+            raise RoundingError(which, message)
+
+
+def _way(a: Corner, b: Corner, k: int) -> Vector:
+    size = math.dist(a[:2], b[:2])
+    if size < NEAREST:
+        raise RoundingError(k, "lies on the corner next to it")
+    return (b[0] - a[0]) / size, (b[1] - a[1]) / size
