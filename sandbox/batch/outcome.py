@@ -126,7 +126,7 @@ class Outcome:
         if not len(run.time):
             return {}
         names = scene.fixed_names[len(scene.fixed) :]
-        holes = {pocket.position: name for pocket, name in zip(scene.pockets, names, strict=True)}
+        holes = {pocket.position: name for pocket, name in zip(scene.pockets, names, strict=False)}  # then come zones
         places = zip(run.names.tolist(), run.position[-1].tolist(), strict=True)
         return {name: holes[x, y] for name, (x, y) in places if (x, y) in holes}
 
