@@ -13,6 +13,8 @@ SOLID = ("plane", "wall", "post", "pocket")
 def are_collisions(run: Trajectory) -> BoolArray:
     """Tell which contacts of a run are collisions, or falls into pockets, (C,)."""
     scene = run.info["scene"]
+    if not scene.get("zone"):
+        return np.ones(len(run.contact_pair), np.bool_)
     return np.asarray(run.contact_pair[:, 1] >= -sum(len(scene.get(kind, ())) for kind in SOLID))
 
 

@@ -304,3 +304,24 @@ def test_other_engines_refuse_zones(engine: str) -> None:
 def test_half_kick_is_refused_with_zones_that_change_motion() -> None:
     with pytest.raises(Refusal, match="half_kick"):
         sandbox.start(scene_of(HOLE, solver={"half_kick": True}))
+
+
+def test_contacts_that_last_keep_their_impulses_while_others_are_noted() -> None:
+    """A heap rests while a ball flies through zones above it: each resting contact bears the same as without them."""
+    plane = {"point": [0.0, -1.0], "normal": [0.0, 1.0], "layers": ["ground"]}
+    balls = [{"position": [0.3 * k, -0.9], "radius": 0.1} for k in range(3)]
+    flies = {"name": "flies", "position": [0.0, 0.0], "velocity": [1.0, 0.0], "radius": 0.05, "layer": "air"}
+    gates = [{"position": [0.2 + 0.1 * k, 0.0], "radius": 0.04, "layers": ["air"]} for k in range(8)]
+    world = {"duration": 1.0, "gravity": [0.0, -2.0]}
+    sky = {"position": [0.0, 0.0], "radius": 9.0, "layers": ["air"], "gravity": [0.0, 0.0]}
+    plain, noted = (
+        sandbox.run(
+            from_document({"world": world, "ball": [*balls, flies], "plane": [plane], "zone": [sky, *more]}),
+            audit=False,
+        )
+        for more in ([], gates)
+    )
+    rests = [run.contact_impulse[run.contact_pair[:, 1] == -1] for run in (plain, noted)]
+    assert np.array_equal(*rests)
+    assert rests[0][:, 1] == pytest.approx(-2.0, abs=0.1)  # m·g·t of each, 1 kg · 2 m/s² · 1 s, but the first touch
+    assert len(noted.contact_time) - len(plain.contact_time) == 8

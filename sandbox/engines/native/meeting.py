@@ -23,7 +23,7 @@ from sandbox.engines.native.space import (
 )
 from sandbox.engines.native.steady import Steady
 from sandbox.engines.native.tethers import Tethers
-from sandbox.engines.touching import NOTHING, Touching
+from sandbox.engines.touching import NOTHING, ComplexArray, Touching
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import Links
 from sandbox.scene.meetings import Meetings
@@ -302,13 +302,20 @@ class MeetingBodies:
         if self.drives:
             self.drives.write(position, velocity, angle, angular_velocity)
 
-    def touching(self) -> Touching:
-        """Return who touches whom now, and how (`Reader.touching`); from the first call on, all impulses add up."""
+    def touching(self, steady: bool = False) -> Touching | ComplexArray:
+        """Return who touches whom now, and how; from the first call on, all impulses add up.
+
+        Args:
+            steady: where it is who touched at the last call, in the same order, their impulses alone will do.
+        """
         if not self._moving:
             return NOTHING
-        found = self._reader.touching(self._polygons)
+        same = self._reader.look(self._polygons)
         remembered = self._remember()
+        if same and steady and remembered.pairs and not remembered.found:
+            return self._reader.impulses()
         remembered.pairs = True
+        found = self._reader.touching()
         ids, impulses = remembered.take()
         return without(found, self._reader.numbers(ids), impulses) if len(ids) else found
 

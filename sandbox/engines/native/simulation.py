@@ -15,7 +15,7 @@ from sandbox.engines.expiry import Expiry
 from sandbox.engines.native.books import Books
 from sandbox.engines.native.population import Population
 from sandbox.engines.running import Running
-from sandbox.engines.touching import joined
+from sandbox.engines.touching import Touching, joined
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -276,12 +276,20 @@ class NativeSimulation(Running):
         """Enter what touches at a time, s, and who has come into zones; who did at the opening lasts till the next."""
         if self._ledger is not None:
             felt = self._population.felt
-            now = self._population.meeting.touching() if felt is None else felt.told()
-            self._work["contacts"] += len(now.a)
-            self._work["contact_iterations"] += len(now.a) * self._settings.iterations
             visiting = self._population.visiting
             came = None if visiting is None else visiting.told(again=opening)
-            self._ledger.record(time, now if came is None else joined(now, came))
+            steady = self._ledger.steady and came is None
+            now = self._population.meeting.touching(steady) if felt is None else felt.told()
+            if isinstance(now, Touching):
+                self._ledger.record(time, now if came is None else joined(now, came))
+                count = len(now.a)
+            else:
+                self._ledger.go_on(now)
+                count = len(now)
+            if came is not None:
+                self._ledger.steady = False  # a note does not last: next time others touch
+            self._work["contacts"] += count
+            self._work["contact_iterations"] += count * self._settings.iterations
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the present arrays in scene order; they belong to the population."""

@@ -68,7 +68,8 @@ class Given:
 
     def only_plane(self) -> Plane | None:
         """Return the plane that is the one fixed thing there is; None where there are others, or none."""
-        return self.scene.planes[0] if len(self.scene.fixed) == len(self.scene.planes) == 1 else None
+        alone = len(self.scene.fixed) == len(self.scene.planes) == len(self.scene.layers) == 1
+        return self.scene.planes[0] if alone else None
 
     def tie(self, number: int) -> Tie | None:
         """Return the one joint of a body, which never breaks and holds it to the world or a fixed body, or None."""

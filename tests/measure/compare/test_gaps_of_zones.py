@@ -7,6 +7,7 @@ import sandbox
 from sandbox.measure.collisions import are_collisions, collisions, together
 from sandbox.measure.compare.drift import momentum_drift
 from sandbox.measure.compare.gaps import gap
+from sandbox.measure.compare.spelled import spelled
 from sandbox.scene.file import from_document
 
 
@@ -35,3 +36,13 @@ def test_notes_are_no_collisions() -> None:
     assert momentum_drift(run, scene) == pytest.approx(0.0, abs=1e-12)  # the wall's impulse explains all
     shared = together(run, scene, (0, -1))
     assert shared.tolist() == (run.layer[:, 0] == 1).tolist()
+
+
+def test_a_scene_spelled_out_keeps_layers_and_zones() -> None:
+    grid = {"origin": [0, 0], "columns": 2, "spacing": [1, 1], "radius": 0.1, "layer": "up"}
+    zone = {"position": [0.5, 0], "radius": 0.2, "layers": ["up"]}
+    scene = from_document({"grid": [grid], "zone": [zone], "ball": [{"position": [0, 3], "radius": 0.1}]})
+    written = from_document(spelled(scene).document)
+    layers = dict(zip(written.bodies.names, written.bodies.layer.tolist(), strict=True))
+    assert layers == dict(zip(scene.bodies.names, scene.bodies.layer.tolist(), strict=True))
+    assert len(written.zones) == 1
