@@ -24,6 +24,15 @@ from sandbox.scene.shipped import find
 FOLDER = Path(__file__).resolve().parent / "pictures"
 SIZE = (1280, 800)
 FRAME = 1.0 / 60.0  # s
+FLIGHT = (
+    (2.6, "turn left", 1.0),
+    (3.1, "turn left", 0.0),
+    (3.2, "turn right", 1.0),
+    (3.65, "turn right", 0.0),
+    (3.7, "engine", 0.8),
+    (6.1, "turn right", 0.6),
+)
+"""s, controls and values of a landing that is under way"""
 
 
 def window(scene: str, seconds: float, overlays: set[str], *, ghost: bool, trust: bool, file: str) -> None:
@@ -51,6 +60,25 @@ def film(scene: str, file: str, *options: str) -> None:
         ):
             if call(arguments):
                 sys.exit(f"sandbox {' '.join(arguments)} failed")
+
+
+def landing(file: str) -> None:
+    """Come down on the pad by a script of throttles, and keep what is seen half-way."""
+    stage = Stage(overrides=["world.seed=9"])
+    opened = Window(stage, size=SIZE)
+    stage.open(find("landing"))
+    opened.desk.overlays |= {"trails"}
+    opened.turn(FRAME)
+    stage.messages = Messages()
+    for seconds, control, value in FLIGHT:
+        while stage.show is not None and stage.show.frame.time < seconds:
+            opened.turn(FRAME)
+        if stage.host is not None:
+            stage.host.hold("script", control, value)
+    for _ in range(12):
+        opened.turn(FRAME)
+    pygame.image.save(opened.surface, FOLDER / file)
+    opened.close()
 
 
 def table(file: str) -> None:
@@ -113,5 +141,6 @@ if __name__ == "__main__":
     film("pile", "pile.gif", "--size", "320x400", "--fps", "15", "--until", "2")
     film("ragdoll_stairs", "ragdoll.gif", "--size", "640x300", "--fps", "20", "--until", "2.5")
     table("table.png")
+    landing("landing.png")
     rolling("break.gif", 2.6)
     film("tearing_cloth", "tearing.gif", "--size", "640x340", "--fps", "20", "--until", "1.6")

@@ -82,6 +82,16 @@ DEMANDED = {
         Demand.POLYGONS,
         Demand.DRIVES,
     },
+    "games/landing": {
+        Demand.TRANSLATION,
+        Demand.ROTATION,
+        Demand.GRAVITY,
+        Demand.POLYGONS,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.THRUST,
+        Demand.BOUNDS,
+    },
     "joints/bridge": {
         *FALLING,
         Demand.BALL_SEGMENT,

@@ -6,6 +6,7 @@ from sandbox.play.drawing.arrows import draw_contacts, draw_impulses, draw_veloc
 from sandbox.play.drawing.discs import Discs
 from sandbox.play.drawing.drives import draw_hinges, draw_stops
 from sandbox.play.drawing.fittings import draw_fittings
+from sandbox.play.drawing.flames import draw_flames
 from sandbox.play.drawing.joints import draw_joints, held
 from sandbox.play.drawing.marks import (
     draw_boxes,
@@ -47,6 +48,8 @@ class Overlays:
         """Draw what bodies cover."""
         if "trails" in view.sight.overlays:
             draw_trails(view, self._points)
+        if "shapes" in view.sight.overlays and view.sight.flames:
+            draw_flames(view)
         if "shapes" in view.sight.overlays and len(view.sight.links):
             draw_joints(view, held(view), self._discs)
 

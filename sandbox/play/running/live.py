@@ -10,6 +10,7 @@ from sandbox.play.breaks import BreakNotes, broken_by
 from sandbox.play.footage.film import Film
 from sandbox.play.picking import overlapping
 from sandbox.play.running.between import between
+from sandbox.play.running.burning import burning
 from sandbox.play.running.company import Company
 from sandbox.play.running.journey import Journey
 from sandbox.play.running.pace import Pace
@@ -318,6 +319,9 @@ class Live:
             picked=picked,
             pull=pull,
             broken=broken_by(session.breaks, frame.time),
+            flames=burning(session.scene, self.bodies, session.relay.throttles, session.time)
+            if present and session.scene.thrusts
+            else (),
         )
 
     def close(self) -> None:
