@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from sandbox.scene.part import Colour, Part, Point, Radius
 
@@ -16,3 +16,10 @@ class Paint(Part):
     radius: Radius | None = None
     points: Annotated[tuple[Point, ...], Field(min_length=3, max_length=10_000)] | None = None
     """corners of a polygon, m"""
+
+    @model_validator(mode="after")
+    def _one(self) -> "Paint":
+        disc = self.position is not None and self.radius is not None and self.points is None
+        if not disc and (self.points is None or self.position is not None or self.radius is not None):
+            raise ValueError("has no shape; give it `position` and `radius`, or `points`")
+        return self

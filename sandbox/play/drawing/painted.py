@@ -6,10 +6,12 @@ import numpy as np
 import pygame
 
 from sandbox.play.camera import Camera
+from sandbox.play.drawing.decks import on_layer
 from sandbox.play.drawing.fixtures import draw_fixtures
 from sandbox.play.drawing.palette import BACKGROUND, INK, Colour, colour_of_fixed, hex_colour, mixed
 from sandbox.play.drawing.shade import Look, disc_distance, paint
-from sandbox.play.drawing.strokes import Pixel, clipped, fill, stroke
+from sandbox.play.drawing.strokes import Pixel, clipped, cut, fill, stroke
+from sandbox.play.drawing.zones import draw_zones
 from sandbox.scene.model import Post, Scene
 from sandbox.scene.paint import Paint
 from sandbox.scene.part import Point
@@ -23,6 +25,8 @@ SHADOW = (0.003, -0.005)
 """m, from what is fixed to its shadow"""
 SHADE, NOTHING = 90, (255, 0, 255)
 """how dark shadows are, of 255; and the colour that stands for none"""
+HUGE = 4000.0
+"""px: what is larger than the picture needs no shadow"""
 RAISED = 0.62
 """of the radius of a post that kicks: its cap"""
 
@@ -39,16 +43,24 @@ def draw_painted(
             lit = AMBER if part.colour is None else hex_colour(part.colour)
             look = Look(mixed(BACKGROUND, lit, 0.35), mixed(BACKGROUND, lit, 0.7), 1.2 * unit, 1.0, antialias)
             _disc(surface, camera, part.light, LAMP, look)
-    draw_fixtures(surface, camera, scene, unit, antialias)
+    draw_zones(surface, camera, _coloured(scene), unit, antialias)
+    draw_fixtures(surface, camera, on_layer(scene, 0), unit, antialias)
     for post in scene.posts:
         if post.kick is not None:
             _cap(surface, camera, post, unit, antialias)
 
 
+def _coloured(scene: Scene) -> Scene:
+    """Return a scene with only those zones that have a colour of their own; paint and lamps mark the others."""
+    return scene.model_copy(update={"zones": tuple(zone for zone in scene.zones if zone.colour is not None)})
+
+
 def _area(surface: pygame.Surface, camera: Camera, area: Paint, antialias: bool) -> None:
     colour = hex_colour(area.colour)
     if area.points is not None:
-        fill(surface, [(x, y) for x, y in camera.to_screen(np.asarray(area.points)).tolist()], colour, antialias)
+        corners = cut([(x, y) for x, y in camera.to_screen(np.asarray(area.points)).tolist()], surface.get_clip())
+        if corners:
+            fill(surface, corners, colour, antialias)
     elif area.position is not None and area.radius is not None:
         _disc(surface, camera, area.position, area.radius, Look(colour, colour, 0.0, 1.0, antialias))
 
@@ -80,20 +92,27 @@ def _shadows(surface: pygame.Surface, camera: Camera, scene: Scene) -> None:
         ends: list[Pixel] = [(x, y) for x, y in camera.to_screen(points).tolist()]
         for a, b in pairwise(ends):
             stroke(layer, a, b, DARK, 2.0 * half, antialias=False)
-        for x, y in ends:
-            if half > 1.0 and clipped((x, y), (x, y), layer.get_rect(), half) is not None:
-                pygame.draw.circle(layer, DARK, (x, y), half)
+        if 1.0 < half < HUGE:
+            for end in ends:
+                _dark(layer, end, half)
     for post in scene.posts:
-        at = camera.to_screen(np.asarray(post.position) + SHADOW).tolist()
-        size = post.radius * camera.scale
-        if clipped((at[0], at[1]), (at[0], at[1]), layer.get_rect(), size) is not None:
-            pygame.draw.circle(layer, DARK, at, size)
+        x, y = camera.to_screen(np.asarray(post.position) + SHADOW).tolist()
+        if post.solid and GROUND in post.layers and post.radius * camera.scale < HUGE:
+            _dark(layer, (x, y), post.radius * camera.scale)
     surface.blit(layer, (0, 0))
+
+
+def _dark(layer: pygame.Surface, at: Pixel, radius: float) -> None:
+    if clipped(at, at, layer.get_rect(), radius) is not None:
+        pygame.draw.circle(layer, DARK, at, radius)
 
 
 def _disc(surface: pygame.Surface, camera: Camera, at: Point, radius: float, look: Look) -> None:
     ((x, y),), size = camera.to_screen(np.asarray([at])).tolist(), radius * camera.scale
     if clipped((x, y), (x, y), surface.get_clip(), size + 4.0) is None:
         return
-    within = pygame.Rect(int(x - size) - 3, int(y - size) - 3, int(2.0 * size) + 7, int(2.0 * size) + 7)
+    reach = min(size, 1e6)
+    low, high = (min(max(v - reach, -1e6), 1e6) for v in (x, y)), (min(max(v + reach, -1e6), 1e6) for v in (x, y))
+    (left, top), (right, bottom) = low, high
+    within = pygame.Rect(int(left) - 3, int(top) - 3, int(right - left) + 7, int(bottom - top) + 7)
     paint(surface, disc_distance(x, y, size), look, within)

@@ -7,7 +7,7 @@ import pygame
 
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.ageing import Ageing
-from sandbox.play.drawing.decks import draw_deck, layers_among, on_layer
+from sandbox.play.drawing.decks import Decks, layers_among, on_layer
 from sandbox.play.drawing.discs import Discs, spokes
 from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
 from sandbox.play.drawing.grid import draw_grid, draw_scale
@@ -70,6 +70,7 @@ class Picture:
         self._points = Points()
         self._polygons = Polygons()
         self._balls = Balls()
+        self._decks = Decks()
         self._overlays = Overlays(self._discs, self._points, self._polygons)
         self._background: tuple[Kept, pygame.Surface] | None = None
         self._sizes: Sizes | None = None
@@ -143,7 +144,7 @@ class Picture:
         layer = layers_among(view.sight.frame, view.shown[which])
         for k in range(len(scene.layers)):
             if k > 0:
-                draw_deck(view.surface, view.camera, on_layer(scene, k), view.unit, view.antialias)
+                self._decks.draw(view.surface, view.camera, scene, k, view.unit, view.antialias)
             self._draw_bodies(view, which[layer == k])
 
     def _draw_bodies(self, view: View, which: IntArray | None) -> None:

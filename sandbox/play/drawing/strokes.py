@@ -92,6 +92,26 @@ def fill(surface: pygame.Surface, corners: list[Pixel], colour: Colour, antialia
         pygame.draw.aalines(surface, colour, True, moved)
 
 
+def cut(corners: list[Pixel], area: pygame.Rect) -> list[Pixel]:
+    """Return the part of a polygon that lies in an area; nothing where it has no part there.
+
+    Sutherland and Hodgman's way, 1974: each edge of the area cuts in turn. Where a concave polygon falls apart, its
+    parts stay joined along the edge.
+    """
+    left, top, right, bottom = area.left - 2.0, area.top - 2.0, area.right + 2.0, area.bottom + 2.0
+    for axis, sign, limit in ((0, 1.0, left), (0, -1.0, right), (1, 1.0, top), (1, -1.0, bottom)):
+        kept: list[Pixel] = []
+        for a, b in zip(corners, (*corners[1:], *corners[:1]), strict=True):
+            here, there = sign * (a[axis] - limit), sign * (b[axis] - limit)
+            if here >= 0.0:
+                kept.append(a)
+            if (here >= 0.0) != (there >= 0.0):
+                share = here / (here - there)
+                kept.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])))
+        corners = kept
+    return corners if len(corners) > 2 else []
+
+
 def arrow(
     surface: pygame.Surface,
     a: Pixel,

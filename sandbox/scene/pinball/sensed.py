@@ -63,5 +63,5 @@ class Ramp(Scoring):
     rise: Size = 0.04
     """how high that leads above the playfield, m"""
     floor: Colour | None = None
-    """of what lies between the rails"""
+    """of the ground below it, between the rails"""
     score: Points = 2500

@@ -1,10 +1,11 @@
 """Sensing: the zones, rails and lamps of a table's rollovers, spinners, kicker holes, ramps and drains."""
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
-from sandbox.scene.part import Point
+from sandbox.scene.part import Point, Vector
 from sandbox.scene.pinball.building import Building
 from sandbox.scene.pinball.fixing import DARK
 from sandbox.scene.pinball.rolling import ROLLING, G
@@ -12,6 +13,8 @@ from sandbox.scene.pinball.rounding import beside, length_of, part_of
 from sandbox.scene.pinball.sensed import LEAST_DEPTH, Drain, Kicker, Ramp, Rollover, Spinner
 from sandbox.scene.surfaced import GROUND
 
+PIECE = 0.03
+"""m, of a bent climb, along which gravity has one direction"""
 GAP = 0.006
 """m, between the strips at the mouth of a ramp of which one lifts the ball and the other lets it down"""
 
@@ -54,6 +57,7 @@ def ramp(to: Building, name: str, of: Ramp) -> None:
     rail: dict[str, Any] = {"thickness": of.thickness, "material": "wall", "colour": of.colour}
     for side, aside in (("left", half), ("right", -half)):
         to.wall(f"{name} {side} rail", beside(line, aside), layers=(layer,), **rail)
+    to.paint(of.floor, (*beside(line, half), *reversed(beside(line, -half))))
     climb = part_of(line, 0.0, of.climb)
     left, right = beside(climb, half), beside(climb, -half)
     (ax, ay), (bx, by) = climb[-2:]
@@ -71,12 +75,10 @@ def ramp(to: Building, name: str, of: Ramp) -> None:
         to_layer=GROUND,
     )
     to.zone(name, points=_across(line, mouth, of.width - deep), thickness=deep, to_layer=layer)
-    for k, (a, b) in enumerate(pairwise(part_of(line, mouth, of.climb))):
-        steep = G * ROLLING * of.rise / of.climb / math.dist(a, b)
-        pull = to.gravity[0] - steep * (b[0] - a[0]), to.gravity[1] - steep * (b[1] - a[1])
-        strip = (a, b)
-        outline = (*beside(strip, half), *reversed(beside(strip, -half)))
-        to.zone(f"{name} climb {k + 1}", points=outline, layers=(layer,), gravity=pull)
+    for k, piece in enumerate(_pieces(line, mouth, of.climb)):
+        left, right = beside(piece, half), beside(piece, -half)
+        outline = left[0], left[-1], right[-1], right[0]  # what a bend leaves out lies nearer to a rail than any ball
+        to.zone(f"{name} climb {k + 1}", points=outline, layers=(layer,), gravity=_pull(to, piece, of.rise / of.climb))
     end = f"{name} exit"
     to.zone(
         end, points=_across(line, whole - half_deep, of.width - deep), thickness=deep, layers=(layer,), to_layer=GROUND
@@ -84,6 +86,22 @@ def ramp(to: Building, name: str, of: Ramp) -> None:
     group = of.group or name
     to.part(name, "ramp", group=group, step=0)
     to.part(end, "ramp", group=group, step=1, score=of.score, light=of.light or line[0])
+
+
+def _pieces(line: Sequence[Point], begin: float, end: float) -> list[tuple[Point, ...]]:
+    """Return part of a line in pieces that are nearly straight and long enough for no ball to pass one unnoticed."""
+    whole = part_of(line, begin, end)
+    count = 1 if len(whole) == 2 else max(round((end - begin) / PIECE), 1)
+    cuts = [begin + (end - begin) * k / count for k in range(count + 1)]
+    return [part_of(line, a, b) for a, b in pairwise(cuts)]
+
+
+def _pull(to: Building, piece: tuple[Point, ...], steepness: float) -> Vector:
+    """Return gravity on a piece of a climb, m/s²: from one end to the other it takes what the rise does."""
+    (ax, ay), (bx, by) = piece[0], piece[-1]
+    size = math.dist(piece[0], piece[-1])
+    back = G * ROLLING * steepness * length_of(piece) / size**2
+    return to.gravity[0] - back * (bx - ax), to.gravity[1] - back * (by - ay)
 
 
 def _across(line: tuple[Point, ...], along: float, width: float) -> tuple[Point, Point]:
