@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sandbox.action import Move
 from sandbox.engines.relay import start
 from sandbox.games.pinball.hand import Hand
 from sandbox.games.pinball.pinball import Pinball
@@ -68,3 +69,31 @@ def test_game_is_played_and_scored(path: Path) -> None:
     rules, said, _ = play(seeded(path, 1), Hand(1), 15.0)
     assert rules.score > 0
     assert "ball search" not in [text for _, text in said]
+
+
+def test_multiball_of_the_full_table_puts_all_balls_into_play() -> None:
+    scene = seeded(next(path for path in TABLES if path.stem == "full"), 1)
+    simulation = start(scene, "pymunk")
+    simulation.contacts()
+    rules = Pinball(scene, simulation.bodies)
+    referee, hand = Referee(rules), Hand(1, 0.8)
+    store = simulation.frame().position[rules.board.balls[1]].copy()
+    most = 0
+    while simulation.time < 12.0:
+        frame = simulation.frame()
+        own = referee.look(simulation.time, frame, simulation.contacts())
+        pressed = []
+        if simulation.time > 2.0:
+            pressed = [a for c, v in hand.decide(referee.seen, rules) for a in referee.press(simulation.time, c, v)]
+        referee.saw(pressed)
+        for action in (*own, *pressed):
+            simulation.apply(action)
+        if abs(simulation.time - 1.0) < 1e-9:  # the third ball comes into the lock
+            assert np.array_equal(frame.position[rules.board.balls[1]], store)  # the others have not stirred
+            rules.sheet.locked, rules.sheet.lit = 2, True
+            hole = next(each for each in rules.board.of_role("kicker") if each.group == "lock")
+            simulation.apply(Move(time=1.0, body="ball", position=hole.where, velocity=(0.0, 0.0)))
+        simulation.step()
+        most = max(most, len(rules.trough.flown))
+    assert rules.sheet.score >= 10_000
+    assert most == 3
