@@ -44,6 +44,15 @@ def test_what_is_there_can_be_claimed(play: dict[str, Any]) -> None:
         ({"arrow_step": 0}, "play.arrow_step", "greater than 0"),
         ({"show": "all"}, "play.show", "overlap"),
         ({"zzz": 1}, "play.zzz", r"\w"),
+        ({"part": [{"name": "a.b", "role": "lamp"}]}, "play.part.a.b.role", "one of 'ball', 'bumper'"),
+        (
+            {"part": [{"name": "zzz", "role": "ball"}]},
+            "play.part.zzz.name",
+            "no body, fixed thing or zone is named 'zzz'",
+        ),
+        ({"part": 2 * [{"name": "a.b", "role": "ball"}]}, "play.part.a.b.name", "plays a part already"),
+        ({"paint": [{"colour": "#000000"}]}, "play.paint[0]", "has no shape"),
+        ({"paint": [{"colour": "#000000", "radius": 1.0, "points": [[0, 0]] * 3}]}, "play.paint[0]", "has no shape"),
     ],
 )
 def test_what_is_not_there_is_a_fault_where_it_stands(play: dict[str, Any], path: str, words: str) -> None:

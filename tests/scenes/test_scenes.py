@@ -25,6 +25,21 @@ PENDULUM = {*FALLING, Demand.RODS}
 ROLLING = {*MEETING, Demand.SURFACE, Demand.SPIN}
 CAROM = {*ROLLING, Demand.BALL_SEGMENT, Demand.FRICTION, Demand.ROTATION}
 POCKETED = {*CAROM, Demand.BALL_POST, Demand.POCKETS}
+PINBALL = {
+    *FALLING,
+    Demand.BALL_SEGMENT,
+    Demand.BALL_POST,
+    Demand.POLYGONS,
+    Demand.RESTITUTION,
+    Demand.FALLOFF,
+    Demand.FRICTION,
+    Demand.ROTATION,
+    Demand.KICKS,
+    Demand.ONE_WAY,
+    Demand.ZONES,
+    Demand.DRIVES,
+    Demand.BOUNDS,
+}
 DEMANDED = {
     "benchmark/bounce_to_rest": {*FALLING, Demand.BALL_PLANE, Demand.RESTITUTION},
     "benchmark/box_slides": BOX,
@@ -124,6 +139,8 @@ DEMANDED = {
         Demand.ROTATION,
         Demand.LIFETIMES,
     },
+    "pinball/classic": PINBALL,
+    "pinball/full": {*PINBALL, Demand.LAYERS},
     "tutorial/ball": FALLING,
     "tutorial/bounce": {*FALLING, Demand.BALL_PLANE, Demand.RESTITUTION},
     "tutorial/circle_half_plane": {Demand.TRANSLATION, Demand.BALL_PLANE},
