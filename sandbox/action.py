@@ -143,14 +143,6 @@ class Throttle(Timed):
     """share of its force, from now on"""
 
 
-class Toggle(Timed):
-    """Let a wall or post be met from now on, or let everything pass it: a drop target, a diverter."""
-
-    kind: Literal["toggle"] = "toggle"
-    thing: Name
-    solid: bool
-
-
 class Drive(Timed):
     """Ask a drive of the scene for a level from now on."""
 
@@ -158,6 +150,14 @@ class Drive(Timed):
     drive: Name
     level: Annotated[float, Field(ge=0, le=1)]
     """0 is at rest; of a torque the part of it, of a pull how far, of a stroke anything above 0 all the way"""
+
+
+class Toggle(Timed):
+    """Let a wall or post be met from now on, or let everything pass it: a drop target, a diverter."""
+
+    kind: Literal["toggle"] = "toggle"
+    thing: Name
+    solid: bool
 
 
 class Strike(Timed, Stroke):
@@ -187,8 +187,8 @@ Action = Annotated[
     | Pull
     | Launch
     | Throttle
-    | Toggle
     | Drive
+    | Toggle
     | Strike
     | Switch,
     Field(discriminator="kind"),

@@ -138,10 +138,10 @@ def perform(action: Action, cast: Cast) -> int | None:
             _set(action, cast)
         case Throttle():
             cast.throttle(_thrust_number(action.thrust, cast.scene), action.level)
-        case Toggle():
-            _toggle(action, cast)
         case Drive():
             cast.drive(_drive_number(action.drive, cast.scene), action.level)
+        case Toggle():
+            _toggle(action, cast)
         case Strike():
             _strike(action, cast)
         case Pull() | Launch() | Switch():

@@ -49,9 +49,8 @@ def launched(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tupl
         layer = np.where(those, scene.layers.index(generator.layer), layer)
     if visits is not None:
         visits = np.where(those[:, None], AWAY, visits)
-    present = frame.present | those
-    begun = Frame(frame.time, present=present, roll=roll, layer=layer, visits=visits, drives=frame.drives, **columns)
-    return begun, bodies, those
+    laid = Frame(frame.time, present=frame.present | those, roll=roll, layer=layer, visits=visits, **columns)
+    return replace(laid, drives=frame.drives), bodies, those
 
 
 def _first(scene: Scene, generator: Mover) -> int:

@@ -1,6 +1,8 @@
 """Drives: what moves a body to and fro on demand, as a scene file says it: flippers, diverters, plungers.
 
-A drive holds its body by itself: nothing else can move it but, of a drive by torque, what it meets.
+A drive holds its body by itself: nothing else can move it but, of a drive by torque, its weight and what it meets; the
+air does not slow it. What a stroke or a plunger leads goes on whatever is in its way: it pushes what moves freely, and
+passes through what never moves and through others that are led.
 """
 
 from typing import Annotated, Literal

@@ -30,7 +30,7 @@ class Meetings:
     held: BoolArray
     """(N,) is joined to something"""
     noted: BoolArray
-    """(N,) can come into a zone"""
+    """(N,) can come into a zone; what a drive leads is not noted"""
     turnable: BoolArray
     """(N,) can be turned: by what rubs it; of other shapes than balls by all they meet; by joints, thrusts, drives"""
     mutual: bool
@@ -117,7 +117,7 @@ def meetings(scene: Scene, bodies: Bodies | None = None) -> Meetings:
         surfaces=surfaces,
         touches=_any_of(body, meets[kinds.of_piece], len(bodies)),
         held=links.held(len(bodies)),
-        noted=_noted(scene, bodies, reached),
+        noted=_noted(scene, bodies, reached) & ~driven_in(scene, bodies),
         turnable=(turnable | _thrust_turned(scene, bodies) | driven_in(scene, bodies, turning=True)) & ~bodies.fixed,
         mutual=bool(pair.any()),
         ball_ball=bool((pair & np.outer(kinds.ball, kinds.ball)).any()),

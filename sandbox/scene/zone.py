@@ -2,7 +2,7 @@
 
 A visit begins when the centre of a body is inside while the body is on one of the zone's layers, and ends when the
 centre is outside; whatever happens to its layer meanwhile, one visit is one note. What collides with nothing
-(`collides = "none"`) is not noted.
+(`collides = "none"`) is not noted, nor is what a drive leads.
 """
 
 from typing import TYPE_CHECKING, Annotated

@@ -95,6 +95,8 @@ DEMANDED = {
         Demand.RESTITUTION,
         Demand.FRICTION,
         Demand.POLYGONS,
+        Demand.FALLOFF,
+        Demand.KICKS,
         Demand.DRIVES,
     },
     "games/landing": {

@@ -91,6 +91,8 @@ class Drives:
                 self._space.on_collision(each, None, pre_solve=self._met)
 
     def _met(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: object) -> None:
+        if not arbiter.process_collision:  # it is let pass
+            return
         for shape, first in zip(arbiter.shapes, (True, False), strict=True):
             hinge = self._hinges.get(shape.body.id) if shape.body is not None else None
             if hinge is not None:

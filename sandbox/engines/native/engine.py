@@ -15,11 +15,10 @@ if TYPE_CHECKING:
 PYMUNK_WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
 """The one word of each choice that describes what pymunk does."""
 
+OWN = frozenset({Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.LAYERS, Demand.ZONES, Demand.DRIVES})
+
 PERSISTENCE = 3
 """pymunk's own."""
-
-
-OWN = frozenset({Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.DRIVES, Demand.LAYERS, Demand.ZONES})
 
 
 @dataclass(frozen=True)

@@ -166,8 +166,7 @@ class NativeSimulation(Running):
         layer = population.layer.copy() if len(scene.layers) > 1 else None
         visits = population.visits.copy() if scene.zones else None
         drives = population.meeting.drives.told() if scene.drives else None
-        state = present, roll, layer, visits, drives
-        return Frame(self.time, position, velocity, angle, angular_velocity, *state)
+        return Frame(self.time, position, velocity, angle, angular_velocity, present, roll, layer, visits, drives)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""

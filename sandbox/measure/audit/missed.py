@@ -53,7 +53,8 @@ class Audit:
     that lies inside it, for the radius: what passes through that was surely missed, so that there is no false alarm,
     but what only clips a corner is not counted. A body whose core is 0, as its centre of mass lies outside of it, is
     left out. Pairs that a joint keeps from meeting, and bodies of one
-    group, miss nothing; nor does who is on different layers, or changes its own within the substep.
+    group, miss nothing; nor does who is on different layers, or changes its own within the substep, nor those that
+    strokes and plungers lead through fixed things.
 
     Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
     planes), and among balls with the pairs that are near.
@@ -62,6 +63,7 @@ class Audit:
     def __init__(self, scene: Scene, bodies: Bodies | None = None) -> None:
         self._obstacles = Obstacles.of(scene)
         self._apart = scene.links.apart()
+        self._led = frozenset(drive.body for drive in scene.drives if drive.kind != "torque")
         self._times: list[FloatArray] = []
         self._pairs: list[IntArray] = []
         self._looks = Looks()
@@ -151,6 +153,9 @@ class Audit:
         self._part = part = slice(self._offset, int(matter[-1]) + 1 if len(matter) else 0)
         self._moves, self._to_all, self._still = moves[part], to_all[part], still[part]
         self._core = bodies.core[part]
+        self._lands = self._moves
+        if self._led:  # what a stroke or a plunger leads passes through what never moves
+            self._lands = self._moves & ~np.isin(bodies.names[part], [*self._led])
         self._group = bodies.group[part] if bodies.group.any() else None
         self._least2 = least[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
         self._neighbours = Neighbours(self._core, member[part], self._meet)
@@ -190,7 +195,7 @@ class Audit:
 
     def _fixed(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
         """Return when (M,) which pairs (M, 2) of a body and a fixed thing were missed."""
-        when, who = np.nonzero(fast & self._moves)
+        when, who = np.nonzero(fast & self._lands)
         on = self._on[when, who] if len(self._on) else None
         paths = Paths(when, who + self._offset, start[when, who], end[when, who], self._core[who], on)
         return self._obstacles.missed(paths, self._looks)

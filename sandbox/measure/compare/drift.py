@@ -60,9 +60,9 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
 
     Explained are gravity, and the recorded impulses between bodies that move and things that do not; joints and
     attraction between bodies that move keep momentum. None with drag, thrust, drives, a joint to what stands still or
-    an attraction towards it, or zones that stop or lift, whose impulses are not recorded; where a body was retired, and
-    took its momentum along; where the run did not reach its end, or ended within a step, of whose contacts there is no
-    record.
+    an attraction towards it, or zones that stop or lift, whose impulses are not recorded; where a body was retired,
+    and took its momentum along; where the run did not reach its end, or ended within a step, of whose contacts there
+    is no record.
     """
     bodies, world = scene.bodies, scene.world
     if run.status != "ok" or np.isfinite(run.retired_time).any():

@@ -1,4 +1,4 @@
-"""Drives that nothing stops: strokes and plungers, and the balls that they push."""
+"""Drives that nothing stops: plungers and strokes, and the balls that they push."""
 
 import math
 
@@ -66,6 +66,37 @@ def test_ball_is_thrown_by_a_stroke_as_by_a_wall_that_moves():
     # The blow comes within the first step, 0.02 rad on
     assert np.hypot(*frame.velocity[0]) == pytest.approx(1.5 * RATE * arm, rel=0.02)
     assert frame.angular_velocity[1] == RATE
+
+
+@pytest.mark.parametrize("shape", ["box", "ball"])
+def test_restitution_falls_with_the_speed_of_the_place_that_hits(shape):
+    """E = e₀ / (1 + f v), v = ω r: of a bar, and of a disc that goes about a hinge 60 mm off."""
+    arm, falloff, e = 0.06, 0.5, 0.8
+    own = {"restitution": e, "restitution_falloff": falloff}
+    tables = gate()
+    tables["box"][0] |= own
+    y = 0.01 + BALL + 0.0305
+    if shape == "ball":
+        disc = {"name": "gate", "position": [arm, 0.0], "radius": 0.01, **own}
+        tables = {"ball": [disc], "drive": gate()["drive"]}
+    balls = [*tables.get("ball", []), ball(arm, y)]
+    running = start(scene(tables | {"ball": balls}, dt=1e-5, substeps=1))
+    press(running)
+    which = len(balls) - 1
+    for _ in range(10_000):
+        running.step()
+        if running.frame().velocity[which].any():
+            break
+    after(running, 2)
+    frame = running.frame()
+    number = running.bodies.names.index("gate")
+    # The place that hits goes round the hinge, its velocity along the normal, which is that in which the ball leaves
+    normal = frame.velocity[which] / np.hypot(*frame.velocity[which])
+    point = frame.position[which] - normal * BALL
+    speed = RATE * (point[0] * normal[1] - point[1] * normal[0])
+    told = speed * (1.0 + e / (1.0 + falloff * speed))
+    assert np.hypot(*frame.velocity[which]) == pytest.approx(told, rel=2e-3)  # it has gone on for a few steps
+    assert frame.angular_velocity[number] == RATE
 
 
 def test_stroke_holds_against_whatever_hits_it():
@@ -139,3 +170,16 @@ def test_account_of_strokes_and_plungers_closes():
     assert sum(entries.values()) == pytest.approx(total_energy(running) - energy, abs=1e-13)
     assert entries["drives"] > 0.05  # J: the ball in the gate's way gets a third more than ½ · 80 g · (1.2 m/s)²
     assert entries["actions"] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_what_is_led_through_walls_is_no_missed_contact():
+    """A head of 40 mm that springs through a wall, its half a step: it passes by what it is, and nothing is amiss."""
+    import sandbox
+    from sandbox.action import Drive
+
+    walls = [{"points": [[-1.0, -0.15], [1.0, -0.15]]}]
+    made = scene(rod(travel=0.2, speed=40.0), {"wall": walls})
+    told = tuple(Drive(time=time, drive="flip", level=level) for time, level in ((0.0, 1.0), (0.4, 0.0)))
+    run = sandbox.run(made, actions=told)
+    assert run.position[:, 0, 1].min() == pytest.approx(-0.25, rel=1e-12)
+    assert (run.missed_contacts, len(run.contact_time)) == (0, 0)
