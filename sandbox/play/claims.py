@@ -70,7 +70,7 @@ def claims(scene: Scene, hands: Hands, gestures: Gestures | None = None, host: H
     played, played_out = ({}, {}) if host is None else control_keys.deeds(host)
     for called, verb, pressed, released in held(scene):
         key = KEYS[called]
-        if key in played:  # then it is the rules' to do
+        if key in played:  # it is the rules' to press
             continue
         deeds[key] = partial(_act, action=pressed, also=deeds.get(key))
         releases[key] = partial(_act, action=released, also=releases.get(key))
