@@ -157,6 +157,15 @@ def test_ramp_has_rails_on_its_layer_a_mouth_that_lifts_and_an_end_that_lets_dow
     assert climb[0] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_what_has_a_colour_inside_is_painted_and_lies_over_the_playfield() -> None:
+    wall = {"points": [[0, 0], [0.1, 0], [0.1, 0.1, 0.02]], "closed": True, "fill": "#123456"}
+    paints = table(wall=[wall]).play.paints
+    assert [paint.colour for paint in paints[:3]] == ["#14304a", "#e9b44c", "#123456"]
+    assert paints[2].points is not None
+    assert len(paints[2].points) > 3  # one corner is round
+    assert max(y for _, y in paints[0].points or ()) == pytest.approx(1.0, abs=2e-5)  # the tolerance
+
+
 def test_what_the_scene_states_outranks_the_table() -> None:
     own = {
         "pinball": EVERY,
@@ -198,6 +207,7 @@ def test_overrides_reach_elements_and_what_they_stand_for() -> None:
         ({"wall": [{"name": "w", "points": [[0, 0], [0.1, 0, 9], [1, 1]]}]}, "pinball.wall.w.points[1]", "rounded by"),
         ({"wall": [{"points": [[0, 0], [1, 0, -1], [1, 1]]}]}, "pinball.wall[0].points[1][2]", "less than nothing"),
         ({"wall": [{"points": [[0, 0], [1, 0]], "closed": True}]}, "pinball.wall[0].points", "enclose nothing"),
+        ({"wall": [{"points": [[0, 0], [1, 0]], "fill": "#000000"}]}, "pinball.wall[0].fill", "a closed line"),
         ({"standup": [{"position": [0, 0], "facing": [0, 0]}]}, "pinball.standup[0].facing", "has no direction"),
         ({"drops": [{"position": [0, 0], "facing": [1, 0], "count": 0}]}, "pinball.drops[0].count", "1 or more"),
         ({"slingshot": [{"points": [[0, 0], [1, 0], [2, 0]]}]}, "pinball.slingshot[0].points", "three posts"),

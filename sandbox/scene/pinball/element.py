@@ -50,3 +50,5 @@ class Line(Element):
     closed: bool = False
     """Join the last point to the first."""
     layers: Layers = (GROUND,)
+    fill: Colour | None = None
+    """of what a closed line encloses"""

@@ -45,6 +45,8 @@ def _wrong(element: Element, tolerance: float) -> Iterator[Found]:
     match element:
         case Line():
             yield from _corners(("points",), element.points, element.closed, tolerance)
+            if element.fill is not None and not element.closed:
+                yield ("fill",), "is of what a closed line encloses; set `closed`, or leave it out"
         case Ramp():
             yield from _ramp(element, tolerance)
         case Gate() | Spinner() | Drain() if math.dist(*element.points) < CLOSEST:

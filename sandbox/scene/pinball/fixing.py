@@ -29,6 +29,8 @@ def wall(to: Building, name: str, of: Line) -> None:
     """Add a wall, or a rubber."""
     material = of.material if isinstance(of, PinballWall) else "rubber"
     points = to.line(of.points, of.closed)
+    if of.closed:
+        to.paint(of.fill, points)
     to.wall(
         name, points, closed=of.closed, thickness=of.thickness, material=material, colour=of.colour, layers=of.layers
     )
