@@ -44,7 +44,8 @@ class HonoursPanel:
         if pygame.time.get_ticks() - self._since < 1000 * DEAF:
             return True
         if event.key in ENTER:
-            self.honours.keep()
+            if entering.letters:  # Enter may be a key of the game, which hands still press
+                self.honours.keep()
         elif event.key == pygame.K_ESCAPE:
             self.honours.leave()
         elif event.key == pygame.K_BACKSPACE:

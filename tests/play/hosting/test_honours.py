@@ -68,6 +68,13 @@ def test_initials_are_asked_for_at_the_end_and_kept() -> None:
     assert panel.honours.entering is None  # one game is entered once
 
 
+def test_enter_without_letters_keeps_nothing() -> None:
+    panel = ended()
+    assert press(panel, pygame.K_RETURN) == [True]
+    assert opened().of(TABLE) == ()
+    assert panel.honours.entering is not None
+
+
 def test_escape_keeps_nothing() -> None:
     panel = ended()
     assert press(panel, "a", pygame.K_ESCAPE, pygame.K_ESCAPE) == [True, True, False]
