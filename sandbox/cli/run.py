@@ -37,7 +37,11 @@ from sandbox.scene.faults import Fault, SceneError
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
 @click.option("--sweep", "sweeps", multiple=True, metavar="KEY=A,B,C", help="run each value; or KEY=LOW:HIGH:N[:log]")
 @click.option("--seeds", type=click.IntRange(1, 1_000_000), metavar="N", help="run the seeds 1 to N")
-@click.option("--player", metavar="WHO", help="of a game: random (the default), none, or the file of a script")
+@click.option(
+    "--player",
+    metavar="WHO",
+    help="of a game: random, skilled, none, or a script file",
+)
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="store every run in a folder, once")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw the run: .png, .svg or .pdf")
 @click.option("--body", "bodies", multiple=True, metavar="NAME", help="which bodies to draw")

@@ -6,10 +6,10 @@ from typing import Any, Self
 from sandbox.games.bout import Bout
 from sandbox.games.policies import POLICIES, Script
 from sandbox.games.registry import fitting_rules
-from sandbox.games.rules import Press
+from sandbox.games.rules import Press, UnfitError
 from sandbox.games.script_file import faults_of, read_script
 from sandbox.recording import Recording
-from sandbox.scene.faults import SceneError
+from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.model import Scene
 
 RECORDED = "as recorded"
@@ -54,7 +54,10 @@ class Player:
         if self.name == RECORDED:
             return Bout(rules, None, RECORDED, self.presses)
         if self.name in POLICIES:
-            return Bout(rules, POLICIES[self.name](scene), self.name)
+            try:
+                return Bout(rules, POLICIES[self.name](scene), self.name)
+            except UnfitError as error:
+                raise SceneError([Fault("--player", None, "", str(error))]) from None
         faults = faults_of(self.presses, rules.controls, self.name)
         if faults:
             raise SceneError(faults)

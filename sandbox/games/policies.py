@@ -1,10 +1,11 @@
-"""Policies: who plays where nobody sits at the window. None of them looks at the scene: they press keys."""
+"""Policies: who plays where nobody sits at the window. But for the skilled they look at nothing: they press keys."""
 
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from sandbox.games.rules import Control, Policy, Press, Rules, Seen
+from sandbox.games.pinball.hand import Hand
+from sandbox.games.rules import Control, Policy, Press, Rules, Seen, UnfitError
 from sandbox.scene.model import Scene
 
 RATES = 0.2, 2.0
@@ -70,8 +71,20 @@ class Script:
         return [(press.control, press.value) for press in self._presses[begin : self._done]]
 
 
+def _skilled(scene: Scene) -> Policy:
+    """Return a player who watches the ball, of the one game that has one.
+
+    Raises:
+        UnfitError: it is another game.
+    """
+    if scene.play.game != "pinball":
+        raise UnfitError(f"skilled plays pinball alone, not {scene.play.game}; random plays everything")
+    return Hand(scene.world.seed)
+
+
 POLICIES: dict[str, Callable[[Scene], Policy]] = {
     "random": lambda scene: Chance(scene.world.seed),
     "none": lambda _: Nobody(),
+    "skilled": _skilled,
 }
 """Those that need no script, by name."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from sandbox.games.curling.rules import Curling
 from sandbox.games.landing import Landing
+from sandbox.games.pinball.pinball import Pinball
 from sandbox.games.rules import Rules, UnfitError
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.faults import Fault, Lines, SceneError
@@ -13,6 +14,7 @@ from sandbox.scene.model import Scene
 RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {
     "curling": Curling,
     "landing": Landing,
+    "pinball": Pinball,
 }
 """Each begins a game. A game is one line here, and its name in `scene.spots.Game`."""
 

@@ -12,6 +12,7 @@ from sandbox.play.drawing.palette import BACKGROUND, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.instruments.graph import EnergyGraph
+from sandbox.play.instruments.honours_panel import HonoursPanel
 from sandbox.play.instruments.hud import draw_hud, hud_width
 from sandbox.play.instruments.knob import Knob
 from sandbox.play.instruments.manual import Manual
@@ -44,6 +45,7 @@ class Desk:
         self.manual = Manual()
         self.picker: Picker | None = None
         self.tools = Tools()
+        self._honours = HonoursPanel()
         self._timeline = Timeline()
         self._graph = EnergyGraph()
         self._picture = Picture()
@@ -121,6 +123,8 @@ class Desk:
             if path is not None or self.picker.closed:
                 self.picker = None
             return True
+        if stage.host is not None and self._honours.handle(event):
+            return True
         if self.manual.handle(event) or self._close_faults(event, stage) or self.panel.handle(event):
             return True
         show = stage.show
@@ -176,6 +180,9 @@ class Desk:
         elif stage.host is not None and not self.manual.open:
             free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
             draw_score(surface, stage.host.board(), free, hud_width(words, self.unit), self.unit)
+            for note in self._honours.watch(stage.host):
+                stage.messages.tell(note, "warning")
+            self._honours.draw(surface, free, self.unit)
         if show is not None:
             self._draw_graph(surface, stage)
             if self.foot:

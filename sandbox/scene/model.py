@@ -153,6 +153,8 @@ class Play(Part):
     curling: CurlingMatch | None = None
     """of a match of curling"""
     markings: tuple[Marking, ...] = Field((), alias="marking")
+    players: Annotated[int, Field(ge=1, le=4)] = 1
+    """of a game that they play in turn, such as pinball"""
     parts: tuple[PlayPart, ...] = Field((), alias="part")
     """which thing is what to the rules of the game"""
     paints: tuple[Paint, ...] = Field((), alias="paint")

@@ -39,7 +39,6 @@ PINBALL = {
     Demand.ONE_WAY,
     Demand.ZONES,
     Demand.DRIVES,
-    Demand.BOUNDS,
 }
 DEMANDED = {
     "benchmark/bounce_to_rest": {*FALLING, Demand.BALL_PLANE, Demand.RESTITUTION},
@@ -157,7 +156,7 @@ DEMANDED = {
         Demand.LIFETIMES,
     },
     "pinball/classic": PINBALL,
-    "pinball/full": {*PINBALL, Demand.LAYERS},
+    "pinball/full": {*PINBALL, Demand.BALL_BALL, Demand.LAYERS},
     "tutorial/ball": FALLING,
     "tutorial/bounce": {*FALLING, Demand.BALL_PLANE, Demand.RESTITUTION},
     "tutorial/circle_half_plane": {Demand.TRANSLATION, Demand.BALL_PLANE},

@@ -62,7 +62,7 @@ class Layout:
     def pockets(self) -> dict[str, Disc]:
         """The pockets by name."""
         names = self.scene.fixed_names[len(self.scene.fixed) :]
-        return {name: (*each.position, each.radius) for name, each in zip(names, self.scene.pockets, strict=True)}
+        return {name: (*each.position, each.radius) for name, each in zip(names, self.scene.pockets, strict=False)}
 
     @cached_property
     def spots(self) -> dict[str, Point]:

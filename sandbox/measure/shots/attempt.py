@@ -32,7 +32,7 @@ class Attempt:
     def pockets(self) -> tuple[str, ...]:
         """The names of the table's pockets, in scene order."""
         scene = self.table.scene
-        return scene.fixed_names[len(scene.fixed) :]
+        return scene.fixed_names[len(scene.fixed) :][: len(scene.pockets)]
 
     def number(self, ball: str) -> int:
         """Return a ball's number.

@@ -44,6 +44,8 @@ class Host:
     def __init__(self, live: Live, game: Referee) -> None:
         self.live = live
         self.controls: tuple[Control, ...] = game.rules.controls
+        self.touched = False
+        """whether hands have played, and not a recording alone"""
         self._held: dict[str, dict[object, float]] = {control.name: {} for control in self.controls}
         self._game: Referee | None = None  # whose cues were heard last
         self._told = False
@@ -72,6 +74,7 @@ class Host:
             sources[source] = value
         now = max(sources.values(), default=0.0)
         if now != before:
+            self.touched = True
             self._press(control, now)
 
     def _press(self, control: str, value: float) -> None:

@@ -1,0 +1,153 @@
+"""Course: whose ball it is, from the plunger to the drain, the bonus, and the next player's."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+from sandbox.games.pinball.board import Board
+from sandbox.games.pinball.effects import Again, Cue, Effect, Machine, Now, Say
+from sandbox.games.pinball.holes import Holes
+from sandbox.games.pinball.nudge import Nudge
+from sandbox.games.pinball.sheet import Sheet
+from sandbox.games.pinball.trough import Trough
+
+SAVED = 8.0
+"""s after a ball has left the lane, in which it comes back if it drains"""
+
+COUNT = 1.5
+"""s, that the bonus is counted for"""
+
+SETTLE = 3.0
+"""s after a tilted ball, until the next"""
+
+EXTRA = 250_000
+"""points that give an extra ball"""
+
+Phase = Literal["start", "play", "count", "over"]
+
+
+class Course:
+    """The players' sheets, whose turn it is, and how far the ball has come."""
+
+    def __init__(self, board: Board, holes: Holes, nudge: Nudge) -> None:
+        self.board, self.holes, self.nudge, self.trough = board, holes, nudge, Trough(board)
+        self.machines: tuple[Machine, ...] = ()
+        """which are made ready for each ball"""
+        self.sheets = [Sheet() for _ in range(board.players)]
+        self.turn = 0
+        self.phase: Phase = "start"
+        self.until = 0.0
+        """when counting ends and the next ball begins, s"""
+        self.saved = 0.0
+        """until when drained balls come back, s"""
+        self.fresh = True
+        """whether the ball has not left the lane yet"""
+        self.touched = False
+        """whether it has closed a switch since it was served"""
+
+    @property
+    def sheet(self) -> Sheet:
+        """Of who plays."""
+        return self.sheets[self.turn]
+
+    @property
+    def alive(self) -> bool:
+        """Whether the table obeys its player."""
+        return self.phase == "play" and not self.nudge.tilted
+
+    @property
+    def balls_left(self) -> bool:
+        """Whether there is anything to play with."""
+        return bool(self.trough.live or self.trough.idle)
+
+    def save(self, until: float) -> None:
+        """Have drained balls come back until a time, s."""
+        self.saved, self.fresh = until, False
+
+    def take(self, ball: int, now: Now) -> Iterator[Effect]:
+        """Take a ball out of play."""
+        self.holes.forget(ball)
+        yield from self.trough.park(ball, now)
+
+    def drained(self, ball: int, now: Now) -> Iterator[Effect]:
+        """Take out a ball that has drained; serve it again while balls are saved."""
+        yield Cue("drain")
+        yield from self.take(ball, now)
+        if now.time < self.saved and not self.nudge.tilted:
+            self.trough.serve(alone=True)
+            yield Cue("save")
+            yield Say("ball saved")
+
+    def missed(self, now: Now) -> Iterator[Effect]:
+        """Return balls that have left the table to the plunger; give up those that are gone for good."""
+        for ball in now.live:
+            if ball not in self.trough.live:
+                continue
+            if not now.frame.present[ball]:
+                self.holes.forget(ball)
+                self.trough.lose(ball)
+                yield Say("a ball is gone")
+            elif not self.board.inside(*now.frame.position[ball].tolist()):
+                yield from self.take(ball, now)
+                if not self.nudge.tilted:
+                    self.trough.serve(alone=False)
+                yield Say("ball lost: back to the plunger")
+
+    def went_on(self, now: Now) -> Iterator[Effect]:
+        """Start the ball's save, end the ball, or begin the next."""
+        if self.phase == "play":
+            yield from self._played(now)
+        elif self.phase == "start":
+            yield from self._begun(now)
+        elif self.phase == "count" and now.time >= self.until:
+            self._counted()
+            yield from self._begun(now)
+
+    def scored(self, points: int, bonus: int) -> Iterator[Effect]:
+        """Add to the sheet of who plays."""
+        self.sheet.score += points
+        self.sheet.bonus += bonus
+        if self.sheet.score >= EXTRA:
+            yield Again("score")
+
+    def again(self, reason: str) -> bool:
+        """Let the player shoot again, once for a reason; tell whether it was one."""
+        if reason in self.sheet.had:
+            return False
+        self.sheet.had.add(reason)
+        self.sheet.again += 1
+        return True
+
+    def _played(self, now: Now) -> Iterator[Effect]:
+        trough, tilted, sheet = self.trough, self.nudge.tilted, self.sheet
+        if self.fresh and trough.flown:
+            self.save(now.time + SAVED)
+        elif trough.live and not trough.flown and not self.touched:
+            self.fresh = True  # a weak shot, which fell back into the lane
+        if trough.live or (trough.queue and trough.idle):
+            return
+        trough.queue.clear()
+        self.phase, self.until = "count", now.time + (SETTLE if tilted else COUNT)
+        if sheet.bonus and not tilted:
+            yield Cue("bonus")
+            yield Say(f"bonus {sheet.bonus * sheet.times:,}")
+
+    def _counted(self) -> None:
+        """Count the bonus, and pass the turn on."""
+        sheet, again = self.sheet, self.sheet.again > 0
+        if not self.nudge.tilted:
+            sheet.score += sheet.bonus * sheet.times
+        sheet.ended()
+        if not again:
+            self.turn = (self.turn + 1) % len(self.sheets)
+
+    def _begun(self, now: Now) -> Iterator[Effect]:
+        """Begin a ball, or end the game."""
+        if self.sheet.done or not self.balls_left:
+            self.phase = "over"
+            yield Cue("over")
+            return
+        self.phase, self.fresh, self.touched, self.saved = "play", True, False, 0.0
+        now.sheet = self.sheet
+        for machine in self.machines:
+            yield from machine.begin(now)
+        self.trough.serve(alone=False)

@@ -1,0 +1,121 @@
+"""High scores: ten a table, kept through crashes, damage told and put aside."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sandbox.games.high_scores import BEST, FILE, HighScores, data_folder, initials_of, opened, table_of
+from sandbox.scene.file import loads
+
+
+@pytest.fixture
+def scores(tmp_path: Path) -> HighScores:
+    return opened(tmp_path / "new" / FILE)
+
+
+def test_best_come_first_and_ten_stay(scores: HighScores) -> None:
+    for k in (5, 3, 8, 1, 9, 2, 7, 4, 6, 10, 12, 11):
+        scores.enter("a", f"p{k}", k * 1000)
+    assert [each.score for each in scores.of("a")] == [k * 1000 for k in range(12, 2, -1)]
+    assert scores.of("a")[0].initials == "P12"
+    assert scores.of("b") == ()
+
+
+def test_rank_is_the_place_that_entering_takes(scores: HighScores) -> None:
+    for k in range(BEST):
+        scores.enter("a", "abc", 100 * (k + 1))
+    for score, place in ((2000, 1), (1000, 2), (150, 10), (100, None), (50, None)):
+        assert scores.rank("a", score) == place
+    assert scores.enter("a", "low", 50) is None
+    assert scores.enter("a", "new", 1000) == 2
+    assert [each.initials for each in scores.of("a")][:2] == ["ABC", "NEW"]  # the earlier of equals is ahead
+
+
+def test_nothing_is_no_high_score(scores: HighScores) -> None:
+    assert scores.rank("a", 0) is None
+    assert scores.enter("a", "abc", 0) is None
+    assert not scores.path.exists()
+
+
+@given(st.text())
+def test_initials_of_any_text_can_be_stored(text: str) -> None:
+    initials = initials_of(text)
+    assert 1 <= len(initials) <= 3
+    assert initials_of(initials) == initials
+
+
+def test_file_survives_a_crash_in_the_middle_of_writing(scores: HighScores) -> None:
+    scores.enter("a", "abc", 100)
+    before = scores.path.read_bytes()
+    # A process that dies as a power cut would have it, with half a file on the disk.
+    crash = f"""
+import os, pathlib
+from sandbox.games.high_scores import HighScores
+write = pathlib.Path.write_text
+def half(self, text, **rest):
+    write(self, text[: len(text) // 2], **rest)
+    os._exit(9)
+pathlib.Path.write_text = half
+HighScores(pathlib.Path({str(scores.path)!r})).enter("a", "new", 500)
+"""
+    done = subprocess.run([sys.executable, "-c", crash], check=False)
+    assert done.returncode == 9
+    assert len(list(scores.path.parent.iterdir())) == 2  # half a file did come to be
+    assert scores.path.read_bytes() == before
+    again = opened(scores.path)
+    assert (again.told, again.of("a")[0].score) == (None, 100)
+
+
+DAMAGE = {
+    "not JSON": b'{"a": [["ABC", 1',
+    "not text": b"\xff\xfe\x00",
+    "no object": b"[1, 2]",
+    "no pairs": b'{"a": [["ABC"]]}',
+    "no initials": b'{"a": [["ABCDEF", 5]]}',
+    "no number": b'{"a": [["ABC", "many"]]}',
+    "not finite": b'{"a": [["ABC", 1e999]]}',
+    "too deep": b"[" * 100_000,
+}
+
+
+@pytest.mark.parametrize("what", DAMAGE)
+def test_damaged_file_is_told_and_kept_aside(tmp_path: Path, what: str) -> None:
+    path = tmp_path / FILE
+    for k in (1, 2):
+        path.write_bytes(DAMAGE[what])
+        scores = opened(path)
+        aside = tmp_path / f"high-scores-damaged-{k}.json"
+        assert scores.told is not None
+        assert str(aside) in scores.told
+        assert "\n" not in scores.told
+        assert aside.read_bytes() == DAMAGE[what]
+        scores.enter("a", "abc", 5)
+        assert opened(path).told is None
+
+
+def test_file_that_cannot_be_read_is_not_taken_for_damaged(tmp_path: Path) -> None:
+    (tmp_path / FILE).mkdir()
+    with pytest.raises(OSError, match=FILE):
+        opened(tmp_path / FILE)
+
+
+def test_folder_is_the_stated_one_or_the_users(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("SANDBOX_DATA", str(tmp_path))
+    assert opened().path == tmp_path / FILE
+    monkeypatch.delenv("SANDBOX_DATA")
+    monkeypatch.setattr(os, "name", "posix")
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "xdg"))
+    assert data_folder() == tmp_path / "xdg" / "sandbox"
+    monkeypatch.setenv("XDG_DATA_HOME", "not/absolute")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert data_folder() == tmp_path / ".local" / "share" / "sandbox"
+
+
+def test_each_table_has_scores_of_its_own() -> None:
+    scene = loads('title = "Classic"\n[play]\ngame = "pinball"\n[[ball]]\nposition = [0.0, 0.0]\nradius = 0.1\n')
+    assert table_of(scene) == "pinball: Classic"
