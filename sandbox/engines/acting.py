@@ -16,6 +16,7 @@ from sandbox.action import (
     Move,
     Pull,
     Remove,
+    Reshape,
     SetParameter,
     Spawn,
     Strike,
@@ -26,8 +27,9 @@ from sandbox.action import (
 )
 from sandbox.scene.address import AddressError, assign
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.crosscheck import MAX_SURFACES, crosscheck
+from sandbox.scene.crosscheck import MAX_SURFACES, course, crosscheck
 from sandbox.scene.cue import MISCUE, miscues, struck
+from sandbox.scene.demands import on_floor
 from sandbox.scene.document import to_document
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import from_document
@@ -86,7 +88,7 @@ class Cast(Protocol):
         """
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs in air, gravity or coefficients alone.
+        """Go on with a scene that differs in air, gravity, coefficients, or the course of walls alone.
 
         Raises:
             ActionError: it asks for what the settings or the engine cannot go on with.
@@ -128,6 +130,8 @@ def perform(action: Action, cast: Cast) -> int | None:
             _set(action, cast)
         case Throttle():
             cast.throttle(_thrust_number(action.thrust, cast.scene), action.level)
+        case Reshape():
+            _reshape(action, cast)
         case Strike():
             _strike(action, cast)
         case Pull() | Launch() | Switch():
@@ -231,6 +235,22 @@ def _thrust_number(name: str, scene: Scene) -> int:
     return names.index(name)
 
 
+def _reshape(action: Reshape, cast: Cast) -> None:
+    scene = cast.scene
+    names = scene.fixed_names[len(scene.planes) : len(scene.planes) + len(scene.walls)]
+    if action.thing not in names:
+        raise ActionError(f"no wall is named {action.thing!r}; there are {', '.join(map(repr, names)) or 'none'}")
+    if on_floor(scene):
+        raise ActionError(f"{action.thing!r} is a cushion; what stands on a [surface] keeps its course")
+    number = names.index(action.thing)
+    wall = scene.walls[number].model_copy(update={"points": action.points})
+    faults = [f"{'.'.join(map(str, where))} {message}" for where, message in course(wall)]
+    if faults:
+        raise ActionError(f"the wall {action.thing!r}: {'; '.join(faults)}")
+    walls = (*scene.walls[:number], wall, *scene.walls[number + 1 :])
+    cast.change(_going_on(scene.model_copy(update={"walls": walls}), scene))
+
+
 def _spawn(action: Spawn, cast: Cast) -> None:
     scene, single = cast.scene, action.single
     name = single.name or default_name("spawned", len(cast.bodies))
@@ -266,7 +286,7 @@ def alone_in(scene: Scene, single: Single) -> Scene:
 
 
 def _going_on(scene: Scene, running: Scene) -> Scene:
-    """Return a scene with the bodies and joints of a running one that differs in air, gravity or coefficients alone.
+    """Return a scene with the bodies and joints of a running one, of which it differs in surroundings alone.
 
     Laid out anew they would be those of the file: with who is gone, with what is broken, and hanging along the new
     gravity.

@@ -134,14 +134,17 @@ class Roster:
         """Refuse no place: bodies may start from anywhere."""
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs in air, gravity or coefficients alone.
+        """Go on with a scene that differs in air, gravity, coefficients, or the course of walls alone.
 
         Raises:
             ActionError: it has more surfaces than a scene may have.
         """
         spawned = self.bodies.elements[len(self.scene.elements) :]
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
-        self._assume(scene, bodies, derived(scene, bodies))
+        meet = derived(scene, bodies)
+        if scene.walls != self.scene.walls:
+            self.fixtures = fixtures_of(scene)
+        self._assume(scene, bodies, meet)
 
     def add(self, single: Single, name: str) -> int:
         """Add a body that was checked, and return its number.

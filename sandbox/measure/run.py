@@ -186,7 +186,7 @@ class Auditor:
     def __init__(self, scene: Scene, simulation: Simulation) -> None:
         self._audit = Audit(scene, simulation.bodies)
         self._simulation = simulation
-        self._known = len(simulation.bodies)
+        self._known, self._walls = len(simulation.bodies), scene.walls
         self.seconds = 0.0
         simulation.watch(self)
 
@@ -196,6 +196,9 @@ class Auditor:
         if len(end) != self._known:
             self._audit.joined(self._simulation.bodies)
             self._known = len(end)
+        if self._simulation.scene.walls is not self._walls:
+            self._walls = self._simulation.scene.walls
+            self._audit.reshaped(self._simulation.scene)
         self._audit(time, start, end, touching)
         self.seconds += perf_counter() - began
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from sandbox.scene.links import Links
 
 __all__ = [
-    "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc",
+    "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Course", "Disc",
     "Emitter", "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Pocket",
     "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust",
     "Wall", "World", "default_name",
@@ -39,6 +39,7 @@ __all__ = [
 Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
 Drag = Annotated[float, Field(ge=0, le=1e9)]
 Height = Annotated[float, Field(gt=0, le=1e9)]
+Course = Annotated[tuple[Point, ...], Field(min_length=2, max_length=100_000)]
 
 
 class World(Part):
@@ -88,7 +89,7 @@ class Plane(Surfaced):
 class Wall(Surfaced):
     """A polyline with round ends, solid on both sides."""
 
-    points: Annotated[tuple[Point, ...], Field(min_length=2, max_length=100_000)]
+    points: Course
     thickness: Annotated[float, Field(ge=0, le=1e9)] = 0.0
     """full thickness, m"""
     closed: bool = False

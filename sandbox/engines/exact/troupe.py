@@ -4,6 +4,7 @@ import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.engines.exact.overlap import allowed, overlapping_things, told
+from sandbox.engines.fixtures import fixtures_of
 from sandbox.engines.floor.level import unlevel
 from sandbox.engines.floor.pockets import caught
 from sandbox.engines.roster import ALL, FIXED, MEETS, NOTHING, Roster
@@ -22,13 +23,15 @@ class Troupe(Roster):
         self.moved: set[int] = set()
         """whose place it has"""
         self.renewed = False
-        """whether it has changed gravity, coefficients or who there is"""
+        """whether it has changed gravity, coefficients, walls or who there is"""
+        self.reshaped = False
+        """whether it has changed walls"""
 
     def settled(self) -> None:
         """Forget what the last action did."""
         self.kicked.clear()
         self.moved.clear()
-        self.renewed = False
+        self.renewed = self.reshaped = False
 
     def set_velocity(self, number: int, velocity: FloatArray) -> None:
         """Give a body a velocity, m/s.
@@ -75,17 +78,25 @@ class Troupe(Roster):
         self.moved.add(number)
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs in gravity or coefficients alone.
+        """Go on with a scene that differs in gravity, coefficients, or the course of walls alone.
 
         Raises:
-            ActionError: it has drag, or gravity along a floor, or more surfaces than a scene may have.
+            ActionError: it has drag, or gravity along a floor, or walls that pass through balls, or more surfaces than
+                a scene may have.
         """
         if scene.world.linear_drag or scene.world.quadratic_drag:
             raise ActionError("exact does not model drag; pymunk and reference do")
         if on_floor(scene) and (lacks := next(unlevel(scene, self.bodies), None)):
             raise ActionError(lacks)
+        reshaped = scene.walls != self.scene.walls
+        if reshaped:
+            meets = self.moving & (self.meets != NOTHING)
+            found = overlapping_things(self.position[meets], self.radius[meets], fixtures_of(scene))
+            if found is not None:
+                name = self.bodies.names[np.flatnonzero(meets)[found[0]]]
+                raise ActionError(told(name, scene.fixed_names[found[1]], found[2]))
         super().change(scene)
-        self.renewed = True
+        self.renewed, self.reshaped = True, reshaped
 
     def add(self, single: Single, name: str) -> int:
         """Add a body that was checked, and return its number.

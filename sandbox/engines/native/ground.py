@@ -50,6 +50,22 @@ class Ground:
         where = min(self.reach, FARTHEST)
         self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
 
+    def reshape(self, before: Scene, after: Scene) -> None:
+        """Let walls take the course that they have in another scene, with surfaces yet to be given."""
+        if not self._laid or before.walls == after.walls:
+            return
+        first = len(before.planes)
+        for number, (old, new) in enumerate(zip(before.walls, after.walls, strict=True), first):
+            if (old.points, old.closed, old.thickness) == (new.points, new.closed, new.thickness):
+                continue
+            body, shapes = self._things[number]
+            self._space.remove(*shapes)
+            shapes[:] = fixed_shapes(new, body, np.zeros(2), self.reach)  # a wall is as long as it is
+            for shape in shapes:
+                shape.filter = category(True, "all")
+            for k in shuffled(len(shapes)):
+                self._space.add(shapes[k])
+
     def dress(self, surface: IntArray) -> None:
         """Give the fixed things their surfaces (F,) anew."""
         for (_, shapes), number in zip(self._things, surface.tolist(), strict=False):

@@ -59,7 +59,8 @@ class Stage:
         self.penalty = Penalty(roster, settings, self.finder) if settings.response == "penalty" else None
         self.time = 0.0
         self.witness: Witness | None = None
-        self._memory: tuple[IntArray, FloatArray, float] = np.empty(0, np.int64), np.empty((0, 2)), settings.h
+        self._fixtures = roster.fixtures
+        self._forget()
         self.push: FloatArray = np.zeros((0, 3))
         """(N, 3) m/s and rad/s, by which overlap is undone in the next substep"""
         self.enter()
@@ -109,10 +110,13 @@ class Stage:
         self.push = np.where(roster.moving[:, None], kept, 0.0)
         self._pushes = bool(self.push.any())
         self._no_spin: FloatArray = np.zeros((len(roster.position), 3))
-        if roster.meet.solids != isinstance(self.finder, PieceFinder):  # keys mean other pairs from now on
+        if roster.fixtures is not self._fixtures:  # keys mean other pairs from now on
+            self._fixtures = roster.fixtures
+            self._forget()
+        if roster.meet.solids != isinstance(self.finder, PieceFinder):  # the same
             work, self.finder = self.finder.work, self._new_finder()
             self.finder.work = work
-            self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
+            self._forget()
             if self._settings.response == "penalty":
                 self.penalty = Penalty(roster, self._settings, self.finder)
         self.finder.population_changed()
@@ -121,6 +125,10 @@ class Stage:
         if self._joints is not None:
             self._joints.use(roster.inverse_mass, roster.inverse_moment, roster.linked())
         self.apply_forces()
+
+    def _forget(self) -> None:
+        """Let all contacts start without the impulses that they last had."""
+        self._memory: tuple[IntArray, FloatArray, float] = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
 
     def tear(self, h: float, time: float) -> None:
         """Break what gave more than its strength, on average over a substep of h, s, that ended at a time, s.
