@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from sandbox.scene.links import Links
 
 __all__ = [
-    "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Course", "Disc",
-    "Emitter", "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Pocket",
+    "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Course",
+    "Disc", "Emitter", "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Pocket",
     "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust",
     "Wall", "World", "default_name",
 ]  # fmt: skip
