@@ -72,7 +72,7 @@ def from_document(
     """
     assignments, faults = _parsed(overrides, file)
     stated, whole, changed = document, True, set[Location]()
-    if presets.KEY in document or any(path.startswith(presets.KEY) for path, _ in assignments):
+    if presets.has_presets(document, assignments):
         stated, changed, assignments = presets.set_first(document, assignments)
         written = presets.written_out(stated)
         document, whole = (stated, False) if written is None else (written, True)
@@ -102,7 +102,7 @@ def from_document(
         found = [((), f"the scene cannot be read: {error}")]
     else:
         if not whole:
-            from sandbox.scene.billiards.expanding import faults_of
+            from sandbox.scene.expanding import faults_of
 
             found = list(faults_of(scene))
             if not found:  # it was mended by what was set
@@ -115,7 +115,7 @@ def from_document(
     lines = Lines(text)
     for location, message in dict.fromkeys(found):
         is_set = any(location[: len(c)] == c for c in changed)
-        place: Location = (presets.KEY,) if whole and presets.is_written(location, stated) else location
+        place = presets.writer(stated) if whole and presets.is_written(location, stated) else location
         line = None if is_set else lines.find(place)
         path = path_of(location, document) + (" (set)" if is_set else "")
         faults.append(Fault(file, line, path, message))

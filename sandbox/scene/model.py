@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
+from sandbox.scene.artillery.described import Artillery, Terrain
 from sandbox.scene.billiards.described import Billiards
 from sandbox.scene.cue import Shot
 from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
@@ -136,6 +137,10 @@ class Scene(Part):
     play: Play = Field(default_factory=Play)
     billiards: Billiards | None = None
     """None once the scene was read: by then it is written out"""
+    terrain: Terrain | None = None
+    """likewise"""
+    artillery: Artillery | None = None
+    """who plays; their tanks are written out"""
     surface: Floor | None = None
     contact_models: ContactModels = Field(default_factory=ContactModels)
     materials: tuple[Material, ...] = Field((), alias="material")

@@ -7,7 +7,8 @@ from sandbox.scene.document import read_model, to_document
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene
 
-KEY = "billiards"
+KEYS = ("billiards", "terrain", "artillery")
+"""The tables that stand for others."""
 
 Assignment = tuple[str, Any]
 
@@ -17,7 +18,7 @@ _LISTS = {field.alias for field in Scene.model_fields.values() if field.alias is
 
 def written_out(document: dict[str, Any]) -> dict[str, Any] | None:
     """Return the document of primitives that one with a preset stands for; None where it has faults."""
-    from sandbox.scene.billiards.expanding import expanded, faults_of  # few scenes need it
+    from sandbox.scene.expanding import expanded, faults_of  # few scenes need it
 
     try:
         scene = read_model(document)
@@ -45,6 +46,16 @@ def set_first(
         except AddressError:
             later.append((path, value))
     return document, changed, later
+
+
+def has_presets(document: dict[str, Any], assignments: list[Assignment]) -> bool:
+    """Tell whether a document has presets, or is to be given some."""
+    return any(key in document or any(path.startswith(key) for path, _ in assignments) for key in KEYS)
+
+
+def writer(stated: dict[str, Any]) -> Location:
+    """Return where the preset stands that wrote into a document what was not stated in it."""
+    return (next((key for key in KEYS if key in stated), KEYS[0]),)
 
 
 def is_written(location: Location, stated: dict[str, Any]) -> bool:
