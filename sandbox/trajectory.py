@@ -104,6 +104,24 @@ class Contacts:
         columns = ("time", "pair", "point", "normal", "impulse")
         return cls(*(np.concatenate([getattr(part, column) for part in parts]) for column in columns))
 
+    def merged(self) -> Self:
+        """Return the same with one row a contact, its impulse summed, where one that lasted was told of many times.
+
+        One that lasts keeps the time of its first touch: rows of one time and one pair are the same contact.
+        """
+        if len(self) < 2:
+            return self
+        order = np.lexsort((self.pair[:, 1], self.pair[:, 0], self.time))  # stable: the first row told stays first
+        time, pair = self.time[order], self.pair[order]
+        new = np.append(True, (time[1:] != time[:-1]) | (pair[1:] != pair[:-1]).any(axis=1))
+        first = np.flatnonzero(new)
+        if len(first) == len(order):
+            return self
+        impulse = np.add.reduceat(self.impulse[order], first, axis=0)
+        kept = np.argsort(order[first], kind="stable")
+        rows = order[first][kept]
+        return type(self)(self.time[rows], self.pair[rows], self.point[rows], self.normal[rows], impulse[kept])
+
     def __len__(self) -> int:
         return len(self.time)
 

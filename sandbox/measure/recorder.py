@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from sandbox.action import Action
+from sandbox.engines.contract import Exhaustion
 from sandbox.measure.schedule import schedule
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -125,9 +126,18 @@ class Recorder:
         self._count -= 1
         self.keep(frame, float(self.time[self._count]))
 
+    def end(self, frame: Frame) -> None:
+        """Keep a frame as the last, also where it was kept before something more was done."""
+        if frame.time == self.time[self._count - 1]:
+            self.amend(frame)
+        else:
+            self.keep(frame, frame.time)
+
     def keep(self, frame: Frame, time: float) -> None:
         """Keep a frame, as of a time."""
         k, n = self._count, len(frame.position)
+        if n > self.angle.shape[1]:
+            self._widen(n)
         self.time[k] = time
         self.position[k, :n], self.velocity[k, :n] = frame.position, frame.velocity
         self.angle[k, :n], self.angular_velocity[k, :n] = frame.angle, frame.angular_velocity
@@ -139,6 +149,18 @@ class Recorder:
         if self._books is not None:
             self._energy[k], self._account[k] = self._books()
         self._count += 1
+
+    def _widen(self, bodies: int) -> None:
+        """Make room for bodies that nobody had foreseen, as those that the rules of a game spawn."""
+        wide = bodies + bodies // 2  # more are to be expected
+        if len(self.time) * wide * BYTES_PER_BODY > free_memory() * SHARE:
+            raise Exhaustion(f"the frames of {bodies:,} bodies do not fit into memory; use solver.record_every")
+        for name in ("position", "velocity", "angle", "angular_velocity", "spin"):
+            old = getattr(self, name)
+            if old is not None:
+                new = np.full((len(old), wide, *old.shape[2:]), np.nan)
+                new[: self._count, : old.shape[1]] = old[: self._count]
+                setattr(self, name, new)
 
     def arrays(self, bodies: int) -> dict[str, FloatArray]:
         """Return what was kept of the first so many bodies."""

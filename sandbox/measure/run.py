@@ -1,24 +1,26 @@
 """Running: a scene on an engine from start to end, recorded and audited."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from sandbox.action import Action, ActionError, Spawn, actions_to_json, in_order
+from sandbox.action import Action, Spawn, actions_to_json, in_order
 from sandbox.engines.account import Cause
 from sandbox.engines.compiling import COMPILING
-from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
+from sandbox.engines.contract import Refusal, Simulation
 from sandbox.engines.energy import total_energy
 from sandbox.engines.registry import engine_named
 from sandbox.engines.relay import start
+from sandbox.games.bout import Bout
 from sandbox.interrupt import heeded
 from sandbox.measure.audit import Audit
+from sandbox.measure.drive import Progress, drive
 from sandbox.measure.energy import energies
 from sandbox.measure.joint_error import joint_error
 from sandbox.measure.recorder import Books, Recorder, TooLargeError
-from sandbox.measure.schedule import ROUNDING, Stretch, schedule
+from sandbox.measure.schedule import schedule
 from sandbox.measure.versions import versions
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.document import to_document
@@ -27,10 +29,7 @@ from sandbox.scene.part import MAX_STEPS
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, FloatArray, IntArray, Trajectory
 
-Progress = Callable[[float], None]
-"""Called now and then with the share of the run that is done, 0 to 1."""
-
-REPORT_EVERY = 0.1  # s
+__all__ = ["Progress", "run"]
 
 
 @heeded()
@@ -42,6 +41,7 @@ def run(
     audit: bool = True,
     account: bool = False,
     progress: Progress | None = None,
+    bout: Bout | None = None,
     **settings: Any,
 ) -> Trajectory:
     """Run a scene from start to end.
@@ -54,6 +54,7 @@ def run(
         audit: count the contacts that the engine misses.
         account: keep the account of energy at every frame, which `measure.ledger` reads.
         progress: who is told how far it is.
+        bout: a game to be played on the way; the run ends with it. What it did is among the actions of the outcome.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
     Returns:
@@ -85,7 +86,7 @@ def run(
     auditor = Auditor(scene, simulation) if audit else None
 
     began, compiled = perf_counter(), COMPILING.seconds
-    status, reason, steps, contacts = _drive(scene, simulation, stretches, actions, recorder, progress)
+    end = drive(scene.world.duration, simulation, stretches, actions, recorder, progress, bout)
     seconds = perf_counter() - began - (auditor.seconds if auditor else 0.0) - (COMPILING.seconds - compiled)
     bodies, work = simulation.bodies, dict(simulation.work)
     state_hash = simulation.state_hash()
@@ -97,12 +98,15 @@ def run(
     broken = np.full(len(scene.links), np.nan)
     broken[list(simulation.broken)] = list(simulation.broken.values())
     missed = auditor.missed if auditor else _no_misses()
-    outcome = {"status": status, "reason": reason, "steps": steps, "seconds": seconds, "work": work, "audited": audit}
+    outcome = {"status": end.status, "reason": end.reason, "steps": end.steps, "seconds": seconds, "work": work}
+    outcome |= {"audited": audit}
     outcome |= {"state_hash": state_hash, "broken": len(simulation.broken)}
-    info = _info(scene, engine, resolved, actions, **outcome)
+    info = _info(scene, engine, resolved, end.done, **outcome)
+    if bout is not None:
+        info["game"] = bout.told(scene.play.game or "")
     if account:
         info["causes"] = [cause.value for cause in Cause]
-    trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, contacts, retired, broken, missed, info)
+    trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, end.contacts, retired, broken, missed, info)
     total = energies(trajectory.at([0, -1]), scene, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     info["joint_error"] = joint_error(trajectory, scene)
@@ -206,64 +210,3 @@ class Auditor:
     def missed(self) -> tuple[FloatArray, IntArray]:
         """When, (M,) s, and between whom, (M, 2), contacts were missed."""
         return self._audit.missed()
-
-
-def _drive(
-    scene: Scene,
-    simulation: Simulation,
-    stretches: list[Stretch],
-    actions: tuple[Action, ...],
-    recorder: Recorder,
-    progress: Progress | None,
-) -> tuple[str, str | None, int, Contacts]:
-    """Step to the end. Return status, reason, steps and contacts."""
-    status, reason, step, due = "ok", None, 0, 0
-    every = sum(stretch.steps for stretch in stretches)
-    part, duration = stretches[-1].part, scene.world.duration
-    told = perf_counter()
-    simulation.contacts()
-    recorder.keep(simulation.frame(), 0.0)
-    try:
-        for stretch in stretches:
-            for _ in range(stretch.steps):
-                due = _act(simulation, actions, due, simulation.time + ROUNDING * stretch.dt)
-                simulation.step()
-                step += 1
-                last = step == every and part == 0.0
-                if recorder.wants(step, last):
-                    recorder.keep(simulation.frame(), duration if last else simulation.time)
-                if progress is not None and perf_counter() - told > REPORT_EVERY:
-                    told = perf_counter()
-                    progress(step / (every + part))
-        if part > 0.0:
-            due = _act(simulation, actions, due, simulation.time + ROUNDING * stretches[-1].dt)
-            simulation.finish(part)
-            recorder.keep(simulation.frame(), duration)
-        elif _act(simulation, actions, due, simulation.time + ROUNDING * stretches[-1].dt) > due:
-            recorder.amend(simulation.frame())
-    except Divergence as divergence:
-        status, reason = "diverged", str(divergence)
-        recorder.keep(simulation.frame(), divergence.time)
-    except ActionError as error:
-        status, reason = "failed", f"at {simulation.time:g} s: {error}"
-        recorder.keep_as_it_is(simulation.frame())
-    except Exhaustion as error:  # within a step: there is no frame of it
-        status, reason = "failed", f"at {simulation.time:g} s: {error}"
-    if progress is not None:
-        progress(1.0)
-    return status, reason, step, _by_pair(simulation.contacts())
-
-
-def _by_pair(contacts: Contacts) -> Contacts:
-    """Return contacts of one moment in the order of their pairs; an engine may find them in any."""
-    order = np.lexsort((contacts.pair[:, 1], contacts.pair[:, 0], contacts.time))
-    vectors = (each[order] for each in (contacts.point, contacts.normal, contacts.impulse))
-    return Contacts(contacts.time[order], contacts.pair[order], *vectors)
-
-
-def _act(simulation: Simulation, actions: tuple[Action, ...], due: int, now: float) -> int:
-    """Apply the actions from number `due` on whose time has come; return the number of the next."""
-    while due < len(actions) and actions[due].time <= now:
-        simulation.apply(actions[due])
-        due += 1
-    return due

@@ -1,0 +1,77 @@
+"""Policies: who plays where nobody sits at the window. None of them looks at the scene: they press keys."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from sandbox.games.rules import Control, Policy, Press, Rules, Seen
+from sandbox.scene.model import Scene
+
+RATES = 0.2, 2.0
+"""1/s, how often a random player presses a control: one rate for each, drawn evenly by factors between these"""
+HOLDS = 0.05, 0.8
+"""s, how long it holds a control on average: drawn likewise"""
+STREAM = 0x706C6179
+"""Sets the player's chances apart from all else that the scene's seed decides: the letters of `play`."""
+
+
+class Nobody:
+    """Presses nothing."""
+
+    def decide(self, seen: Seen, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
+        """Return nothing."""
+        return ()
+
+
+class Chance:
+    """Presses and lets go of each control at random times, exponentially distributed, at rates of its own."""
+
+    def __init__(self, seed: int) -> None:
+        self._chance = np.random.default_rng([STREAM, seed])
+        self._turns: dict[str, tuple[float, bool]] = {}  # by control: when it changes next, and whether it is down
+        self._means: dict[str, tuple[float, float]] = {}  # s between presses, and of holding
+
+    def decide(self, seen: Seen, rules: Rules) -> Sequence[tuple[str, float]]:
+        """Return what changes now."""
+        if not self._turns:
+            self._begin(rules.controls, seen.time)
+        found = []
+        for control in rules.controls:
+            due, down = self._turns[control.name]
+            if due > seen.time:
+                continue
+            down = not down
+            pause, hold = self._means[control.name]
+            # No sooner than the next step: a control changes once a step.
+            self._turns[control.name] = seen.time + self._chance.exponential(hold if down else pause), down
+            level = float(self._chance.uniform()) if control.analogue else 1.0
+            found.append((control.name, level if down else 0.0))
+        return found
+
+    def _begin(self, controls: Sequence[Control], time: float) -> None:
+        for control in controls:
+            rate, hold = (float(np.exp(self._chance.uniform(*np.log(each)))) for each in (RATES, HOLDS))
+            self._means[control.name] = 1.0 / rate, hold
+            self._turns[control.name] = time + self._chance.exponential(1.0 / rate), False
+
+
+class Script:
+    """Presses what a script says, each before the first step that starts at its time or later."""
+
+    def __init__(self, presses: Iterable[Press]) -> None:
+        self._presses = sorted(presses, key=lambda press: press.time)
+        self._done = 0
+
+    def decide(self, seen: Seen, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
+        """Return what is due."""
+        begin = self._done
+        while self._done < len(self._presses) and self._presses[self._done].time <= seen.time + 1e-9:  # rounding
+            self._done += 1
+        return [(press.control, press.value) for press in self._presses[begin : self._done]]
+
+
+POLICIES: dict[str, Callable[[Scene], Policy]] = {
+    "random": lambda scene: Chance(scene.world.seed),
+    "none": lambda _: Nobody(),
+}
+"""Those that need no script, by name."""
