@@ -45,6 +45,8 @@ class Ground:
         self.each = width / len(heights)
         self.middles = (np.arange(len(heights)) + 0.5) * self.each
         """(N,) m"""
+        self.kinks = np.concatenate(([0.0], self.middles, [width]))
+        """(N + 2,) m, where the surface may bend, and where it ends"""
 
     @property
     def points(self) -> tuple[Point, ...]:
