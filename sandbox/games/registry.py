@@ -6,7 +6,14 @@ from sandbox.games.rules import Rules
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 
-RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {}
+
+def _artillery(scene: Scene, bodies: Bodies) -> Rules:
+    from sandbox.games.artillery.rules import ArtilleryRules  # numpy, and the integrators of an engine
+
+    return ArtilleryRules(scene, bodies)
+
+
+RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {"artillery": _artillery}
 """Each begins a game. A game is one line here, and its name in `scene.spots.Game`."""
 
 

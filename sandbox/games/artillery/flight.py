@@ -121,9 +121,7 @@ def past(
     return np.array([2.0 * wall - place[0], place[1]]), np.array([-velocity[0], velocity[1]])
 
 
-def _first(
-    flight: Flight, ground: Ground, edges: Edges, discs: FloatArray, longest: float
-) -> tuple[float, int] | None:
+def _first(flight: Flight, ground: Ground, edges: Edges, discs: FloatArray, longest: float) -> tuple[float, int] | None:
     """Return when a flight first meets ground or disc (0) or a side (−1, 1); None where it never does."""
     count, top = 64, max(float(ground.heights.max()), float((discs[:, 1] + discs[:, 2]).max(initial=0.0)))
     for first in range(0, int(longest / FINE), count):

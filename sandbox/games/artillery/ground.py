@@ -76,9 +76,7 @@ class Ground:
         high = np.clip(_whole(centre[1] + half), 0.0, self.heights)
         removed = np.where(half > 0.0, high - low, 0.0)
         hanging = np.flatnonzero((removed > 0.0) & (high < self.heights))
-        loose = tuple(
-            Loose(k, float(high[k]), float(self.heights[k]), float(removed[k])) for k in hanging.tolist()
-        )
+        loose = tuple(Loose(k, float(high[k]), float(self.heights[k]), float(removed[k])) for k in hanging.tolist())
         return Crater(Ground(self.heights - removed, self.width), removed, loose)
 
     def with_heap(self, centre: Point, radius: float) -> Crater:

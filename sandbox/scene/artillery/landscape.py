@@ -43,6 +43,4 @@ def levelled(heights: tuple[float, ...], width: float, at: float, half: float) -
     """Return heights with the columns whose middles lie within `half` of a place, m, as high as the nearest to it."""
     each = width / len(heights)
     level = heights[min(max(int(at / each), 0), len(heights) - 1)]
-    return tuple(
-        level if abs((k + 0.5) * each - at) <= half else height for k, height in enumerate(heights)
-    )
+    return tuple(level if abs((k + 0.5) * each - at) <= half else height for k, height in enumerate(heights))

@@ -1,0 +1,44 @@
+"""Shot: what a shot came to, and by how much the flight that was computed missed the exact one."""
+
+import math
+from typing import NamedTuple
+
+from sandbox.scene.part import Point
+
+
+class Shot(NamedTuple):
+    """A shot that has come down, or left."""
+
+    shooter: str
+    weapon: str
+    place: Point | None
+    """where it came down, m; none where it left for good"""
+    exact: Point | None
+    """where the exact flight comes down, m"""
+    flown: float
+    """s"""
+
+    @property
+    def off(self) -> float | None:
+        """How far the two are apart, m; none unless both come down."""
+        return None if self.place is None or self.exact is None else math.dist(self.place, self.exact)
+
+    @property
+    def told(self) -> str:
+        """In words."""
+        if self.place is None:
+            return "gone" if self.exact is None else f"gone; exactly at {self.exact[0]:.2f} m"
+        if self.off is None:
+            return f"at {self.place[0]:.2f} m; exactly, gone"
+        return (
+            f"at {self.place[0]:.2f} m, exactly {self.exact[0]:.2f} m: off by {length(self.off)}" if self.exact else ""
+        )
+
+
+def length(metres: float) -> str:
+    """Return a length in words that has three digits or so."""
+    if metres >= 1.0:
+        return f"{metres:.2f} m"
+    if metres >= 1e-3:
+        return f"{metres * 1e3:.3g} mm"
+    return f"{metres * 1e6:.3g} µm" if metres >= 1e-9 else "less than 1 nm"
