@@ -42,6 +42,10 @@ class Recording:
     """s"""
     state_hash: str | None = None
     """of the state at the end, where it is known"""
+    presses: tuple[Press, ...] = ()
+    """what was pressed, of a game; what came of it is among the actions"""
+    score: float | None = None
+    """of a game at the end, where it is known"""
 
     @property
     def whole_scene(self) -> Scene:
@@ -55,7 +59,7 @@ class Recording:
             action.model_copy(update={"engine": None}) if isinstance(action, Switch) else action
             for action in self.actions
         )
-        return replace(self, engine=engine, actions=actions, state_hash=None)
+        return replace(self, engine=engine, actions=actions, state_hash=None, score=None)
 
     def save(self, path: str | Path) -> Path:
         """Write it to a file, to a temporary name first: never half a file."""
@@ -75,6 +79,8 @@ class Recording:
             "duration": self.duration,
             "state_hash": self.state_hash,
         }
+        if self.presses or self.score is not None:
+            document |= {"presses": [list(press) for press in self.presses], "score": self.score}
         return json.dumps(document, indent=1, ensure_ascii=False)
 
     @classmethod
@@ -98,6 +104,8 @@ class Recording:
                 actions=actions_from_json(json.dumps(_part(document, "actions", list))),
                 duration=float(duration),
                 state_hash=_part(document, "state_hash", (str, type(None))),
+                presses=tuple(_press(each) for each in _part(document, "presses", list, [])),
+                score=_part(document, "score", (int, float, type(None)), None),
             )
         except ActionError as error:
             raise SceneError([Fault(file, None, "actions", line) for line in str(error).splitlines()]) from None
@@ -121,8 +129,16 @@ class Recording:
         return cls.from_json(text, str(path))
 
 
-def _part(document: Mapping[str, Any], key: str, kind: type | tuple[type, ...]) -> Any:
-    value = document.get(key)
+def _part(document: Mapping[str, Any], key: str, kind: type | tuple[type, ...], without: Any = ...) -> Any:
+    """Return a part of a document; one that may be missing has a value for where it is."""
+    value = document.get(key) if without is ... else document.get(key, without)
     if not isinstance(value, kind) or isinstance(value, bool):
         raise ValueError(f"`{key}` is missing or of the wrong type")
     return value
+
+
+def _press(value: Any) -> Press:
+    match value:
+        case [float() | int() as time, str() as control, float() | int() as level] if 0 <= time <= MAX_DURATION:
+            return Press(float(time), control, level)
+    raise ValueError(f"`presses`: {value!r} is no [time, control, value]")

@@ -15,6 +15,9 @@ from sandbox.measure.run import Progress, run
 from sandbox.measure.versions import versions
 from sandbox.trajectory import Trajectory
 
+GAME = ("score", "over", "player", "otherwise")
+"""What a row tells of a game."""
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -30,9 +33,20 @@ class Outcome:
 
     @property
     def replayed(self) -> bool | None:
-        """Whether a recorded session ended in its own state, bit for bit; None where there is none to compare with."""
+        """Whether a recorded session ended in its own state, bit for bit, and score; None where none is known."""
         wanted, found = self.job.state_hash, self.trajectory.info.get("state_hash")
-        return None if wanted is None or found is None else bool(wanted == found)
+        if wanted is None or found is None:
+            return None
+        return bool(wanted == found) and self.job.score in (None, self.score)
+
+    @property
+    def _game(self) -> dict[str, Any]:
+        return self.trajectory.info.get("game") or {}
+
+    @property
+    def score(self) -> float | None:
+        """Of the game, where one was played."""
+        return self._game.get("score")
 
     def row(self, final: bool = True, ledger: bool = False) -> dict[str, Any]:
         """Return the run as one JSON object; figures that are not finite are null.
@@ -71,6 +85,7 @@ class Outcome:
             "pocketed": self._pocketed(),
             "state_hash": info.get("state_hash"),
             **({"replayed": self.replayed} if self.job.recorded else {}),
+            **({key: self._game.get(key) for key in GAME} if self.job.player is not None else {}),
             **({"ledger": self._ledger()} if ledger else {}),
             **({"final": self._final()} if final else {}),
             "path": None if self.path is None else str(self.path),
@@ -137,12 +152,14 @@ def execute(
     Raises:
         TooLargeError: the frames would not fit into memory.
         StoreError: the store cannot be used, or what it holds of this run cannot be read.
+        SceneError: the game of the scene cannot be played so.
     """
     engine = engine_named(job.engine)
     settings = job.scene.solver
     if not engine.missing(job.scene, settings):
         settings = engine.resolve(job.scene, settings)
-    number = run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions)
+    game = None if job.player is None else job.player.document(job.scene)
+    number = run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions, game)
     found = store.find(number) if store is not None else None
     if store is not None and found is not None:
         file = store.file(found)
@@ -155,7 +172,10 @@ def execute(
                 done(outcome)
             return outcome
         audit = audit or bool(outcome.trajectory.info.get("audited"))  # what was known stays known
-    trajectory = run(job.scene, job.engine, actions=job.actions, audit=audit, account=account, progress=progress)
+    bout = None if job.player is None else job.player.bout(job.scene, job.label)
+    trajectory = run(
+        job.scene, job.engine, actions=job.actions, audit=audit, account=account, progress=progress, bout=bout
+    )
     with uninterrupted():
         path = store.file(store.add(trajectory, number)) if store is not None else None
         if found is not None and path is not None:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
+from sandbox.games.player import Player
+from sandbox.games.registry import RULES
 from sandbox.recording import Recording
 from sandbox.scene.address import AddressError, parse_assignment, parse_value, split_assignment
 from sandbox.scene.document import to_document
@@ -35,6 +37,10 @@ class Job:
     """It is a session that was played before."""
     state_hash: str | None = None
     """of the end of that session, where this run is to end alike: on its engine, with nothing set"""
+    player: Player | None = None
+    """who plays the game of the scene, where it has one with rules"""
+    score: float | None = None
+    """of that session, where this run is to end alike"""
 
 
 def plan(
@@ -43,6 +49,7 @@ def plan(
     overrides: Sequence[Override] = (),
     sweeps: Sequence[str] = (),
     seeds: int | None = None,
+    player: Player | None = None,
 ) -> list[Job]:
     """Lay out every run, in order: scene by scene, the last sweep changing fastest, then seeds, then engines.
 
@@ -52,9 +59,11 @@ def plan(
         overrides: `KEY=VALUE`, set in every run.
         sweeps: `KEY=A,B,C` or `KEY=LOW:HIGH:N[:log]`.
         seeds: how many, from 1 on; without, each scene's own.
+        player: who plays where a scene has a game with rules; by default chance, and of a session who played it.
 
     Raises:
-        SceneError: scenes have faults, as they stand or with a value set; all of them are told, each once.
+        SceneError: scenes have faults, as they stand or with a value set; all of them are told, each once. Or a game
+            cannot be played so.
         AddressError: a sweep cannot be understood.
     """
     axes: list[list[tuple[str, Any]]] = [[(key, value) for value in values] for key, values in map(parse_sweep, sweeps)]
@@ -68,13 +77,16 @@ def plan(
         for point in product(*axes):
             try:
                 session = _read(path, (*overrides, *point))
+                plays = _player(session, path, player)
             except SceneError as error:
                 faults |= dict.fromkeys(error.faults)
                 continue
             for engine in engines or (session.engine,):
                 played = session if engine == session.engine else session.on(engine)
-                known = None if overrides or point else played.state_hash
-                jobs.append(Job(label, played.scene, engine, played.actions, point, _is_recording(path), known))
+                same = not (overrides or point)
+                known, score = (played.state_hash, played.score) if same else (None, None)
+                recorded = _is_recording(path)
+                jobs.append(Job(label, played.scene, engine, played.actions, point, recorded, known, plays, score))
     if faults:
         raise SceneError(tuple(faults))
     return jobs
@@ -93,6 +105,19 @@ def _read(path: str, overrides: Sequence[Override]) -> Recording:
     document = to_document(session.whole_scene)
     document["solver"] = session.settings.model_dump(mode="json", exclude_defaults=True)
     return replace(session, scene=from_document(document, path, overrides))
+
+
+def _player(session: Recording, path: str, player: Player | None) -> Player | None:
+    """Return who plays; none where there is no game with rules.
+
+    Raises:
+        SceneError: the game cannot be played so.
+    """
+    if session.scene.play.game not in RULES:
+        return None
+    plays = Player.of(session) if _is_recording(path) else player or Player()
+    plays.bout(session.scene, path)
+    return plays
 
 
 def _is_recording(path: str) -> bool:

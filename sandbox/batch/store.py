@@ -25,7 +25,7 @@ from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
 DATABASE = "runs.sqlite"
-VERSION = 1
+VERSION = 2
 """Of the table below. A store of an earlier one is brought up to date, a later one is refused."""
 WAIT = 60.0
 """s, for another process to finish its write; each takes milliseconds, for files are written before."""
@@ -49,9 +49,13 @@ CREATE TABLE runs (
     energy_end REAL,
     contacts INTEGER NOT NULL,
     missed_contacts INTEGER,
-    path TEXT NOT NULL
+    path TEXT NOT NULL,
+    score REAL
 )
 """
+
+LATER = {2: "ALTER TABLE runs ADD COLUMN score REAL"}
+"""By version, what makes its table of that of the version before."""
 
 
 class StoreError(Exception):
@@ -86,6 +90,8 @@ class StoredRun:
     """None where the run was not audited"""
     path: str
     """file name of the arrays, in the store's folder"""
+    score: float | None = None
+    """of a game; None where none was played"""
 
 
 COLUMNS = ", ".join(column.name for column in fields(StoredRun))
@@ -99,24 +105,25 @@ def run_id(
     seed: int,
     versions: Mapping[str, str],
     actions: tuple[Action, ...] = (),
+    game: Mapping[str, object] | None = None,
 ) -> str:
     """Return the id of a run, 20 hex digits: a hash of everything that decides how it goes.
 
-    The settings are the resolved ones; what the scene's own `[solver]` says does not count beside them.
+    The settings are the resolved ones; what the scene's own `[solver]` says does not count beside them. What `[play]`
+    says does not either, but for a game that is played: `game` tells which, and who plays.
     """
     document = to_document(scene)
     document.pop("solver", None)
     document.pop("play", None)
-    return _hash(
-        {
-            "scene": document,
-            "engine": engine,
-            "settings": settings.model_dump(mode="json"),
-            "seed": seed,
-            "versions": dict(versions),
-            "actions": actions_to_json(actions),
-        }
-    )
+    decides = {
+        "scene": document,
+        "engine": engine,
+        "settings": settings.model_dump(mode="json"),
+        "seed": seed,
+        "versions": dict(versions),
+        "actions": actions_to_json(actions),
+    }
+    return _hash(decides if game is None else decides | {"game": dict(game)})
 
 
 def _hash(document: object) -> str:
@@ -218,9 +225,13 @@ class Store:
             )
         if version == VERSION:
             return
-        if self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+        if version:
+            for later in range(version + 1, VERSION + 1):
+                self._connection.execute(LATER[later])
+        elif self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
             raise StoreError(f"{self._database}: a database of something else; name another folder")
-        self._connection.execute(TABLE)
+        else:
+            self._connection.execute(TABLE)
         self._connection.execute(f"PRAGMA user_version = {VERSION}")
 
     @contextmanager
@@ -274,6 +285,7 @@ def _row(trajectory: Trajectory, run: str) -> StoredRun:
         contacts=len(trajectory.contact_time),
         missed_contacts=trajectory.missed_contacts,
         path=f"{run}.npz",
+        score=_known((info.get("game") or {}).get("score")),
     )
 
 

@@ -15,7 +15,9 @@ from sandbox.cli.ledger_table import print_ledgers
 from sandbox.cli.naming import engines_in
 from sandbox.cli.output import require_picture
 from sandbox.cli.reading import gathering, paths_of, print_json, refused
+from sandbox.cli.scores_table import print_scores, score_rows
 from sandbox.cli.table import Row, print_runs
+from sandbox.games.player import Player
 from sandbox.measure.recorder import TooLargeError, require_memory
 from sandbox.measure.run import Progress
 from sandbox.measure.seeds import same_chances
@@ -35,6 +37,7 @@ from sandbox.scene.faults import Fault, SceneError
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
 @click.option("--sweep", "sweeps", multiple=True, metavar="KEY=A,B,C", help="run each value; or KEY=LOW:HIGH:N[:log]")
 @click.option("--seeds", type=click.IntRange(1, 1_000_000), metavar="N", help="run the seeds 1 to N")
+@click.option("--player", metavar="WHO", help="of a game: random (the default), none, or the file of a script")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="store every run in a folder, once")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw the run: .png, .svg or .pdf")
 @click.option("--body", "bodies", multiple=True, metavar="NAME", help="which bodies to draw")
@@ -48,6 +51,7 @@ def command(
     overrides: tuple[str, ...],
     sweeps: tuple[str, ...],
     seeds: int | None,
+    player: str | None,
     out: Path | None,
     plot: Path | None,
     bodies: tuple[str, ...],
@@ -71,9 +75,14 @@ def command(
         with gathering(faults, "--sweep", (AddressError,)):
             parse_sweep(sweep)
             sound.append(sweep)
+    plays: Player | None = None
+    with gathering(faults):
+        plays = None if player is None else Player.named(player)
     jobs: list[Job] = []
     with gathering(faults, "--sweep", (AddressError,)):
-        jobs = plan(found, names, overrides, sound, seeds)
+        jobs = plan(found, names, overrides, sound, seeds, plays)
+    if plays is not None and jobs and not any(job.player == plays for job in jobs):
+        faults.append(Fault("--player", None, "", "nobody plays here: no scene named has a game with rules"))
     if not faults:
         with gathering(faults):
             _check_drawing(plot, bodies, jobs)
@@ -113,12 +122,16 @@ def command(
             click.echo(f"{row['scene']}: {row['status']}: {row['reason']}", err=True)
         if row.get("replayed") is False:
             status = status or 1
-            message = "ended in another state than the session did; other versions of the engines lead elsewhere"
+            what = "state" if row.get("otherwise") is None else f"game, from {row['otherwise']:g} s on,"
+            message = f"ended in another {what} than the session did; other versions of the engines lead elsewhere"
             click.echo(f"{row['scene']}: {message}", err=True)
     if as_json:
-        print_json({"runs": rows})
+        spread = score_rows(rows) if seeds is not None else []
+        print_json({"runs": rows, **({"scores": spread} if spread else {})})
     elif not quiet and rows:
         print_runs(rows)
+        if seeds is not None:
+            print_scores(score_rows(rows))
         if ledger:
             print_ledgers(rows)
         if out is not None:
@@ -161,6 +174,8 @@ def _tell_if_nothing_is_random(jobs: list[Job]) -> None:
     """Say so where runs of several seeds will all be the same."""
     for label in dict.fromkeys(job.label for job in jobs):
         # Seeds change fastest: the first two that differ in it have every other value in common.
+        if any(job.label == label and job.player is not None for job in jobs):
+            continue  # the game and who plays it have chances of their own
         first, *others = (job.scene for job in jobs if job.label == label)
         other = next((scene for scene in others if scene.world.seed != first.world.seed), first)
         if other is first:

@@ -38,6 +38,10 @@ def print_runs(rows: Sequence[Row]) -> None:
     joints = *(("joints off",) if joined else ()), *(("broken",) if torn else ())
     for head in ("× real", "energy, J", *joints, "contacts", "missed"):
         table.add_column(head, justify="right", no_wrap=True)
+    games = any("score" in row for row in rows)
+    if games:
+        table.add_column("score", justify="right", no_wrap=True)
+        table.add_column("game", no_wrap=True)
     fallen = any(row["pocketed"] for row in rows)
     if fallen:
         table.add_column("falls", no_wrap=True)
@@ -59,6 +63,7 @@ def print_runs(rows: Sequence[Row]) -> None:
             *([_share(row["joint_error"])] if joined else []),
             *([f"{row['broken_joints']:,}"] if torn else []),
             *(("–", "–") if row["status"] == "refused" else (f"{row['contacts']:,}", _missed(row["missed_contacts"]))),
+            *((_figure(row.get("score")), Text(row.get("over") or "goes on")) if games else ()),
             *([Text(", ".join(f"{ball}: {pocket}" for ball, pocket in row["pocketed"].items()))] if fallen else []),
         )
     console = Console(width=None if sys.stdout.isatty() else WIDE)

@@ -1,9 +1,12 @@
 """RULES: every game by the name that `[play] game` calls it by, but billiards, which have a host of their own."""
 
 from collections.abc import Callable
+from pathlib import Path
 
-from sandbox.games.rules import Rules
+from sandbox.games.landing import Landing
+from sandbox.games.rules import Rules, UnfitError
 from sandbox.scene.bodies import Bodies
+from sandbox.scene.faults import Fault, Lines, SceneError
 from sandbox.scene.model import Scene
 
 
@@ -13,7 +16,10 @@ def _artillery(scene: Scene, bodies: Bodies) -> Rules:
     return ArtilleryRules(scene, bodies)
 
 
-RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {"artillery": _artillery}
+RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {
+    "artillery": _artillery,
+    "landing": Landing,
+}
 """Each begins a game. A game is one line here, and its name in `scene.spots.Game`."""
 
 
@@ -23,6 +29,25 @@ def rules_of(scene: Scene, bodies: Bodies | None = None) -> Rules | None:
     Args:
         scene: as it is played.
         bodies: its bodies; by default as it starts them.
+
+    Raises:
+        UnfitError: the scene lacks what the game needs.
     """
     begin = RULES.get(scene.play.game or "")
     return None if begin is None else begin(scene, scene.bodies if bodies is None else bodies)
+
+
+def fitting_rules(scene: Scene, file: str) -> Rules | None:
+    """Begin the game that the scene of a file names; none where it names none that has rules here.
+
+    Raises:
+        SceneError: the scene lacks what the game needs; it names file and line.
+    """
+    try:
+        return rules_of(scene)
+    except UnfitError as error:
+        try:
+            line = Lines(Path(file).read_text(encoding="utf-8")).find(("play", "game"))
+        except (OSError, ValueError):  # it was read from elsewhere, or is a session
+            line = None
+        raise SceneError([Fault(file, line, "play.game", str(error))]) from None

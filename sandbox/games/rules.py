@@ -19,7 +19,11 @@ from sandbox.action import Action
 from sandbox.recording import Press
 from sandbox.trajectory import Contacts, Frame
 
-__all__ = ["Control", "Policy", "Press", "Rules", "Seen"]
+__all__ = ["Control", "Policy", "Press", "Rules", "Seen", "UnfitError"]
+
+
+class UnfitError(ValueError):
+    """A scene cannot be played by the rules that it names: raised as a game begins. `str()` says what it needs."""
 
 
 class Seen(NamedTuple):

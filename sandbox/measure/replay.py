@@ -1,5 +1,7 @@
 """Replaying: a recorded session run again without a window, on its own engine or another."""
 
+from sandbox.games.bout import Bout
+from sandbox.games.registry import rules_of
 from sandbox.measure.run import Progress, run
 from sandbox.recording import Recording
 from sandbox.trajectory import Trajectory
@@ -13,6 +15,9 @@ def rerun(
     With its own engine and the same versions it ends in the same state, bit for bit: `info["state_hash"]` is the
     recording's. Another engine computes the whole session, also where the session changed engines.
 
+    Of a game the rules look on: `info["game"]` says their score, and `otherwise` since when, s, they would have done
+    something else than was recorded. On the same engine that is never.
+
     Args:
         recording: the session.
         engine: another engine's name; without, the session's own.
@@ -22,13 +27,16 @@ def rerun(
     Raises:
         UnknownEngineError: no engine has that name.
         TooLargeError: the frames would not fit into memory.
+        UnfitError: the scene lacks what the game that it names needs.
     """
     chosen = recording if engine is None else recording.on(engine)
+    rules = rules_of(chosen.scene)
     return run(
         chosen.whole_scene,
         chosen.engine,
         actions=chosen.actions,
         audit=audit,
         progress=progress,
+        bout=None if rules is None else Bout(rules, None, "as recorded", chosen.presses),
         **chosen.settings.model_dump(),
     )

@@ -10,6 +10,7 @@ from sandbox.games.artillery.tanks import Tank, Tanks
 from sandbox.games.artillery.weapons import WEAPONS
 from sandbox.scene.artillery.described import Artillery
 from sandbox.scene.model import World
+from sandbox.trajectory import FloatArray
 
 STREAM = 12
 """of the scene's seed; ground has another"""
@@ -47,9 +48,7 @@ def aimed(
 ) -> Aim:
     """Return the shot that a bot takes at a target: the best there is, but for its error."""
 
-    def muzzle(
-        angle: np.ndarray[tuple[int], np.dtype[np.float64]],
-    ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    def muzzle(angle: FloatArray) -> FloatArray:
         return tanks.muzzle(shooter, angle)
 
     aim = best_aim(world, muzzle, ground, artillery.edges, artillery.speed, target.place, NEAR * radius)

@@ -60,7 +60,8 @@ class Flight:
     def places(self, first: int, count: int) -> FloatArray:
         """Return the places (count, 2), m, at the times k·`FINE` from k = first on."""
         if not self._world.quadratic_drag:
-            return free_flight(FINE * np.arange(first, first + count), *self._start, self._world)[0]
+            times = np.arange(first, first + count, dtype=np.float64) * FINE
+            return free_flight(times, *self._start, self._world)[0]
         self.at(FINE * (first + count - 1))
         self.at(FINE * (first + count))  # rounding of the time must not leave the last out
         return np.stack([knot[0, 0] for knot in self._knots[first : first + count]])

@@ -94,7 +94,7 @@ class Ground:
     def _chords(self, x: float, radius: float) -> FloatArray:
         """Return half the chord that a circle at x has in each column's middle, (N,) m."""
         square = radius * radius - (self.middles - x) ** 2
-        return np.sqrt(np.maximum(square, 0.0))
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
 def _whole(height: FloatArray) -> FloatArray:

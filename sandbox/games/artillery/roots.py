@@ -1,4 +1,4 @@
-"""Roots: where a function changes its sign, by false position with Illinois' halving (Dowell, Jarratt, BIT 11, 1971)."""
+"""Roots: where a function changes sign, by false position with halving (Illinois; Dowell, Jarratt, BIT 11, 1971)."""
 
 from collections.abc import Callable
 

@@ -30,8 +30,8 @@ PATIENCE = 8.0
 """s that tanks are given to come to rest, and what rolls to stop"""
 PAUSE = 0.5
 """s between turns, at least"""
-"""Where dirt is thrown up under a tank it is lifted, this much above the ground, m."""
 LIFT = 0.01
+"""m above the ground: who was under it is put there"""
 ROLLER = 0.5
 """m, the radius of what rolls"""
 HARDLY = 0.5
@@ -128,16 +128,11 @@ class ArtilleryRules:
         told = []
         for tank in self.tanks.every:
             mark = "> " if tank is self.shooter and self._over is None else ""
-            state = (
-                f"{tank.health:.0f} %, {tank.points} points, {tank.money} $"
-                if tank.alive
-                else f"out, {tank.points} points"
-            )
-            told.append((f"{mark}{tank.name}", state))
+            state = f"{tank.health:.0f} %, {tank.points} points, {tank.money} $"
+            told.append((f"{mark}{tank.name}", state if tank.alive else f"out, {tank.points} points"))
         wind = self.world.wind[0]
-        told.append(
-            ("wind", f"{abs(wind):.1f} m/s {'to the right' if wind > 0 else 'to the left'}" if wind else "none")
-        )
+        side = "to the right" if wind > 0 else "to the left"
+        told.append(("wind", f"{abs(wind):.1f} m/s {side}" if wind else "none"))
         tank, weapon = self.shooter, WEAPONS[self.shooter.weapon]
         told.append(("gun", f"{math.degrees(tank.angle):.1f}°, {tank.power:.1%}, {self.speed(tank):.1f} m/s"))
         told.append(("weapon", f"{weapon.name}, {weapon.cost} $" if weapon.cost else weapon.name))

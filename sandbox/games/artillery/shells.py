@@ -101,7 +101,7 @@ class Step:
 def returned(
     place: FloatArray, velocity: FloatArray, ground: Ground, edges: Edges
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return place and velocity of a shell beyond a side as it goes on within; None where it is within, or may leave."""
+    """Return place and velocity of a shell beyond a side as it goes on within; none where it is not, or may leave."""
     if edges == "open" or 0.0 <= place[0] <= ground.width:
         return None
     return past(place, velocity, 1 if place[0] > 0.0 else -1, ground.width, edges)

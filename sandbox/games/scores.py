@@ -1,0 +1,58 @@
+"""Scores: how the scores of many games are spread."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+"""of games, whose scores are no more than the quantiles"""
+MOST_BINS = 10
+
+
+@dataclass(frozen=True)
+class Scores:
+    """A sample of scores."""
+
+    count: int
+    mean: float
+    deviation: float
+    """of one score, from the sample; 0 of a single game"""
+    quantiles: tuple[float, ...]
+    """for each of `SHARES`"""
+    edges: tuple[float, ...]
+    """of the histogram's bins, one more than there are bins"""
+    counts: tuple[int, ...]
+    """games in each bin; the last bin holds its upper edge too"""
+
+    @classmethod
+    def of(cls, scores: Sequence[float]) -> "Scores":
+        """Return how scores are spread.
+
+        Raises:
+            ValueError: there are none.
+        """
+        if not scores:
+            raise ValueError("no game, no spread of scores")
+        values = np.asarray(scores, dtype=np.float64)
+        bins = int(min(MOST_BINS, max(len(np.unique(values)), 1)))
+        counts, edges = np.histogram(values, bins)
+        return cls(
+            count=len(values),
+            mean=float(values.mean()),
+            deviation=float(values.std(ddof=1)) if len(values) > 1 else 0.0,
+            quantiles=tuple(np.quantile(values, SHARES).tolist()),
+            edges=tuple(edges.tolist()),
+            counts=tuple(counts.tolist()),
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return it as JSON values."""
+        return {
+            "count": self.count,
+            "mean": self.mean,
+            "deviation": self.deviation,
+            "quantiles": {f"{share:g}": value for share, value in zip(SHARES, self.quantiles, strict=True)},
+            "histogram": {"edges": list(self.edges), "counts": list(self.counts)},
+        }

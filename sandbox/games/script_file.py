@@ -1,0 +1,66 @@
+"""Script files: who presses what when, a line each: `time, control, value`; what follows a # is a remark."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from sandbox.games.rules import Control, Press
+from sandbox.scene.faults import Fault, SceneError
+
+LONGEST = 1e9
+"""s, as of a scene"""
+
+
+def read_script(path: str | Path) -> tuple[Press, ...]:
+    """Read a script.
+
+    Raises:
+        SceneError: it cannot be read, or lines are wrong; all of them are told.
+    """
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or error
+        raise SceneError([Fault(str(path), None, "", f"cannot be read: {reason}")]) from None
+    presses, faults = [], []
+    for number, line in enumerate(lines, 1):
+        text = line.partition("#")[0].strip()
+        if not text:
+            continue
+        try:
+            presses.append(_press(text))
+        except ValueError as error:
+            faults.append(Fault(str(path), number, "", str(error)))
+    if faults:
+        raise SceneError(faults)
+    return tuple(sorted(presses, key=lambda press: press.time))
+
+
+def _press(text: str) -> Press:
+    parts = [part.strip() for part in text.split(",")]
+    try:
+        time, control, value = float(parts[0]), ",".join(parts[1:-1]).strip(), float(parts[-1])
+    except ValueError:
+        raise ValueError(f"{text!r} should be `time, control, value`, such as `0.5, left, 1`") from None
+    if len(parts) < 3 or not control:
+        raise ValueError(f"{text!r} should be `time, control, value`, such as `0.5, left, 1`")
+    if not (0.0 <= time <= LONGEST):
+        raise ValueError(f"a time of {parts[0]} s is out of range; it should be 0 to {LONGEST:g}")
+    if not (math.isfinite(value) and 0.0 <= value <= 1.0):
+        raise ValueError(f"a value of {parts[-1]} is out of range; it should be 0 to 1, 0 lets go")
+    return Press(time, control, value)
+
+
+def faults_of(presses: Sequence[Press], controls: Sequence[Control], file: str) -> list[Fault]:
+    """Return what of a script a game cannot do, each fault once."""
+    known = {control.name: control for control in controls}
+    names = ", ".join(map(repr, known))
+    found: dict[Fault, None] = {}
+    for press in presses:
+        if press.control not in known:
+            message = f"there is no control {press.control!r}; the game has {names}"
+            found[Fault(file, None, "", message)] = None
+        elif not known[press.control].analogue and press.value not in (0.0, 1.0):
+            message = f"{press.control!r} is 0 or 1, not {press.value:g}"
+            found[Fault(file, None, "", message)] = None
+    return list(found)
