@@ -107,7 +107,7 @@ def best_aim(
         full: the greatest speed, m/s.
         target: m.
         near: m; among shots that come down as near as this, those that hardly miss when aimed a little otherwise come
-            first, and of these the one that is in the air for the shortest time.
+            first, of these the slowest, and then those that are in the air for the shortest time.
     """
     range_ = _Range(world, muzzle, ground, edges, target[0])
     angle, share = (each.reshape(-1) for each in np.meshgrid(ANGLES, SHARES))
@@ -116,7 +116,7 @@ def best_aim(
     miss, when = range_.misses(shots[:, 0], shots[:, 1], CLOSE)
     shaken = [range_.misses(shots[:, 0] + turn, shots[:, 1], CLOSE)[0] for turn in (-SHAKE, SHAKE)]
     unsure = ~(np.max(np.abs([miss, *shaken]), axis=0, initial=0.0) <= STEADY * near)  # where nan, too
-    order = np.lexsort((when, unsure, ~(np.abs(miss) <= near)))
+    order = np.lexsort((when, shots[:, 1], unsure, ~(np.abs(miss) <= near)))
     best = nearest
     for k in order[:CHECKED].tolist():
         aim = range_.checked(Aim(float(shots[k, 0]), float(shots[k, 1]), float(miss[k])))

@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from sandbox.games.artillery.aim import Aim, best_aim
-from sandbox.games.artillery.ground import Ground
+from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.tanks import Tank, Tanks
 from sandbox.games.artillery.weapons import WEAPONS
-from sandbox.scene.artillery.described import Artillery
 from sandbox.scene.model import World
 from sandbox.trajectory import FloatArray
 
@@ -36,24 +35,16 @@ def choose(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tuple[Ta
     return target, able[-1] if able and big and target.health > WEAPONS[0].damage else 0
 
 
-def aimed(
-    world: World,
-    ground: Ground,
-    artillery: Artillery,
-    tanks: Tanks,
-    shooter: Tank,
-    target: Tank,
-    radius: float,
-    random: np.random.Generator,
-) -> Aim:
+def aimed(world: World, field: Field, shooter: Tank, target: Tank, radius: float, random: np.random.Generator) -> Aim:
     """Return the shot that a bot takes at a target: the best there is, but for its error."""
+    full = field.artillery.speed
 
     def muzzle(angle: FloatArray) -> FloatArray:
-        return tanks.muzzle(shooter, angle)
+        return field.tanks.muzzle(shooter, angle)
 
-    aim = best_aim(world, muzzle, ground, artillery.edges, artillery.speed, target.place, NEAR * radius)
+    aim = best_aim(world, muzzle, field.ground, field.artillery.edges, full, target.place, NEAR * radius)
     lack = 1.0 - (shooter.player.bot or 0.0)
     turned, faster = random.standard_normal(2).tolist()
     angle = min(max(aim.angle + lack * ANGLE_ERROR * turned, 0.0), math.pi)
-    speed = min(max(aim.speed * (1.0 + lack * SPEED_ERROR * faster), 0.0), artillery.speed)
+    speed = min(max(aim.speed * (1.0 + lack * SPEED_ERROR * faster), 0.0), full)
     return aim._replace(angle=angle, speed=speed)

@@ -34,13 +34,12 @@ class Gunner:
     def __init__(self) -> None:
         self._held: dict[str, float] = {}
 
-    def press(self, name: str, value: float) -> bool:
-        """Take note of a key; tell whether it fires."""
+    def press(self, name: str, value: float) -> None:
+        """Take note of a key that goes down, or up."""
         if value > 0.0:
             self._held[name] = 0.0
         else:
             self._held.pop(name, None)
-        return name == "fire" and value > 0.0
 
     def touch(self, name: str, tank: Tank) -> None:
         """Do what a tap does."""

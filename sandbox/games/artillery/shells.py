@@ -36,8 +36,6 @@ class Shell:
     """(2,) m, as seen last"""
     velocity: FloatArray
     """(2,) m/s"""
-    time: float
-    """s, when that was"""
     number: int | None = None
     """of its body, once that is there"""
     fired: float = 0.0

@@ -28,6 +28,9 @@ WEAPONS: tuple[Weapon, ...] = (
     Weapon("dirt", "dirt", 7.0, 0.0, 100),
 )
 
+WRECK = Weapon("wreck", "shell", 4.0, 30.0, 0)
+"""What becomes of a tank that has no health left."""
+
 FRAGMENTS = 5
 """of a cluster"""
 SPREAD = 3.0
