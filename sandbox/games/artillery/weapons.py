@@ -21,8 +21,8 @@ class Weapon(NamedTuple):
 
 
 WEAPONS: tuple[Weapon, ...] = (
-    Weapon("shell", "shell", 5.0, 40.0, 0),
-    Weapon("big shell", "shell", 10.0, 75.0, 300),
+    Weapon("shell", "shell", 5.0, 35.0, 0),
+    Weapon("big shell", "shell", 9.0, 55.0, 300),
     Weapon("cluster", "cluster", 4.0, 25.0, 250),
     Weapon("roller", "roller", 5.5, 50.0, 150),
     Weapon("dirt", "dirt", 7.0, 0.0, 100),
