@@ -33,6 +33,8 @@ def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
         yield ("terrain", "heights"), "say it all; leave out `columns`, `base` and `height`"
     if artillery is None:
         return
+    if artillery.wind and not (scene.world.linear_drag or scene.world.quadratic_drag):
+        yield ("artillery", "wind"), "pushes nothing without world.linear_drag or world.quadratic_drag; state one"
     if terrain is not None:
         width = terrain.width
     elif GROUND not in walls:
@@ -45,7 +47,10 @@ def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
             yield ("artillery",), message
             return
         width = columns[1]
+    names = [player.name for player in artillery.players]
     for k, player in enumerate(artillery.players):
+        if player.name in names[:k]:
+            yield ("artillery", "player", k, "name"), f"a second player is called {player.name!r}; names are unique"
         half = 0.5 * artillery.tank[0]
         if not half <= player.position <= width - half:
             yield (
