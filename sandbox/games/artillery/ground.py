@@ -83,7 +83,7 @@ class Ground:
         """Let a disc of dirt fall: onto each column as much as the disc's chord over it. `removed` is negative."""
         half = self._chords(centre[0], radius)
         added = _whole(2.0 * half)
-        bottom = np.maximum(centre[1] - half, self.heights)
+        bottom = np.maximum(_whole(centre[1] - half), self.heights)
         falling = np.flatnonzero(added > 0.0)
         loose = tuple(
             Loose(k, float(bottom[k]), float(bottom[k] + added[k]), float(bottom[k] - self.heights[k]))

@@ -1,6 +1,7 @@
 """Bots: without error they hit from any ground, in any air; with it they miss as much as their skill says."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,8 +22,7 @@ AIRS = [(0.0, 0.0), (0.06, 0.0), (0.0, 0.002)]
 RADIUS = WEAPONS[0].radius
 
 
-@settings(max_examples=15)
-@given(
+CASES = st.tuples(
     st.integers(0, 10_000),
     st.floats(0.0, 0.6),
     st.sampled_from(AIRS),
@@ -32,7 +32,23 @@ RADIUS = WEAPONS[0].radius
     st.floats(160.0, 290.0),
     st.booleans(),
 )
-def test_full_skill_hits_within_the_crater(
+"""Seed and roughness of the ground, drags, wind, sides, and where the two stand, one on each half; who shoots."""
+
+
+@settings(max_examples=4)
+@given(CASES)
+def test_full_skill_hits_within_the_crater(case: tuple[Any, ...]) -> None:
+    hits(*case)
+
+
+@pytest.mark.slow
+@settings(max_examples=60)
+@given(CASES)
+def test_full_skill_hits_wherever_it_stands(case: tuple[Any, ...]) -> None:
+    hits(*case)
+
+
+def hits(
     seed: int, roughness: float, drags: tuple[float, float], wind: float, edges: Edges, a: float, b: float, back: bool
 ) -> None:
     ground, air = hills(seed, roughness, (a, b)), world(*drags, wind)
