@@ -1,7 +1,7 @@
 """Recordings: a session as one JSON document, scene and actions, that any engine can replay."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -104,7 +104,7 @@ class Recording:
                 actions=actions_from_json(json.dumps(_part(document, "actions", list))),
                 duration=float(duration),
                 state_hash=_part(document, "state_hash", (str, type(None))),
-                presses=tuple(_press(each) for each in _part(document, "presses", list, [])),
+                presses=presses_from(_part(document, "presses", list, [])),
                 score=_part(document, "score", (int, float, type(None)), None),
             )
         except ActionError as error:
@@ -135,6 +135,15 @@ def _part(document: Mapping[str, Any], key: str, kind: type | tuple[type, ...], 
     if not isinstance(value, kind) or isinstance(value, bool):
         raise ValueError(f"`{key}` is missing or of the wrong type")
     return value
+
+
+def presses_from(values: Sequence[Any]) -> tuple[Press, ...]:
+    """Read presses from JSON values, each `[time, control, value]`.
+
+    Raises:
+        ValueError: one is none.
+    """
+    return tuple(_press(value) for value in values)
 
 
 def _press(value: Any) -> Press:

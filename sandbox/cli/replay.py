@@ -87,6 +87,8 @@ def _computed(source: Trajectory | Recording, engine: str | None) -> "Live":
         UnknownEngineError: the session is of an engine that is not here.
         Refusal: the engine cannot run it.
     """
+    from sandbox.games.referee import Referee
+    from sandbox.games.registry import fitting_rules
     from sandbox.play.footage.film import Film
     from sandbox.play.running.live import Live
     from sandbox.play.running.session import Session
@@ -100,7 +102,9 @@ def _computed(source: Trajectory | Recording, engine: str | None) -> "Live":
         if engine is not None and engine != session.engine:
             session = session.on(engine)
         session = replace(session, settings=_fitting(session.settings, session.scene, session.engine))
-    played = Session(session.scene, session.engine, session.settings, session.actions)
+    rules = fitting_rules(session.scene, "<run>")
+    game = None if rules is None else Referee(rules, session.presses)
+    played = Session(session.scene, session.engine, session.settings, session.actions, game, session.duration)
     return Live(played, film, until=session.duration)
 
 
@@ -115,15 +119,19 @@ def _session_of(run: Trajectory, scene: Scene, duration: float) -> Recording:
     from pydantic import ValidationError
 
     from sandbox.action import ActionError, actions_from_json
+    from sandbox.recording import presses_from
 
     try:
         settings = Settings.model_validate(run.info["settings"])
         actions = actions_from_json(json.dumps(run.info.get("actions", [])))
+        presses = presses_from((run.info.get("game") or {}).get("presses", []))
     except (KeyError, ValidationError):
         raise SceneError([Fault("<run>", None, "settings", "they are none")]) from None
     except ActionError as error:
         raise SceneError([Fault("<run>", None, "actions", line) for line in str(error).splitlines()]) from None
-    return Recording(scene, str(run.info["engine"]), settings, actions, duration)
+    except ValueError as error:
+        raise SceneError([Fault("<run>", None, "game", str(error))]) from None
+    return Recording(scene, str(run.info["engine"]), settings, actions, duration, presses=presses)
 
 
 def _fitting(settings: Settings, scene: Scene, engine: str) -> Settings:

@@ -171,7 +171,7 @@ class Landing:
             ("height", f"{max(self._height(self._now), 0.0):.1f} m"),
             ("down", _marked(f"{0.0 - up:.1f} m/s", -up > DOWN)),
             ("aside", _marked(f"{aside:+.1f} m/s", abs(aside) > ASIDE)),
-            ("tilt", _marked(f"{0.0 - math.degrees(tilt):+.0f}°", abs(tilt) > TILT)),
+            ("tilt", _marked(f"{-round(math.degrees(tilt)):+d}°", abs(tilt) > TILT)),
         )
 
     def _height(self, frame: Frame) -> float:
@@ -188,7 +188,7 @@ class Landing:
 
 def _control(name: str, thrust: Thrust) -> Control:
     assert thrust.key is not None
-    return Control(name, f"fire {name}", (thrust.key,), PADS.get(thrust.key), analogue=True)
+    return Control(name, name, (thrust.key,), PADS.get(thrust.key), analogue=True)
 
 
 def _place(scene: Scene) -> Point:

@@ -46,12 +46,21 @@ class Referee:
 
     @property
     def coming(self) -> tuple[Press, ...]:
-        """What was pressed later than now, in the game that is seen again."""
+        """What was pressed later than now, in a game that is seen again."""
         return tuple(self._presses[self._pressed :])
 
-    def expect(self, presses: Iterable[Press]) -> None:
-        """Take over what was pressed later than now, after having gone back."""
-        self._presses[self._pressed :] = [*presses]
+    @property
+    def all_presses(self) -> tuple[Press, ...]:
+        """What was pressed, also later than now in a game that is seen again."""
+        return tuple(self._presses)
+
+    def expect(self, presses: Sequence[Press]) -> None:
+        """Take over all that was pressed, from a game that is this one up to now."""
+        self._presses = [*presses]
+
+    def forget(self) -> None:
+        """Forget what was pressed later than now: it goes another way."""
+        del self._presses[self._pressed :]
 
     def look(self, time: float, frame: Frame, contacts: Contacts) -> tuple[Action, ...]:
         """Let the rules see a state, and return what they do, with its time; once the game is over, nothing."""
@@ -62,7 +71,8 @@ class Referee:
         """Set a control now, and return what comes of it; whatever was pressed later is forgotten."""
         if self.rules.over is not None:
             return ()
-        self._presses[self._pressed :] = [Press(time, control, value)]
+        self.forget()
+        self._presses.append(Press(time, control, value))
         self._pressed += 1
         return _stamped(self.rules.control(control, value), time)
 

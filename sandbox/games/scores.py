@@ -1,5 +1,6 @@
 """Scores: how the scores of many games are spread."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """of games, whose scores are no more than the quantiles"""
 MOST_BINS = 10
+"""and one more, where bins do not begin at the least score"""
 
 
 @dataclass(frozen=True)
@@ -22,9 +24,9 @@ class Scores:
     quantiles: tuple[float, ...]
     """for each of `SHARES`"""
     edges: tuple[float, ...]
-    """of the histogram's bins, one more than there are bins"""
+    """of the histogram's bins, one more than there are bins; a bin holds its lower edge"""
     counts: tuple[int, ...]
-    """games in each bin; the last bin holds its upper edge too"""
+    """games in each bin"""
 
     @classmethod
     def of(cls, scores: Sequence[float]) -> "Scores":
@@ -36,8 +38,7 @@ class Scores:
         if not scores:
             raise ValueError("no game, no spread of scores")
         values = np.asarray(scores, dtype=np.float64)
-        bins = int(min(MOST_BINS, max(len(np.unique(values)), 1)))
-        counts, edges = np.histogram(values, bins)
+        counts, edges = np.histogram(values, _edges(float(values.min()), float(values.max())))
         return cls(
             count=len(values),
             mean=float(values.mean()),
@@ -56,3 +57,11 @@ class Scores:
             "quantiles": {f"{share:g}": value for share, value in zip(SHARES, self.quantiles, strict=True)},
             "histogram": {"edges": list(self.edges), "counts": list(self.counts)},
         }
+
+
+def _edges(least: float, most: float) -> list[float]:
+    """Return the edges of bins that are 1, 2 or 5 times a power of ten wide, of few digits, and hold all scores."""
+    width = 10.0 ** math.floor(math.log10(max(most - least, 1.0) / MOST_BINS))
+    width *= next(times for times in (1.0, 2.0, 5.0, 10.0) if most - least <= width * times * MOST_BINS)
+    first, last = math.floor(least / width), math.floor(most / width) + 1
+    return [width * k for k in range(first, last + 1)]

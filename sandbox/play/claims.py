@@ -10,6 +10,8 @@ from sandbox.play import cue_keys
 from sandbox.play.billiards.gestures import Gestures
 from sandbox.play.cue_keys import Deed
 from sandbox.play.hands import Hands
+from sandbox.play.hosting import control_keys
+from sandbox.play.hosting.host import Host
 from sandbox.play.running.live import Live
 from sandbox.scene.model import Scene, default_name
 
@@ -38,8 +40,8 @@ class Claims(NamedTuple):
         return None if again and (key not in ARROWS or key in self.releases) else self.deeds.get(key)
 
 
-def claims(scene: Scene, hands: Hands, gestures: Gestures | None = None) -> Claims:
-    """Return the keys that a scene claims, those of a table among them."""
+def claims(scene: Scene, hands: Hands, gestures: Gestures | None = None, host: Host | None = None) -> Claims:
+    """Return the keys that a scene claims, those of a table or of a game's controls among them."""
     deeds: dict[int, Deed] = {}
     told: list[tuple[str, str]] = []
     body, step, generator = scene.play.arrows, scene.play.arrow_step, scene.play.relaunch
@@ -51,13 +53,18 @@ def claims(scene: Scene, hands: Hands, gestures: Gestures | None = None) -> Clai
         deeds[pygame.K_SPACE] = partial(_relaunch, generator=generator)
         told.append(("Space", f"launch {generator} again"))
     releases: dict[int, Deed] = {}
+    played, played_out = ({}, {}) if host is None else control_keys.deeds(host)
     for k, thrust in enumerate(scene.thrusts):
-        if thrust.key is not None:
+        if thrust.key is not None and KEYS[thrust.key] not in played:  # else it is the rules' to fire
             name = thrust.name or default_name("thrust", k)
             key = KEYS[thrust.key]
             deeds[key] = partial(_throttle, thrust=name, level=1.0, also=deeds.get(key))
             releases[key] = partial(_throttle, thrust=name, level=0.0, also=releases.get(key))
             told.append((thrust.key.capitalize(), f"fire {name}"))
+    if host is not None:
+        deeds |= played
+        releases |= played_out
+        told += control_keys.told(host.controls)
     if gestures is not None:
         pressed, released = cue_keys.deeds(gestures)
         deeds |= pressed

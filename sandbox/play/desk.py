@@ -18,6 +18,7 @@ from sandbox.play.instruments.manual import Manual
 from sandbox.play.instruments.panel import Panel
 from sandbox.play.instruments.picker import Picker
 from sandbox.play.instruments.plates import plate
+from sandbox.play.instruments.score_panel import draw_score
 from sandbox.play.instruments.timeline import HEIGHT, Timeline
 from sandbox.play.instruments.tools import Tools
 from sandbox.play.knobs import Knobs
@@ -79,9 +80,9 @@ class Desk:
         """Return the keys that the scene claims."""
         if not isinstance(stage.show, Live):
             return Claims({}, (), {})
-        key = stage.gestures or stage.show.scene.play
+        key = stage.gestures or stage.host or stage.show.scene.play
         if self._claims is None or self._claims[0] is not key:
-            self._claims = key, claims(stage.show.scene, stage.hands, stage.gestures)
+            self._claims = key, claims(stage.show.scene, stage.hands, stage.gestures, stage.host)
         return self._claims[1]
 
     def claimed(self, stage: Stage) -> frozenset[int]:
@@ -162,14 +163,19 @@ class Desk:
             if show.contacts is not self._heard:
                 self._heard = show.contacts
                 self._sounds.hits(show.contacts, show.bodies)
+            for cue in stage.host.cues() if stage.host is not None else ():
+                self._sounds.cue(cue)
         if stage.game is None:
             self.tools.foot = 0
         status = self.status(stage, rate, recording)
         self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot + self.tools.foot)
+        words = f"{status.engine}  ·  {status.settings}"
         if stage.gestures is not None and not self.manual.open:
             free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
-            words = f"{status.engine}  ·  {status.settings}"
             self.tools.draw(surface, stage.gestures.person, free, hud_width(words, self.unit), self.unit)
+        elif stage.host is not None and not self.manual.open:
+            free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
+            draw_score(surface, stage.host.board(), free, hud_width(words, self.unit), self.unit)
         if show is not None:
             self._draw_graph(surface, stage)
             if self.foot:

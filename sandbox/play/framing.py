@@ -31,8 +31,10 @@ FAR = 20.0
 def framing(scene: Scene) -> Box:
     """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there.
 
-    Of a table that is the table.
+    Of a table that is the table; a scene may state its own.
     """
+    if scene.play.view is not None:
+        return scene.play.view
     if scene.play.area is not None:
         return outside(scene.play.area)
     bodies = scene.bodies

@@ -6,6 +6,7 @@ import numpy as np
 import pygame
 
 from sandbox.play.chime import RATE, chime, pitch_of
+from sandbox.play.hosting.jingle import jingle
 from sandbox.scene.bodies import Bodies
 from sandbox.trajectory import Contacts, FloatArray, IntArray
 
@@ -20,6 +21,8 @@ GRAVITY = 9.81
 SILENT, LOUDEST = 0.1, 4.0
 """Impulse over m·√(2·g·r), that of a body which falls its own radius: below the first nothing is heard, from the
 second on it is not louder. A body at rest passes on m·g·dt a step, 0.05 of it for half a metre at 1/60 s."""
+CUE = 0.7
+"""volume of a game's cues, beside which hits are still heard"""
 BUFFER = 512
 """Samples between picture and sound: 12 ms."""
 
@@ -34,7 +37,7 @@ class Sounds:
         """it failed"""
         self.enabled = False
         self._heard = Contacts.none()
-        self._sounds: dict[float, pygame.mixer.Sound] = {}
+        self._sounds: dict[float | str, pygame.mixer.Sound] = {}
         self._opened = False
 
     def enable(self) -> bool:
@@ -98,15 +101,27 @@ class Sounds:
             played.add(pitch)
         return len(played)
 
-    def _sound(self, pitch: float) -> pygame.mixer.Sound:
-        if pitch not in self._sounds:
+    def cue(self, name: str) -> bool:
+        """Play the figure of a cue of a game; tell whether it began."""
+        if not self.enabled or pygame.mixer.get_init() is None:
+            return False
+        channel = pygame.mixer.find_channel()
+        if channel is None:
+            return False
+        channel.play(self._sound(name))
+        channel.set_volume(CUE)
+        return True
+
+    def _sound(self, what: float | str) -> pygame.mixer.Sound:
+        """Return the chime of a pitch, Hz, or the figure of a cue by its name."""
+        if what not in self._sounds:
             rate, _, channels = pygame.mixer.get_init() or (RATE, -16, 2)
-            samples = chime(pitch)
+            samples = jingle(what) if isinstance(what, str) else chime(what)
             if rate != RATE:  # somebody else has opened the mixer
                 places = np.arange(0, len(samples), RATE / rate)
                 samples = np.interp(places, np.arange(len(samples)), samples).astype(np.int16)
-            self._sounds[pitch] = pygame.mixer.Sound(buffer=np.repeat(samples, channels).tobytes())
-        return self._sounds[pitch]
+            self._sounds[what] = pygame.mixer.Sound(buffer=np.repeat(samples, channels).tobytes())
+        return self._sounds[what]
 
 
 def loudness(contacts: Contacts, bodies: Bodies) -> tuple[FloatArray, FloatArray]:

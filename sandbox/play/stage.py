@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from sandbox.action import ActionError, SetParameter
-from sandbox.engines.contract import Refusal
-from sandbox.engines.registry import ENGINES, USUAL, able, engine_named, usual
+from sandbox.engines.registry import ENGINES, USUAL, engine_named, usual
 from sandbox.play.billiards.game import PLAYERS, Game, Players
 from sandbox.play.billiards.gestures import Gestures
-from sandbox.play.billiards.seats import Seats, laid
+from sandbox.play.billiards.seats import Seats
 from sandbox.play.hands import Hands
+from sandbox.play.hosting.host import Host, hosted
 from sandbox.play.instruments.knob import Value
 from sandbox.play.knobs import turned
 from sandbox.play.messages import Messages
+from sandbox.play.running.beginning import begun
 from sandbox.play.running.live import Live
-from sandbox.play.running.session import Session
 from sandbox.play.running.stored import Stored
 from sandbox.play.shelf import neighbour
 from sandbox.scene.document import to_document
@@ -47,6 +47,8 @@ class Stage:
         self.file: Scene | None = None
         """the scene as its file has it"""
         self._seats = Seats()
+        self.host: Host | None = None
+        """of the game with rules that is on"""
         self._paused = False
         self.hands = Hands()
         self.messages = Messages()
@@ -109,6 +111,7 @@ class Stage:
             again: makes it anew for a restart, where scene and settings are not all of it, as of a recording.
         """
         self._seats.leave()
+        self.host = hosted(show) if isinstance(show, Live) else None
         if self.show is not None:
             self.show.close()
         self.show, self.path, self.file = show, path, file
@@ -141,18 +144,10 @@ class Stage:
     def _start(
         self, scene: Scene, path: Path | None, file: Scene, engine: str, settings: Settings | None, same: bool
     ) -> bool:
-        scene = laid(scene)
-        try:
-            session = Session(scene, engine, settings)
-        except Refusal as refusal:
-            others = able(scene)
-            if not others:
-                self.messages.tell(str(refusal), "error")
-                return False
-            self.messages.tell(f"{refusal}; {others[0]} plays it", "warning")
-            session = Session(scene, others[0])
-        self.put_on(Live(session), path, file, same)
-        return True
+        live = begun(scene, engine, settings, self.messages)
+        if live is not None:
+            self.put_on(live, path, file, same)
+        return live is not None
 
     def restart(self) -> None:
         """Start the same scene at 0, with what was turned, and with the same engine."""
@@ -284,6 +279,9 @@ class Stage:
             for level, text in game.notes:
                 self.messages.tell(text, level)
             game.notes.clear()
+        doubt = self.host.doubt() if self.host is not None else None
+        if doubt is not None:
+            self.messages.tell(doubt, "warning")
         if isinstance(self.show, Live) and self.show.wants_pause:
             self.paused, self.show.wants_pause = True, False
         elif isinstance(self.show, Stored) and self.show.at_end:

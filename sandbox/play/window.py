@@ -16,7 +16,8 @@ import pygame
 from sandbox.engines.compiling import COMPILING
 from sandbox.play.commands import Commands
 from sandbox.play.cue_keys import Deed
-from sandbox.play.keys import Keyboard
+from sandbox.play.hosting.gamepad import Gamepads
+from sandbox.play.keys import Command, Keyboard
 from sandbox.play.mouse import Mouse
 from sandbox.play.screen import close_screen, open_screen, unit
 from sandbox.play.seat import TITLE, Seat
@@ -53,6 +54,8 @@ class Window(Seat):
         super().__init__(open_screen(size, TITLE), unit(), stage, folder or Path(), film, say)
         self._keyboard = Keyboard()
         self._held: dict[int, Deed] = {}  # claimed keys that are down, and what is done when they are let go
+        self._gamepads = Gamepads(self.tell)
+        self._gamepads.begin()
         self.mouse = Mouse(self)
         self.commands = Commands(self, self.mouse)
         self._clock = pygame.time.Clock()
@@ -102,6 +105,8 @@ class Window(Seat):
             self.leaving = 0
         elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
             self._resize()
+        for error in self._gamepads.take(event, self.stage.host, lambda: self.commands.do(Command.PAUSE)):
+            self.stage.messages.tell(str(error), "warning")
         command = self._keyboard.command(event, self.desk.claimed(self.stage))
         self._let_go(event)
         if self.desk.handle(event, self.stage):

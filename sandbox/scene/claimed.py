@@ -15,9 +15,10 @@ def claimed(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
     names = generator_names(scene)
     if relaunch is not None and relaunch not in names:
         yield ("play", "relaunch"), f"no generator is named {relaunch!r}; there are {_some(names)}"
-    area, spots = scene.play.area, [spot.name for spot in scene.play.spots]
-    if area is not None and not all(low < high for low, high in zip(*area, strict=True)):
-        yield ("play", "area"), "encloses nothing; give the lower left and then the upper right corner"
+    spots = [spot.name for spot in scene.play.spots]
+    for key, box in (("area", scene.play.area), ("view", scene.play.view)):
+        if box is not None and not all(low < high for low, high in zip(*box, strict=True)):
+            yield ("play", key), "encloses nothing; give the lower left and then the upper right corner"
     for k, name in enumerate(spots):
         if name in spots[:k]:
             yield ("play", "spot", k, "name"), f"a second spot is called {name!r}; names are unique"

@@ -123,6 +123,8 @@ class Play(Part):
     """whose rules are kept: of billiards, at a table in the window; of any other, also headless"""
     area: tuple[Point, Point] | None = None
     """lower left and upper right corner of a table's playing area, m"""
+    view: tuple[Point, Point] | None = None
+    """lower left and upper right corner of what the window shows at first, m; by default what the bodies may reach"""
     spots: tuple[Spot, ...] = Field((), alias="spot")
 
 

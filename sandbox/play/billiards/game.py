@@ -1,7 +1,7 @@
 """Game: who plays what at the table in the window, stroke by stroke."""
 
 import math
-from typing import Literal
+from typing import Literal, get_args
 
 from sandbox.action import ActionError, Strike
 from sandbox.games.billiards.match import Match
@@ -16,6 +16,7 @@ from sandbox.play.running.rest import at_rest
 from sandbox.scene.cue import Shot
 from sandbox.scene.model import Scene
 from sandbox.scene.part import Point
+from sandbox.scene.spots import TableGame
 
 Players = Literal["alone", "two", "bot"]
 PLAYERS: tuple[Players, ...] = ("alone", "two", "bot")
@@ -26,7 +27,7 @@ BOT = 1
 
 def plays(scene: Scene) -> bool:
     """Tell whether a scene is a table to play at: it names a game, or has a floor and a ball to strike."""
-    if scene.surface is None:
+    if scene.surface is None or scene.play.game not in (None, *get_args(TableGame)):
         return False
     return scene.play.game is not None or any(ball.name == "cue" for ball in scene.balls)
 

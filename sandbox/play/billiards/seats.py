@@ -1,6 +1,7 @@
 """Seats: who sits at the table that is on, if one is."""
 
 from collections.abc import Callable
+from typing import get_args
 
 from sandbox.games.billiards.layout import Layout
 from sandbox.games.billiards.rules.happening import GameError
@@ -9,11 +10,12 @@ from sandbox.play.billiards.gestures import Gestures
 from sandbox.play.billiards.person import Person
 from sandbox.play.running.live import Live
 from sandbox.scene.model import Scene
+from sandbox.scene.spots import TableGame
 
 
 def laid(scene: Scene) -> Scene:
     """Return a scene as it is played: of one that names a game the shots are the players'."""
-    return scene if scene.play.game is None else Layout.of(scene).scene
+    return Layout.of(scene).scene if scene.play.game in get_args(TableGame) else scene
 
 
 class Seats:

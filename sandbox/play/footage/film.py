@@ -158,7 +158,7 @@ class Film:
     @cached_property
     def box(self) -> Box:
         """What a picture of the whole run shows, m; what strays far from the rest does not count."""
-        if self.scene.play.area is not None:
+        if self.scene.play.area is not None or self.scene.play.view is not None:
             return framing(self.scene)
         return crowd(self.trajectory.position, self.bodies.radius, anchors_of(self.scene))
 

@@ -6,12 +6,14 @@ It knows nothing of what was seen before: that is the session's.
 from sandbox.action import Action, ActionError, Pull
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.relay import Relay
+from sandbox.games.referee import Referee
 from sandbox.play.running.history import Mark
-from sandbox.play.running.script import Script
+from sandbox.play.running.script import ROUNDING, Script
 from sandbox.recording import Recording
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
+from sandbox.trajectory import Contacts
 
 PATIENCE = 2.0
 """s that one step may take to compute, where an engine can tell."""
@@ -26,6 +28,8 @@ class Course:
         engine: str = "pymunk",
         settings: Settings | None = None,
         actions: tuple[Action, ...] = (),
+        game: Referee | None = None,
+        until: float = -1.0,
     ) -> None:
         """Start.
 
@@ -34,6 +38,8 @@ class Course:
             engine: its name.
             settings: by default the scene's own.
             actions: to be done on the way, in order of time.
+            game: one that has not yet begun, and what is to be pressed on the way.
+            until: up to when all that was done is known, that of the rules too, s: they look on till then.
 
         Raises:
             UnknownEngineError: no engine has that name.
@@ -46,7 +52,11 @@ class Course:
         self._script = Script(actions)
         self._redone: list[tuple[int, Action]] = []
         self._step = 0
-        self._take_over(Relay(*self._start))
+        self._first_game, self._until = game, until
+        self.game: Referee | None = None
+        """the game that is played, as it stands"""
+        self._heard: list[Contacts] = []  # what the game has been told of, since somebody else asked
+        self._begin(Relay(*self._start))
 
     @property
     def scene(self) -> Scene:
@@ -99,6 +109,7 @@ class Course:
             return False
         self._step += 1
         if self.ended is None:
+            self._judge()
             self._redo()
         return True
 
@@ -108,6 +119,36 @@ class Course:
             self._redone += [(self._step, action) for action in self._script.redo(self.relay)]
         except ActionError as error:
             self.ended = f"at {self.relay.time:g} s: {error}"
+
+    @property
+    def _known(self) -> bool:
+        """Whether what the rules do now was done before, and is in the script."""
+        return self.ahead or self.relay.time <= self._until + ROUNDING * self.relay.settings.dt
+
+    def _judge(self) -> None:
+        """Let the rules look, and do what they say; where that was done before, hold it against what was done."""
+        game, relay = self.game, self.relay
+        if game is None:
+            return
+        contacts = relay.contacts()
+        self._heard.append(contacts)
+        own, due = game.look(relay.time, relay.frame(), contacts), self._script.due(relay)
+        if self._known:
+            game.watch(relay.time, own, due)
+            return
+        try:
+            for action in own:
+                relay.apply(action)
+                self._script.add(action, relay)
+                self._redone.append((self._step, action))
+        except ActionError as error:
+            self.ended = f"at {relay.time:g} s: {error}"
+
+    def _contacts_since(self) -> Contacts:
+        """Return the contacts since the last call, also those that the game has been told of."""
+        heard, self._heard = self._heard, []
+        last = self.relay.contacts()
+        return Contacts.joined([*heard, last]).merged() if heard else last
 
     def redone(self) -> list[tuple[int, Action]]:
         """Return what was done again since the last call, each with the step after which it was."""
@@ -125,15 +166,31 @@ class Course:
         self.relay.close()
         self.ended, self._exhausted = None, False
         self._step, self._script.done = (mark.step, mark.actions) if mark is not None else (0, 0)
-        self._take_over(relay or Relay(*self._start))
+        if relay is None or mark is None:
+            self._begin(Relay(*self._start))
+        else:
+            self._take_over(relay, mark.game)
+            if self.game is not None:
+                self.game.watch_player(relay.time, self._script.due(relay))
+            self._redo()
         return mark is not None
 
-    def _take_over(self, relay: Relay) -> None:
+    def _begin(self, relay: Relay) -> None:
+        """Begin at the start."""
+        self._take_over(relay, self._first_game)
+        self._judge()
+        self._redo()
+
+    def _take_over(self, relay: Relay, game: Referee | None) -> None:
+        """Go on with a relay, and with a copy of a game; what was pressed later than now stays known."""
         self.relay = relay
         """what runs"""
         relay.patience = PATIENCE
         relay.contacts()
-        self._redo()
+        self._heard.clear()
+        before, self.game = self.game, None if game is None else game.copy()
+        if self.game is not None and before is not None:
+            self.game.expect(before.all_presses)
 
     def recording(self) -> Recording:
         """Return all up to now, to be replayed."""
@@ -146,6 +203,8 @@ class Course:
             actions=self.actions + tuple(Pull(time=self.relay.time, body=name) for name in self.relay.pulls),
             duration=self.relay.time,
             state_hash=None if self._exhausted else self.relay.state_hash(),
+            presses=() if self.game is None else self.game.presses,
+            score=None if self.game is None else self.game.rules.score,
         )
 
     def close(self) -> None:

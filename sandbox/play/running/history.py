@@ -4,6 +4,7 @@ from bisect import bisect_left, bisect_right, insort
 from typing import NamedTuple
 
 from sandbox.engines.checkpoint import Checkpoint
+from sandbox.games.referee import Referee
 from sandbox.trajectory import Frame
 
 BUDGET = 256 * 2**20
@@ -22,6 +23,8 @@ class Mark(NamedTuple):
     step: int
     actions: int
     point: Checkpoint
+    game: Referee | None = None
+    """as it stood then"""
 
 
 class History:

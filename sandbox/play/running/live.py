@@ -158,6 +158,17 @@ class Live:
         self.company.did(done)
         self._hear()
 
+    def press(self, control: str, value: float) -> None:
+        """Set a control of the game now.
+
+        Raises:
+            ActionError: it cannot be done. Then it was not pressed.
+        """
+        self._check_there()
+        for action in self.session.press(control, value):
+            self.company.did(action)
+        self._hear()
+
     def _hear(self) -> None:
         self._contacts = self.session.contacts()
         self.on_contacts(self._contacts)

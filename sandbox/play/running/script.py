@@ -30,20 +30,28 @@ class Script:
         del self._actions[place:]
         self.done = min(self.done, place)
 
+    def due(self, relay: Relay) -> list[Action]:
+        """Return what was done at this time, and has not yet been done again."""
+        due = relay.time + ROUNDING * relay.settings.dt
+        end = self.done
+        while end < len(self._actions) and self._actions[end].time <= due:
+            end += 1
+        return self._actions[self.done : end]
+
     def redo(self, relay: Relay) -> list[Action]:
         """Do what was done at this time, and return it.
 
         Raises:
             ActionError: the engine cannot do it, as may be with a recording of another.
         """
-        due, begin = relay.time + ROUNDING * relay.settings.dt, self.done
-        while self.done < len(self._actions) and self._actions[self.done].time <= due:
-            relay.apply(self._actions[self.done])
+        due = self.due(relay)
+        for action in due:
+            relay.apply(action)
             self.done += 1
-        return self._actions[begin : self.done]
+        return due
 
-    def add(self, action: Action, relay: Relay) -> None:
-        """Take note of what has just been done; what lay ahead is forgotten.
+    def add(self, action: Action | None, relay: Relay) -> None:
+        """Take note of what has just been done, if anything; what lay ahead is forgotten.
 
         Who was to be let go of later is let go of now, unless the action says more of it.
         """
@@ -51,10 +59,11 @@ class Script:
         for each in ahead:
             goes_on = isinstance(action, Pull) and isinstance(each, Pull) and action.body == each.body
             if isinstance(each, Pull) and each.target is None and not goes_on:
-                release = each.model_copy(update={"time": action.time})
+                release = each.model_copy(update={"time": relay.time})
                 relay.apply(release)
                 self._actions.append(release)
-        self._actions.append(action)
+        if action is not None:
+            self._actions.append(action)
         self.done = len(self._actions)
 
     def hand_over(self, place: int, time: float) -> bool:
@@ -64,9 +73,13 @@ class Script:
             place: how many actions had been done there.
             time: when that was, s.
         """
-        handed_over = Switch(time=time)
-        if self._actions[:place][-1:] == [handed_over]:
-            return False
-        self._actions.insert(place, handed_over)
-        self.done += 1
-        return True
+        known = len(self._actions)
+        self._actions = [*handed_over(tuple(self._actions), place, time)]
+        self.done += len(self._actions) - known
+        return len(self._actions) > known
+
+
+def handed_over(actions: tuple[Action, ...], place: int, time: float) -> tuple[Action, ...]:
+    """Return actions with the taking up of a checkpoint at a place and a time, s, where it is not there yet."""
+    switch = Switch(time=time)
+    return actions if actions[:place][-1:] == (switch,) else (*actions[:place], switch, *actions[place:])

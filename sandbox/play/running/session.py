@@ -10,14 +10,18 @@ up part of the session, as a switch that changes nothing: who replays the sessio
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
 from sandbox.action import Action, ActionError
+from sandbox.games.referee import Referee
 from sandbox.play.running.course import Course
 from sandbox.play.running.history import History, Mark
 from sandbox.play.running.rest import at_rest
+from sandbox.play.running.script import handed_over
+from sandbox.recording import Recording
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -49,9 +53,12 @@ class Session(Course):
         engine: str = "pymunk",
         settings: Settings | None = None,
         actions: tuple[Action, ...] = (),
+        game: Referee | None = None,
+        until: float = -1.0,
     ) -> None:
         """Start; as `Course`."""
-        super().__init__(scene, engine, settings, actions)
+        self.history = History()
+        super().__init__(scene, engine, settings, actions, game, until)
         self._calm = 0
         self._mark: Mark | None = None  # that the relay was taken up from, as long as all that followed was known
         self._unsure: list[
@@ -61,9 +68,13 @@ class Session(Course):
         self._contacts: list[Contacts] = []
         self._everyone = self.bodies
         self._breaks = np.full(len(self.scene.links), np.inf)
-        self.history = History()
         self._previous = self._frame = self.relay.frame()
         self.history.keep(0, self._frame)
+
+    @property
+    def _known(self) -> bool:
+        seen = self.history.known(0) is not None and self._step <= self.history.furthest
+        return seen or super()._known
 
     def bodies_in(self, frame: Frame) -> Bodies:
         """Return the bodies by number, with those of a state that was seen; it may lie ahead and have more."""
@@ -125,7 +136,7 @@ class Session(Course):
         if len(self.bodies) >= len(self._everyone):
             self._everyone = self.bodies
         self._note_breaks()
-        self._contacts.append(self.relay.contacts())
+        self._contacts.append(self._contacts_since())
         del self._contacts[:-64]  # nobody asks
         if len(self._contacts[-1]):
             self._calm = 0
@@ -141,7 +152,11 @@ class Session(Course):
         if self.scene.surface is not None and not at_rest(self._frame):
             calm = False  # a state in mid-roll does not tell when the roll began: the way on differs by roundings
         if calm and self.ended is None and self.history.wants_mark(self._step):
-            self.history.mark(Mark(self._step, self._script.done, self.relay.checkpoint()))
+            self.history.mark(self._mark_here())
+
+    def _mark_here(self) -> Mark:
+        game = None if self.game is None else self.game.copy()
+        return Mark(self._step, self._script.done, self.relay.checkpoint(), game)
 
     def _note_breaks(self) -> None:
         """Learn when joints broke. Those that broke later than now are kept: the same way leads there again."""
@@ -169,6 +184,13 @@ class Session(Course):
         if mark is not None and self._script.hand_over(mark.actions, mark.point.frame.time):
             self.history.inserted(mark.step)
 
+    def recording(self) -> Recording:
+        """Return all up to now, to be replayed; a state that only a way from a checkpoint has led to, by that way."""
+        recording, mark = super().recording(), self._mark
+        if mark is None or not self._unsure:
+            return recording
+        return replace(recording, actions=handed_over(recording.actions, mark.actions, mark.point.frame.time))
+
     def contacts(self) -> Contacts:
         """Return the contacts that were open since the last call."""
         parts, self._contacts = self._contacts, []
@@ -187,8 +209,47 @@ class Session(Course):
             raise ActionError("the scene has ended here; go back, or restart")
         timed = action.model_copy(update={"time": self.relay.time})
         self.relay.apply(timed)
+        self._go_another_way(timed)
+        if self.game is not None:
+            self.game.forget()
+            self.game.saw([timed])
+        return timed
+
+    def press(self, control: str, value: float) -> tuple[Action, ...]:
+        """Set a control of the game now, and do what comes of it; what came later is forgotten.
+
+        Returns:
+            What came of it.
+
+        Raises:
+            ActionError: it cannot be done. Then it was not pressed.
+        """
+        if self.game is None or self.game.rules.over is not None:
+            return ()
+        if self.ended is not None:
+            raise ActionError("the scene has ended here; go back, or restart")
+        before, done = self.game.copy(), 0
+        actions = self.game.press(self.relay.time, control, value)
+        try:
+            for action in actions:
+                self.relay.apply(action)
+                self._go_another_way(action)
+                done += 1
+        except ActionError:
+            self.game = before
+            self.game.forget()
+            raise
+        finally:
+            self.game.saw(actions[:done])
+        if not actions:
+            self._go_another_way(None)
+        return actions
+
+    def _go_another_way(self, action: Action | None) -> None:
+        """Take note of what has just been done, if anything: what came later is forgotten."""
         self._own_up()
-        self._script.add(timed, self.relay)
+        self._script.add(action, self.relay)
+        self._until = min(self._until, self.relay.time)
         self.history.cut(self._step - 1)
         self._everyone = self.bodies
         self._breaks = np.full(len(self._breaks), np.inf)
@@ -196,7 +257,6 @@ class Session(Course):
         self._frame = self._previous = self.relay.frame()
         self.history.keep(self._step, self._frame)
         self._calm = 0
-        return timed
 
     def retract(self, place: int) -> int:
         """Take back what was done from the place-th action on, and forget what came of it.

@@ -1,0 +1,1 @@
+"""hosting: games with rules of their own in the window: keys, gamepads, scores, sounds."""

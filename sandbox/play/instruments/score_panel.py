@@ -1,0 +1,94 @@
+"""Score panel: how a game with rules stands, as a row of labelled figures, and how it ended."""
+
+import pygame
+
+from sandbox.play.drawing.palette import FAINT, GREEN, INK, LINE, WARNING
+from sandbox.play.drawing.text import measure, write
+from sandbox.play.hosting.host import Board
+from sandbox.play.instruments.icons import draw_disc
+from sandbox.play.instruments.plates import plate, shortened, wrapped
+
+RIGHT = 66.0
+"""px at unit 1 beside it, for how many pictures a second there are"""
+NARROWEST = 300.0
+LETTERS = 14.0
+MOST_LINES = 8
+
+
+def draw_score(surface: pygame.Surface, board: Board, free: pygame.Rect, left: int, unit: float) -> pygame.Rect:
+    """Draw it at the top of what is free, or where that is too narrow, at the bottom; return what it covers.
+
+    Args:
+        surface: the picture.
+        board: what is shown.
+        free: px, what it may cover.
+        left: px, what else covers the top.
+        unit: px of a pixel at 1080 lines.
+    """
+    scale = unit * min(1.0, free.width / (520.0 * unit), free.height / (360.0 * unit))
+    size, margin = LETTERS * scale, round(10 * scale)
+    pad, gap = round(0.7 * size), round(1.1 * size)
+    right = free.right - round(RIGHT * unit)
+    above = right - left >= NARROWEST * unit
+    if not above:
+        left, right = free.left + margin, free.right - margin
+    rows = _rows(board, right - left - 2 * pad, size, gap)
+    end = wrapped(_told(board), size, right - left - 2 * pad - 1.3 * size, 2) if board.over is not None else ()
+    wide = max(max(sum(cells) + gap * (len(cells) - 1) for _, cells in rows), *(_wide(line, size) for line in end), 0)
+    tall = round(2.75 * size)
+    rect = pygame.Rect(0, 0, wide + 2 * pad, tall * len(rows) + round(1.5 * size) * len(end) + round(0.9 * size))
+    rect.midtop = (left + right) // 2, free.top + margin
+    if not above:
+        rect.bottomleft = left, free.bottom - margin
+    plate(surface, rect, 8 * scale)
+    y = rect.top + round(0.45 * size)
+    for cells, widths in rows:
+        _draw_cells(surface, cells, widths, (rect.left + pad, y), size, gap)
+        y += tall
+    for k, line in enumerate(end):
+        middle = y + (k + 0.5) * 1.5 * size
+        if k == 0:
+            draw_disc(surface, (rect.left + pad + 0.4 * size, middle), 0.3 * size, WARNING)
+        write(surface, line, (rect.left + pad + 1.2 * size, middle), size, INK, "midleft", bold=k == 0)
+    return rect
+
+
+Cell = tuple[str, str]
+
+
+def _rows(board: Board, room: float, size: float, gap: int) -> list[tuple[list[Cell], list[int]]]:
+    """Return the cells in rows that fit, each with their widths, px; the score comes first."""
+    cells = [("score", board.score), *board.lines[:MOST_LINES]]
+    rows: list[tuple[list[Cell], list[int]]] = [([], [])]
+    for label, text in cells:
+        text = shortened(text, 1.25 * size, room, mono=True)
+        wide = max(measure(label, 0.82 * size)[0], measure(text, 1.25 * size, mono=True)[0])
+        wide += -wide % round(1.5 * size)  # figures that change their length do not make all others jump
+        if rows[-1][1] and sum(rows[-1][1]) + gap * len(rows[-1][1]) + wide > room:
+            rows.append(([], []))
+        rows[-1][0].append((label, text))
+        rows[-1][1].append(wide)
+    return rows
+
+
+def _draw_cells(
+    surface: pygame.Surface, cells: list[Cell], widths: list[int], at: tuple[int, float], size: float, gap: int
+) -> None:
+    x, y = at
+    for k, ((label, text), wide) in enumerate(zip(cells, widths, strict=True)):
+        write(surface, label, (x, y + 0.55 * size), 0.82 * size, FAINT, "midleft")
+        warns = text.endswith("!")
+        colour = WARNING if warns else GREEN if label == "score" else INK
+        write(surface, text, (x, y + 1.75 * size), 1.25 * size, colour, "midleft", bold=label == "score", mono=True)
+        x += wide + gap
+        if k < len(cells) - 1:
+            line = x - gap // 2
+            pygame.draw.line(surface, LINE, (line, y + 0.2 * size), (line, y + 2.35 * size))
+
+
+def _told(board: Board) -> str:
+    return f"{board.over}  ·  R starts again"
+
+
+def _wide(line: str, size: float) -> int:
+    return measure(line, size, bold=True)[0] + round(1.3 * size)

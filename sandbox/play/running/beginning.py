@@ -1,0 +1,33 @@
+"""Beginning: a scene becomes a session that is watched, on the engine that is wished for or one that can."""
+
+from sandbox.engines.contract import Refusal
+from sandbox.engines.registry import able
+from sandbox.play.billiards.seats import laid
+from sandbox.play.hosting.host import refereed
+from sandbox.play.messages import Messages
+from sandbox.play.running.live import Live
+from sandbox.play.running.session import Session
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+
+def begun(scene: Scene, engine: str, settings: Settings | None, messages: Messages) -> Live | None:
+    """Begin a session of a scene, with its game where it has one; None where no engine can, which is told.
+
+    Args:
+        scene: as its file has it.
+        engine: the wish; where it cannot, one that can takes its place, and that is told.
+        settings: by default the scene's own.
+        messages: told of what is not as wished.
+    """
+    scene = laid(scene)
+    game = refereed(scene, messages)
+    try:
+        return Live(Session(scene, engine, settings, game=game))
+    except Refusal as refusal:
+        others = able(scene)
+        if not others:
+            messages.tell(str(refusal), "error")
+            return None
+        messages.tell(f"{refusal}; {others[0]} plays it", "warning")
+        return Live(Session(scene, others[0], game=game))

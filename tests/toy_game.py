@@ -1,0 +1,90 @@
+"""A toy game for tests of hosts: it draws chances, acts by itself, spawns, remembers presses, and ends."""
+
+import math
+import random
+from collections.abc import Sequence
+
+from sandbox.action import Action, Impulse, Spawn
+from sandbox.games.referee import Referee
+from sandbox.games.rules import Control, Seen
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.file import loads
+from sandbox.scene.model import Ball, Scene
+
+TOY = """
+title = "Toy"
+[play]
+game = "landing"   # whose rules tests put in the place of the real ones
+[world]
+gravity = [0.0, -9.81]
+duration = 2.0
+seed = 7
+[solver]
+dt = 0.01
+[[plane]]
+name = "floor"
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+restitution = 0.8
+[[ball]]
+name = "a"
+position = [0.0, 1.0]
+radius = 0.2
+restitution = 0.9
+"""
+
+
+class Toy:
+    """A point a bounce, and what presses add; each bounce kicks the ball aside by chance, every third spawns one."""
+
+    controls = (
+        Control("kick", "up", ("up",), "a"),
+        Control("aim", "how far kicks go", ("left",), "-leftx", analogue=True),
+    )
+
+    def __init__(self, scene: Scene, bodies: Bodies) -> None:
+        assert bodies.names[0] == "a"
+        self._chance = random.Random(scene.world.seed)  # copied with all else, unlike a module's
+        self.score = 0.0
+        self.over: str | None = None
+        self._aim, self._bounces, self._last = 0.5, 0, -1.0
+        self._cues: list[str] = []
+        self.ends_at = math.inf
+
+    def control(self, name: str, value: float) -> Sequence[Action]:
+        if name == "aim":  # nothing comes of it now, but of the next kick
+            self._aim = value
+            return ()
+        return (Impulse(time=99.0, body="a", impulse=(0.0, 3.0 * self._aim)),) if value else ()
+
+    def look(self, seen: Seen) -> Sequence[Action]:
+        self.score += sum(0.5 for action in seen.actions if isinstance(action, Impulse))
+        if self.score >= self.ends_at:
+            self.over = "enough"
+        acts: list[Action] = []
+        if seen.time == 0.0:
+            acts.append(Impulse(time=0.0, body="a", impulse=(self._chance.uniform(-0.1, 0.1), 0.0)))
+        for contact in seen.contacts:
+            if contact.pair == (0, -1) and contact.time > self._last:
+                self._last, self._bounces = contact.time, self._bounces + 1
+                self.score += 1
+                self._cues.append("bounce")
+                acts.append(Impulse(time=0.0, body="a", impulse=(self._chance.uniform(-0.1, 0.1), 0.0)))
+                if self._bounces % 3 == 0:
+                    acts.append(Spawn(time=0.0, ball=Ball(position=(5.0 + self._bounces, 3.0), radius=0.1)))
+        return acts
+
+    def lines(self) -> Sequence[tuple[str, str]]:
+        return (("bounces", str(self._bounces)), ("aim", f"{self._aim:.2f}"))
+
+    def cues(self) -> Sequence[str]:
+        cues, self._cues = self._cues, []
+        return cues
+
+
+def toy_scene(**world: float) -> Scene:
+    return loads(TOY, overrides=[(f"world.{key}", value) for key, value in world.items()])
+
+
+def toy_game(scene: Scene) -> Referee:
+    return Referee(Toy(scene, scene.bodies))
