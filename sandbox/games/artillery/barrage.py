@@ -32,6 +32,8 @@ class Barrage:
         self.shells: list[Shell] = []
         self.shots: list[Shot] = []
         """that have come down, or left, in the whole game"""
+        self.ways: dict[str, list[tuple[float, float]]] = {}
+        """m, where each shell of the last shot has been"""
         self._fired = 0
 
     def fire(self, time: float, world: World, tank: Tank, weapon: Weapon, speed: float) -> list[Action]:
@@ -40,6 +42,8 @@ class Barrage:
         place = field.tanks.muzzle(tank, np.array([tank.angle]))[0]
         velocity = speed * np.array([math.cos(tank.angle), math.sin(tank.angle)])
         field.cues.append("fire")
+        field.blasts.clear()
+        self.ways.clear()
         action = self._shell(time, tank, weapon, place, velocity)
         exact = landing(world, place, velocity, field.ground, self._edges, field.tanks.discs)
         self.shells[-1].exact = exact
@@ -73,6 +77,8 @@ class Barrage:
                 actions += self._roll(shell, seen.time)
             else:
                 actions += self._fly(shell, before, seen.time, passed)
+            x, y = shell.place.tolist()
+            self.ways[shell.name].append((x, y))
         return actions
 
     def _fly(self, shell: Shell, before: tuple[FloatArray, FloatArray], time: float, passed: float) -> list[Action]:
@@ -102,6 +108,7 @@ class Barrage:
     ) -> list[Action]:
         """Let a shell go off where it came down at a share of the last step, or begin to roll there."""
         x, y = step.at(share).tolist()
+        shell.place = np.array([x, y])
         self._tell(shell, (x, y), time - (1.0 - share) * passed)
         if shell.weapon.kind != "roller" or struck is not None:
             return self._go_off(shell, (x, y), time)
@@ -170,6 +177,7 @@ class Barrage:
         shell.rolling = time if rolls else None
         self.shells.append(shell)
         (x, y), (vx, vy) = place.tolist(), velocity.tolist()
+        self.ways[shell.name] = [(x, y)]
         ball = Ball(
             name=shell.name,
             position=(x, y),

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,18 @@ LIFT = 0.01
 """m above the ground: who was under it is put there"""
 
 
+class Blast(NamedTuple):
+    """Where and when a shell went off, for who draws it."""
+
+    time: float
+    """s"""
+    place: Point
+    """m"""
+    radius: float
+    """m"""
+    dirt: bool
+
+
 class Field:
     """A ground with tanks on it."""
 
@@ -44,6 +57,8 @@ class Field:
         self.tanks = Tanks(scene.artillery, bodies.names)
         self.falling: list[tuple[float, tuple[Loose, ...]]] = []
         """(s, dirt): since when it falls"""
+        self.blasts: list[Blast] = []
+        """of this turn"""
         self.cues: list[str] = []
         """names of sounds"""
         self._pull = math.hypot(*scene.world.gravity)
@@ -55,6 +70,7 @@ class Field:
         dirt = weapon.kind == "dirt"
         change = (self.ground.with_heap if dirt else self.ground.without)(place, weapon.radius)
         self.cues.append("dirt" if dirt else "blast")
+        self.blasts.append(Blast(time, place, weapon.radius, dirt))
         actions = self._changed(time, change)
         hurt = self.tanks.blast(shooter, place, weapon)
         return actions + self._out(time, [tank for tank, _ in hurt if not tank.alive])

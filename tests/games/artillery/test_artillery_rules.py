@@ -1,11 +1,13 @@
 """Games of artillery: turns, weapons, damage and the end; on the engines, recorded, and seen again."""
 
 import copy
+import json
 import math
 
 import numpy as np
 import pytest
 
+from sandbox.action import Action, actions_from_json
 from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.rules import ArtilleryRules
 from sandbox.games.artillery.tanks import PER_KILL
@@ -76,21 +78,13 @@ def test_bots_fight_to_the_end_and_the_recording_ends_alike(engine: str) -> None
     assert len(shots) >= 2
     assert {shot.shooter for shot in shots} == {"Red", "Blue"}
 
-    recording = Recording(
-        scene, engine, scene.solver, tuple(bout_actions(made)), made.time[-1], made.info["state_hash"], bout.presses
-    )
+    actions = actions_from_json(json.dumps(made.info["actions"]))
+    end = made.time[-1], made.info["state_hash"]
+    recording = Recording(scene, engine, scene.solver, actions, *end, bout.presses)
     again = rerun(Recording.from_json(recording.to_json()))
     assert again.info["state_hash"] == made.info["state_hash"]
     assert again.info["game"]["score"] == rules.score == made.info["game"]["score"]
     assert again.info["game"]["otherwise"] is None
-
-
-def bout_actions(made: Trajectory) -> list[object]:
-    from sandbox.action import _ACTIONS
-
-    import json
-
-    return list(_ACTIONS.validate_json(json.dumps(made.info["actions"])))
 
 
 def test_a_perfect_gunner_hits_with_its_first_shot() -> None:
@@ -161,40 +155,26 @@ def test_dirt_lifts_who_stands_under_it() -> None:
     assert red.health == 100.0
 
 
-def test_tanks_fall_with_their_ground_and_are_hurt() -> None:
-    scene = loads(TEXT)
-    field = Field(scene, scene.bodies)
-    rules, made, _ = played(scene, taps(*["weapon"], "left", "fire"))
-    assert field.tanks.every[0].number == 0
-    red = rules.field.tanks.every[0]
-    assert red.money == 1000 - WEAPONS[1].cost + 5 * rules_points(rules)
-
-
-def rules_points(rules: ArtilleryRules) -> int:
-    """Health that Red took from others, as points without those for a last hit."""
-    red, blue = rules.field.tanks.every
-    return red.points - (0 if blue.alive else PER_KILL)
+def test_money_is_paid_and_earned() -> None:
+    red, blue = played(loads(TEXT), taps("weapon", "fire"))[0].field.tanks.every
+    taken = red.points - (0 if blue.alive else PER_KILL)
+    assert red.money == 1000 - WEAPONS[1].cost + 5 * max(taken, 0)
 
 
 def test_a_pit_under_a_tank_costs_health_by_its_depth() -> None:
     scene = loads(TEXT, overrides=["artillery.wind=0"])
-    rules = rules_of(scene)
-    assert isinstance(rules, ArtilleryRules)
-    red, blue = rules.field.tanks.every
-    shot = Script(taps("fire"))
-    rules.barrage  # noqa: B018
     x, y = scene.bodies.position[1].tolist()
     pit = Weapon("pit", "shell", 8.0, 0.0, 0)
 
     class Digs(ArtilleryRules):
         """Fires nothing, but takes the ground from under Blue."""
 
-        def _fire(self) -> list:  # type: ignore[type-arg]
+        def _fire(self) -> list[Action]:
             self.phase = "fly"
             return self.field.blast(self._time, self.shooter, (x, y - 0.75), pit)
 
     digs = Digs(scene, scene.bodies)
-    made = run(scene, bout=Bout(digs, shot, "script"))
+    made = run(scene, bout=Bout(digs, Script(taps("fire")), "script"))
     assert made.status == "ok"
     blue = digs.field.tanks.every[1]
     fallen = y - float(made.position[-1, 1, 1])
@@ -204,7 +184,7 @@ def test_a_pit_under_a_tank_costs_health_by_its_depth() -> None:
 
 
 def test_a_cluster_comes_apart_and_keeps_its_momentum() -> None:
-    rules, made, _ = played(loads(TEXT), taps("weapon", "weapon", "fire"))
+    made = played(loads(TEXT), taps("weapon", "weapon", "fire"))[1]
     spawned = [action["ball"] for action in made.info["actions"] if action["kind"] == "spawn"]
     assert len(spawned) == 6
     names = [ball["name"] for ball in spawned]
@@ -219,7 +199,7 @@ def test_a_cluster_comes_apart_and_keeps_its_momentum() -> None:
 
 
 def test_a_roller_rolls_before_it_goes_off() -> None:
-    rules, made, _ = played(loads(TEXT), taps("weapon", "weapon", "weapon", "fire"))
+    made = played(loads(TEXT), taps("weapon", "weapon", "weapon", "fire"))[1]
     kinds = [action["kind"] for action in made.info["actions"]]
     assert kinds.count("spawn") == 2
     assert kinds.count("reshape") == 1
@@ -269,7 +249,7 @@ def test_lines_and_cues_tell_what_goes_on() -> None:
     assert set(lines) >= {"Red", "> Blue", "wind", "gun", "weapon", "last shot"}
     assert "exactly" in lines["last shot"] or "gone" in lines["last shot"]
     cues = rules.cues()
-    assert ["turn", "fire"] == list(cues)[:2]
+    assert list(cues)[:2] == ["turn", "fire"]
     assert "blast" in cues
     assert rules.cues() == []
 
