@@ -113,8 +113,8 @@ class ArtilleryRules:
         told = []
         for tank in self.field.tanks.every:
             mark = "> " if tank is self.shooter and self._over is None else ""
-            state = f"{tank.health:.0f} %, {tank.points} points, {tank.money} $"
-            told.append((f"{mark}{tank.name}", state if tank.alive else f"out, {tank.points} points"))
+            state = f"{tank.health:.0f} %, {tank.points} pt, {tank.money} $"
+            told.append((f"{mark}{tank.name}", state if tank.alive else f"out, {tank.points} pt"))
         wind = self.world.wind[0]
         side = "to the right" if wind > 0 else "to the left"
         told.append(("wind", f"{abs(wind):.1f} m/s {side}" if wind else "none"))

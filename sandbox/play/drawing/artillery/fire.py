@@ -107,10 +107,10 @@ def _landed(view: View, landed: tuple[tuple[float, float], tuple[float, float]])
 
 
 def _wind(view: View, wind: float) -> None:
-    """Draw which way the wind blows, and how hard, at the top of the picture."""
+    """Draw which way the wind blows, and how hard, at the left, below what is told of the run."""
     size = 13.0 * view.unit
-    middle, top = 0.5 * view.surface.get_width(), 64.0 * view.unit
-    half = max(7.0 * abs(wind), 6.0) * view.unit
+    middle, top = 96.0 * view.unit, 150.0 * view.unit
+    half = min(max(7.0 * abs(wind), 8.0), 84.0) * view.unit
     told = f"wind {abs(wind):.1f} m/s" if wind else "no wind"
     write(view.surface, told, (middle + 1, top + 9 * view.unit + 1), size, BACKGROUND, "midtop", bold=True)
     write(view.surface, told, (middle, top + 9 * view.unit), size, INK, "midtop", bold=True)

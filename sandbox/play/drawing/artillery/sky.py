@@ -9,20 +9,23 @@ import pygame
 
 from sandbox.play.drawing.palette import Colour, mixed
 from sandbox.scene.artillery.landscape import displaced
+from sandbox.trajectory import FloatArray
 
 TONES: tuple[tuple[float, Colour], ...] = (
     (0.0, (13, 17, 34)),
-    (0.45, (34, 44, 82)),
-    (0.72, (92, 84, 122)),
-    (0.88, (186, 124, 116)),
-    (1.0, (232, 172, 122)),
+    (0.30, (34, 42, 80)),
+    (0.48, (92, 80, 120)),
+    (0.60, (182, 118, 116)),
+    (0.70, (232, 168, 122)),
+    (1.0, (240, 186, 140)),
 )
 """Shares of the way down the picture, and colours there."""
 RIDGES: tuple[tuple[float, float, Colour], ...] = (
-    (0.60, 0.20, (66, 66, 106)),
-    (0.74, 0.16, (48, 52, 88)),
+    (0.56, 0.22, (84, 74, 112)),
+    (0.72, 0.18, (58, 56, 92)),
 )
 """How far down the picture ridges stand, how far they reach up and down, and their colours; the nearest last."""
+MIST: Colour = (176, 128, 122)
 STARS = 140
 
 
@@ -42,12 +45,8 @@ def sky(size: tuple[int, int]) -> pygame.Surface:
     for k, (level, reach, colour) in enumerate(RIDGES):
         line = displaced(96, 0.5, k + 3)
         line = (line - line.mean()) / max(float(np.abs(line - line.mean()).max()), 1e-9)
-        tops = (level - 0.5 * reach * line) * height
-        corners = [(width * n / 95.0, top) for n, top in enumerate(tops.tolist())]
-        corners = [*corners, (float(width), float(height)), (0.0, float(height))]
-        pygame.draw.polygon(whole, colour, corners)
-        pygame.draw.aalines(whole, mixed(colour, TONES[-1][1], 0.25), False, corners[:-2])
-        _haze(whole, round(level * height), colour, k)
+        tops = np.interp(np.linspace(0.0, 95.0, width), np.arange(96), (level - 0.5 * reach * line) * height)
+        _ridge(whole, tops, colour)
     return whole
 
 
@@ -59,20 +58,11 @@ def tone(share: float) -> Colour:
     return TONES[-1][1]
 
 
-def _haze(surface: pygame.Surface, top: int, colour: Colour, k: int) -> None:
-    """Let the foot of a ridge go into mist."""
-    width, height = surface.get_size()
-    mist = mixed(colour, TONES[-1][1], 0.30 - 0.12 * k)
-    veil = pygame.Surface((1, max(height - top, 1)), pygame.SRCALPHA)
-    for y in range(veil.get_height()):
-        veil.set_at((0, y), (*mist, round(150.0 * (1.0 - math.exp(-2.5 * y / veil.get_height())))))
-    layer = pygame.Surface((width, veil.get_height()), pygame.SRCALPHA)
-    line = displaced(96, 0.5, k + 3)
-    line = (line - line.mean()) / max(float(np.abs(line - line.mean()).max()), 1e-9)
-    tops = (RIDGES[k][0] - 0.5 * RIDGES[k][1] * line) * height - top
-    corners = [(width * n / 95.0, max(at, 0.0)) for n, at in enumerate(tops.tolist())]
-    layer.blit(pygame.transform.scale(veil, layer.get_size()), (0, 0))
-    mask = pygame.Surface(layer.get_size(), pygame.SRCALPHA)
-    pygame.draw.polygon(mask, (255, 255, 255, 255), [*corners, (width, layer.get_height()), (0, layer.get_height())])
-    layer.blit(mask, (0, 0), special_flags=pygame.BLEND_RGBA_MIN)
-    surface.blit(layer, (0, top))
+def _ridge(surface: pygame.Surface, tops: FloatArray, colour: Colour) -> None:
+    """Draw a ridge, whose foot is lost in mist, a column of pixels at a time."""
+    height = surface.get_height()
+    strip = pygame.Surface((1, height), 0, surface)
+    for y in range(height):
+        strip.set_at((0, y), mixed(colour, MIST, 0.75 * (1.0 - math.exp(-3.0 * y / height))))
+    surface.blits([(strip, (x, top)) for x, top in enumerate(np.floor(tops).astype(int).tolist())], doreturn=False)
+    pygame.draw.aalines(surface, mixed(colour, MIST, 0.3), False, list(enumerate(tops.tolist())))
