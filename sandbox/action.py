@@ -153,6 +153,14 @@ class Reshape(Timed):
     """m, in place of those that it had"""
 
 
+class Toggle(Timed):
+    """Let a wall or post be met from now on, or let everything pass it: a drop target, a diverter."""
+
+    kind: Literal["toggle"] = "toggle"
+    thing: Name
+    solid: bool
+
+
 class Strike(Timed, Stroke):
     """Strike a ball on a floor with a cue: it has the velocity and the spin of the stroke, whatever it had before."""
 
@@ -171,7 +179,19 @@ class Switch(Timed):
 
 
 Action = Annotated[
-    Impulse | Force | Move | Spawn | Remove | SetParameter | Pull | Launch | Throttle | Reshape | Strike | Switch,
+    Impulse
+    | Force
+    | Move
+    | Spawn
+    | Remove
+    | SetParameter
+    | Pull
+    | Launch
+    | Throttle
+    | Reshape
+    | Toggle
+    | Strike
+    | Switch,
     Field(discriminator="kind"),
 ]
 

@@ -28,6 +28,8 @@ class Cause(StrEnum):
     """Dampers of springs"""
     JOINTS = "joints"
     """What holds joints, as far as it takes: ideally nothing"""
+    KICKS = "kicks"
+    """What surfaces that kick add to a rebound: bumpers, slingshots"""
     DRIVES = "drives"
     """Thrusts, motors, steady forces, hands"""
     CORRECTION = "position correction"
@@ -60,7 +62,7 @@ class Account:
         self._entries[Cause.PHANTOM if energy > 0.0 and cause in TAKES else cause] += energy
 
     def touch(self, along: float, across: float) -> None:
-        """Book what contacts brought at once, along their normals and along their surfaces.
+        """Book what contacts brought at once, along their normals, kicks apart, and along their surfaces.
 
         Only both together can be said to take: an impulse along the normal of a corner changes how fast it slides.
         Where one of the two gives, that is set against what the other takes; phantom is what they give together.

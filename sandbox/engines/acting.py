@@ -22,6 +22,7 @@ from sandbox.action import (
     Strike,
     Switch,
     Throttle,
+    Toggle,
     is_settable,
     speed_limit,
 )
@@ -88,7 +89,7 @@ class Cast(Protocol):
         """
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs in air, gravity, coefficients, or the course of walls alone.
+        """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
 
         Raises:
             ActionError: it asks for what the settings or the engine cannot go on with.
@@ -132,6 +133,8 @@ def perform(action: Action, cast: Cast) -> int | None:
             cast.throttle(_thrust_number(action.thrust, cast.scene), action.level)
         case Reshape():
             _reshape(action, cast)
+        case Toggle():
+            _toggle(action, cast)
         case Strike():
             _strike(action, cast)
         case Pull() | Launch() | Switch():
@@ -228,6 +231,23 @@ def _strike(action: Strike, cast: Cast) -> None:
     cast.set_roll(number, spin[:2])
 
 
+def _toggle(action: Toggle, cast: Cast) -> None:
+    scene = cast.scene
+    begin = len(scene.planes)
+    names = scene.fixed_names[begin : len(scene.fixed)]
+    if action.thing not in names:
+        raise ActionError(f"no wall or post is named {action.thing!r}; there are {', '.join(names) or 'none'}")
+    if scene.surface is not None or scene.pockets:
+        raise ActionError("cushions of a table on a floor are solid; none can be toggled")
+    number = names.index(action.thing)
+    things: list[Wall | Post] = [*scene.walls, *scene.posts]
+    if things[number].solid == action.solid:
+        return
+    things[number] = things[number].model_copy(update={"solid": action.solid})
+    walls, posts = tuple(things[: len(scene.walls)]), tuple(things[len(scene.walls) :])
+    cast.change(_going_on(scene.model_copy(update={"walls": walls, "posts": posts}), scene))
+
+
 def _thrust_number(name: str, scene: Scene) -> int:
     names = [thrust.name or default_name("thrust", k) for k, thrust in enumerate(scene.thrusts)]
     if name not in names:
@@ -286,7 +306,7 @@ def alone_in(scene: Scene, single: Single) -> Scene:
 
 
 def _going_on(scene: Scene, running: Scene) -> Scene:
-    """Return a scene with the bodies and joints of a running one, of which it differs in surroundings alone.
+    """Return a scene, changed as `Cast.change` allows, with the bodies and joints of the running one.
 
     Laid out anew they would be those of the file: with who is gone, with what is broken, and hanging along the new
     gravity.

@@ -23,10 +23,12 @@ class Fixtures(NamedTuple):
     """(G,) which fixed thing each belongs to"""
 
 
-def fixtures_of(scene: Scene) -> Fixtures:
-    """Lay out a scene's fixed things."""
+def fixtures_of(scene: Scene, everything: bool = False) -> Fixtures:
+    """Lay out a scene's fixed things: those that are solid, or everything."""
     planes, segments = [], []
     for k, thing in enumerate(scene.fixed):
+        if not (isinstance(thing, Plane) or thing.solid or everything):
+            continue
         if isinstance(thing, Plane):
             # Scaled first: the square of a very long or short normal would leave the range of doubles.
             largest = max(abs(thing.normal[0]), abs(thing.normal[1]))

@@ -59,6 +59,7 @@ class Roster:
         self.fixed_surface: IntArray = surfaces.of_fixed
         self.restitution: FloatArray = surfaces.restitution
         self.friction: FloatArray = surfaces.friction
+        self.falloff: FloatArray = surfaces.falloff
         kinds = np.asarray([MEETS[element.collides] for element in bodies.elements], dtype=np.int64)
         self.meets: IntArray = np.where(self.present, kinds[bodies.element], NOTHING)
         """(N,) `NOTHING`, `FIXED` (planes, walls, posts, fixed balls) or `ALL`"""
@@ -134,7 +135,7 @@ class Roster:
         """Refuse no place: bodies may start from anywhere."""
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs in air, gravity, coefficients, or the course of walls alone.
+        """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
 
         Raises:
             ActionError: it has more surfaces than a scene may have.
@@ -142,7 +143,7 @@ class Roster:
         spawned = self.bodies.elements[len(self.scene.elements) :]
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
         meet = derived(scene, bodies)
-        if scene.walls != self.scene.walls:
+        if scene.fixed != self.scene.fixed:
             self.fixtures = fixtures_of(scene)
         self._assume(scene, bodies, meet)
 

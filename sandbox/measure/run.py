@@ -190,19 +190,20 @@ class Auditor:
     def __init__(self, scene: Scene, simulation: Simulation) -> None:
         self._audit = Audit(scene, simulation.bodies)
         self._simulation = simulation
-        self._known, self._walls = len(simulation.bodies), scene.walls
+        self._known, self._scene = len(simulation.bodies), simulation.scene
         self.seconds = 0.0
         simulation.watch(self)
 
     def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
         """Audit one substep."""
         began = perf_counter()
+        if (now := self._simulation.scene) is not self._scene:
+            if now.fixed != self._scene.fixed:
+                self._audit.changed(now, self._simulation.bodies)
+            self._scene = now
         if len(end) != self._known:
             self._audit.joined(self._simulation.bodies)
             self._known = len(end)
-        if self._simulation.scene.walls is not self._walls:
-            self._walls = self._simulation.scene.walls
-            self._audit.reshaped(self._simulation.scene)
         self._audit(time, start, end, touching)
         self.seconds += perf_counter() - began
 

@@ -184,7 +184,9 @@ class Hands:
 def _like(bodies: Bodies, number: int, place: Place, box: bool) -> Ball | Box:
     """Return a ball or box at a place that is like a body."""
     element = bodies.elements[int(bodies.element[number])]
-    surface = {key: getattr(element, key) for key in ("material", "restitution", "friction", "collides")}
+    surface = {
+        key: getattr(element, key) for key in ("material", "restitution", "restitution_falloff", "friction", "collides")
+    }
     if not box and isinstance(element, Disc):
         return Ball(position=place, radius=element.radius, mass=element.mass, density=element.density, **surface)
     if box and isinstance(element, Box):

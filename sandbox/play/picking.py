@@ -49,13 +49,13 @@ def overlapping(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
             found |= lone & ((position - np.asarray(plane.point)) @ normal < radius)
             for number, hulls in solids.items():
                 found[number] |= any(((h.corners - plane.point) @ normal < h.radius).any() for h in hulls)
-        for wall in scene.walls:
+        for wall in (wall for wall in scene.walls if wall.solid):
             points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
             for a, b in pairwise(points):
                 near = _to_segment(position, a, b) < radius + wall.thickness / 2.0
                 found |= near & lone
                 _meet_fixed(found, near, solids, Hull(np.asarray((a, b)), wall.thickness / 2.0))
-        for post in scene.posts:
+        for post in (post for post in scene.posts if post.solid):
             near = np.hypot(*(position - np.asarray(post.position)).T) < radius + post.radius
             found |= near & lone
             _meet_fixed(found, near, solids, Hull(np.asarray((post.position,)), post.radius))

@@ -1,7 +1,7 @@
 """Cross-checks: what a scene's parts say about each other, which no single part can see."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from sandbox.scene.faults import Location
 from sandbox.scene.floored import floored
 from sandbox.scene.generated import generated, tied
 from sandbox.scene.generators import GeneratorError
-from sandbox.scene.model import Mover, Scene, Single, Surfaced, Wall
+from sandbox.scene.model import Material, Mover, Pair, Scene, Single, Surfaced, Wall
 from sandbox.scene.outlines import outlines, sound
 from sandbox.scene.part import MAX_POSITION, MAX_SPEED, MAX_STEPS
 from sandbox.scene.repeats import repeats
@@ -134,6 +134,32 @@ def _fixed(scene: Scene) -> Iterator[Found]:
     for k, wall in enumerate(scene.walls):
         for where, message in course(wall):
             yield ("wall", k, *where), message
+    yield from _gates(scene)
+
+
+def _gates(scene: Scene) -> Iterator[Found]:
+    """Check what kicks, lets pass, or is not solid: a post has no length, and the cushions of a table do none of it."""
+    for k, post in enumerate(scene.posts):
+        if post.kick is not None and post.kick.profile != "even":
+            yield ("post", k, "kick", "profile"), "is of a wall's length, which a post has not; 'even' is right here"
+    if scene.surface is None and not scene.pockets:
+        return
+    for location, thing in _things(scene):
+        for key, usual in (("kick", None), ("one_way", False), ("solid", True), ("restitution_falloff", None)):
+            if getattr(thing, key, usual) != usual:
+                yield (*location, key), "is not of a cushion: balls on a [surface] meet what is solid and does not kick"
+    some: dict[str, Sequence[Material | Pair | Mover]] = {
+        "material": scene.materials,
+        "pair": scene.pairs,
+        **scene.kinds,
+    }
+    for kind, those in some.items():
+        for k, each in enumerate(those):
+            if each.restitution_falloff:
+                yield (
+                    (kind, k, "restitution_falloff"),
+                    "is not of balls on a [surface], which rebound alike at any speed",
+                )
 
 
 def course(wall: Wall) -> Iterator[Found]:

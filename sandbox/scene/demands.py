@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.scene.links import LinkKind
-from sandbox.scene.meetings import meetings
+from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Plane, Post, Scene, Wall
 
 
@@ -28,6 +28,10 @@ class Demand(StrEnum):
     POLYGONS = "polygons"
     RESTITUTION = "restitution"
     FRICTION = "friction"
+    FALLOFF = "falloff"
+    KICKS = "kicks"
+    ONE_WAY = "one-way walls"
+    PASSABLE = "openings"
     RODS = "rods"
     PIVOTS = "pivots"
     SLIDES = "slides"
@@ -63,6 +67,9 @@ BALLS = frozenset(
     }
 )
 """All that a scene of balls and fixed things can demand. Engines list what they have: a new demand is nobody's yet."""
+
+SURFACES = frozenset({Demand.FALLOFF, Demand.KICKS, Demand.ONE_WAY, Demand.PASSABLE})
+"""What surfaces can do beyond restitution and friction."""
 
 FLOOR = frozenset({Demand.SURFACE, Demand.SPIN, Demand.POCKETS})
 """What only spheres on a floor demand."""
@@ -145,11 +152,30 @@ def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
         why = f"up to {most:g}" if most else "0 for every pair that can meet"
         yield demand, most > 0, why if touch else "nothing can meet"
 
+    yield from _surfaces(scene, meet)
     yield from _joints(scene)
     yield from _floor(scene)
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     mortal = int(np.isfinite(bodies.lifetime).sum())
     yield Demand.LIFETIMES, mortal > 0, _count(mortal, "body lives for a time", "bodies live for a time", "all stay")
+
+
+def _surfaces(scene: Scene, meet: Meetings) -> Iterator[tuple[Demand, bool, str]]:
+    surfaces = meet.surfaces
+    most = float(np.max(surfaces.falloff[meet.touching & (surfaces.restitution > 0.0)], initial=0.0))
+    why = f"up to {most:g} s/m" if most else "restitution is the same at all speeds"
+    yield Demand.FALLOFF, most > 0.0, why
+    touched = np.asarray(meet.touching.any(axis=1))
+    of_fixed = touched[surfaces.of_fixed]
+    for demand, does, one, many, none in (
+        (Demand.KICKS, surfaces.kicks, "wall or post kicks", "walls and posts kick", "nothing kicks"),
+        (Demand.ONE_WAY, surfaces.one_way, "wall lets pass from one side", "walls let pass from one side", "none"),
+    ):
+        count = int(np.count_nonzero(does[surfaces.of_fixed] & of_fixed)) if len(does) else 0
+        yield demand, count > 0, _count(count, one, many, none)
+    things: tuple[Wall | Post, ...] = (*scene.walls, *scene.posts)
+    open_ = sum(not thing.solid for thing in things)
+    yield Demand.PASSABLE, open_ > 0, _count(open_, "wall or post", "walls and posts", "all are solid")
 
 
 def _joints(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:

@@ -17,7 +17,8 @@ from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
 from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
-from sandbox.scene.part import Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
+from sandbox.scene.kick import Kick
+from sandbox.scene.part import Falloff, Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule, Compound, Polygon
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Course",
-    "Disc", "Emitter", "Floor", "Generator", "Grid", "Joint", "Material", "Mover", "Pair", "Plane", "Play", "Pocket",
-    "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust",
+    "Disc", "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Pair", "Plane", "Play",
+    "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust",
     "Wall", "World", "default_name",
 ]  # fmt: skip
 
@@ -63,10 +64,12 @@ class World(Part):
 
 
 class Material(Part):
-    """A named pair of coefficients."""
+    """Named coefficients."""
 
     name: Name
     restitution: Restitution | None = None
+    restitution_falloff: Falloff | None = None
+    """s/m"""
     friction: Friction | None = None
 
 
@@ -75,6 +78,8 @@ class Pair(Part):
 
     between: tuple[Name, Name]
     restitution: Restitution | None = None
+    restitution_falloff: Falloff | None = None
+    """s/m"""
     friction: Friction | None = None
 
 
@@ -97,6 +102,11 @@ class Wall(Surfaced):
     """Join the last point to the first."""
     height: Height | None = None
     """of the nose above a floor, m"""
+    kick: Kick | None = None
+    one_way: bool = False
+    """Solid only for what comes from the left of its direction, first to last point; from the right all pass."""
+    solid: bool = True
+    """whether anything meets it; an action can change that"""
 
 
 class Post(Surfaced):
@@ -106,6 +116,9 @@ class Post(Surfaced):
     radius: Radius
     height: Height | None = None
     """of the nose above a floor, m"""
+    kick: Kick | None = None
+    solid: bool = True
+    """whether anything meets it; an action can change that"""
 
 
 class Play(Part):

@@ -47,6 +47,8 @@ Mass = Annotated[float, Field(ge=1e-15, le=1e30)]
 Density = Annotated[float, Field(ge=1e-30, le=1e30)]
 Restitution = Annotated[float, Field(ge=0, le=1)]
 Friction = Annotated[float, Field(ge=0, le=1000)]
+Falloff = Annotated[float, Field(ge=0, le=1e6)]
+"""How restitution falls with speed, s/m: e(v) = e / (1 + f·v), v the speed of approach."""
 
 Name = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$")]
 """A body's or material's name: any text without control characters."""

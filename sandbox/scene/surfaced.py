@@ -8,6 +8,7 @@ from sandbox.scene.part import (
     AngularVelocity,
     Colour,
     Density,
+    Falloff,
     Friction,
     Mass,
     Name,
@@ -28,6 +29,8 @@ class Surfaced(Part):
     """one without a name is called by its kind and its place in the file"""
     material: Name | None = None
     restitution: Restitution | None = None
+    restitution_falloff: Falloff | None = None
+    """s/m: how restitution falls with the speed of approach, e(v) = e / (1 + f·v); the sides of a contact add theirs"""
     friction: Friction | None = None
     colour: Colour | None = None
 

@@ -9,8 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sandbox.engines.fixtures import Fixtures
+from sandbox.engines.fixtures import Fixtures, fixtures_of
+from sandbox.engines.rebound import kicked, stretches
 from sandbox.engines.roster import ALL, NOTHING, Roster
+from sandbox.scene.model import Plane, Scene, Wall
 from sandbox.trajectory import FloatArray, IntArray
 
 T, X, Y, VX, VY, AX, AY, RADIUS, LATE, ANGLE, SPIN, ALPHA, SLIDES, SINCE = range(14)
@@ -31,21 +33,26 @@ LAST_KIND, LAST_WHO, NEXT_KIND, NEXT_WHO, NEXT_STAMP, STAMP, TAGS = range(6, 13)
 filled first; the log's rows of the two, −1 for none; kind and partner of its last impact; kind and partner of its next
 event, and the partner's stamp when that was predicted; its own stamp: how often its motion has changed."""
 
-PX, PY, NX, NY, UX, UY, LENGTH, HALF = range(8)
+PX, PY, NX, NY, UX, UY, LENGTH, HALF, WHOLE, KICK, THRESHOLD, MIDDLE, BEGIN, SPAN = range(14)
 """Columns of `flats`: a point of the surface, the normal out of it, the direction along it and how far it goes from
-the point, and half the thickness of what it is a side of."""
+the point, below 0 while it is not solid, so that nothing can be along it; half the thickness of what it is a side of;
+how far it goes when it is solid; the kick, m/s, its threshold, whether that is most in the middle, at which share of
+the whole wall it begins, and how much of it it is."""
+
+SOLID, KICKS, ABOVE = range(3, 6)
+"""Columns of `knobs` behind centre and radius: whether it is solid; what it kicks with, m/s, and the threshold."""
 
 THING, COAT, ENDS = range(3)
 """Columns of `flat_tags` and `knob_tags`: fixed thing, surface, and of flats the two knobs at the ends, −1 for none."""
 
-RESTITUTION, FRICTION = range(2)
+RESTITUTION, FRICTION, FALLOFF = range(3)
 """Places of `surfaces`."""
 
 GX, GY, HOP, NOW, NOW_LATE, SECOND, INSTANT = range(7)
-BY_NORMAL, BY_RUBBING, BY_PHANTOM = range(7, 10)
+BY_NORMAL, BY_RUBBING, BY_PHANTOM, BY_KICKS = range(7, 11)
 """Places of `world`: gravity, m/s²; the speed of a hop, m/s; the time of the last event, s, and what rounding has cut
 off it; the starts of the second and of the instant in which events are being counted; energy that impulses along
-normals and along surfaces took, J, negative, and that either gave."""
+normals and along surfaces took, J, negative, that either gave, and that kicks brought."""
 
 NONE, SLIP_ENDS, EDGE, FLAT, KNOB, BALL = range(6)
 """Kinds of event, in the order in which those of one ball at one instant happen."""
@@ -77,17 +84,17 @@ class Arena(NamedTuple):
     others: IntArray
     """those that a ball can hit"""
     surfaces: FloatArray
-    """(2, S, S) restitution and friction"""
+    """(3, S, S) restitution, friction and falloff, s/m"""
     flats: FloatArray
-    """(F, 8)"""
+    """(F, 14)"""
     flat_tags: IntArray
     """(F, 4)"""
     knobs: FloatArray
-    """(K, 3) centre and radius, m"""
+    """(K, 6) centre and radius, m, and more"""
     knob_tags: IntArray
     """(K, 2)"""
     world: FloatArray
-    """(10,)"""
+    """(11,)"""
     counts: IntArray
     """(12,)"""
     log: FloatArray
@@ -111,9 +118,9 @@ def arena_of(roster: Roster) -> Arena:
         next_time=np.full(number, np.inf),
         movers=np.empty(0, np.int64),
         others=np.empty(0, np.int64),
-        surfaces=np.empty((2, 0, 0)),
-        **_laid(roster.fixtures),
-        world=np.zeros(10),
+        surfaces=np.empty((3, 0, 0)),
+        **_laid(roster.scene),
+        world=np.zeros(11),
         counts=np.zeros(12, np.int64),
         log=np.empty((0, 7)),
         log_pair=np.empty((0, 2), np.int64),
@@ -121,8 +128,9 @@ def arena_of(roster: Roster) -> Arena:
     return renewed(arena, roster)
 
 
-def _laid(fixtures: Fixtures) -> dict[str, Any]:
-    """Return the arrays of an arena that say where what is fixed stands."""
+def _laid(scene: Scene) -> dict[str, Any]:
+    """Return the arrays of an arena that say where what is fixed stands, solid or not."""
+    fixtures = fixtures_of(scene, everything=True)
     knobs, knob_thing, ends = _knobs(fixtures)
     flats, flat_thing, flat_knobs = _flats(fixtures, ends)
     return {
@@ -136,7 +144,7 @@ def _laid(fixtures: Fixtures) -> dict[str, Any]:
 def reshaped(arena: Arena, roster: Roster) -> Arena:
     """Return the arena with the walls that a roster now has. No ball may rest on anything: what flats mean changes."""
     arena.tags[:, LAST_KIND] = NONE  # whom each met last was one of those that were
-    return arena._replace(**_laid(roster.fixtures))
+    return arena._replace(**_laid(roster.scene))
 
 
 def renewed(arena: Arena, roster: Roster) -> Arena:
@@ -153,14 +161,39 @@ def renewed(arena: Arena, roster: Roster) -> Arena:
     tags[:, MEETS], tags[:, SURFACE] = roster.meets, roster.surface
     for things in (arena.flat_tags, arena.knob_tags):
         things[:, COAT] = roster.fixed_surface[things[:, THING]]
+    _bear(arena, roster.scene)
     gravity = roster.scene.world.gravity
     world[GX], world[GY] = gravity
     world[HOP] = min(math.hypot(*gravity) * HOP_TIME, HOP_MOST)
     return arena._replace(
         movers=np.flatnonzero((roster.inverse_mass > 0) & (roster.meets != NOTHING)),
         others=np.flatnonzero(roster.meets == ALL),
-        surfaces=np.stack((roster.restitution, roster.friction)),
+        surfaces=np.stack((roster.restitution, roster.friction, roster.falloff)),
     )
+
+
+def _bear(arena: Arena, scene: Scene) -> None:
+    """Enter what kicks, and what is not solid; of planes there is none."""
+    things, number, flats, knobs = scene.fixed, len(scene.planes), arena.flats, arena.knobs
+    solid = np.asarray([isinstance(thing, Plane) or thing.solid for thing in things], dtype=np.bool_)
+    flats[:, LENGTH] = np.where(solid[arena.flat_tags[:, THING]], flats[:, WHOLE], -1.0)
+    knobs[:, SOLID] = solid[arena.knob_tags[:, THING]]
+    for k, thing in enumerate(things[number:], number):
+        if isinstance(thing, Plane) or thing.kick is None:
+            continue
+        middle, mine = thing.kick.profile == "middle", arena.flat_tags[:, THING] == k
+        if isinstance(thing, Wall):
+            parts = np.repeat(stretches(thing.points, thing.closed), 2, axis=0)  # each segment has two sides
+            flats[mine, BEGIN], flats[mine, SPAN] = parts[:, 0], parts[:, 1] - parts[:, 0]
+        flats[mine, KICK], flats[mine, THRESHOLD], flats[mine, MIDDLE] = thing.kick.speed, thing.kick.threshold, middle
+        for each in np.flatnonzero(arena.knob_tags[:, THING] == k).tolist():
+            share = 0.5
+            if middle:
+                ends = np.flatnonzero(mine & (arena.flat_tags[:, ENDS : ENDS + 2] == each).any(axis=1))
+                first = arena.flat_tags[ends[0], ENDS] == each
+                share = float(flats[ends[0], BEGIN] + (0.0 if first else flats[ends[0], SPAN]))
+            knobs[each, KICKS] = kicked(thing.kick.speed, 0.0, middle, share, 1.0)
+            knobs[each, ABOVE] = thing.kick.threshold
 
 
 def _knobs(fixtures: Fixtures) -> tuple[FloatArray, IntArray, dict[tuple[float, float, float, int], int]]:
@@ -170,7 +203,9 @@ def _knobs(fixtures: Fixtures) -> tuple[FloatArray, IntArray, dict[tuple[float, 
         place.setdefault((ax, ay, half, thing), len(place))
         place.setdefault((bx, by, half, thing), len(place))
     rows = np.asarray(list(place), dtype=np.float64).reshape(-1, 4)
-    return rows[:, :3].copy(), rows[:, 3].astype(np.int64), place
+    knobs = np.zeros((len(rows), 6))
+    knobs[:, :3], knobs[:, SOLID] = rows[:, :3], 1.0
+    return knobs, rows[:, 3].astype(np.int64), place
 
 
 def _flats(
@@ -195,8 +230,9 @@ def _flats(
             rows.append((ax + half * nx, ay + half * ny, nx, ny, ux, uy, length, half))
             things.append(thing)
             knobs.append(pair)
+    plain = np.asarray(rows, dtype=np.float64).reshape(-1, 8)
     return (
-        np.asarray(rows, dtype=np.float64).reshape(-1, 8),
+        np.column_stack((plain, plain[:, LENGTH], np.zeros((len(plain), 5)))),
         np.asarray(things, dtype=np.int64),
         np.asarray(knobs, dtype=np.int64).reshape(-1, 2),
     )

@@ -11,6 +11,7 @@ from sandbox.engines.exact.arena import (
     AY,
     BOOKED,
     BOOKED_LATE,
+    BY_KICKS,
     BY_NORMAL,
     BY_PHANTOM,
     BY_RUBBING,
@@ -98,7 +99,7 @@ def book_hit(arena: Arena, i: int, j: int, jx: float, jy: float, nx: float, ny: 
 
 
 @kernel
-def book_strike(arena: Arena, i: int, nx: float, ny: float, normal: float, across: float) -> None:
+def book_strike(arena: Arena, i: int, nx: float, ny: float, normal: float, across: float, kick: float) -> None:
     """Book what has happened between a ball and something fixed.
 
     Args:
@@ -108,12 +109,14 @@ def book_strike(arena: Arena, i: int, nx: float, ny: float, normal: float, acros
         ny: likewise.
         normal: impulse on the ball along it, N·s.
         across: impulse along the surface, to the normal's left.
+        kick: what a kick brought, J.
     """
     state, world = arena.state, arena.world
     out = state[i, VX] * nx + state[i, VY] * ny
     slip = state[i, VY] * nx - state[i, VX] * ny - rim(state, i)
     took = across * (slip - 0.5 * across * readiness(state, i))
-    touch(world, normal * (out - 0.5 * normal * state[i, LIGHTNESS]), took)
+    touch(world, normal * (out - 0.5 * normal * state[i, LIGHTNESS]) - kick, took)
+    world[BY_KICKS] += kick
 
 
 @kernel

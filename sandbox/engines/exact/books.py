@@ -7,6 +7,7 @@ from sandbox.engines.exact.arena import (
     ACCOUNTING,
     BOOKED,
     BOOKED_LATE,
+    BY_KICKS,
     BY_NORMAL,
     BY_PHANTOM,
     BY_RUBBING,
@@ -14,7 +15,12 @@ from sandbox.engines.exact.arena import (
 )
 from sandbox.engines.exact.booking import book_slides
 
-PLACES = {Cause.RESTITUTION: BY_NORMAL, Cause.FRICTION: BY_RUBBING, Cause.PHANTOM: BY_PHANTOM}
+PLACES = {
+    Cause.RESTITUTION: BY_NORMAL,
+    Cause.FRICTION: BY_RUBBING,
+    Cause.KICKS: BY_KICKS,
+    Cause.PHANTOM: BY_PHANTOM,
+}
 
 
 class Books:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sandbox.engines.floor.level import unlevel
-from sandbox.scene.demands import BALLS, FLOOR, Demand, on_floor, unmodelled
+from sandbox.scene.demands import BALLS, FLOOR, SURFACES, Demand, on_floor, unmodelled
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import FloatArray
@@ -36,7 +36,7 @@ class ExactEngine:
 
     name: str = "exact"
     about: str = "event-driven: closed-form motion between events, next events from stable roots"
-    capabilities: frozenset[Demand] = BALLS - {Demand.DRAG} | FLOOR
+    capabilities: frozenset[Demand] = BALLS - {Demand.DRAG} | FLOOR | SURFACES - {Demand.ONE_WAY}
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that it lacks."""

@@ -3,14 +3,17 @@
 import math
 
 from sandbox.engines.exact.arena import (
+    ABOVE,
     ACCOUNTING,
     ANGLE,
     AX,
     AY,
     BALL,
     COAT,
+    FALLOFF,
     FRICTION,
     HOP,
+    KICKS,
     KNOB,
     LAST_KIND,
     LAST_TIME,
@@ -35,6 +38,7 @@ from sandbox.engines.exact.log import add_impulse, log_rest, open_row
 from sandbox.engines.exact.motion import place, turned
 from sandbox.engines.exact.roots import NOISE
 from sandbox.engines.kernel import bare_kernel as kernel
+from sandbox.engines.rebound import compiled_kicked, compiled_rebound
 from sandbox.trajectory import FloatArray, IntArray
 
 ALMOST_STILL = 1e-9
@@ -68,7 +72,9 @@ def rubbed(slip: float, mass: float, friction: float, normal: float) -> float:
 
 
 @kernel
-def strike(arena: Arena, i: int, nx: float, ny: float, rebound: float, friction: float) -> tuple[float, float]:
+def strike(
+    arena: Arena, i: int, nx: float, ny: float, parting: float, kick: float, friction: float
+) -> tuple[float, float]:
     """Let a ball bounce off something fixed.
 
     Args:
@@ -76,7 +82,8 @@ def strike(arena: Arena, i: int, nx: float, ny: float, rebound: float, friction:
         i: ball.
         nx: normal out of the fixed thing.
         ny: likewise.
-        rebound: speed along the normal after it, m/s.
+        parting: speed along the normal after it, m/s, by itself.
+        kick: on top of that, m/s.
         friction: coefficient.
 
     Returns:
@@ -85,7 +92,7 @@ def strike(arena: Arena, i: int, nx: float, ny: float, rebound: float, friction:
     state, r = arena.state, arena.state[i, RADIUS]
     im, ii = arena.state[i, LIGHTNESS], arena.state[i, READINESS]
     closing = -(state[i, VX] * nx + state[i, VY] * ny)
-    normal = max((closing + rebound) / im, 0.0)
+    normal = max((closing + parting + kick) / im, 0.0)
     across = 0.0
     if friction > 0.0:
         slip = -state[i, VX] * ny + state[i, VY] * nx - state[i, SPIN] * r
@@ -95,18 +102,19 @@ def strike(arena: Arena, i: int, nx: float, ny: float, rebound: float, friction:
     state[i, VY] += jy * im
     state[i, SPIN] -= r * across * ii
     if arena.counts[ACCOUNTING] != 0:
-        book_strike(arena, i, nx, ny, normal, across)
+        # From `parting` on the impulse is the kick's: half of it finds the speed before it, half that after.
+        book_strike(arena, i, nx, ny, normal, across, kick / im * (parting + 0.5 * kick))
     return jx, jy
 
 
 @kernel
-def parting_speed(hop: float, closing: float, restitution: float, press: float) -> float:
+def parting_speed(hop: float, closing: float, restitution: float, falloff: float, press: float) -> float:
     """Return how fast two things part of which at least one is round.
 
     e times the closing speed; all of it where that is next to nothing; and where gravity presses them together, no
     less than a hop's speed: there is no rest on anything round.
     """
-    parting = restitution * closing
+    parting = compiled_rebound(restitution, falloff, closing)
     if closing <= max(hop, ALMOST_STILL):
         parting = max(closing, 0.0)
     if press > 0.0:
@@ -127,8 +135,10 @@ def hit_knob(arena: Arena, i: int, k: int) -> None:
     across = -state[i, VX] * ny + state[i, VY] * nx
     press = state[i, AX] * nx + state[i, AY] * ny - across * across / distance
     mine, its = arena.tags[i, SURFACE], arena.knob_tags[k, COAT]
-    parting = parting_speed(arena.world[HOP], closing, arena.surfaces[RESTITUTION, mine, its], press)
-    jx, jy = strike(arena, i, -nx, -ny, parting, arena.surfaces[FRICTION, mine, its])
+    restitution, falloff = arena.surfaces[RESTITUTION, mine, its], arena.surfaces[FALLOFF, mine, its]
+    parting = parting_speed(arena.world[HOP], closing, restitution, falloff, press)
+    kick = compiled_kicked(arena.knobs[k, KICKS], arena.knobs[k, ABOVE], False, 0.5, closing)
+    jx, jy = strike(arena, i, -nx, -ny, parting, kick, arena.surfaces[FRICTION, mine, its])
     r = arena.state[i, RADIUS]
     row = open_row(arena, i, -1 - arena.knob_tags[k, THING], state[i, X] + r * nx, state[i, Y] + r * ny, nx, ny)
     add_impulse(arena, row, -jx, -jy)
@@ -164,7 +174,7 @@ def hit_ball(
     if abs(pull) <= NOISE * (abs(state[i, AX]) + abs(state[i, AY]) + abs(state[j, AX]) + abs(state[j, AY])):
         press = 0.0  # they fall alike: nothing presses them together
     mine, its = tags[i, SURFACE], tags[j, SURFACE]
-    parting = parting_speed(hop, closing, surfaces[RESTITUTION, mine, its], press)
+    parting = parting_speed(hop, closing, surfaces[RESTITUTION, mine, its], surfaces[FALLOFF, mine, its], press)
     ri, rj = state[i, RADIUS], state[j, RADIUS]
     mi, mj = state[i, LIGHTNESS], state[j, LIGHTNESS]
     ii, ij = state[i, READINESS], state[j, READINESS]

@@ -11,6 +11,7 @@ from sandbox.engines.exact.arena import (
     LIGHTNESS,
     MEETS,
     RADIUS,
+    SOLID,
     VX,
     VY,
     T,
@@ -54,7 +55,7 @@ def nearest_knob(
     ax, ay, radius = state[i, AX], state[i, AY], state[i, RADIUS]
     straight, speed, partner = ax == 0.0 and ay == 0.0, abs(vx) + abs(vy), -1
     for k in range(len(knobs)):
-        if k in (skip, other) or (straight and k == met):
+        if k in (skip, other) or (straight and k == met) or knobs[k, SOLID] == 0.0:
             continue
         dx, dy, reach = knobs[k, 0] - x, knobs[k, 1] - y, knobs[k, 2] + radius
         if straight:

@@ -11,16 +11,20 @@ from sandbox.engines.exact.arena import (
     ALPHA,
     AX,
     AY,
+    BEGIN,
     COAT,
     EDGE,
+    FALLOFF,
     FLAT,
     FORCE,
     FRICTION,
     GX,
     GY,
+    KICK,
     LATE,
     LENGTH,
     LIGHTNESS,
+    MIDDLE,
     NX,
     NY,
     PX,
@@ -31,14 +35,17 @@ from sandbox.engines.exact.arena import (
     ROW,
     SINCE,
     SLIDES,
+    SPAN,
     SPIN,
     SUPPORT,
     SURFACE,
     THING,
+    THRESHOLD,
     UX,
     UY,
     VX,
     VY,
+    WHOLE,
     Arena,
     T,
     X,
@@ -50,6 +57,7 @@ from sandbox.engines.exact.log import add_impulse, open_rest, open_row
 from sandbox.engines.exact.predict import parallel
 from sandbox.engines.exact.roots import NOISE
 from sandbox.engines.kernel import bare_kernel as kernel
+from sandbox.engines.rebound import compiled_kicked, compiled_rebound
 from sandbox.trajectory import FloatArray
 
 REST_TIME = 1e-13
@@ -74,11 +82,15 @@ def hit_flat(arena: Arena, i: int, f: int) -> None:
     restitution, friction = arena.surfaces[RESTITUTION, mine, its], arena.surfaces[FRICTION, mine, its]
     closing = max(-(state[i, VX] * nx + state[i, VY] * ny), 0.0)
     press = -(state[i, AX] * nx + state[i, AY] * ny)
+    parting = compiled_rebound(restitution, arena.surfaces[FALLOFF, mine, its], closing)
+    kick = 0.0
+    if arena.flats[f, KICK] > 0.0:
+        kick = flat_kick(arena.flats, f, state[i, X], state[i, Y], closing)
     rests = False
-    if press > 0.0:
-        hop = 2.0 * restitution * closing / press
+    if press > 0.0 and kick == 0.0:
+        hop = 2.0 * parting / press
         rests = hop <= TICKS * abs(state[i, T]) or hop <= REST_TIME * (1.0 - restitution)
-    jx, jy = strike(arena, i, nx, ny, 0.0 if rests else restitution * closing, friction)
+    jx, jy = strike(arena, i, nx, ny, 0.0 if rests else parting, kick, friction)
     note(state, arena.tags, i, FLAT, f)
     knocked(arena, i)
     if rests and arena.tags[i, SUPPORT + 1] < 0:
@@ -91,6 +103,14 @@ def hit_flat(arena: Arena, i: int, f: int) -> None:
         thing = -1 - arena.flat_tags[f, THING]
         row = open_row(arena, i, thing, state[i, X] - r * nx, state[i, Y] - r * ny, -nx, -ny)
         add_impulse(arena, row, -jx, -jy)
+
+
+@kernel
+def flat_kick(flats: FloatArray, f: int, x: float, y: float, closing: float) -> float:
+    """Return what a flat that is hit from (x, y) kicks with, m/s."""
+    share = ((x - flats[f, PX]) * flats[f, UX] + (y - flats[f, PY]) * flats[f, UY]) / flats[f, WHOLE]
+    share = flats[f, BEGIN] + flats[f, SPAN] * min(max(share, 0.0), 1.0)
+    return compiled_kicked(flats[f, KICK], flats[f, THRESHOLD], flats[f, MIDDLE] != 0.0, share, closing)
 
 
 @kernel
@@ -110,6 +130,9 @@ def knocked(arena: Arena, i: int) -> None:
         f = arena.tags[i, SUPPORT + which]
         if f < 0:
             continue
+        if arena.flats[f, LENGTH] < 0.0:  # it has ceased to be solid
+            release(arena, i, which)
+            continue
         nx, ny = arena.flats[f, NX], arena.flats[f, NY]
         press = -(arena.world[GX] * nx + arena.world[GY] * ny)
         least = REST_TIME * abs(press) + NOISE * (abs(state[i, VX]) + abs(state[i, VY]))
@@ -118,7 +141,7 @@ def knocked(arena: Arena, i: int) -> None:
             release(arena, i, which)
         elif out < -least:
             friction = arena.surfaces[FRICTION, arena.tags[i, SURFACE], arena.flat_tags[f, COAT]]
-            jx, jy = strike(arena, i, nx, ny, 0.0, friction)
+            jx, jy = strike(arena, i, nx, ny, 0.0, 0.0, friction)
             add_impulse(arena, arena.tags[i, ROW + which], -jx, -jy)
 
 

@@ -78,23 +78,22 @@ class Troupe(Roster):
         self.moved.add(number)
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs in gravity, coefficients, or the course of walls alone.
+        """Go on with a scene that differs alone in gravity, coefficients, the course of walls, or in what is solid.
 
         Raises:
-            ActionError: it has drag, or gravity along a floor, or walls that pass through balls, or more surfaces than
-                a scene may have.
+            ActionError: it has drag, or gravity along a floor, or more surfaces than a scene may have; or a ball
+                stands where something becomes solid.
         """
         if scene.world.linear_drag or scene.world.quadratic_drag:
             raise ActionError("exact does not model drag; pymunk and reference do")
         if on_floor(scene) and (lacks := next(unlevel(scene, self.bodies), None)):
             raise ActionError(lacks)
-        reshaped = scene.walls != self.scene.walls
-        if reshaped:
-            meets = self.moving & (self.meets != NOTHING)
+        meets = np.flatnonzero((self.meets != NOTHING) & self.moving)
+        if len(meets) and any(new is not old for new, old in zip(scene.fixed, self.scene.fixed, strict=True)):
             found = overlapping_things(self.position[meets], self.radius[meets], fixtures_of(scene))
             if found is not None:
-                name = self.bodies.names[np.flatnonzero(meets)[found[0]]]
-                raise ActionError(told(name, scene.fixed_names[found[1]], found[2]))
+                raise ActionError(told(self.bodies.names[meets[found[0]]], scene.fixed_names[found[1]], found[2]))
+        reshaped = [wall.points for wall in scene.walls] != [wall.points for wall in self.scene.walls]
         super().change(scene)
         self.renewed, self.reshaped = True, reshaped
 

@@ -96,7 +96,9 @@ class Books:
         account.enter(Cause.DRAG, float(np.sum(kicks.dragged * velocity[:-1])))
         account.enter(Cause.DRIVES, float(np.sum(kicks.driven * velocity[:-1]) + kicks.twisted @ spin[:-1]))
         account.enter(Cause.DAMPING, sum(each.work(velocity, spin) for each in damped))
-        account.touch(*points.work(velocity, spin))
+        along, across, by_kicks = points.work(velocity, spin)
+        account.touch(along, across)
+        account.enter(Cause.KICKS, by_kicks)
 
         if len(held.rigid):
             given = self._given(before, now, counts, kicks)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from sandbox.engines.native.floors import of_floors, on_floor
 from sandbox.engines.overlap import BIAS, slop_of
-from sandbox.scene.demands import BALLS, FLOOR, JOINTS, Demand, unmodelled
+from sandbox.scene.demands import BALLS, FLOOR, JOINTS, SURFACES, Demand, unmodelled
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -30,7 +30,9 @@ class PymunkEngine:
 
     name: str = "pymunk"
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
-    capabilities: frozenset[Demand] = BALLS | JOINTS | FLOOR | {Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST}
+    capabilities: frozenset[Demand] = (
+        BALLS | JOINTS | FLOOR | SURFACES | {Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST}
+    )
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that pymunk lacks."""

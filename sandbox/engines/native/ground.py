@@ -7,8 +7,9 @@ import pymunk
 
 from sandbox.engines.limits import FARTHEST, FASTEST
 from sandbox.engines.native.space import SurfaceSetter, category, fixed_shapes, reach_of
+from sandbox.engines.rebound import stretches
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
+from sandbox.scene.model import Plane, Post, Scene, Wall
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 MANY = 5_000
@@ -38,9 +39,8 @@ class Ground:
         every: list[pymunk.Shape] = []
         for thing, number in zip(scene.fixed, surface.tolist(), strict=True):
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
-            shapes = list(fixed_shapes(thing, body, centre, reach))
+            shapes = self._shapes(thing, body, centre, reach)
             for shape in shapes:
-                shape.filter = category(True, "all")
                 self._setter.dress(shape, number)
             self._space.add(body)
             self._things.append((body, shapes))
@@ -50,27 +50,45 @@ class Ground:
         where = min(self.reach, FARTHEST)
         self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
 
+    def _shapes(
+        self, thing: Plane | Wall | Post, body: pymunk.Body, centre: FloatArray, reach: float
+    ) -> list[pymunk.Shape]:
+        """Return the shapes of a fixed thing, with surfaces yet to be given."""
+        shapes = list(fixed_shapes(thing, body, centre, reach))
+        for shape in shapes:
+            shape.filter = _filter(thing)
+        if isinstance(thing, Wall) and thing.kick is not None:
+            parts = stretches(thing.points, thing.closed)
+            self._setter.laws.stretches |= dict(zip(shapes, parts, strict=True))
+        if isinstance(thing, Wall) and thing.one_way:
+            self._setter.gates.walls.update(shapes)
+        return shapes
+
     def reshape(self, before: Scene, after: Scene) -> None:
         """Let walls take the course that they have in another scene, with surfaces yet to be given."""
         if not self._laid or before.walls == after.walls:
             return
         first = len(before.planes)
         for number, (old, new) in enumerate(zip(before.walls, after.walls, strict=True), first):
-            if (old.points, old.closed, old.thickness) == (new.points, new.closed, new.thickness):
+            if old.points == new.points:
                 continue
             body, shapes = self._things[number]
             self._space.remove(*shapes)
-            shapes[:] = fixed_shapes(new, body, np.zeros(2), self.reach)  # a wall is as long as it is
             for shape in shapes:
-                shape.filter = category(True, "all")
+                self._setter.laws.stretches.pop(shape, None)
+                self._setter.gates.walls.discard(shape)
+            shapes[:] = self._shapes(new, body, np.zeros(2), self.reach)  # a wall is as long as it is
             for k in shuffled(len(shapes)):
                 self._space.add(shapes[k])
 
-    def dress(self, surface: IntArray) -> None:
-        """Give the fixed things their surfaces (F,) anew."""
-        for (_, shapes), number in zip(self._things, surface.tolist(), strict=False):
+    def renew(self, scene: Scene, surface: IntArray) -> None:
+        """Give the fixed things their surfaces (F,) anew, and let those be met that now are solid."""
+        for (_, shapes), thing, number in zip(self._things, scene.fixed, surface.tolist(), strict=False):
+            passes = _filter(thing)
             for shape in shapes:
                 self._setter.dress(shape, number)
+                if shape.filter != passes:
+                    shape.filter = passes
 
     @property
     def ids(self) -> dict[int, int]:
@@ -89,6 +107,11 @@ class Ground:
     def reaches(self, place: FloatArray) -> bool:
         """Tell whether planes are planes at a place; so they are until there are some."""
         return bool((np.abs(place - self._middle[0:2]) <= self.reach).all())
+
+
+def _filter(thing: Plane | Wall | Post) -> pymunk.ShapeFilter:
+    """Return whom a fixed thing meets."""
+    return category(True, "all" if isinstance(thing, Plane) or thing.solid else "none")
 
 
 def shuffled(count: int) -> list[int]:

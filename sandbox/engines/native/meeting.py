@@ -44,7 +44,7 @@ class MeetingBodies:
         self._scene, self._settings, self._skin = scene, settings, skin
         self._space = new_space(scene, settings)
         self._reader = Reader(self._space)
-        self._setter = SurfaceSetter(self._space)
+        self._setter = SurfaceSetter(self._space, settings.h)
         self._members: dict[int, Member] = {}
         self._ground = Ground(self._space, self._setter)
         self._surface_of: IntArray = np.empty(0, np.int64)
@@ -190,7 +190,7 @@ class MeetingBodies:
                 self._setter.dress(shape, int(self._surface_of[piece]))
             if meet.turnable[number] and math.isinf(body.moment):
                 body.moment = float(self._moments[number])
-        self._ground.dress(self._surface_of_fixed)
+        self._ground.renew(scene, self._surface_of_fixed)
 
     def step(self, time: float) -> None:
         """Advance by one substep, from a time, s."""
@@ -198,6 +198,8 @@ class MeetingBodies:
             return
         self.field.time = time
         self._apply_forces()
+        if self._setter.gates.walls:
+            self._setter.gates.tick += 1
         self._space.step(self._settings.h)
         self._state = None
 
@@ -252,7 +254,7 @@ class MeetingBodies:
     def points(self) -> Points:
         """Return the contact points of the last substep; from the first call on, their impulses add up."""
         if self._points is None:
-            self._points = PointReader(self._space, self._remember())
+            self._points = PointReader(self._space, self._remember(), self._setter.laws)
         return self._points.read(self._reader.records)
 
     def beyond(self) -> tuple[int, str] | None:

@@ -6,6 +6,7 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.native.hauls import Hauls
+from sandbox.engines.native.laws import Laws, worths
 from sandbox.engines.native.memory import RememberedImpulses
 from sandbox.engines.native.record import ARMS, IMPULSES, WIDTH, address_of, points_of
 from sandbox.trajectory import FloatArray, IntArray
@@ -31,6 +32,8 @@ class Points(NamedTuple):
     """(P,) impulse on b along the normal, N·s"""
     across: FloatArray
     """(P,) impulse on b to the normal's left, N·s"""
+    kick: FloatArray
+    """(P,) what a kick brings for each N·s along the normal, J; 0 where nothing kicks"""
 
     def times(self, share: float) -> Self:
         """Return a share of the impulses."""
@@ -43,20 +46,21 @@ class Points(NamedTuple):
         impulse = np.column_stack((nx * self.along - ny * self.across, ny * self.along + nx * self.across))
         return Hauls(self.a, self.b, self.arm_a, self.arm_b, impulse, np.zeros(len(self.a)))
 
-    def work(self, velocity: FloatArray, spin: FloatArray) -> tuple[float, float]:
-        """Return the work of impulses along normals and along surfaces, J, at mean velocities, as of `Hauls`."""
+    def work(self, velocity: FloatArray, spin: FloatArray) -> tuple[float, float, float]:
+        """Return the work, J, of impulses along normals, along surfaces and by kicks, at mean velocities of `Hauls`."""
         parting = self.hauls.parting(velocity, spin)
         nx, ny = self.normal.T
         out, left = nx * parting[:, 0] + ny * parting[:, 1], nx * parting[:, 1] - ny * parting[:, 0]
-        return float(self.along @ out), float(self.across @ left)
+        kicks = float(self.along @ self.kick)
+        return float(self.along @ out) - kicks, float(self.across @ left), kicks
 
 
 class PointReader:
     """Reads the contact points of one space after each substep."""
 
-    def __init__(self, space: pymunk.Space, remembered: RememberedImpulses) -> None:
-        self._space, self._remembered = space, remembered
-        remembered.points = {}
+    def __init__(self, space: pymunk.Space, remembered: RememberedImpulses, laws: Laws) -> None:
+        self._space, self._remembered, self._laws = space, remembered, laws
+        remembered.points, laws.told = {}, {}
 
     def read(self, number: dict[Any, int]) -> Points:
         """Return the points of the last substep, with the impulses that were applied in it.
@@ -69,6 +73,8 @@ class PointReader:
         second: list[int] = []
         normal: list[tuple[float, float]] = []
         records: list[FloatArray] = []
+        places: list[int] = []
+        told = self._laws.told
         for arbiter in self._space._get_arbiters():
             if arbiter.state >= APART:
                 continue
@@ -78,6 +84,8 @@ class PointReader:
                 if old is not None:
                     record[:, IMPULSES] -= old  # applied before they parted
             records.append(record)
+            if told:
+                places.append(address_of(arbiter))
             a, b = number.get(arbiter.body_a, -1), number.get(arbiter.body_b, -1)
             n = arbiter.n.x, arbiter.n.y
             for _ in range(len(record)):
@@ -86,8 +94,12 @@ class PointReader:
                 normal.append(n)
         if begun:
             begun.clear()
+        kick = np.zeros(len(first))
+        if told:
+            kick = worths(told, places, [len(record) for record in records])
+            told.clear()
         table = np.concatenate(records) if records else np.empty((0, WIDTH))
         arms, impulses = table[:, ARMS], table[:, IMPULSES]
         numbers = np.asarray(first, np.int64), np.asarray(second, np.int64)
         normals = np.asarray(normal, np.float64).reshape(-1, 2)
-        return Points(*numbers, arms[:, :2], arms[:, 2:], normals, impulses[:, 0], impulses[:, 1])
+        return Points(*numbers, arms[:, :2], arms[:, 2:], normals, impulses[:, 0], impulses[:, 1], kick)

@@ -143,7 +143,7 @@ class Population:
         return np.asarray([field.thrusted(name) for name in self.bodies.names], dtype=np.bool_)
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs in air, gravity, coefficients, or the course of walls alone.
+        """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
 
         Raises:
             ActionError: it asks for what the settings or the engine cannot go on with.

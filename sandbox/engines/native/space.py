@@ -13,10 +13,12 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.native.coefficients import factors, wrong_pairs
+from sandbox.engines.native.gates import Gates
+from sandbox.engines.native.laws import Laws
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Collides, Plane, Post, Scene, Wall
-from sandbox.scene.near import FloatArray
+from sandbox.scene.near import BoolArray, FloatArray
 from sandbox.scene.part import BACKING
 from sandbox.scene.settings import Settings
 
@@ -123,29 +125,28 @@ def _half_plane(plane: Plane, body: pymunk.Body, centre: FloatArray, reach: floa
 class SurfaceSetter:
     """Gives shapes their elasticity and friction, so that every pair has exactly its own coefficients."""
 
-    def __init__(self, space: pymunk.Space) -> None:
-        self._space = space
-        self._handled: dict[tuple[int, int], list[float]] = {}
+    def __init__(self, space: pymunk.Space, h: float) -> None:
+        self.gates = Gates(space, h)
+        """walls that let pass from one side"""
+        self.laws = Laws(space, self.gates)
+        """what no factors can serve"""
         self._elasticity: list[float] = []
         self._friction: list[float] = []
 
     def renew(self, meet: Meetings) -> None:
-        """Work out each surface's factors, and handlers for the pairs that no factors can serve."""
+        """Work out each surface's factors, and laws for the pairs that no factors can serve."""
         surfaces, touching = meet.surfaces, meet.touching
-        for handled in self._handled.values():
-            handled[:] = []
         stated = [(s.restitution, s.friction) for s in surfaces.surfaces]
         self._elasticity = factors(surfaces.restitution, touching, [e for e, _ in stated])
         self._friction = factors(surfaces.friction, touching, [mu for _, mu in stated])
         wrong = {
             *wrong_pairs(surfaces.restitution, touching, self._elasticity),
             *wrong_pairs(surfaces.friction, touching, self._friction),
+            *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
         }
-        for a, b in sorted(wrong):
-            values = [float(surfaces.restitution[a, b]), float(surfaces.friction[a, b])]
-            known = self._handled.setdefault((a, b), [])
-            known[:] = values
-            self._space.on_collision(a + 1, b + 1, pre_solve=_set_coefficients, data=known)
+        self.laws.renew(surfaces, wrong)
+        if surfaces.one_way.any():
+            self.gates.renew(surfaces, touching)
 
     def dress(self, shape: pymunk.Shape, surface: int) -> None:
         """Give a shape its surface."""
@@ -154,6 +155,6 @@ class SurfaceSetter:
         shape.collision_type = surface + 1  # 0 is what pymunk gives to shapes of no type
 
 
-def _set_coefficients(arbiter: pymunk.Arbiter, _: pymunk.Space, data: list[float]) -> None:
-    if data:
-        arbiter.restitution, arbiter.friction = data
+def _pairs(which: BoolArray) -> list[tuple[int, int]]:
+    """Return the pairs a ≤ b of which something holds, of a symmetric (S, S)."""
+    return [(a, b) for a, b in np.argwhere(np.triu(which)).tolist()]

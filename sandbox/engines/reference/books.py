@@ -52,11 +52,14 @@ class Idle:
     def met(self, moved: State) -> None:
         """Take note of the state in which contacts and joints are resolved: joints held by positions are done."""
 
-    def held(self, moved: State, contacts: Manifolds, impulse: FloatArray) -> None:
-        """Book what impulses (K, 2), N·s, of contacts through the step, and of joints, did to velocities."""
+    def held(self, moved: State, contacts: Manifolds, impulse: FloatArray, worth: FloatArray | None) -> None:
+        """Book what impulses (K, 2), N·s, of contacts through the step, and of joints, did to velocities.
 
-    def struck(self, moved: State, contacts: Manifolds, impulse: FloatArray) -> None:
-        """Book what impulses (K, 2), N·s, of impacts at the end of a step did to velocities."""
+        Of contacts that were kicked `worth` (K,) is what that brought for each N·s along the normal, J; else none.
+        """
+
+    def struck(self, moved: State, contacts: Manifolds, impulse: FloatArray, worth: FloatArray | None) -> None:
+        """Book what impulses (K, 2), N·s, of impacts at the end of a step did to velocities; `worth` as above."""
 
     def done(self, time: float, after: State, h: float) -> None:
         """Book the rest of a step of h, s, that began at a time, s, and led to a state."""
@@ -113,22 +116,25 @@ class Bookkeeper(Idle):
         self._met = moved.copy()
         self._end = self._met[1]  # the velocities at the end of what acts through the step
 
-    def held(self, moved: State, contacts: Manifolds, impulse: FloatArray) -> None:
+    def held(self, moved: State, contacts: Manifolds, impulse: FloatArray, worth: FloatArray | None) -> None:
         """Book contacts through the step, and joints held by impulses."""
         self._end = moved[1].copy()
         mean = 0.5 * (self._start[1] + self._end)
-        self._touch(contacts, impulse, mean)
+        self._touch(contacts, impulse, mean, worth)
         if self._joints is not None and self._joints.how == "impulses":
             self.account.enter(Cause.JOINTS, self._joints.work(mean))
 
-    def struck(self, moved: State, contacts: Manifolds, impulse: FloatArray) -> None:
+    def struck(self, moved: State, contacts: Manifolds, impulse: FloatArray, worth: FloatArray | None) -> None:
         """Book impacts."""
-        self._touch(contacts, impulse, 0.5 * (self._end + moved[1]))
+        self._touch(contacts, impulse, 0.5 * (self._end + moved[1]), worth)
 
-    def _touch(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray) -> None:
+    def _touch(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray, worth: FloatArray | None) -> None:
         if contacts.size:
             spin = mean[:, 2] if mean.shape[1] == 3 else self._no_spin
-            self.account.touch(*contact_work(contacts, impulse, mean, spin))
+            along, across = contact_work(contacts, impulse, mean, spin)
+            kicks = 0.0 if worth is None else float(impulse[:, 0] @ worth)
+            self.account.touch(along - kicks, across)
+            self.account.enter(Cause.KICKS, kicks)
 
     def done(self, time: float, after: State, h: float) -> None:
         """Book the rest of a step: forces, joints held by positions, positions put right, the integrator."""

@@ -41,6 +41,9 @@ class ReferenceEngine:
     name: str = "reference"
     about: str = "by hand, fixed step: integrators, broad phases, times of impact, impulses or penalty springs"
     capabilities: frozenset[Demand] = BALLS | {
+        Demand.FALLOFF,
+        Demand.KICKS,
+        Demand.PASSABLE,
         Demand.POLYGONS,
         Demand.RODS,
         Demand.PIVOTS,
@@ -67,6 +70,11 @@ class ReferenceEngine:
             lacks.append(f"persistence {settings.persistence}: it remembers contacts for 1 substep")
         if settings.response == "penalty":
             lacks += self._penalty_lacks(scene, settings)
+            for demand in (Demand.FALLOFF, Demand.KICKS):
+                if demand in wanted:
+                    lacks.append(
+                        f"response 'penalty' does not model {demand}: its springs part what meets; 'impulse' does"
+                    )
         else:
             lacks += [
                 f"{key} is a figure of penalty springs; solver.response is not 'penalty'"

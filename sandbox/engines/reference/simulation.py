@@ -22,6 +22,7 @@ from sandbox.engines.touching import NOTHING, Touching
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Disc, Scene, Single
 from sandbox.scene.settings import Settings
+from sandbox.scene.surfaces import bearers_of
 from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
 
 ROUNDING = 1e-12
@@ -149,13 +150,15 @@ class ReferenceSimulation(Running):
                 self._take_out(np.asarray([leaving]))
 
     def _check_shape(self, single: Single) -> None:
-        """Refuse a body that the chosen detection knows nothing of.
+        """Refuse a body that the chosen detection or response knows nothing of.
 
         Raises:
             ActionError: it does not.
         """
         if self._settings.detection == "swept" and single.collides != "none" and not isinstance(single, Disc):
             raise ActionError(BALLS_ALONE)
+        if self._settings.response == "penalty" and _falls_off(single, self.scene):
+            raise ActionError("penalty springs have no restitution that falls with speed; response 'impulse' has")
 
     def frame(self) -> Frame:
         """Return the present state."""
@@ -190,6 +193,15 @@ class ReferenceSimulation(Running):
         if self._observer is not None:
             # The observer may keep what it is given: these arrays are never written to again.
             self._observer(start, before[0, :, :2], after[0, :, :2], self._ledger.pairs())
+
+
+def _falls_off(single: Single, scene: Scene) -> bool:
+    """Tell whether restitution falls with speed at some contact of a body that is to be added."""
+    own = {bearer.material for bearer in bearers_of((single,))}
+    figures = [bearer.restitution_falloff for bearer in bearers_of((single,))]
+    figures += [material.restitution_falloff for material in scene.materials if material.name in own]
+    figures += [pair.restitution_falloff for pair in scene.pairs if own.intersection(pair.between)]
+    return any(figures)
 
 
 def _real(

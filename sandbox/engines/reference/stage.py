@@ -24,6 +24,7 @@ from sandbox.engines.reference.joints.solver import JointSolver, kick_pose
 from sandbox.engines.reference.joints.together import solve_together
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.motion import Inputs, State, transition
+from sandbox.engines.reference.parting import Bounce, Parting
 from sandbox.engines.reference.penalty import Penalty
 from sandbox.engines.reference.piece_finder import PieceFinder
 from sandbox.engines.roster import Roster
@@ -56,11 +57,12 @@ class Stage:
         self._given: FloatArray = np.zeros((len(self._links), 2))  # N·s or N·m·s by each link, in this substep
         self._field = Field(roster)
         self.finder = self._new_finder()
+        self._fixtures = roster.fixtures
+        self._parting: Parting | None = None
         self.penalty = Penalty(roster, settings, self.finder) if settings.response == "penalty" else None
         self.time = 0.0
         self.witness: Witness | None = None
-        self._fixtures = roster.fixtures
-        self._forget()
+        self._memory: tuple[IntArray, FloatArray, float] = np.empty(0, np.int64), np.empty((0, 2)), settings.h
         self.push: FloatArray = np.zeros((0, 3))
         """(N, 3) m/s and rad/s, by which overlap is undone in the next substep"""
         self.enter()
@@ -110,25 +112,25 @@ class Stage:
         self.push = np.where(roster.moving[:, None], kept, 0.0)
         self._pushes = bool(self.push.any())
         self._no_spin: FloatArray = np.zeros((len(roster.position), 3))
-        if roster.fixtures is not self._fixtures:  # keys mean other pairs from now on
-            self._fixtures = roster.fixtures
-            self._forget()
-        if roster.meet.solids != isinstance(self.finder, PieceFinder):  # the same
+        if roster.meet.solids != isinstance(self.finder, PieceFinder):  # keys mean other pairs from now on
             work, self.finder = self.finder.work, self._new_finder()
             self.finder.work = work
-            self._forget()
+            self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
             if self._settings.response == "penalty":
                 self.penalty = Penalty(roster, self._settings, self.finder)
+        if roster.fixtures is not self._fixtures:  # other things may be solid now, and keys mean other segments
+            self._fixtures = roster.fixtures
+            self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
         self.finder.population_changed()
+        self._parting = None
+        if Parting.needed(roster):
+            self._parting = Parting(roster)
+            self.finder.use(self._parting.codes)
         if self.penalty is not None:
             self.penalty.population_changed()
         if self._joints is not None:
             self._joints.use(roster.inverse_mass, roster.inverse_moment, roster.linked())
         self.apply_forces()
-
-    def _forget(self) -> None:
-        """Let all contacts start without the impulses that they last had."""
-        self._memory: tuple[IntArray, FloatArray, float] = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
 
     def tear(self, h: float, time: float) -> None:
         """Break what gave more than its strength, on average over a substep of h, s, that ended at a time, s.
@@ -230,9 +232,9 @@ class Stage:
         """
         held = self._held(moved, lasting, h)
         struck = np.zeros((clash.size, 2))
-        bounce = self._approach(clash, moved[1]) * clash.coefficient[:, 0]
-        self._solve(clash, bounce, moved[1], struck)
-        self.books.struck(moved, clash, struck)
+        bounce = self._bounce(clash, moved[1])
+        self._solve(clash, bounce.speed, moved[1], struck)
+        self.books.struck(moved, clash, struck, bounce.worth)
         self._done(moved, lasting.joined(clash), np.concatenate((held, struck)), h)
 
     def _held(self, moved: State, contacts: Manifolds, h: float) -> FloatArray:
@@ -248,19 +250,26 @@ class Stage:
         share = self._integrator.share
         if self._joints is not None and joined:
             self._joints.prepare(kick_pose(moved, share, h), h)
-        bounce = self._approach(contacts, self.x[1]) * contacts.coefficient[:, 0]
+        bounce = self._bounce(contacts, self.x[1])
         key, old, old_h = self._memory
         remembered(contacts.key, key, old, impulse)
         # What rests takes impulses in proportion to the time. Never more: a blow does not grow with it.
         impulse *= min(h / old_h, 1.0)
         kicked = moved[1].copy()
-        self._solve(contacts, bounce, moved[1], impulse, joined)
-        self.books.held(moved, contacts, impulse)
+        self._solve(contacts, bounce.speed, moved[1], impulse, joined)
+        self.books.held(moved, contacts, impulse, bounce.worth)
         if share:
             change = moved[1] - kicked
             moved[0] += (share * h) * change
             contacts.separation[:] += (share * h) * self._approach(contacts, change)
         return impulse
+
+    def _bounce(self, contacts: Manifolds, velocity: FloatArray) -> Bounce:
+        """Return how fast contacts are to part that approach with some velocities."""
+        approach = self._approach(contacts, velocity)
+        if self._parting is None:
+            return Bounce(approach * contacts.coefficient[:, 0], None)
+        return self._parting.bounce(contacts, approach)
 
     def _approach(self, contacts: Manifolds, velocity: FloatArray) -> FloatArray:
         out = np.empty(contacts.size)

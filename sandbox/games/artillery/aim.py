@@ -61,7 +61,7 @@ def ranges(
 ) -> tuple[FloatArray, FloatArray]:
     """Return where along the ground K shots come down, (K,) m, and when, (K,) s; beside it or never: nan.
 
-    Between steps the way is straight: (g h²)/8 off at most, 2 mm at a step of 40 ms. A peak between two steps is not seen.
+    Between steps the way is straight: (g h²)/8 off at most, 2 mm at a step of 40 ms. Peaks between steps are not seen.
     """
     step, inputs = INTEGRATORS["rk4"].step, inputs_of(world, len(position))
     state = np.stack((position, velocity))

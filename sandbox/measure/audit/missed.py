@@ -73,10 +73,11 @@ class Audit:
         self._examine()
         self._lay_out(bodies)
 
-    def reshaped(self, scene: Scene) -> None:
-        """Take note that walls have taken another course."""
+    def changed(self, scene: Scene, bodies: Bodies) -> None:
+        """Take note that other things are solid now; `bodies` are all there are."""
         self._examine()
         self._obstacles = Obstacles.of(scene)
+        self._lay_out(bodies)
 
     def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
         """Take note of one substep; they are examined some at a time. The arrays are copied.

@@ -17,7 +17,7 @@ from sandbox.measure.audit.sweep import (
     dot,
     from_segment,
 )
-from sandbox.scene.model import Plane, Post, Scene
+from sandbox.scene.model import Plane, Post, Scene, Wall
 from sandbox.scene.part import BACKING, Point
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
@@ -67,7 +67,7 @@ class Obstacles:
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
-        """Gather a scene's fixed things."""
+        """Gather a scene's fixed things, but those that are not solid, or let pass from one side: they miss nothing."""
         normal = _rows([plane.normal for plane in scene.planes])
         normal /= np.abs(normal).max(axis=1, keepdims=True, initial=0.0)  # any length may be given: 1e±300 too
         rows: list[tuple[float, ...]] = []
@@ -75,7 +75,7 @@ class Obstacles:
         number: list[int] = []
         line: tuple[Point, ...]
         for k, thing in enumerate(scene.fixed):
-            if isinstance(thing, Plane):
+            if isinstance(thing, Plane) or not thing.solid or (isinstance(thing, Wall) and thing.one_way):
                 continue
             if isinstance(thing, Post):
                 line, width = (thing.position, thing.position), thing.radius

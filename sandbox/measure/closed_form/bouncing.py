@@ -160,7 +160,7 @@ def bouncing(given: Given, number: int) -> Bouncing | None:
     """Return the bouncing of a ball, as long as it meets nothing but the plane; None where it is no such case.
 
     Nothing holds, draws or drives it. The scene has one plane, gravity is square to it or 0, there is no drag, and
-    nothing rubs: friction is 0, or the ball neither spins nor moves along the plane.
+    nothing rubs: friction is 0, or the ball neither spins nor moves along the plane. Restitution is one at all speeds.
     """
     bodies, planes = given.bodies, given.scene.planes
     collides = bodies.elements[bodies.element[number]].collides
@@ -177,6 +177,8 @@ def bouncing(given: Given, number: int) -> Bouncing | None:
     # Planes come first among the fixed things: the only plane is fixed thing 0, in contacts −1.
     surfaces = given.meet.surfaces
     sides = surfaces.of_body[number], surfaces.of_fixed[0]
+    if not surfaces.fixed_coefficients[sides]:
+        return None
     slides = bodies.angular_velocity[number] != 0 or not parallel(velocity, normal)
     if slides and surfaces.friction[sides] > 0:
         return None

@@ -115,6 +115,8 @@ def _followed(given: Given) -> Impacts | None:
     restitution, friction = (each[np.ix_(numbers, numbers)] for each in (surfaces.restitution, surfaces.friction))
     mass, reach = bodies.mass, bodies.radius[:, None] + bodies.radius
     apart = np.triu(np.ones((len(bodies), len(bodies)), np.bool_), 1)
+    if not surfaces.fixed_coefficients[np.ix_(numbers, numbers)][apart].all():
+        return None  # restitution falls with speed
     passes_on = bool((mass == mass[0]).all() and (restitution[apart] == 1.0).all())
 
     away = np.hypot(*np.moveaxis(bodies.position[:, None] - bodies.position, 2, 0))

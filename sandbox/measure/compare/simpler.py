@@ -12,6 +12,7 @@ Key = tuple[str, int, str]
 DISPENSABLE = (
     "angular_velocity", "velocity", "angle", "colour", "colours", "collides", "friction", "restitution", "material",
     "density", "mass", "jitter", "velocity_jitter", "lifetime", "lifetime_jitter", "thickness", "closed",
+    "restitution_falloff", "kick", "one_way", "solid",
 )  # fmt: skip
 """Keys of bodies and fixed things that have a default."""
 

@@ -14,7 +14,9 @@ Place = tuple[str, int]
 
 FIXED = ("plane", "wall", "post")
 BONDS = ("joint", "attraction", "thrust")
-SURFACE = ("material", "restitution", "friction", "colour", "mass", "density", "collides")
+SURFACE = (
+    "material", "restitution", "restitution_falloff", "friction", "colour", "mass", "density", "collides",
+)  # fmt: skip
 
 MOST_SPELLED = 20_000
 """Bodies that are written out one by one; of more, generators stay whole."""

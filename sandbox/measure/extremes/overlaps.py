@@ -47,7 +47,7 @@ def deepest(run: Trajectory, scene: Scene) -> FloatArray:
         for number in able[~bodies.round[able]].tolist():
             above = gap_above(bodies, number, run.position[:, number], run.angle[:, number], point, normal)
             found = np.maximum(found, -above)
-    others = [-1 - k for k, thing in enumerate(scene.fixed) if not isinstance(thing, Plane)]
+    others = [-1 - k for k, thing in enumerate(scene.fixed) if not isinstance(thing, Plane) and thing.solid]
     pairs = [(number, thing) for number in able[:MOST_APART].tolist() for thing in others]
     mutual = meetings(scene).mutual
     if mutual and not bodies.round[able].all():

@@ -79,6 +79,8 @@ def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
         found.append(Passage(bodies.names[movers[k]], thing, float(speeds[k]), float(reach[k])))
 
     for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):
+        if not isinstance(thing, Plane) and not thing.solid:
+            continue
         worst(half + _half_depth(thing), speed, name)
     among = meet_each_other(bodies)[movers]
     fixed = np.flatnonzero(bodies.fixed & meet.touches)
@@ -112,7 +114,8 @@ def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
     By its own fall: from rest on the speed it starts with, until a level floor below it or the end of the run; in
     scenes with other bodies than balls, or joints, also the end of what it hangs on, or past all that could stop it.
     Where balls can meet, any may be hit by the fastest: an equal one takes over its speed, a lighter one gets up to
-    twice it. What springs, motors, attraction and thrusts add is left out.
+    twice it. Who is kicked gets up to the speed at which each hit takes as much as it brings. What springs, motors,
+    attraction and thrusts add is left out.
     """
     bodies, world = scene.bodies, scene.world
     start = np.hypot(*bodies.velocity.T)
@@ -131,12 +134,28 @@ def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
     speed = np.where(bodies.fixed, 0.0, speed)
     if world.linear_drag or world.quadratic_drag:
         speed += math.hypot(*world.wind)
+    speed = np.where(meet.touches & ~bodies.fixed, np.maximum(speed, _kicked(meet)), speed)
     if meet.mutual:
         movers = ~bodies.fixed & meet.touches
         heaviest, fastest = float(bodies.mass[movers].max()), float(speed[movers].max())
         gained = fastest * 2.0 * heaviest / (heaviest + bodies.mass)
         speed = np.where(movers, np.maximum(speed, gained), speed)
     return np.asarray(speed)
+
+
+def _kicked(meet: Meetings) -> float:
+    """Return how fast kicks make a body, m/s, that always comes back; by one kick where there is no end."""
+    surfaces, fastest = meet.surfaces, 0.0
+    for b in np.flatnonzero(surfaces.kicks).tolist():
+        kick = surfaces.surfaces[b].kick
+        assert kick is not None
+        for a in np.flatnonzero(meet.touching[b]).tolist():
+            e, f = float(surfaces.restitution[a, b]), float(surfaces.falloff[a, b])
+            # v = e v/(1 + f v) + k, that is f v² + (1 − e − k f) v − k = 0
+            half = 0.5 * (1.0 - e - kick.speed * f)
+            root = half + math.sqrt(half * half + f * kick.speed)
+            fastest = max(fastest, kick.speed / root if root > 0.0 else kick.speed)
+    return fastest
 
 
 def _fall(scene: Scene, down: FloatArray) -> FloatArray:

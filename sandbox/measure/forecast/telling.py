@@ -6,6 +6,7 @@ import numpy as np
 
 from sandbox.measure.forecast.chains import chain_warnings
 from sandbox.measure.forecast.events import event_warnings
+from sandbox.measure.forecast.kicks import kick_warnings
 from sandbox.measure.forecast.laid import Laid, laid
 from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, Passage, farther, meet_each_other, passages
 from sandbox.measure.forecast.springs import spring_warnings
@@ -46,6 +47,7 @@ def warnings(scene: Scene, settings: Settings | None = None, engine: str | None 
         *_overlaps(scene, meet, close),
         *(() if engine == "reference" else _iterations(settings, meet)),
         *_rounding(scene, settings, meet),
+        *kick_warnings(scene, settings, meet),
         *spring_warnings(scene, settings),
         *chain_warnings(scene, settings),
         *stretch_warnings(scene, settings),

@@ -79,8 +79,8 @@ def keeps_energy(scene: Scene) -> bool:
     if scene.world.linear_drag or scene.world.quadratic_drag or scene.thrusts or scene.links.figures[:, 2].any():
         return False
     meet = meetings(scene)
-    restitution = meet.surfaces.restitution[meet.touching]
-    return bool((restitution == 1.0).all() and meet.friction == 0.0)
+    elastic = (meet.surfaces.restitution == 1.0) & meet.surfaces.fixed_coefficients
+    return bool(elastic[meet.touching].all() and meet.friction == 0.0)
 
 
 def require_aim(metric: str | None, tolerance: float | None, budget: float | None, fps: float) -> None:

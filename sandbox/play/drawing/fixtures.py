@@ -23,6 +23,12 @@ from sandbox.scene.model import Plane, Post, Scene, Wall
 
 HATCH, HATCHES = 9.0, 600
 """px between two hatches of a plane, and the most of them"""
+WAYS = 60.0
+"""px between two arrows through a wall that lets pass from one side"""
+CAP = 5.0
+"""px, the least radius at which a post that kicks shows its ring"""
+ABSENT = 0.4
+"""How much of its colour is left of what is not solid"""
 MOST_ROUND = 300
 """Segments of thick walls in sight that get round, shaded ends; where there are more, all are plain lines."""
 
@@ -118,6 +124,13 @@ def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, anti
     area = surface.get_clip()
     pixels = camera.to_screen(points).tolist()
     parts = [part for a, b in pairwise(pixels) if (part := clipped((a[0], a[1]), (b[0], b[1]), area, half + 4.0))]
+    if not wall.solid:
+        ends = (((a[0], a[1]), (b[0], b[1])) for a, b in pairwise(pixels))
+        dashes(surface, ends, mixed(BACKGROUND, edge, ABSENT), 5.0 * unit, antialias)
+        return
+    if wall.one_way:
+        for a, b in pairwise(pixels):
+            _ways_through(surface, (a[0], a[1]), (b[0], b[1]), half, edge, unit, antialias)
     plain = len(parts) > MOST_ROUND
     rim = 0.0 if thin else min(1.5 * unit, half)
     # The outline of all segments first and then the filling of all, so that no outline shows inside a corner.
@@ -128,6 +141,27 @@ def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, anti
             else:
                 look = Look(colour, colour, 0.0, antialias=antialias)
                 paint(surface, capsule_distance(a, b, half - inset), look, _around(a, b, half, area))
+
+
+def _ways_through(
+    surface: pygame.Surface, a: Pixel, b: Pixel, half: float, colour: Colour, unit: float, antialias: bool
+) -> None:
+    """Draw small arrows out of a wall's left, the way that it lets pass; they stay where they are on it."""
+    part, length = clipped(a, b, surface.get_clip(), half + 12.0 * unit), math.dist(a, b)
+    if part is None or length < 2.0:
+        return
+    ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+    out = uy, -ux  # on the screen y points down: so it is to the left
+    step = length / max(1, round(length / (WAYS * unit)))
+    first = math.floor(math.dist(a, part[0]) / step)
+    for k in range(first, min(math.ceil(math.dist(a, part[1]) / step), first + HATCHES)):
+        s = (k + 0.5) * step
+        x, y = a[0] + s * ux + half * out[0], a[1] + s * uy + half * out[1]
+        tip = x + 10.0 * unit * out[0], y + 10.0 * unit * out[1]
+        stroke(surface, (x, y), tip, colour, 1.5 * unit, antialias)
+        for side in (-4.0 * unit, 4.0 * unit):
+            barb = tip[0] - 4.0 * unit * out[0] + side * ux, tip[1] - 4.0 * unit * out[1] + side * uy
+            stroke(surface, tip, barb, colour, 1.5 * unit, antialias)
 
 
 def _around(a: Pixel, b: Pixel, reach: float, area: pygame.Rect) -> pygame.Rect:
@@ -146,6 +180,13 @@ def _post(surface: pygame.Surface, camera: Camera, post: Post, unit: float, anti
         return
     x, y = camera.to_screen(place)[0].tolist()
     edge = colour_of_fixed(post, NEUTRAL)
-    filling = mixed(BACKGROUND, edge, 0.55)
-    look = Look(filling, edge, min(1.5 * unit, radius), antialias=antialias)
-    paint(surface, disc_distance(x, y, radius), look, _around((x, y), (x, y), radius, surface.get_clip()))
+    around = _around((x, y), (x, y), radius, surface.get_clip())
+    if not post.solid:
+        faint = mixed(BACKGROUND, edge, ABSENT)
+        paint(surface, disc_distance(x, y, radius), Look(BACKGROUND, faint, 1.0 * unit, antialias=antialias), around)
+        return
+    look = Look(mixed(BACKGROUND, edge, 0.55), edge, min(1.5 * unit, radius), antialias=antialias)
+    paint(surface, disc_distance(x, y, radius), look, around)
+    if post.kick is not None and radius > CAP * unit:  # the ring of a bumper, inside its cap
+        ring = Look(mixed(BACKGROUND, edge, 0.3), edge, 1.5 * unit, antialias=antialias)
+        paint(surface, disc_distance(x, y, 0.6 * radius), ring, around)

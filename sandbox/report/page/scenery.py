@@ -50,8 +50,9 @@ def scenery_of(scene: Scene, drawn: IntArray, origin: tuple[float, float]) -> di
                 "closed": wall.closed,
             }
             for wall in scene.walls
+            if wall.solid
         ],
-        "posts": [[*_moved(post.position, origin), post.radius] for post in scene.posts],
+        "posts": [[*_moved(post.position, origin), post.radius] for post in scene.posts if post.solid],
         "solids": _solids(bodies, origin),
         "attractions": [_moved(a.toward, origin) for a in scene.attractions if not isinstance(a.toward, str)],
         "links": _links(scene, drawn, origin),

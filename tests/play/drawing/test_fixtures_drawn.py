@@ -104,8 +104,37 @@ def test_no_wall_or_post_is_too_far(points, thickness, power):
     assume(all(math.dist(a, b) >= 1e-9 for a, b in pairwise(points)))  # m; nearer ones are no wall
     wall = {"points": [list(p) for p in points], "thickness": thickness}
     post = {"position": list(points[1]), "radius": max(thickness, 1e-9)}
-    draw_fixtures(surface, camera, scene(wall=[wall], post=[post]))
+    for more in ({}, {"solid": False}, {"one_way": True}):
+        there = {key: value for key, value in more.items() if key == "solid"}
+        draw_fixtures(surface, camera, scene(wall=[{**wall, **more}], post=[{**post, **there}]))
     assert surface.get_size() == camera.size
+
+
+def test_what_is_not_solid_is_fainter_and_leaves_the_background_free():
+    there = {"wall": [{"points": [[-2, 1], [2, 1]], "thickness": 0.5}], "post": [{"position": [1, -1], "radius": 0.6}]}
+    gone = {kind: [{**each, "solid": False} for each in those] for kind, those in there.items()}
+    solid, faint = fixtures(**there), fixtures(**gone)
+    drawn_of = [changed(each, np.full_like(each, BACKGROUND)) for each in (solid, faint)]
+    assert 0 < drawn_of[1].sum() < 0.3 * drawn_of[0].sum()
+    assert at(faint, 1.0, -1.0) == BACKGROUND
+    assert faint.max() < solid.max()
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_arrows_tell_which_way_a_gate_lets_pass(way):
+    gate = {"points": [[0, -2 * way], [0, 2 * way]], "thickness": 0.1}
+    arrows = changed(fixtures(wall=[{**gate, "one_way": True}]), fixtures(wall=[gate]))
+    column, _ = np.nonzero(arrows)
+    assert len(column) > 10
+    assert ((column - SIZE[0] / 2) * way <= 0).all()  # left of its direction
+
+
+def test_a_post_that_kicks_has_a_ring():
+    post = {"position": [0, 0], "radius": 1.0}
+    ring = changed(fixtures(post=[{**post, "kick": {"speed": 1}}]), fixtures(post=[post]))
+    column, row = np.nonzero(ring)
+    away = np.hypot(column + 0.5 - SIZE[0] / 2, row + 0.5 - SIZE[1] / 2) / CAMERA.scale
+    assert 0.55 < away.max() < 0.65
 
 
 def test_a_post_is_a_filled_circle():

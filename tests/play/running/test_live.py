@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Spawn
+from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Spawn, Toggle
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
 from sandbox.play.footage.film import Film
@@ -383,3 +383,25 @@ def test_stored_run_of_one_frame_stands_still() -> None:
 
 def first_frame(session: Session) -> Trajectory:
     return run(session.scene, "pymunk", audit=False).at([0])
+
+
+def test_way_back_knows_what_was_solid_then() -> None:
+    shelf = {"name": "shelf", "points": [[-1, 0], [1, 0]]}
+    ball = {"name": "ball", "position": [0, 0.1], "radius": 0.1}
+    scene = from_document({"world": {"gravity": [0, -9.81], "duration": 5}, "ball": [ball], "wall": [shelf]})
+    show = Live(Session(scene, "pymunk"))
+    for _ in range(60):
+        show.go_on(1 / 60, paused=False)
+    show.act(Toggle(time=0.0, thing="shelf", solid=False))
+    for _ in range(60):
+        show.go_on(1 / 60, paused=False)
+    fell, then = show.session.frame, show.session.step_number
+    assert fell.position[0, 1] < -3.0
+    show.seek(then // 4)
+    arrived(show)
+    assert show.scene.walls[0].solid
+    assert show.session.frame.position[0, 1] == pytest.approx(0.1, abs=0.01)  # slop
+    show.seek(then)
+    arrived(show)
+    assert not show.scene.walls[0].solid
+    assert np.array_equal(show.session.frame.position, fell.position)

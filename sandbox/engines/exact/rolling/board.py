@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.engines.exact.arena import BY_PHANTOM, arena_of
+from sandbox.engines.exact.arena import BY_PHANTOM, HALF, arena_of
 from sandbox.engines.floor.collide import BALL_BALL, CUSHION
 from sandbox.engines.floor.phase import RESTING, Figures, figures_of
 from sandbox.engines.roster import Roster
@@ -103,9 +103,11 @@ def board_of(roster: Roster) -> Board:
     number, scene = len(roster.bodies), roster.scene
     plain = arena_of(roster)
     heights = _heights(scene)
-    knobs = np.column_stack((plain.knobs, heights[plain.knob_tags[:, 0]] if len(plain.knobs) else np.empty((0,))))
+    knobs = np.column_stack(
+        (plain.knobs[:, :3], heights[plain.knob_tags[:, 0]] if len(plain.knobs) else np.empty((0,)))
+    )
     bare = exposed(knobs)
-    lines = plain.flats.copy()
+    lines = plain.flats[:, : HALF + 1].copy()
     lines[:, NOSE] = heights[plain.flat_tags[:, 0]]
     state = np.zeros((number, WIDTH))
     state[:, X : Y + 1], state[:, VX : VY + 1] = roster.position, roster.velocity

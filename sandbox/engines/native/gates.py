@@ -1,0 +1,72 @@
+"""Gates: one-way walls. Who comes from the right of one is let through, for as long as the two overlap.
+
+Munk2D keeps to what `begin` decides of a contact until it ends; until then `pre_solve` is called all the same.
+`separate`, which would tell the end, is of no use: it is called for what still touches when a space goes, and pymunk
+has let go of its own objects by then.
+"""
+
+from typing import Any
+
+import numpy as np
+import pymunk
+
+from sandbox.engines.native.approach import closing_speed
+from sandbox.scene.surfaces import Surfaces
+from sandbox.trajectory import BoolArray
+
+
+class Gates:
+    """The one-way walls of a space, and who is passing them."""
+
+    def __init__(self, space: pymunk.Space, h: float) -> None:
+        self._space, self._h = space, h
+        self.walls: set[pymunk.Shape] = set()
+        """the segments of those that let pass"""
+        self.tick = 0
+        """counts substeps"""
+        self._handled: set[tuple[int, int]] = set()
+        self._passing: dict[tuple[int, int], dict[tuple[pymunk.Shape, pymunk.Shape], int]] = {}
+
+    def renew(self, surfaces: Surfaces, touching: BoolArray) -> None:
+        """Watch the pairs (S, S) of surfaces of which one may be such a wall's."""
+        for a, b in np.argwhere(np.triu(touching & (surfaces.one_way | surfaces.one_way[:, None]))).tolist():
+            if (a, b) not in self._handled:
+                self._handled.add((a, b))
+                self._space.on_collision(a + 1, b + 1, begin=self._begin)
+
+    def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
+        wall, shape = self._told_apart(arbiter)
+        if wall is None:  # surfaces are numbered anew as bodies come
+            return
+        # Where two segments of a wall join, both are touched: the one goes by what the other has decided.
+        passing = self._passing.setdefault(_who(shape, wall), {})
+        through = any(last >= self.tick - 1 and pair != (shape, wall) for pair, last in passing.items())
+        arbiter.process_collision = not through and self._keeps(arbiter, wall, shape)
+
+    def passed(self, arbiter: pymunk.Arbiter) -> None:
+        """Take note that a contact is still being ignored."""
+        wall, shape = self._told_apart(arbiter)
+        if wall is not None:
+            self._passing.setdefault(_who(shape, wall), {})[shape, wall] = self.tick
+
+    def _told_apart(self, arbiter: pymunk.Arbiter) -> tuple[pymunk.Shape | None, pymunk.Shape]:
+        """Return the wall that lets pass, if one of the two is such, and the other."""
+        a, b = arbiter.shapes
+        if a in self.walls:
+            return a, b
+        return (b if b in self.walls else None), a
+
+    def _keeps(self, arbiter: pymunk.Arbiter, wall: pymunk.Shape, shape: pymunk.Shape) -> bool:
+        """Tell whether what has just come to touch a wall came from its left, and does not leave it already.
+
+        Positions have moved on by the velocity that a body still has, so where it was a substep ago is known.
+        """
+        assert isinstance(wall, pymunk.Segment) and shape.body is not None
+        side = shape.bb.center() - shape.body.velocity * self._h - wall.a
+        return bool((wall.b - wall.a).cross(side) >= 0.0 and closing_speed(arbiter) >= 0.0)
+
+
+def _who(shape: pymunk.Shape, wall: pymunk.Shape) -> tuple[int, int]:
+    """Return the ids of a body and a wall."""
+    assert shape.body is not None and wall.body is not None
+    return shape.body.id, wall.body.id

@@ -1,0 +1,60 @@
+"""Rebound: how fast two things part that meet at a speed, which every engine asks here.
+
+    parting = e / (1 + f·v) · v + kick,    v the speed of approach along the normal
+
+Restitution falls with speed as in Visual Pinball (`ElasticityWithFalloff`, src/physics/collide.h), whose rubber
+rebounds at 0.8/(1 + 0.3 v) of v m/s. A kick comes on top, once for each hit above its threshold, by what bumpers and
+slingshots do there; a slingshot's is a parabola along its length.
+"""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from sandbox.engines.kernel import bare_kernel as kernel
+from sandbox.scene.part import Point
+
+
+def rebound(restitution: float, falloff: float, closing: float) -> float:
+    """Return how fast two part by themselves, m/s, that meet at `closing`, m/s; `falloff` is in s/m."""
+    if closing <= 0.0:
+        return restitution * closing
+    return restitution / (1.0 + falloff * closing) * closing
+
+
+def kicked(speed: float, threshold: float, middle: bool, share: float, closing: float) -> float:
+    """Return what a kick adds to that, m/s.
+
+    Args:
+        speed: of the kick, m/s.
+        threshold: of the approach, m/s, up to which there is none.
+        middle: whether it is most in the middle.
+        share: of the length at which it was hit, 0 to 1.
+        closing: the speed of approach, m/s.
+    """
+    if closing <= threshold:
+        return 0.0
+    return speed * 4.0 * share * (1.0 - share) if middle else speed
+
+
+compiled_rebound, compiled_kicked = kernel(rebound), kernel(kicked)
+"""The same for kernels; whoever asks for one contact at a time would wait longer for the compiler."""
+
+
+def stretches(points: Sequence[Point], closed: bool) -> list[tuple[float, float]]:
+    """Return for each segment of a polyline at which shares of the whole length it begins and ends."""
+    ends = (*points, points[0]) if closed else tuple(points)
+    lengths = [math.dist(a, b) for a, b in pairwise(ends)]
+    whole, begin = math.fsum(lengths), 0.0
+    found = []
+    for length in lengths:
+        found.append((begin / whole, (begin + length) / whole))
+        begin += length
+    return found
+
+
+def share_at(a: Point, b: Point, stretch: tuple[float, float], point: Point) -> float:
+    """Return at which share of a whole polyline the nearest place of its segment from a to b lies."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    along = ((point[0] - a[0]) * dx + (point[1] - a[1]) * dy) / (dx * dx + dy * dy)
+    return stretch[0] + (stretch[1] - stretch[0]) * min(max(along, 0.0), 1.0)

@@ -1,0 +1,165 @@
+"""One-way walls: solid from the left, open from the right, for as long as it takes to pass."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sandbox.engines.contract import Refusal
+from sandbox.engines.relay import Relay, start
+from sandbox.measure.run import run
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Scene
+
+R = 0.1
+
+
+def gate(ball: dict[str, Any], points: list[list[float]] | None = None, **more: Any) -> Scene:
+    """Return a ball, and a gate that runs upwards, so that its left is where x < 0; what goes to −x passes."""
+    wall = {"name": "gate", "points": points or [[0.0, -1.0], [0.0, 1.0]], "thickness": 0.02, "restitution": 1.0}
+    return from_document(
+        {
+            "solver": {"dt": 0.005},
+            "world": {"duration": 2.0, **more},
+            "ball": [{"name": "ball", "radius": R, "mass": 1.0, **ball}],
+            "wall": [{**wall, "one_way": True}],
+        }
+    )
+
+
+def gone(simulation: Relay, steps: int) -> np.ndarray[Any, Any]:
+    """Return the velocities (steps, 2) while a simulation goes on."""
+    found = []
+    for _ in range(steps):
+        simulation.step()
+        found.append(simulation.frame().velocity[0])
+    return np.asarray(found)
+
+
+@pytest.mark.parametrize("speed", [0.01, 1.0, 15.0])
+def test_what_comes_from_the_left_rebounds(speed: float) -> None:
+    scene = gate({"position": [-R - 0.01 - 0.05 * speed, 0.0], "velocity": [speed, 0.0]})
+    velocity = gone(start(scene), 40)
+    assert velocity[-1, 0] == pytest.approx(-speed, rel=1e-12)  # rounding
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0, 10.0, 30.0])
+def test_what_comes_from_the_right_passes_without_a_trace(speed: float) -> None:
+    simulation = start(gate({"position": [R + 0.01 + 0.05 * speed, 0.0], "velocity": [-speed, 0.0]}))
+    simulation.contacts()
+    velocity = gone(simulation, 1000 if speed < 1.0 else 200)
+    assert (velocity == [-speed, 0.0]).all()
+    assert simulation.frame().position[0, 0] < -R - 0.01
+    assert not len(simulation.contacts().time)
+
+
+def test_it_rebounds_from_the_left_once_it_has_passed() -> None:
+    # Thrown through against a pull to the right: it turns round beyond the gate and comes back to it.
+    simulation = start(gate({"position": [0.5, 0.0], "velocity": [-3.0, 0.0]}, gravity=[4.0, 0.0]))
+    x = []
+    for _ in range(400):
+        simulation.step()
+        x.append(float(simulation.frame().position[0, 0]))
+    passed = next(k for k, place in enumerate(x) if place < -R - 0.01)
+    assert max(x[passed:]) < -R - 0.01 + 0.03  # m: the way of one step, 0.005 s at 4 m/s, and rounding
+    assert min(x) == pytest.approx(0.5 - 9.0 / 8.0, abs=0.02)  # v²/2a: it lost nothing on the way through
+
+
+def test_what_turns_round_within_goes_back_unhindered() -> None:
+    # It turns round while it overlaps, its centre beyond the line: nothing snaps it to either side.
+    start_x = 0.5
+    pull = 2.0
+    speed = float(np.sqrt(2.0 * pull * (start_x + 0.04)))  # it reaches x = −0.04
+    simulation = start(gate({"position": [start_x, 0.0], "velocity": [-speed, 0.0]}, gravity=[pull, 0.0]))
+    velocity = gone(simulation, 300)
+    assert np.diff(velocity[:, 0]) == pytest.approx(np.full(299, pull * 0.005), rel=1e-9)  # free fall throughout
+    assert simulation.frame().position[0, 0] > 0.5
+
+
+def test_what_rests_on_it_stays_there_and_what_hangs_below_falls_up_through() -> None:
+    # Its left is above: first point to the right, last to the left, would be below.
+    points = [[-1.0, 0.0], [1.0, 0.0]]
+    lying = start(gate({"position": [0.0, R + 0.01]}, points, gravity=[0.0, -9.81]))
+    for _ in range(200):
+        lying.step()
+    assert lying.frame().position[0, 1] == pytest.approx(R + 0.01, abs=2e-3)  # pymunk's slop
+    turned = start(gate({"position": [0.0, R + 0.01]}, points[::-1], gravity=[0.0, -9.81]))
+    for _ in range(200):
+        turned.step()
+    assert turned.frame().position[0, 1] < -4.0
+
+
+def test_polyline_lets_pass_where_its_segments_join() -> None:
+    for points in ([[0.0, -1.0], [0.0, 0.0], [0.0, 1.0]], [[-0.3, -1.0], [0.0, 0.0], [-0.3, 1.0]]):
+        simulation = start(gate({"position": [0.5, 0.0], "velocity": [-1.0, 0.0]}, points))
+        assert (gone(simulation, 200) == [-1.0, 0.0]).all()
+        back = start(gate({"position": [-0.8, 0.0], "velocity": [1.0, 0.0]}, points))
+        assert gone(back, 200)[-1, 0] == pytest.approx(-1.0, rel=0.02)  # two at once in a corner: ten passes
+
+
+def test_box_passes_too() -> None:
+    document = {
+        "solver": {"dt": 0.005},
+        "box": [{"position": [0.5, 0.3], "velocity": [-1.0, 0.0], "angular_velocity": 2.0, "size": [0.3, 0.1]}],
+        "wall": [{"points": [[0.0, -1.0], [0.0, 1.0]], "one_way": True, "friction": 1.0}],
+    }
+    simulation = start(from_document(document))
+    assert (gone(simulation, 200) == [-1.0, 0.0]).all()
+    assert simulation.frame().angular_velocity[0] == 2.0
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(-1.2, 1.2), st.floats(-0.5, 0.5), st.floats(0.2, 20.0))
+def test_nothing_gets_from_left_to_right_nor_loses_energy(y: float, up: float, speed: float) -> None:
+    # Elastic and without friction: whatever it meets, sides or ends, its speed stays.
+    for side in (-1.0, 1.0):
+        scene = gate({"position": [side * 0.6, y], "velocity": [-side * speed, up * speed]})
+        simulation = start(scene, settings=scene.solver.replace(dt=0.5 * R / (20.0 * 1.2)))
+        for _ in range(200):
+            simulation.step()
+            velocity = simulation.frame().velocity[0]
+            assert np.hypot(*velocity) == pytest.approx(speed * np.hypot(1.0, up), rel=1e-9)  # rounding
+        if side > 0.0 and abs(y) + 0.6 * abs(up) < 0.9:  # it meets no end
+            assert velocity[0] == -speed
+        if side < 0.0 and abs(y) + 0.6 * abs(up) < 0.9:
+            assert velocity[0] <= speed
+            assert simulation.frame().position[0, 0] < 0.0 or velocity[0] == speed
+
+
+def test_checkpoint_within_the_gate_goes_on_through() -> None:
+    simulation = start(gate({"position": [0.5, 0.0], "velocity": [-1.0, 0.0]}))
+    for _ in range(110):  # its centre is beyond the line by now, and it still overlaps
+        simulation.step()
+    assert -R < simulation.frame().position[0, 0] < 0.0
+    taken_up = Relay.resumed(simulation.checkpoint())
+    for each in (simulation, taken_up):
+        gone(each, 100)
+    assert taken_up.state_hash() == simulation.state_hash()
+
+
+def test_audit_misses_nothing_at_a_gate() -> None:
+    scene = gate({"position": [0.5, 0.0], "velocity": [-60.0, 0.0]})
+    assert run(scene).missed_contacts == 0
+
+
+@pytest.mark.parametrize("engine", ["exact", "reference"])
+def test_engines_without_gates_refuse(engine: str) -> None:
+    with pytest.raises(Refusal, match=r"does not model one-way walls; these could: pymunk"):
+        start(gate({"position": [0.5, 0.0]}), engine)
+
+
+def test_surfaces_numbered_anew_leave_the_gate_what_it_is() -> None:
+    from sandbox.action import Spawn
+    from sandbox.scene.discs import Ball
+
+    simulation = start(gate({"position": [0.5, 0.0], "velocity": [-1.0, 0.0]}))
+    for k in range(3):
+        simulation.apply(Spawn(time=0.0, ball=Ball(position=(3.0 + k, 0.5), radius=R, restitution=0.1 * k + 0.05)))
+    ball = Ball(position=(-0.5, 0.5), velocity=(1.0, 0.0), radius=R, restitution=0.9)
+    simulation.apply(Spawn(time=0.0, ball=ball))
+    gone(simulation, 180)
+    velocity = simulation.frame().velocity
+    assert velocity[0].tolist() == [-1.0, 0.0]
+    assert velocity[-1, 0] == pytest.approx(-0.9, rel=1e-12)  # rounding

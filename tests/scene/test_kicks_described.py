@@ -1,0 +1,127 @@
+"""What a scene file may say of kicks, falloffs, gates and openings, and what is told of what it may not."""
+
+from typing import Any
+
+import pytest
+
+from sandbox.measure.forecast import warnings
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import from_document, loads
+from sandbox.scene.meetings import meetings
+
+WALL = {"points": [[0, 0], [1, 0]]}
+POST = {"position": [0, 0], "radius": 1}
+BALL = {"position": [5, 5], "radius": 0.1}
+NONE = {"restitution_falloff": 0}
+
+
+@pytest.mark.parametrize(
+    ("document", "where", "what"),
+    [
+        (
+            {"post": [{**POST, "kick": {"speed": 1, "profile": "middle"}}]},
+            "post[0].kick.profile",
+            "a post has not",
+        ),
+        ({"post": [{**POST, "kick": {}}]}, "post[0].kick.speed", "is missing"),
+        ({"post": [{**POST, "kick": {"speed": -1}}]}, "post[0].kick.speed", "0 or more"),
+        ({"post": [{**POST, "kick": {"speed": 1, "threshold": 0}}]}, "post[0].kick.threshold", "0.001 or more"),
+        ({"post": [{**POST, "one_way": True}]}, "post[0].one_way", "unknown key"),
+        ({"wall": [{**WALL, "kick": {"speed": 1, "profile": "ends"}}]}, "wall[0].kick.profile", "one of"),
+        ({"wall": [{**WALL, "solid": 1}]}, "wall[0].solid", "true or false"),
+        ({"ball": [{**BALL, "restitution_falloff": -0.1}]}, "ball[0].restitution_falloff", "0 or more"),
+        ({"surface": {}, "wall": [{**WALL, "solid": False}]}, "wall[0].solid", "not of a cushion"),
+        ({"surface": {}, "wall": [{**WALL, "one_way": True}]}, "wall[0].one_way", "not of a cushion"),
+        ({"surface": {}, "post": [{**POST, "kick": {"speed": 1}}]}, "post[0].kick", "not of a cushion"),
+        (
+            {"surface": {}, "material": [{"name": "m", "restitution_falloff": 0.1}]},
+            "material.m.restitution_falloff",
+            "rebound alike",
+        ),
+        ({"surface": {}, "ball": [{**BALL, "restitution_falloff": 0.1}]}, "ball[0].restitution_falloff", "alike"),
+    ],
+)
+def test_fault_is_told_where_it_is(document: dict[str, Any], where: str, what: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        from_document(document)
+    (fault,) = caught.value.faults
+    assert fault.path == where
+    assert what in fault.message
+
+
+def test_fault_names_file_and_line() -> None:
+    text = "[[post]]\nposition = [0, 0]\nradius = 1\nkick = { speed = 1, profile = 'middle' }\n"
+    with pytest.raises(SceneError, match=r"bumpers\.toml:4: .*'even' is right here"):
+        loads(text, "bumpers.toml")
+
+
+def test_materials_state_falloff_and_a_shape_outranks_its_own() -> None:
+    balls = [{**BALL, "material": "rubber"}, {"position": [9, 9], "radius": 0.1, "material": "rubber", **NONE}]
+    rubber = {"name": "rubber", "restitution": 0.8, "restitution_falloff": 0.3}
+    scene = from_document({"material": [rubber], "ball": balls, "post": [{**POST, "restitution_falloff": 0.1}]})
+    surfaces = meetings(scene).surfaces
+    first, second, post = *surfaces.of_body.tolist(), surfaces.of_fixed[0]
+    assert surfaces.falloff[first, post] == pytest.approx(0.4, rel=1e-15)  # a sum
+    assert surfaces.falloff[second, post] == surfaces.falloff[post, second] == 0.1
+    assert surfaces.fixed_coefficients[second, second]
+    assert not surfaces.fixed_coefficients[first, second]
+
+
+def test_parts_of_a_body_take_over_its_falloff() -> None:
+    part = {"position": [0, 0], "radius": 0.1}
+    parts = [part, {**part, "position": [0.5, 0], "restitution_falloff": 0.5}]
+    scene = from_document({"body": [{"position": [5, 5], "restitution_falloff": 0.2, "ball": parts}]})
+    surfaces = meetings(scene).surfaces
+    assert [surfaces.surfaces[k].falloff for k in surfaces.of_shape.tolist()] == [0.2, 0.5]
+
+
+def test_scene_without_any_of_it_has_the_surfaces_it_had() -> None:
+    surfaces = meetings(from_document({"ball": [BALL], "post": [POST], "wall": [WALL]})).surfaces
+    assert len(surfaces.surfaces) == 1
+    assert surfaces.fixed_coefficients.all()
+    assert not surfaces.kicks.any() | surfaces.one_way.any()
+
+
+def test_warning_where_gravity_alone_makes_a_hit() -> None:
+    kicks = {"position": [0, 0], "radius": 0.5, "name": "bumper", "kick": {"speed": 1, "threshold": 0.054}}
+    document = {"world": {"gravity": [0, -9.81], "duration": 0.1}, "ball": [BALL], "post": [kicks]}
+    slow, quick = ({**document, "solver": {"dt": dt}} for dt in (0.01, 0.005))
+    (warning,) = (each for each in warnings(from_document(slow)) if each.kind == "kick_threshold")
+    assert "'bumper' kicks what closes at 0.054 m/s" in warning.message
+    assert "dt < 0.0055 s" in warning.message  # 0.054/9.81 s
+    assert not [each for each in warnings(from_document(quick)) if each.kind == "kick_threshold"]
+
+
+def test_forecast_of_speed_counts_kicks_in() -> None:
+    from sandbox.measure.forecast.passages import top_speeds
+
+    def fastest(**wall: Any) -> float:
+        scene = from_document({"ball": [BALL], "wall": [{**WALL, **wall}], "world": {"duration": 1}})
+        return float(top_speeds(scene, meetings(scene))[0])
+
+    assert fastest() == 0.0
+    assert fastest(restitution=0.5, kick={"speed": 2.0}) == pytest.approx(4.0, rel=1e-14)  # v = v/2 + 2
+    v = fastest(restitution=0.8, restitution_falloff=0.3, kick={"speed": 2.0})
+    assert v == pytest.approx(0.8 / (1 + 0.3 * v) * v + 2.0, rel=1e-14)
+    assert fastest(restitution=1.0, kick={"speed": 2.0}) == 2.0
+
+
+def test_no_closed_form_is_claimed_where_restitution_falls_off() -> None:
+    from sandbox.measure.closed_form import solution
+
+    plane = {"point": [0, 0], "normal": [0, 1], "restitution": 0.5}
+    drop = {"world": {"gravity": [0, -9.81], "duration": 3}, "ball": [{**BALL, "position": [0, 5]}], "plane": [plane]}
+    assert solution(from_document(drop)) is not None
+    assert solution(from_document({**drop, "plane": [{**plane, "restitution_falloff": 0.1}]})) is None
+    row = [{"position": [x, 0], "velocity": [-x, 0], "radius": 0.1, "restitution": 0.9} for x in (-1, 1)]
+    assert solution(from_document({"ball": row})) is not None
+    assert solution(from_document({"ball": [{**each, "restitution_falloff": 0.1} for each in row]})) is None
+
+
+def test_energy_is_not_kept_where_restitution_falls_off_or_something_kicks() -> None:
+    from sandbox.measure.tradeoff.aim import keeps_energy
+
+    elastic = {**BALL, "restitution": 1}
+    assert keeps_energy(from_document({"ball": [elastic], "post": [POST]}))
+    assert not keeps_energy(from_document({"ball": [{**elastic, "restitution_falloff": 0.1}], "post": [POST]}))
+    assert not keeps_energy(from_document({"ball": [elastic], "post": [{**POST, "kick": {"speed": 1}}]}))
