@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sandbox.engines.registry import ENGINES
     from sandbox.engines.relay import start
     from sandbox.measure.compare import compare
+    from sandbox.measure.play_out import play_out
     from sandbox.measure.run import run
     from sandbox.measure.shots import horizon, odds, sensitivity, windows
     from sandbox.measure.shots.spread import Spread
@@ -50,6 +51,7 @@ __all__ = [
     "load",
     "loads",
     "odds",
+    "play_out",
     "run",
     "sensitivity",
     "start",
@@ -77,6 +79,7 @@ _HOMES = {
     "load": "sandbox.scene.file",
     "loads": "sandbox.scene.file",
     "odds": "sandbox.measure.shots",
+    "play_out": "sandbox.measure.play_out",
     "run": "sandbox.measure.run",
     "sensitivity": "sandbox.measure.shots",
     "start": "sandbox.engines.relay",

@@ -28,6 +28,7 @@ NAMES = [
     "load",
     "loads",
     "odds",
+    "play_out",
     "run",
     "sensitivity",
     "start",

@@ -59,8 +59,6 @@ class Toy:
 
     def look(self, seen: Seen) -> Sequence[Action]:
         self.score += sum(0.5 for action in seen.actions if isinstance(action, Impulse))
-        if self.score >= self.ends_at:
-            self.over = "enough"
         acts: list[Action] = []
         if seen.time == 0.0:
             acts.append(Impulse(time=0.0, body="a", impulse=(self._chance.uniform(-0.1, 0.1), 0.0)))
@@ -72,6 +70,8 @@ class Toy:
                 acts.append(Impulse(time=0.0, body="a", impulse=(self._chance.uniform(-0.1, 0.1), 0.0)))
                 if self._bounces % 3 == 0:
                     acts.append(Spawn(time=0.0, ball=Ball(position=(5.0 + self._bounces, 3.0), radius=0.1)))
+        if self.score >= self.ends_at:
+            self.over = "enough"
         return acts
 
     def lines(self) -> Sequence[tuple[str, str]]:

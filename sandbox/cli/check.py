@@ -10,6 +10,7 @@ import click
 
 from sandbox.cli.reading import fault_rows, path_of, print_json
 from sandbox.engines.registry import ENGINES
+from sandbox.games.registry import fitting_rules
 from sandbox.measure.forecast import at_most, largest_safe_dt, notes, warnings
 from sandbox.scene.demands import JOINTS, Item, bill
 from sandbox.scene.faults import SceneError
@@ -34,6 +35,7 @@ def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, 
     for name in scenes:
         try:
             scene = load(path_of(name), overrides)
+            rules = fitting_rules(scene, path_of(name))
         except SceneError as error:
             status = 2
             documents.append(_faulty(name, error))
@@ -41,6 +43,8 @@ def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, 
                 click.echo(str(error), err=True)
             continue
         document, items = _checked(name, scene)
+        if rules is not None:
+            document["game"] = {"name": scene.play.game, "controls": [each._asdict() for each in rules.controls]}
         documents.append(document)
         if not any(engine["ok"] for engine in document["engines"].values()):
             status = max(status, 1)
@@ -100,6 +104,9 @@ def _print(name: str, scene: Scene, document: dict[str, Any], items: tuple[Item,
         safe = document["safe_dt"]
         say = "at any dt nothing can tunnel" if safe is None else f"nothing can tunnel up to dt = {at_most(safe)} s"
         _tell(f"{say}; the scene's is {scene.solver.dt:g} s")
+        if "game" in document:
+            keys = (f"{each['name']} ({' or '.join(each['keys'])})" for each in document["game"]["controls"])
+            _tell(f"game {document['game']['name']}: {', '.join(keys)}")
         for note in document["notes"]:
             _tell(f"note: {note['message']}")
     for warning in document["warnings"]:

@@ -9,6 +9,7 @@ from sandbox.cli.reading import gathering, path_of, refused
 from sandbox.cli.showing import show_stage, window_options
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import USUAL, UnknownEngineError, able, engine_named, usual
+from sandbox.games.registry import fitting_rules
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import load
 
@@ -28,6 +29,7 @@ def command(scene: str | None, engine: str | None, overrides: tuple[str, ...], *
         if scene is not None:
             path = Path(path_of(scene))
             found = load(path, overrides)
+            fitting_rules(found, str(path))
             first = engine or usual(found)
             missing = engine_named(first).missing(found, found.solver) if not faults else ()
             if missing:

@@ -65,6 +65,11 @@ class Bout:
         return self._referee.otherwise
 
     @property
+    def over(self) -> str | None:
+        """Why the game is over; None while it goes on."""
+        return self._referee.rules.over
+
+    @property
     def score(self) -> int | float:
         """Of who plays."""
         return self._referee.rules.score
@@ -75,7 +80,7 @@ class Bout:
             "name": game,
             "player": self.player,
             "score": self.score,
-            "over": self._referee.rules.over,
+            "over": self.over,
             "lines": [list(line) for line in self._referee.rules.lines()],
             "presses": [list(press) for press in self.presses],
             "otherwise": self.otherwise,

@@ -72,6 +72,16 @@ DEMANDED = {
     "billiards/stun_draw_follow": ROLLING,
     "billiards/three-cushion": CAROM,
     "billiards/throw": {*ROLLING, Demand.ROTATION},
+    "games/landing": {
+        Demand.TRANSLATION,
+        Demand.ROTATION,
+        Demand.GRAVITY,
+        Demand.POLYGONS,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.THRUST,
+        Demand.BOUNDS,
+    },
     "joints/bridge": {
         *FALLING,
         Demand.BALL_SEGMENT,

@@ -74,7 +74,8 @@ def _buttons(pad: str) -> str:
     words = []
     for word in pad.split():
         if word[0] in "+-":
-            words.append(f"{word[1:-1]} stick {sticks[word[-1]][word[0] == '+']}")
+            which = "right stick" if word[1:-1] == "right" else "stick"
+            words.append(f"{which} {sticks[word[-1]][word[0] == '+']}")
         else:
             words.append(word.upper() if word != "up" and len(word) <= 2 else word)
-    return ", ".join(words).replace("left stick left", "stick left").replace("left stick right", "stick right")
+    return ", ".join(words)

@@ -32,8 +32,9 @@ def draw_score(surface: pygame.Surface, board: Board, free: pygame.Rect, left: i
     above = right - left >= NARROWEST * unit
     if not above:
         left, right = free.left + margin, free.right - margin
-    rows = _rows(board, right - left - 2 * pad, size, gap)
-    end = wrapped(_told(board), size, right - left - 2 * pad - 1.3 * size, 2) if board.over is not None else ()
+    room = right - left - 2 * pad
+    rows = _rows(board, room, size, gap)
+    end = wrapped(_told(board), size, room - 1.4 * size, 2, bold=True) if board.over is not None else ()
     wide = max(max(sum(cells) + gap * (len(cells) - 1) for _, cells in rows), *(_wide(line, size) for line in end), 0)
     tall = round(2.75 * size)
     rect = pygame.Rect(0, 0, wide + 2 * pad, tall * len(rows) + round(1.5 * size) * len(end) + round(0.9 * size))

@@ -1,0 +1,255 @@
+"""Gymnasium: a scene with a game as an environment to learn in. The only place that imports gymnasium.
+
+    import gymnasium
+    import sandbox.gym
+
+    env = gymnasium.make("sandbox/Landing-v0")
+
+or `SandboxEnv(scene)` for any scene whose `[play] game` has rules. What an agent does are the game's controls, what it
+gets is what the score gained. An episode is a session: `recording()` returns it, to be replayed and seen in the window.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+try:
+    import gymnasium
+    from gymnasium import spaces
+except ImportError:
+    raise ImportError("sandbox.gym needs gymnasium: pip install 'sandbox2d[gym]'") from None
+
+from sandbox.action import Action, ActionError
+from sandbox.engines.contract import Divergence, Exhaustion
+from sandbox.engines.relay import Relay, start
+from sandbox.games.referee import Referee
+from sandbox.games.registry import rules_of
+from sandbox.games.rules import UnfitError
+from sandbox.measure.seeds import seeded
+from sandbox.recording import Recording
+from sandbox.scene.file import load
+from sandbox.scene.model import Scene
+from sandbox.scene.shipped import find
+from sandbox.trajectory import Contacts, FloatArray
+
+GAMES = {"Landing": ("games/landing", 5)}
+"""By the name in an id, the shipped scene, and how many steps an action lasts."""
+LIMIT = 1e6
+"""of every number that is observed, which is cut off there: spaces without bounds are ill-suited to learning"""
+STATE = 7
+"""Numbers a body: x, y in m, vx, vy in m/s, angle in rad, ω in rad/s, and whether it is there."""
+SIZE = 640, 480
+"""px of a picture"""
+SEEDS = 2**31
+
+Observation = np.ndarray[tuple[int], np.dtype[np.float32]]
+
+
+class SandboxEnv(gymnasium.Env[Observation, Any]):
+    """A game.
+
+    Observed are the chosen bodies, `STATE` numbers each, then the time in s and the score. An action sets every
+    control, where one is analogue by a `Box` of 0 to 1 (of the others more than a half is on), else by a
+    `MultiDiscrete` of 0 and 1. The reward is what the score gained. An episode is terminated as the game is over, and
+    truncated at the scene's duration, or where the physics cannot go on, which `info["failed"]` says.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012, as the base has it
+
+    def __init__(
+        self,
+        scene: Scene | str | Path,
+        engine: str = "pymunk",
+        bodies: Sequence[str] | None = None,
+        every: int = 1,
+        render_mode: str | None = None,
+    ) -> None:
+        """Make an environment; `reset` begins an episode.
+
+        Args:
+            scene: or its file, or the name of a shipped one.
+            engine: its name.
+            bodies: names of those that are observed; by default all that can move.
+            every: steps that an action lasts.
+            render_mode: None, or `rgb_array`.
+
+        Raises:
+            SceneError: the file has faults.
+            UnfitError: the scene has no game with rules, or lacks what its game needs.
+            ValueError: there is no such body, no such mode, or `every` is not positive.
+        """
+        self.scene = scene if isinstance(scene, Scene) else load(find(str(scene)))
+        self.engine, self.every, self.render_mode = engine, every, render_mode
+        rules = rules_of(self.scene)
+        if rules is None:
+            raise UnfitError(f"the scene {self.scene.title!r} has no game with rules: state [play] game")
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"there is no render mode {render_mode!r}; there is rgb_array")
+        if every < 1:
+            raise ValueError(f"an action lasts 1 or more steps, not {every}")
+        self._numbers = _numbers(self.scene, bodies)
+        self.controls = rules.controls
+        count = len(self.controls)
+        self.analogue = any(control.analogue for control in self.controls)
+        self.action_space = (
+            spaces.Box(0.0, 1.0, (count,), np.float32) if self.analogue else spaces.MultiDiscrete([2] * count)
+        )
+        self.observation_space = spaces.Box(-LIMIT, LIMIT, (STATE * len(self._numbers) + 2,), np.float32)
+        self.metadata = self.metadata | {"render_fps": max(round(1.0 / (self.scene.solver.dt * every)), 1)}
+        self._relay: Relay | None = None
+        self._game: Referee | None = None
+        self._played = self.scene
+        self._done: list[Action] = []
+        self._levels: list[float] = []
+        self._canvas: Any = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode.
+
+        Args:
+            seed: of the scene; without, the first episode has the scene's own, and each later one another.
+            options: none are known.
+
+        Raises:
+            ValueError: options are given.
+        """
+        if options:
+            raise ValueError(f"reset knows no options, but was given {', '.join(map(repr, options))}")
+        first = self._np_random is None
+        super().reset(seed=self.scene.world.seed if seed is None and first else seed)
+        number = seed if seed is not None else self.scene.world.seed if first else int(self.np_random.integers(SEEDS))
+        self.close()
+        self._played = seeded(self.scene, number)
+        rules = rules_of(self._played)
+        assert rules is not None
+        self._relay, self._game = start(self._played, self.engine), Referee(rules)
+        self._relay.contacts()
+        self._done, self._levels = [], [0.0] * len(self.controls)
+        self._look(Contacts.none())
+        return self._observation(), self._info()
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Set the controls, and make steps until the next decision, or to the end of the episode."""
+        relay, game = self._going()
+        before, failed = game.rules.score, None
+        try:
+            self._press(np.asarray(action, dtype=np.float64).tolist())
+            for _ in range(self.every):
+                relay.step()
+                self._look(relay.contacts())
+                if game.rules.over is not None or self._late:
+                    break
+        except (Divergence, Exhaustion, ActionError) as error:
+            failed = str(error)
+        info = self._info() | ({} if failed is None else {"failed": failed})
+        over = game.rules.over is not None
+        reward = float(game.rules.score - before)
+        return self._observation(), reward, over, not over and (self._late or failed is not None), info
+
+    def _going(self) -> tuple[Relay, Referee]:
+        if self._relay is None or self._game is None:
+            raise gymnasium.error.ResetNeeded("call reset before step, render or recording")
+        return self._relay, self._game
+
+    @property
+    def _late(self) -> bool:
+        assert self._relay is not None
+        return self._relay.time >= self.scene.world.duration - 0.5 * self.scene.solver.dt
+
+    def _press(self, levels: list[float]) -> None:
+        """Set the controls that an action changes."""
+        relay, game = self._going()
+        for k, (control, level) in enumerate(zip(self.controls, levels, strict=True)):
+            value = level if control.analogue else float(level > 0.5)
+            if value != self._levels[k]:
+                self._levels[k] = value
+                acts = game.press(relay.time, control.name, value)
+                self._do(acts)
+                game.saw(acts)
+
+    def _look(self, contacts: Contacts) -> None:
+        """Let the rules see the state, and do what they say."""
+        relay, game = self._going()
+        self._do(game.look(relay.time, relay.frame(), contacts))
+
+    def _do(self, acts: Sequence[Action]) -> None:
+        relay, _ = self._going()
+        for act in acts:
+            relay.apply(act)
+            self._done.append(act)
+
+    def _observation(self) -> Observation:
+        relay, game = self._going()
+        frame, some = relay.frame(), self._numbers
+        columns: list[FloatArray] = [frame.position[some], frame.velocity[some]]
+        columns += [each[some, None] for each in (frame.angle, frame.angular_velocity, frame.present.astype(float))]
+        state = np.concatenate((np.hstack(columns).ravel(), [relay.time, float(game.rules.score)]))
+        bounded = np.clip(np.nan_to_num(state, posinf=LIMIT, neginf=-LIMIT), -LIMIT, LIMIT)
+        return np.asarray(bounded, np.float32)
+
+    def _info(self) -> dict[str, Any]:
+        relay, game = self._going()
+        rules = game.rules
+        return {
+            "time": relay.time,
+            "score": rules.score,
+            "over": rules.over,
+            "lines": dict(rules.lines()),
+            "seed": self._played.world.seed,
+        }
+
+    def recording(self) -> Recording:
+        """Return the episode up to now, to be replayed: `sandbox replay` shows it."""
+        relay, game = self._going()
+        return Recording(
+            scene=self._played,
+            engine=self.engine,
+            settings=self._played.solver,
+            actions=tuple(self._done),
+            duration=relay.time,
+            state_hash=relay.state_hash(),
+            presses=game.presses,
+            score=game.rules.score,
+        )
+
+    def render(self) -> Any:
+        """Return a picture, (height, width, 3) of 0 to 255, or None without a render mode."""
+        if self.render_mode is None:
+            return None
+        relay, _ = self._going()
+        if self._canvas is None:
+            from sandbox.play.canvas import Canvas  # pygame is for who wants to see something
+
+            self._canvas = Canvas(SIZE)
+        return self._canvas.picture(relay.scene, relay.bodies, relay.frame())
+
+    def close(self) -> None:
+        """Release the engine."""
+        if self._relay is not None:
+            self._relay.close()
+        self._relay = self._game = None
+
+
+def _numbers(scene: Scene, names: Sequence[str] | None) -> list[int]:
+    """Return the numbers of the bodies that are observed.
+
+    Raises:
+        ValueError: there is no such body.
+    """
+    bodies = scene.bodies
+    if names is None:
+        return [int(number) for number in np.flatnonzero(~bodies.fixed)]
+    unknown = [name for name in names if name not in bodies.names]
+    if unknown:
+        raise ValueError(f"no body is named {', '.join(map(repr, unknown))}; there are {', '.join(bodies.names[:9])}")
+    return [bodies.names.index(name) for name in names]
+
+
+for _name, (_scene, _every) in GAMES.items():
+    gymnasium.register(
+        f"sandbox/{_name}-v0", entry_point="sandbox.gym:SandboxEnv", kwargs={"scene": _scene, "every": _every}
+    )

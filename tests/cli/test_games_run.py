@@ -1,0 +1,183 @@
+"""`sandbox run`, `check` and `replay` of games: scores, players, sessions that are played again."""
+
+import json
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from calling import json_of, lines_of, process, written
+from toy_game import TOY, Toy
+
+from sandbox.batch.store import VERSION, Store
+from sandbox.cli.replay import _computed
+from sandbox.cli.stored import read_run
+from sandbox.games import registry
+from sandbox.measure.play_out import play_out
+from sandbox.scene.file import load, loads
+from sandbox.trajectory import Trajectory
+
+
+@pytest.fixture(autouse=True)
+def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(registry.RULES, "landing", Toy)
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> str:
+    return written(tmp_path, TOY, "toy.toml")
+
+
+def test_row_tells_the_score(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, err = json_of(capfd, "run", scene)
+    (row,) = document["runs"]
+    game = play_out(load(scene))
+    assert (status, err) == (0, [])
+    assert (row["score"], row["over"], row["player"], row["otherwise"]) == (game.score, None, "random", None)
+    assert row["state_hash"] == game.recording.state_hash
+    assert "scores" not in document
+    assert (
+        json_of(capfd, "run", scene, "--player", "none")[1]["runs"][0]["score"] == play_out(load(scene), "none").score
+    )
+
+
+def test_table_tells_the_score_only_of_games(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    _, lines, _ = lines_of(capfd, "run", scene, "--player", "none")
+    assert lines[1].split()[-2:] == ["score", "game"]
+    assert lines[2].endswith("goes on")
+    plain = written(tmp_path, TOY.replace('game = "landing"', ""), "plain.toml")
+    _, lines, _ = lines_of(capfd, "run", plain)
+    assert "score" not in lines[1]
+    assert "score" not in json_of(capfd, "run", plain)[1]["runs"][0]
+
+
+def test_seeds_tell_how_scores_are_spread(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    _, document, err = json_of(capfd, "run", scene, "--seeds", "8")
+    scores = [row["score"] for row in document["runs"]]
+    (spread,) = document["scores"]
+    assert err == []
+    assert (spread["count"], spread["mean"]) == (8, pytest.approx(sum(scores) / 8))
+    assert (spread["quantiles"]["0"], spread["quantiles"]["1"]) == (min(scores), max(scores))
+    assert sum(spread["histogram"]["counts"]) == 8
+    _, lines, _ = lines_of(capfd, "run", scene, "--seeds", "8")
+    at = next(k for k, line in enumerate(lines) if line.startswith("scores of"))
+    assert lines[at].endswith("pymunk: 8 games, player random")
+    assert f"mean {spread['mean']:.4g}" in lines[at + 1]
+    assert len(lines) == at + 3 + len(spread["histogram"]["counts"])
+    assert max(line.count("█") for line in lines) == 40
+
+
+def test_sweeps_are_spread_apart(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    arguments = ("run", scene, "--seeds", "3", "--sweep", "world.gravity=[0.0,-9.81],[0.0,-4.0]")
+    _, document, _ = json_of(capfd, *arguments)
+    assert [(each["set"]["world.gravity"], each["count"]) for each in document["scores"]] == [
+        ([0.0, -9.81], 3),
+        ([0.0, -4.0], 3),
+    ]
+
+
+def test_store_keeps_the_score_and_knows_the_player(
+    scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "runs")
+    first = json_of(capfd, "run", scene, "--out", out)[1]["runs"][0]
+    again = json_of(capfd, "run", scene, "--out", out)[1]["runs"][0]
+    other = json_of(capfd, "run", scene, "--out", out, "--player", "none")[1]["runs"][0]
+    assert (again["repeated"], again["score"], again["id"]) == (True, first["score"], first["id"])
+    assert (other["repeated"], other["id"] != first["id"]) == (False, True)
+    with Store(out) as store:
+        assert [row.score for row in store.rows()] == [first["score"], other["score"]]
+
+
+def test_store_of_the_first_version_is_brought_up_to_date(
+    scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "runs"
+    json_of(capfd, "run", scene, "--out", str(out))
+    with closing(sqlite3.connect(out / "runs.sqlite", isolation_level=None)) as old:
+        old.execute("ALTER TABLE runs DROP COLUMN score")  # as version 1 had it
+        old.execute("PRAGMA user_version = 1")
+    with Store(out) as store:
+        assert [row.score for row in store.rows()] == [None]
+    with closing(sqlite3.connect(out / "runs.sqlite")) as new:
+        assert new.execute("PRAGMA user_version").fetchone()[0] == VERSION == 2
+
+
+def test_script_plays(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    script = written(tmp_path, "0.1, kick, 1\n0.2, kick, 0\n", "script.txt")
+    row = json_of(capfd, "run", scene, "--player", script)[1]["runs"][0]
+    assert row["player"] == script
+    assert row["score"] % 1.0 == 0.5
+    bad = written(tmp_path, "0.1, jump, 1\n", "bad.txt")
+    status, _, err = json_of(capfd, "run", scene, "--player", bad)
+    assert (status, err) == (2, [f"{bad}: there is no control 'jump'; the game has 'kick', 'aim'"])
+
+
+def test_player_where_nobody_plays_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    plain = written(tmp_path, TOY.replace('game = "landing"', ""), "plain.toml")
+    status, _, err = lines_of(capfd, "run", plain, "--player", "none")
+    assert (status, err) == (2, ["--player: nobody plays here: no scene named has a game with rules"])
+
+
+def test_session_is_played_again_with_its_score(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    game = play_out(load(scene))
+    file = game.recording.save(tmp_path / "session.json")
+    status, document, err = json_of(capfd, "run", str(file))
+    (row,) = document["runs"]
+    assert (status, err) == (0, [])
+    assert (row["replayed"], row["score"], row["player"]) == (True, game.score, "as recorded")
+
+    forged = json.loads(file.read_text())
+    forged["score"] += 100
+    file.write_text(json.dumps(forged))
+    assert json_of(capfd, "run", str(file))[0] == 1
+
+    forged["score"] -= 100
+    kick = next(action for action in forged["actions"] if action["kind"] == "impulse" and action["time"] > 0.1)
+    kick["impulse"] = [5.0, 5.0]
+    file.write_text(json.dumps(forged))
+    status, document, err = json_of(capfd, "run", str(file))
+    assert (status, document["runs"][0]["replayed"], document["runs"][0]["otherwise"]) == (1, False, kick["time"])
+    assert f"ended in another game, from {kick['time']:g} s on," in err[0]
+
+
+def test_stored_game_is_played_again_in_the_window(
+    scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "runs"
+    row = json_of(capfd, "run", scene, "--out", str(out))[1]["runs"][0]
+    stored = read_run(Path(row["path"]), row["path"])
+    assert isinstance(stored, Trajectory)
+    live = _computed(stored, "pymunk")
+    for _ in live.session.seek(row["steps"]):
+        pass
+    assert live.session.game is not None
+    assert live.session.game.rules.score == row["score"]
+    assert live.session.game.otherwise is None
+    live.close()
+
+
+def test_recording_that_is_damaged_is_one_line(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = play_out(loads(TOY)).recording.save(tmp_path / "session.json")
+    document = json.loads(file.read_text())
+    for presses in ([[0.0, "kick"]], [["x", "kick", 1]], 7, [[-1.0, "kick", 1.0]]):
+        file.write_text(json.dumps(document | {"presses": presses}))
+        status, _, err = lines_of(capfd, "run", str(file))
+        assert status == 2
+        assert len(err) == 1
+        assert "presses" in err[0]
+
+
+def test_check_tells_the_game() -> None:
+    told = process("check", "landing").stdout
+    assert "game landing: engine (up), turn left (left), turn right (right)\n" in told
+
+
+def test_scene_that_its_game_does_not_fit_is_told_with_its_line(tmp_path: Path) -> None:
+    lacking = written(tmp_path, TOY, "lacking.toml")
+    wanted = f"{lacking}:4: play.game: landing needs a body 'ship', a fixed thing 'pad', and a thrust"
+    for command in ("run", "check", "play"):
+        done = process(command, lacking)
+        assert done.returncode == 2
+        assert done.stderr.startswith(wanted)
+        assert done.stderr.count("\n") == 1

@@ -1,0 +1,43 @@
+"""How scores are spread: by numpy's own words, and bins of round widths that lose none."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sandbox.games.scores import MOST_BINS, SHARES, Scores
+
+SCORES = st.lists(st.one_of(st.integers(-1000, 10_000_000), st.floats(-1e6, 1e6)), min_size=1, max_size=60)
+
+
+@given(scores=SCORES)
+def test_figures_are_those_of_the_sample(scores: list[float]) -> None:
+    found = Scores.of(scores)
+    assert found.count == len(scores) == sum(found.counts)
+    assert found.mean == pytest.approx(np.mean(scores), rel=1e-12, abs=1e-9)  # rounding
+    assert found.quantiles[0] == min(scores)
+    assert found.quantiles[-1] == max(scores)
+    assert list(found.quantiles) == sorted(found.quantiles)
+    assert found.quantiles[SHARES.index(0.5)] == pytest.approx(np.median(scores), rel=1e-12, abs=1e-9)
+
+
+@given(scores=SCORES)
+def test_bins_hold_all_scores_and_are_round(scores: list[float]) -> None:
+    found = Scores.of(scores)
+    assert len(found.edges) == len(found.counts) + 1
+    assert len(found.counts) <= MOST_BINS + 1
+    assert found.edges[0] <= min(scores)
+    assert max(scores) <= found.edges[-1] * (1.0 + 1e-12) + 1e-9  # rounding of an edge
+    width = found.edges[1] - found.edges[0]
+    assert f"{width:.0e}"[0] in "125"
+
+
+def test_one_score_is_a_bin() -> None:
+    found = Scores.of([7])
+    assert (found.deviation, found.counts) == (0.0, (1,))
+    assert found.edges[0] <= 7 < found.edges[1]
+
+
+def test_no_score_is_no_sample() -> None:
+    with pytest.raises(ValueError, match="no game"):
+        Scores.of([])

@@ -1,0 +1,60 @@
+"""Scripts of who presses what when: every fault of a file is told, with its line."""
+
+from pathlib import Path
+
+import pytest
+
+from sandbox.games.player import Player
+from sandbox.games.rules import Control, Press
+from sandbox.games.script_file import faults_of, read_script
+from sandbox.scene.faults import SceneError
+
+CONTROLS = (Control("left flipper", "", ("z",)), Control("plunger", "", ("enter",), analogue=True))
+
+
+def test_lines_are_presses_in_order_of_time(tmp_path: Path) -> None:
+    file = tmp_path / "s.txt"
+    file.write_text("1.5, left flipper, 1\n\n  # all of it\n0, plunger, 0.25 # a quarter\n", encoding="utf-8")
+    presses = read_script(file)
+    assert presses == (Press(0.0, "plunger", 0.25), Press(1.5, "left flipper", 1.0))
+    assert faults_of(presses, CONTROLS, "s.txt") == []
+    assert Player.named(str(file)).presses == presses
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("0.5 left 1", "should be `time, control, value`"),
+        ("0.5, 1", "should be `time, control, value`"),
+        ("0.5, , 1", "should be `time, control, value`"),
+        ("soon, left, 1", "should be `time, control, value`"),
+        ("-1, left, 1", "a time of -1 s is out of range"),
+        ("nan, left, 1", "a time of nan s is out of range"),
+        ("1e99, left, 1", "a time of 1e99 s is out of range"),
+        ("1, left, 2", "a value of 2 is out of range"),
+        ("1, left, nan", "a value of nan is out of range"),
+    ],
+)
+def test_faults_are_told_with_their_lines(tmp_path: Path, line: str, told: str) -> None:
+    file = tmp_path / "s.txt"
+    file.write_text(f"# first\n{line}\n1, ok, 1\n{line}\n")
+    with pytest.raises(SceneError) as error:
+        read_script(file)
+    assert [(fault.file, fault.line) for fault in error.value.faults] == [(str(file), 2), (str(file), 4)]
+    assert told in error.value.faults[0].message
+
+
+def test_what_a_game_does_not_have_is_told() -> None:
+    presses = (Press(0.0, "tilt", 1.0), Press(1.0, "tilt", 0.0), Press(2.0, "left flipper", 0.5))
+    assert [str(fault) for fault in faults_of(presses, CONTROLS, "s.txt")] == [
+        "s.txt: there is no control 'tilt'; the game has 'left flipper', 'plunger'",
+        "s.txt: 'left flipper' is 0 or 1, not 0.5",
+    ]
+
+
+def test_no_file_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="cannot be read: No such file"):
+        Player.named(str(tmp_path / "none.txt"))
+    (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SceneError, match="cannot be read"):
+        Player.named(str(tmp_path / "bytes"))

@@ -1,0 +1,367 @@
+"""Games with rules in the window: keys, gamepads, the panel, going back, starting again."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pygame
+import pytest
+from pressing import FOCUS_LOST, key, key_up
+from toy_game import TOY, Toy
+
+from sandbox.games import registry
+from sandbox.games.registry import RULES, rules_of
+from sandbox.games.rules import Control
+from sandbox.measure.replay import rerun
+from sandbox.play.drawing.palette import WARNING
+from sandbox.play.hosting.control_keys import KeyNameError, codes_of, told
+from sandbox.play.hosting.gamepad import LAYOUTS, PLAYSTATION, RUNGS, XBOX, Gamepads, layout_of
+from sandbox.play.hosting.host import Board, Host
+from sandbox.play.hosting.jingle import FIGURES, figure_of, jingle
+from sandbox.play.instruments.score_panel import draw_score
+from sandbox.play.running.live import Live
+from sandbox.play.sound import Sounds
+from sandbox.play.stage import Stage
+from sandbox.play.window import Window
+from sandbox.recording import Recording
+from sandbox.scene.file import load
+from sandbox.scene.shipped import shipped
+
+UP, LEFT, R, P = pygame.K_UP, pygame.K_LEFT, pygame.K_r, pygame.K_p
+
+
+class Buttons(Toy):
+    """The toy with two keys for a control."""
+
+    controls = (
+        Control("kick", "kick it", ("up", "left shift"), "a -lefty"),
+        Control("aim", "how far", ("left",), "lt", analogue=True),
+    )
+
+
+@pytest.fixture(autouse=True)
+def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(registry.RULES, "landing", Buttons)
+
+
+@pytest.fixture
+def window(tmp_path: Path) -> Iterator[Window]:
+    file = tmp_path / "toy.toml"
+    file.write_text(TOY)
+    stage = Stage()
+    stage.take(file)
+    opened = Window(stage, size=(1000, 640), folder=tmp_path, say=lambda _: None)
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+def turned(window: Window, *events: pygame.event.Event, elapsed: float = 0.05) -> Live:
+    for event in events:
+        pygame.event.post(event)
+    window.turn(elapsed)
+    assert isinstance(window.stage.show, Live)
+    return window.stage.show
+
+
+def presses_of(live: Live) -> list[tuple[str, float]]:
+    assert live.session.game is not None
+    return [(press.control, press.value) for press in live.session.game.presses]
+
+
+def host_of(window: Window) -> Host:
+    assert window.stage.host is not None
+    return window.stage.host
+
+
+def test_keys_set_controls_until_they_are_let_go(window: Window) -> None:
+    live = turned(window, key(UP))
+    assert presses_of(live) == [("kick", 1.0)]
+    turned(window, key(UP))  # the keyboard repeats what is held
+    live = turned(window, key_up(UP))
+    assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
+    assert host_of(window).rules.score == 0.5
+
+
+def test_control_is_let_go_with_the_last_of_its_keys(window: Window) -> None:
+    turned(window, key(UP), key(pygame.K_LSHIFT))
+    live = turned(window, key_up(UP))
+    assert presses_of(live) == [("kick", 1.0)]
+    live = turned(window, key_up(pygame.K_LSHIFT))
+    assert presses_of(live)[-1] == ("kick", 0.0)
+
+
+def test_who_looks_elsewhere_lets_go(window: Window) -> None:
+    turned(window, key(UP))
+    assert presses_of(turned(window, FOCUS_LOST))[-1] == ("kick", 0.0)
+
+
+def test_help_lists_controls_and_scene_keys_are_theirs(window: Window) -> None:
+    claims = window.desk.claims(window.stage)
+    assert claims.told == (
+        ("Up or Left Shift", "kick it; gamepad: A, stick up"),
+        ("Left", "how far; gamepad: LT"),
+    )
+    assert {UP, LEFT, pygame.K_LSHIFT} <= window.desk.claimed(window.stage)
+
+
+def test_restart_is_a_new_game(window: Window) -> None:
+    turned(window, key(UP), elapsed=0.3)
+    old = host_of(window)
+    live = turned(window, key(R), elapsed=0.0)
+    assert host_of(window) is not old
+    assert live.session.step_number == 0
+    assert host_of(window).rules.score == 0
+    live = turned(window, key_up(UP))  # held since the game before: it is none of this one's
+    assert presses_of(live) == []
+
+
+def test_reload_is_a_new_game(window: Window) -> None:
+    turned(window, key(UP), elapsed=0.3)
+    live = turned(window, key(pygame.K_l, mod=pygame.KMOD_CTRL), elapsed=0.0)
+    assert (host_of(window).rules.score, presses_of(live)) == (0, [])
+
+
+def test_going_back_brings_the_score_of_then(window: Window) -> None:
+    for _ in range(30):
+        live = turned(window)
+    scores = [host_of(window).rules.score]
+    assert scores[0] >= 1
+    live.seek(5)
+    live.arrive()
+    assert host_of(window).rules.score == 0
+    assert host_of(window).cues() == ()  # nothing new happened
+    live.seek(150)
+    live.arrive()
+    assert host_of(window).rules.score == scores[0]
+
+
+def test_what_was_held_later_is_let_go_of_on_another_way(window: Window) -> None:
+    turned(window, key(LEFT), elapsed=0.2)
+    held = turned(window, elapsed=0.2).session.step_number
+    live = turned(window, key_up(LEFT), elapsed=0.2)
+    live.seek(held // 2)
+    live.arrive()
+    live = turned(window, key(UP), key_up(UP))
+    assert presses_of(live) == [("aim", 1.0), ("kick", 1.0), ("aim", 0.0), ("kick", 0.0)]
+
+
+def test_pause_and_steps_keep_the_game(window: Window) -> None:
+    turned(window, key(P))
+    live = turned(window, key(UP), key_up(UP), elapsed=0.5)
+    step = live.session.step_number
+    turned(window, key(pygame.K_PERIOD, unicode="."))
+    assert live.session.step_number == step + 1
+    assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
+    assert host_of(window).rules.score == 0.5
+
+
+def test_engine_changes_and_the_game_goes_on(window: Window) -> None:
+    turned(window, key(UP), key_up(UP), elapsed=0.3)
+    assert window.stage.switch("reference")
+    live = turned(window, key(UP), key_up(UP), elapsed=0.3)
+    assert host_of(window).rules.score == 1.0
+    recording = live.session.recording()
+    run = rerun(recording, audit=False)
+    assert (run.info["state_hash"], run.info["game"]["score"]) == (recording.state_hash, recording.score)
+    assert run.info["game"]["otherwise"] is None
+
+
+def test_session_that_is_saved_replays(window: Window, tmp_path: Path) -> None:
+    turned(window, key(LEFT), elapsed=0.3)
+    turned(window, key(UP), key_up(UP), elapsed=0.3)
+    turned(window, key(pygame.K_s, mod=pygame.KMOD_CTRL), elapsed=0.0)
+    (file,) = tmp_path.glob("*.json")
+    recording = Recording.load(file)
+    assert len(recording.presses) == 3
+    run = rerun(recording, audit=False)
+    assert (run.info["state_hash"], run.info["game"]["score"]) == (recording.state_hash, recording.score)
+
+
+def test_panel_is_drawn_and_tells_the_end(window: Window) -> None:
+    turned(window)
+    host = host_of(window)
+    assert host.board() == Board("0.0", (("bounces", "0"), ("aim", "0.50")), None)
+    going = pygame.surfarray.array3d(window.surface)
+    rules = host.rules
+    assert isinstance(rules, Toy)
+    rules.over = "enough"
+    turned(window, elapsed=0.0)
+    over = pygame.surfarray.array3d(window.surface)
+    red = (np.abs(over.astype(int) - WARNING).sum(axis=2) < 20) & (going != over).any(axis=2)
+    assert red.any()  # the mark before the words
+    assert presses_of(turned(window, key(UP))) == []  # nobody plays any more
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (900, 300), (420, 300), (200, 150), (60, 40)])
+@pytest.mark.parametrize("over", [None, "a long story of how it came to this end, and what was to be learnt of it"])
+def test_panel_stays_in_what_is_free(size: tuple[int, int], over: str | None) -> None:
+    pygame.font.init()
+    surface = pygame.Surface(size)
+    lines = tuple((f"label {k}", f"{10**k} m/s") for k in range(8))
+    free = surface.get_rect()
+    board = Board("1 234 567", lines, over)
+    rect = draw_score(surface, board, free, 100, 1.0)
+    assert rect.width <= size[0]
+    if min(size) > 200:
+        assert free.contains(rect)
+
+
+class Pad:
+    def __init__(self, number: int, name: str) -> None:
+        self._number, self._name = number, name
+
+    def get_name(self) -> str:
+        return self._name
+
+    def get_instance_id(self) -> int:
+        return self._number
+
+
+def joy(kind: int, number: int = 7, **more: Any) -> pygame.event.Event:
+    return pygame.event.Event(kind, instance_id=number, **more)
+
+
+@pytest.fixture
+def plugged(window: Window) -> Callable[[str], None]:
+    """Plug a gamepad in, as the hardware would."""
+
+    def plug(name: str) -> None:
+        window._gamepads._plug = lambda _: Pad(7, name)
+        turned(window, pygame.event.Event(pygame.JOYDEVICEADDED, device_index=0), elapsed=0.0)
+
+    return plug
+
+
+def test_gamepad_plays(window: Window, plugged: Callable[[str], None]) -> None:
+    plugged("Xbox 360 Controller")
+    assert ("info", "gamepad: Xbox 360 Controller") in window.stage.messages.shown()
+    live = turned(window, joy(pygame.JOYBUTTONDOWN, button=0))
+    live = turned(window, joy(pygame.JOYBUTTONUP, button=0))
+    assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
+    live = turned(window, joy(pygame.JOYAXISMOTION, axis=2, value=0.0))  # the trigger, half-way
+    assert presses_of(live)[-1] == ("aim", 0.5)
+    live = turned(window, joy(pygame.JOYAXISMOTION, axis=2, value=0.001))  # no rung of its own
+    assert len(presses_of(live)) == 3
+    live = turned(window, joy(pygame.JOYAXISMOTION, axis=1, value=-0.3), joy(pygame.JOYAXISMOTION, axis=0, value=1.0))
+    assert len(presses_of(live)) == 3  # less than half-way is no kick, and nothing is to the right
+    live = turned(window, joy(pygame.JOYAXISMOTION, axis=1, value=-0.9))
+    assert presses_of(live)[-1] == ("kick", 1.0)
+
+
+def test_gamepad_that_is_pulled_out_lets_go(window: Window, plugged: Callable[[str], None]) -> None:
+    plugged("DualSense Wireless Controller")
+    turned(window, joy(pygame.JOYBUTTONDOWN, button=0))
+    live = turned(window, joy(pygame.JOYDEVICEREMOVED))
+    assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
+    assert presses_of(turned(window, joy(pygame.JOYBUTTONDOWN, button=0)))[2:] == []  # it is gone
+    plugged("DualSense Wireless Controller")  # and comes again
+    assert presses_of(turned(window, joy(pygame.JOYBUTTONDOWN, button=0)))[2:] == [("kick", 1.0)]
+
+
+@pytest.mark.parametrize(("name", "start"), [("Xbox Series X Controller", 7), ("PS4 Controller", 6)])
+def test_start_pauses(window: Window, plugged: Callable[[str], None], name: str, start: int) -> None:
+    plugged(name)
+    turned(window, joy(pygame.JOYBUTTONDOWN, button=start))
+    assert window.stage.paused
+    turned(window, joy(pygame.JOYBUTTONUP, button=start), joy(pygame.JOYBUTTONDOWN, button=start))
+    assert not window.stage.paused
+
+
+def test_hats_and_crosses_are_the_same() -> None:
+    from sandbox.play.hosting.gamepad import _words
+
+    assert _words(joy(pygame.JOYHATMOTION, hat=0, value=(-1, 1)), XBOX) == {
+        "left": 1.0,
+        "right": 0.0,
+        "down": 0.0,
+        "up": 1.0,
+    }
+    assert _words(joy(pygame.JOYBUTTONDOWN, button=13), PLAYSTATION) == {"left": 1.0}
+    assert _words(joy(pygame.JOYBUTTONDOWN, button=99), PLAYSTATION) == {}
+    half = _words(joy(pygame.JOYAXISMOTION, axis=0, value=0.6), XBOX)
+    assert half == {"-leftx": 0.0, "+leftx": pytest.approx(0.5, abs=0.5 / RUNGS)}  # (0.6 − 0.2) / 0.8
+    assert _words(joy(pygame.JOYAXISMOTION, axis=0, value=0.1), XBOX) == {"-leftx": 0.0, "+leftx": 0.0}
+
+
+def test_unknown_gamepads_are_laid_out_like_the_most_common() -> None:
+    assert layout_of("Some Pad") is XBOX
+    assert layout_of("Sony Interactive Entertainment DualSense") is PLAYSTATION
+    for layout in {id(each): each for each in (*LAYOUTS.values(), XBOX)}.values():
+        words = [*layout.buttons.values(), *layout.triggers.values(), *layout.sticks.values()]
+        assert len(set(words)) == len(words)
+        assert layout.start not in layout.buttons
+
+
+def test_gamepads_that_cannot_be_had_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails() -> None:
+        raise pygame.error("no joysticks here")
+
+    heard: list[str] = []
+    monkeypatch.setattr(pygame.joystick, "init", fails)
+    Gamepads(heard.append).begin()
+    assert heard == ["no gamepads: no joysticks here"]
+
+
+def test_keys_are_called_by_their_names() -> None:
+    assert codes_of("left shift") == (pygame.K_LSHIFT,)
+    assert codes_of("/") == (pygame.K_SLASH,)
+    assert pygame.K_RETURN in codes_of("enter")
+    for name in ("p", "o", "f1", "escape", "Z", "", "lefft"):
+        with pytest.raises(KeyNameError):
+            codes_of(name)
+
+
+@pytest.mark.parametrize("path", [scene.path for scene in shipped()], ids=lambda path: path.stem)
+def test_controls_of_every_shipped_game_can_be_reached(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()  # the game itself, not the toy
+    scene = load(path)
+    rules = rules_of(scene) if scene.play.game in RULES else None
+    if rules is None:
+        return
+    codes = [code for control in rules.controls for key in control.keys for code in codes_of(key)]
+    assert len(set(codes)) == len(codes)  # no key of two controls
+    assert len({control.name for control in rules.controls}) == len(rules.controls)
+    assert all(control.keys or control.pad for control in rules.controls)
+    words = {word for layout in (XBOX, PLAYSTATION) for word in (*layout.buttons.values(), *layout.triggers.values())}
+    words |= {f"{sign}{stick}" for stick in XBOX.sticks.values() for sign in "+-"} | {"left", "right", "up", "down"}
+    assert {word for control in rules.controls for word in (control.pad or "").split()} <= words
+    assert all(about for _, about in told(rules.controls))
+
+
+def test_cues_are_heard_once_sound_is_asked_for(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+    heard: list[str] = []
+    monkeypatch.setattr(Sounds, "cue", lambda _, name: heard.append(name))
+    for _ in range(30):
+        turned(window)
+    assert heard == ["bounce"] * int(host_of(window).rules.score)
+
+
+def test_cues_have_sounds_of_their_own() -> None:
+    sounds = Sounds()
+    assert not sounds.cue("win")  # off until asked for
+    assert sounds.enable()
+    assert sounds.cue("win")
+    sounds.disable()
+    assert figure_of("bumper") == figure_of("bumper")
+    assert len({figure_of(f"cue {k}") for k in range(40)}) > 15
+    for cue in (*FIGURES, "bumper", ""):
+        samples = jingle(cue)
+        assert samples.dtype == np.int16
+        assert 1000 < np.abs(samples).max() <= 0.8 * 32767 + 1
+        assert np.abs(samples[-16:]).max() < 400  # it ends in silence
+
+
+def test_scene_that_its_game_does_not_fit_is_shown_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
+    file = tmp_path / "toy.toml"
+    file.write_text(TOY)  # landing needs a ship
+    stage = Stage()
+    assert stage.open(file)
+    assert stage.host is None
+    assert stage.live is not None
+    level, text = stage.messages.shown()[-1]
+    assert (level, text.partition(",")[0]) == ("warning", "landing needs a body 'ship'")
+    stage.close()
