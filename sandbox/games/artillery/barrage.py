@@ -167,7 +167,7 @@ class Barrage:
         """Note what a shot came to, if it is one that was fired and came down by itself."""
         if shell.whole and shell.rolling is None:
             exact = None if shell.exact is None else shell.exact.place
-            self.shots.append(Shot(shell.shooter.name, shell.weapon.name, place, exact, time - shell.fired))
+            self.shots.append(Shot(shell.shooter.name, shell.weapon.name, place, exact, time - shell.fired, time))
 
     def _shell(
         self, time: float, tank: Tank, weapon: Weapon, place: FloatArray, velocity: FloatArray, rolls: bool = False

@@ -70,6 +70,11 @@ class ArtilleryRules:
         """What all shots came to."""
         return self.barrage.shots
 
+    @property
+    def log(self) -> Sequence[tuple[float, str]]:
+        """What all shots came to, and when, s."""
+        return [(shot.time, f"{shot.shooter}, {shot.weapon}: {shot.told}") for shot in self.shots]
+
     def speed(self, tank: Tank) -> float:
         """Return how fast a shell leaves a tank as it is set, m/s."""
         return tank.power * self.artillery.speed

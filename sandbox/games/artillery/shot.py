@@ -17,6 +17,8 @@ class Shot(NamedTuple):
     """where the exact flight comes down, m"""
     flown: float
     """s"""
+    time: float = 0.0
+    """s, when it came down, or was seen to have left"""
 
     @property
     def off(self) -> float | None:
