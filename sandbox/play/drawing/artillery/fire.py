@@ -19,6 +19,8 @@ from sandbox.trajectory import FloatArray
 SMOKE: Colour = (214, 206, 200)
 FLAME: tuple[Colour, ...] = ((255, 250, 222), (255, 204, 92), (238, 116, 48), (96, 62, 58))
 """From the beginning of a blast to its end."""
+OUTSIDE = 1e4
+"""px from a picture's corner, beyond which nothing is seen"""
 FARTHEST = 400
 """Points of a way that are drawn."""
 
@@ -67,7 +69,8 @@ def _clod(view: View, clod: Clod) -> None:
     """Draw a column of dirt that falls, and the air that it has left where it is to lie."""
     surface = view.surface
     ends = np.array([(clod.left, clod.top), (clod.right, clod.bottom), (clod.right, clod.floor)])
-    (left, top), (right, bottom), (_, floor) = view.camera.to_screen(ends).tolist()
+    places = np.clip(view.camera.to_screen(ends), -OUTSIDE, OUTSIDE)
+    (left, top), (right, bottom), (_, floor) = places.tolist()
     lies = floor - (bottom - top)
     air = pygame.Rect(math.floor(left), math.floor(lies) - 4, math.ceil(right) - math.floor(left) + 1, 1)
     air.height = max(math.ceil(floor) - air.top, 1)

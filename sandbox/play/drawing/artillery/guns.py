@@ -6,7 +6,7 @@ import numpy as np
 import pygame
 
 from sandbox.play.artillery.gunnery import Gun, Gunnery
-from sandbox.play.drawing.artillery.dots import dot
+from sandbox.play.drawing.artillery.dots import FARTHEST, dot
 from sandbox.play.drawing.palette import BACKGROUND, GREEN, INK, ORANGE, WARNING, YELLOW, Colour, mixed
 from sandbox.play.drawing.strokes import Pixel, fill, stroke
 from sandbox.play.drawing.text import write
@@ -30,6 +30,8 @@ def draw_guns(view: View, gunnery: Gunnery, tints: dict[int, Colour]) -> None:
             continue
         x, y = view.camera.to_screen(frame.position[gun.number]).tolist()
         width = max(gunnery.size[0] * view.camera.scale, LEAST * view.unit)
+        if not (abs(x) < FARTHEST and abs(y) < FARTHEST and width < FARTHEST):
+            continue
         height = width * gunnery.size[1] / gunnery.size[0]
         lift = 0.5 * (height - gunnery.size[1] * view.camera.scale)  # what is drawn larger stands where it stands
         _Tank(view, (x, y - lift), (width, height), -float(frame.angle[gun.number]), tints[gun.number]).draw(gun)
