@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sandbox.action import Action, actions_from_json
+from sandbox.games.artillery.bot import chances
 from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.rules import ArtilleryRules
 from sandbox.games.artillery.tanks import PER_KILL
@@ -27,10 +28,10 @@ TEXT = """
 [world]
 gravity = [0.0, -9.81]
 linear_drag = 0.03
-duration = 30.0
+duration = 14.0
 seed = 2
 [solver]
-dt = 0.01
+dt = 0.02
 [terrain]
 width = 240.0
 columns = 240
@@ -66,6 +67,7 @@ def taps(*names: str, begin: float = 0.1) -> tuple[Press, ...]:
     return tuple(press for time, name in each for press in (Press(time, name, 1.0), Press(time + 0.01, name, 0.0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 def test_bots_fight_to_the_end_and_the_recording_ends_alike(engine: str) -> None:
     scene = loads(BOTS, overrides=["world.duration=120"])
@@ -87,24 +89,38 @@ def test_bots_fight_to_the_end_and_the_recording_ends_alike(engine: str) -> None
     assert again.info["game"]["otherwise"] is None
 
 
-def test_a_perfect_gunner_hits_with_its_first_shot() -> None:
-    for seed in range(3):
-        scene = loads(BOTS, overrides=[f"world.seed={seed}", "world.duration=20"])
-        rules = played(scene, engine="reference", **RK4)[0]
-        first = rules.shots[0]
-        x, y = (190.0, scene.bodies.position[1, 1])
-        assert first.place is not None
-        assert math.dist(first.place, (x, y)) <= WEAPONS[0].radius
-        assert first.off is not None
-        assert first.off < 1e-6  # Runge–Kutta's error and the cubic's at 10 ms
-        assert rules.field.tanks.every[1].health < 100.0
+def test_a_shot_is_seen_again_with_the_same_hash_and_score() -> None:
+    scene = loads(TEXT)
+    rules, made, bout = played(scene, taps("left", "up", "fire"))
+    end = made.time[-1], made.info["state_hash"]
+    recording = Recording(
+        scene, "pymunk", scene.solver, actions_from_json(json.dumps(made.info["actions"])), *end, bout.presses
+    )
+    again = rerun(recording, audit=False)
+    assert (again.info["state_hash"], again.info["game"]["score"]) == (end[1], rules.score)
+    assert again.info["game"]["otherwise"] is None
+    assert again.info["game"]["log"] == made.info["game"]["log"]
+    assert len(again.info["game"]["log"]) == 1
+
+
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
+def test_a_perfect_gunner_hits_with_its_first_shot(seed: int) -> None:
+    scene = loads(BOTS, overrides=[f"world.seed={seed}", "world.duration=12"])
+    rules = played(scene, engine="reference", **RK4)[0]
+    first = rules.shots[0]
+    x, y = 190.0, float(scene.bodies.position[1, 1])
+    assert first.place is not None
+    assert math.dist(first.place, (x, y)) <= WEAPONS[0].radius
+    assert first.off is not None
+    assert first.off < 1e-5  # Runge–Kutta's error and the cubic's at 20 ms
+    assert rules.field.tanks.every[1].health < 100.0
 
 
 @pytest.mark.parametrize("edges", ["open", "rubber", "wrap"])
 def test_shells_at_the_sides_go_the_exact_way(edges: str) -> None:
     """At full power half the shots meet a side: taken back there at the next frame, and not before, in a light wind."""
-    scene = loads(TEXT, overrides=[f"artillery.edges={edges}", "artillery.wind=0"])
-    presses = taps("fire") + taps("fire", begin=14.0)
+    scene = loads(TEXT, overrides=[f"artillery.edges={edges}", "artillery.wind=0", "world.duration=24"])
+    presses = taps("fire") + taps("fire", begin=11.0)
     rules = rules_of(scene)
     assert isinstance(rules, ArtilleryRules)
     for tank, angle in zip(rules.field.tanks.every, (120.0, 60.0), strict=True):  # both outwards
@@ -114,7 +130,7 @@ def test_shells_at_the_sides_go_the_exact_way(edges: str) -> None:
     for shot in rules.shots:
         assert (shot.place is None) == (shot.exact is None) == (edges == "open")
         if shot.off is not None:
-            assert shot.off < 1e-6  # nothing of the way is lost: both sides are passed in still air, exactly
+            assert shot.off < 1e-5  # at 20 ms; nothing of the way is lost: both sides are passed in still air, exactly
 
 
 def test_ground_is_dug_away_and_engine_and_rules_agree_on_it() -> None:
@@ -131,13 +147,14 @@ def test_ground_is_dug_away_and_engine_and_rules_agree_on_it() -> None:
 
 def test_wind_is_of_the_turn_and_of_the_seed() -> None:
     winds = []
-    for seed in (2, 2, 3):
+    for seed in (2, 3):
         rules, made, _ = played(loads(TEXT, overrides=[f"world.seed={seed}"]), taps("fire"))
         winds.append([a["value"][0] for a in made.info["actions"] if a["kind"] == "set"])
         assert rules.world.wind[0] == winds[-1][-1]
         assert all(abs(wind) <= 6.0 for wind in winds[-1])
     assert len(winds[0]) == 2
-    assert winds[0] == winds[1] != winds[2]
+    assert winds[0] != winds[1]
+    assert winds[0] == [float(chances(2, 2 * turn).uniform(-6.0, 6.0)) for turn in (1, 2)]
 
 
 def test_dirt_lifts_who_stands_under_it() -> None:
@@ -179,7 +196,9 @@ def test_a_pit_under_a_tank_costs_health_by_its_depth() -> None:
     blue = digs.field.tanks.every[1]
     fallen = y - float(made.position[-1, 1, 1])
     assert fallen > 5.0
-    assert 100.0 - blue.health == pytest.approx(3.0 * (fallen - 1.0), abs=0.5)  # it may still rock a little
+    assert 100.0 - blue.health == pytest.approx(
+        3.0 * (fallen - 1.0), abs=1.5
+    )  # half a metre: in its pit it still rocks, slowly
     assert digs.field.tanks.every[0].points == round(100.0 - blue.health)
 
 
@@ -225,8 +244,8 @@ def test_keys_set_the_gun_and_only_in_turn() -> None:
 
 
 def test_rounds_end_a_game_that_nobody_wins() -> None:
-    scene = loads(TEXT, overrides=["artillery.rounds=1"])
-    away = taps("fire") + taps("fire", begin=14.0)
+    scene = loads(TEXT, overrides=["artillery.rounds=1", "world.duration=26"])
+    away = taps("fire") + taps("fire", begin=12.0)
     rules, _, _ = played(scene, away)
     assert rules.over is not None
     assert rules.over.startswith("out of shells")
