@@ -38,9 +38,8 @@ class Shot(NamedTuple):
 
 
 def length(metres: float) -> str:
-    """Return a length in words that has three digits or so."""
-    if metres >= 1.0:
-        return f"{metres:.2f} m"
-    if metres >= 1e-3:
-        return f"{metres * 1e3:.3g} mm"
-    return f"{metres * 1e6:.3g} µm" if metres >= 1e-9 else "less than 1 nm"
+    """Return a length in words that has three digits."""
+    for least, factor, unit in ((1.0, 1.0, "m"), (1e-3, 1e3, "mm"), (1e-6, 1e6, "µm"), (1e-9, 1e9, "nm")):
+        if metres >= least:
+            return f"{f'{metres * factor:#.3g}'.rstrip('.')} {unit}" if metres < 100.0 else f"{metres:.0f} m"
+    return "less than 1 nm"

@@ -8,6 +8,7 @@ from sandbox.scene.artillery.described import Artillery
 from sandbox.scene.artillery.landscape import heights_of, levelled
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene, Wall
+from sandbox.scene.part import Point
 from sandbox.scene.solids import Box
 
 GROUND = "terrain"
@@ -15,6 +16,9 @@ GROUND = "terrain"
 
 FRICTION = 0.8
 """of ground that says nothing of its own"""
+
+DEEP, HIGH = 0.08, 0.5
+"""of the ground's width, below and above its lowest column, that the window shows"""
 
 MARGIN = 1.0
 """columns beyond a tank to either side that are level with it"""
@@ -82,9 +86,16 @@ def expanded(scene: Scene) -> Scene:
             _tank(artillery, k, ground) for k, player in enumerate(artillery.players) if player.name not in taken
         )
         changes["boxes"] = (*scene.boxes, *tanks)
-        if "game" not in scene.play.model_fields_set:
-            changes["play"] = scene.play.model_copy(update={"game": "artillery"})
+        play = {"game": "artillery", "view": _view(ground)}
+        stated = scene.play.model_fields_set
+        changes["play"] = scene.play.model_copy(update={k: v for k, v in play.items() if k not in stated})
     return scene.model_copy(update=changes)
+
+
+def _view(ground: Wall) -> tuple[Point, Point]:
+    """Return what the window shows: the ground from somewhat below its lowest column up to where shells fly, m."""
+    width, low = ground.points[-1][0], min(y for _, y in ground.points)
+    return (0.0, low - DEEP * width), (width, low + HIGH * width)
 
 
 def _pads(artillery: Artillery | None, each: float) -> Iterator[tuple[float, float]]:
