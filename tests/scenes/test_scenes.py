@@ -26,6 +26,8 @@ ROLLING = {*MEETING, Demand.SURFACE, Demand.SPIN}
 CAROM = {*ROLLING, Demand.BALL_SEGMENT, Demand.FRICTION, Demand.ROTATION}
 POCKETED = {*CAROM, Demand.BALL_POST, Demand.POCKETS}
 DEMANDED = {
+    "artillery/duel": {*BOX, Demand.DRAG},
+    "artillery/four": {*BOX, Demand.DRAG},
     "benchmark/bounce_to_rest": {*FALLING, Demand.BALL_PLANE, Demand.RESTITUTION},
     "benchmark/box_slides": BOX,
     "benchmark/box_sticks": BOX,
