@@ -153,6 +153,15 @@ class Reshape(Timed):
     """m, in place of those that it had"""
 
 
+class Drive(Timed):
+    """Ask a drive of the scene for a level from now on."""
+
+    kind: Literal["drive"] = "drive"
+    drive: Name
+    level: Annotated[float, Field(ge=0, le=1)]
+    """0 is at rest; of a torque the part of it, of a pull how far, of a stroke anything above 0 all the way"""
+
+
 class Toggle(Timed):
     """Let a wall or post be met from now on, or let everything pass it: a drop target, a diverter."""
 
@@ -189,6 +198,7 @@ Action = Annotated[
     | Launch
     | Throttle
     | Reshape
+    | Drive
     | Toggle
     | Strike
     | Switch,

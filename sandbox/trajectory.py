@@ -18,7 +18,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
-LATER = frozenset({"broken_time", "energy", "account", "spin"})
+LATER = frozenset({"broken_time", "energy", "account", "spin", "layer"})
 """Arrays of a trajectory that those stored by earlier versions lack."""
 
 
@@ -40,6 +40,12 @@ class Frame:
     """(N,) false once removed or retired: the body then stays where it was, with no velocity"""
     roll: FloatArray | None = None
     """(N, 2) rad/s, about x and y, of spheres on a floor; none where nothing rolls"""
+    layer: IntArray | None = None
+    """(N,) on which each is, by its number in the scene's `layers`; none where there is one alone"""
+    visits: IntArray | None = None
+    """(N, Z) how each is with each zone, by the words of `scene.zone`; none where there are none"""
+    drives: FloatArray | None = None
+    """(D, 3) of the scene's drives: level; torque, N·m, of a plunger its pull, m, and how fast that grows, m/s"""
 
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""
@@ -52,7 +58,7 @@ class Frame:
         return None if self.roll is None else np.column_stack((self.roll, self.angular_velocity))
 
     def state_hash(self) -> str:
-        """Return a SHA-256 of time and every body's state, bit for bit."""
+        """Return a SHA-256 of time, every body's state and every drive's, bit for bit."""
         digest = hashlib.sha256(np.float64(self.time).tobytes())
         for array in self._arrays():
             digest.update(array.tobytes())
@@ -60,7 +66,8 @@ class Frame:
 
     def _arrays(self) -> tuple[npt.NDArray[Any], ...]:
         arrays = (self.position, self.velocity, self.angle, self.angular_velocity, self.present)
-        return arrays if self.roll is None else (*arrays, self.roll)
+        more = (self.roll, self.layer, self.visits, self.drives)
+        return (*arrays, *(array for array in more if array is not None))
 
 
 class ContactEvent(NamedTuple):
@@ -122,6 +129,11 @@ class Contacts:
         rows = order[first][kept]
         return type(self)(self.time[rows], self.pair[rows], self.point[rows], self.normal[rows], impulse[kept])
 
+    def some(self, which: BoolArray) -> Self:
+        """Return some of them, (C,)."""
+        vectors = (self.point[which], self.normal[which], self.impulse[which])
+        return type(self)(self.time[which], self.pair[which], *vectors)
+
     def __len__(self) -> int:
         return len(self.time)
 
@@ -150,7 +162,7 @@ class Trajectory:
     contact_time: FloatArray
     """(C,) s"""
     contact_pair: IntArray
-    """(C, 2) body numbers; −1 − k for the k-th fixed thing: planes, walls, posts, pockets"""
+    """(C, 2) body numbers; −1 − k for the k-th fixed thing: planes, walls, posts, pockets, zones"""
     contact_point: FloatArray
     """(C, 2) m"""
     contact_normal: FloatArray
@@ -171,6 +183,9 @@ class Trajectory:
     """(T, K) J, what each cause, as in info's `causes`, has brought by then; empty where no account was kept"""
     spin: FloatArray = field(default_factory=lambda: np.empty((0, 0, 3)))
     """(T, N, 3) rad/s, right-handed, z up, of spheres on a floor; empty where nothing rolls"""
+    layer: IntArray = field(default_factory=lambda: np.empty((0, 0), np.int16))
+    """(T, N) on which layer each body is, by its number in the scene's `layers`, −1 before it is there; empty where
+    there is one alone"""
     info: Mapping[str, Any] = field(default_factory=dict)
     """What was run and how it went: scene (as a document), engine, settings, actions, seed, status, reason, steps,
     seconds, work, energy_start, energy_end, joint_error (the largest, as a part of a length; None without joints),
@@ -223,12 +238,14 @@ class Trajectory:
             keys += ["energy", "account"]
         if len(self.spin):
             keys.append("spin")
+        if len(self.layer):
+            keys.append("layer")
         return replace(self, **{key: getattr(self, key)[frames] for key in keys})
 
     def save(self, path: str | Path) -> Path:
         """Write the arrays as one compressed `.npz`, to a temporary name first: never half a file."""
         path = Path(path)
-        without = {"info"} if len(self.spin) else {"info", "spin"}
+        without = {"info", *(key for key in ("spin", "layer") if not len(getattr(self, key)))}
         arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in without}
         arrays["info"] = np.asarray(json.dumps(dict(self.info), ensure_ascii=False))
         with whole(path) as temporary, temporary.open("xb") as stream:

@@ -250,6 +250,31 @@ def _joints(draw: st.DrawFn, names: list[str]) -> Document:
     return {"kind": kind, **draw(joint)}
 
 
+def drives(names: list[str]) -> st.SearchStrategy[Document]:
+    """The drive of a body that starts at rest and at an angle of 0, sound whatever it holds."""
+    common = {"body": st.sampled_from(names)}
+    level = numbers(0, 1)
+    hinged = {**common, "pivot": pairs(-100, 100), "stops": st.sampled_from([[0, 1], [0, -1], [-0.5, 0.5]])}
+    torque = st.fixed_dictionaries(
+        {**hinged, "kind": st.just("torque"), "torque": numbers(1e-3, 10)},
+        optional={"ramp": level, "return_ratio": level, "hold_ratio": level, "hold_within": level, "bounce": level},
+    )
+    stroke = st.fixed_dictionaries(
+        {**hinged, "kind": st.just("stroke"), "rate": numbers(1e-2, 30)}, optional={"return_rate": numbers(0, 30)}
+    )
+    plunger = st.fixed_dictionaries(
+        {
+            **common,
+            "kind": st.just("plunger"),
+            "direction": st.sampled_from([[0, 1], [-3, 4]]),
+            "travel": numbers(1e-2, 3),
+            "speed": numbers(1e-2, 10),
+        },
+        optional={"draw_time": numbers(1e-2, 3), "key": st.sampled_from(["space", "left shift"])},
+    )
+    return torque | stroke | plunger
+
+
 def _thrusts(names: list[str]) -> st.SearchStrategy[Document]:
     optional = {"point": pairs(-3, 3), "begin": numbers(0, 1), "key": st.sampled_from(["up", "left"])}
     return st.fixed_dictionaries({"body": st.sampled_from(names), "force": pairs(-10, 10)}, optional=optional)

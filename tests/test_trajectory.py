@@ -213,3 +213,20 @@ def test_no_contacts_are_empty_arrays_of_the_same_kinds() -> None:
     assert none.time.shape == (0,)
     assert none.pair.shape == none.point.shape == none.normal.shape == none.impulse.shape == (0, 2)
     assert none.pair.dtype == np.int64
+
+
+def test_contacts_told_in_parts_are_merged() -> None:
+    """Rows of one time and pair are one contact: its first row, and the sum of all impulses."""
+    lasting, other = (0.5, (0, -1)), (0.5, (1, -1))
+    rows = [(lasting, 1.0), (other, 2.0), ((0.7, (0, -1)), 4.0), (lasting, 8.0), (other, 16.0), (lasting, 32.0)]
+    time = np.array([key[0] for key, _ in rows])
+    pair = np.array([key[1] for key, _ in rows], np.int64)
+    place = np.arange(12.0).reshape(6, 2)
+    impulse = np.array([[size, -size] for _, size in rows])
+    merged = Contacts(time, pair, place, place + 100.0, impulse).merged()
+    assert [(event.time, event.pair) for event in merged] == [lasting, other, (0.7, (0, -1))]
+    assert merged.impulse.tolist() == [[41.0, -41.0], [18.0, -18.0], [4.0, -4.0]]
+    assert merged.point.tolist() == place[:3].tolist()
+    assert merged.normal.tolist() == (place[:3] + 100.0).tolist()
+    assert merged.merged() is merged
+    assert len(Contacts.none().merged()) == 0

@@ -28,6 +28,15 @@ GUNNER = ("right", 0.5, 0.7), ("up", 0.5, 1.18), ("fire", 9.0, 9.1)
 """What is held in the duel's first turn, and from when until when, s: it comes down near the other."""
 AFTER_FIRE = 14.0
 """s, when the shell is over the hills, and what the window told at the beginning is gone"""
+FLIGHT = (
+    (2.6, "turn left", 1.0),
+    (3.1, "turn left", 0.0),
+    (3.2, "turn right", 1.0),
+    (3.65, "turn right", 0.0),
+    (3.7, "engine", 0.8),
+    (6.1, "turn right", 0.6),
+)
+"""s, controls and values of a landing that is under way"""
 
 
 def window(scene: str, seconds: float, overlays: set[str], *, ghost: bool, trust: bool, file: str) -> None:
@@ -71,6 +80,25 @@ def film(scene: str, file: str, *options: str) -> None:
         ):
             if call(arguments):
                 sys.exit(f"sandbox {' '.join(arguments)} failed")
+
+
+def landing(file: str) -> None:
+    """Come down on the pad by a script of throttles, and keep what is seen half-way."""
+    stage = Stage(overrides=["world.seed=9"])
+    opened = Window(stage, size=SIZE)
+    stage.open(find("landing"))
+    opened.desk.overlays |= {"trails"}
+    opened.turn(FRAME)
+    stage.messages = Messages()
+    for seconds, control, value in FLIGHT:
+        while stage.show is not None and stage.show.frame.time < seconds:
+            opened.turn(FRAME)
+        if stage.host is not None:
+            stage.host.hold("script", control, value)
+    for _ in range(12):
+        opened.turn(FRAME)
+    pygame.image.save(opened.surface, FOLDER / file)
+    opened.close()
 
 
 def table(file: str) -> None:
@@ -134,5 +162,6 @@ if __name__ == "__main__":
     film("ragdoll_stairs", "ragdoll.gif", "--size", "640x300", "--fps", "20", "--until", "2.5")
     table("table.png")
     duel("duel.png")
+    landing("landing.png")
     rolling("break.gif", 2.6)
     film("tearing_cloth", "tearing.gif", "--size", "640x340", "--fps", "20", "--until", "1.6")

@@ -9,6 +9,7 @@ from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError, run_id
 from sandbox.engines.registry import engine_named
 from sandbox.interrupt import heeded, uninterrupted
+from sandbox.measure.collisions import collisions
 from sandbox.measure.finite import finite
 from sandbox.measure.ledger import ledger_of
 from sandbox.measure.run import Progress, run
@@ -77,7 +78,7 @@ class Outcome:
             "energy_end": finite(info["energy_end"]),
             "joint_error": finite(info.get("joint_error")),
             "broken_joints": info.get("broken", 0),
-            "contacts": len(run.contact_time),
+            "contacts": collisions(run),
             "missed_contacts": run.missed_contacts,
             "retired": {
                 str(name): time for name, time in zip(run.names, run.retired_time.tolist(), strict=True) if time == time

@@ -19,6 +19,7 @@ from types import TracebackType
 from typing import Self
 
 from sandbox.action import Action, actions_to_json
+from sandbox.measure.collisions import collisions
 from sandbox.scene.document import to_document
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -282,7 +283,7 @@ def _row(trajectory: Trajectory, run: str) -> StoredRun:
         seconds=_known(info["seconds"]),
         energy_start=_known(info["energy_start"]),
         energy_end=_known(info["energy_end"]),
-        contacts=len(trajectory.contact_time),
+        contacts=collisions(trajectory),
         missed_contacts=trajectory.missed_contacts,
         path=f"{run}.npz",
         score=_known((info.get("game") or {}).get("score")),

@@ -98,6 +98,8 @@ def _check(run: Trajectory) -> None:
         if np.shape(array) != shape or array.dtype != kind:
             found = " x ".join(map(str, np.shape(array)))
             raise ValueError(f"is no stored run: {name} is {found} of {array.dtype}, not {' x '.join(map(str, shape))}")
+    if run.layer.size and (run.layer.shape != (frames, bodies) or run.layer.dtype.kind != "i"):
+        raise ValueError("is no stored run: layer is no row of whole numbers for each frame")
     if run.names.dtype.kind != "U" or not (np.diff(run.time) >= 0.0).all():
         raise ValueError("is no stored run: its names are no text, or its times do not rise")
     info = {"engine": str, "status": str}

@@ -31,7 +31,7 @@ class Cause(StrEnum):
     KICKS = "kicks"
     """What surfaces that kick add to a rebound: bumpers, slingshots"""
     DRIVES = "drives"
-    """Thrusts, motors, steady forces, hands"""
+    """Thrusts, motors, steady forces, hands; zones: whom they stop, and what their gravity gives beyond the world's"""
     CORRECTION = "position correction"
     """Positions that are shifted to undo overlaps, or what is off in joints"""
     INTEGRATOR = "integrator"

@@ -10,6 +10,7 @@ from sandbox.action import (
     SETTABLE,
     Action,
     ActionError,
+    Drive,
     Force,
     Impulse,
     Launch,
@@ -32,6 +33,7 @@ from sandbox.scene.crosscheck import MAX_SURFACES, course, crosscheck
 from sandbox.scene.cue import MISCUE, miscues, struck
 from sandbox.scene.demands import on_floor
 from sandbox.scene.document import to_document
+from sandbox.scene.driven import names_of
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import from_document
 from sandbox.scene.meetings import Meetings, meetings
@@ -102,6 +104,13 @@ class Cast(Protocol):
             ActionError: the engine models no thrust.
         """
 
+    def drive(self, number: int, level: float) -> None:
+        """Ask the scene's drive of that number for a level.
+
+        Raises:
+            ActionError: the engine models no drives.
+        """
+
     def add(self, single: Single, name: str) -> int:
         """Add a body that was checked, and return its number.
 
@@ -133,6 +142,8 @@ def perform(action: Action, cast: Cast) -> int | None:
             cast.throttle(_thrust_number(action.thrust, cast.scene), action.level)
         case Reshape():
             _reshape(action, cast)
+        case Drive():
+            cast.drive(_drive_number(action.drive, cast.scene), action.level)
         case Toggle():
             _toggle(action, cast)
         case Strike():
@@ -184,7 +195,14 @@ def _mover(name: str, cast: Cast) -> int:
     number = _number(name, cast)
     if cast.bodies.fixed[number]:
         raise ActionError(f"{name!r} is fixed; nothing can move it")
+    _refuse_driven(name, cast.scene)
     return number
+
+
+def _refuse_driven(name: str, scene: Scene) -> None:
+    for drive, own in zip(scene.drives, names_of(scene), strict=True):
+        if drive.body == name:
+            raise ActionError(f"{name!r} is held by its drive; only that moves it: a `drive` action on {own!r}")
 
 
 def _kick(action: Impulse, cast: Cast) -> None:
@@ -209,6 +227,7 @@ def _push(action: Force, cast: Cast) -> None:
 
 def _move(action: Move, cast: Cast) -> None:
     number = _number(action.body, cast)
+    _refuse_driven(action.body, cast.scene)
     fixed = bool(cast.bodies.fixed[number])
     if fixed and action.velocity not in (None, (0.0, 0.0)):
         raise ActionError(f"{action.body!r} is fixed; it can be put elsewhere, but has no velocity")
@@ -271,11 +290,20 @@ def _reshape(action: Reshape, cast: Cast) -> None:
     cast.change(_going_on(scene.model_copy(update={"walls": walls}), scene))
 
 
+def _drive_number(name: str, scene: Scene) -> int:
+    names = names_of(scene)
+    if name not in names:
+        raise ActionError(f"no drive is named {name!r}; there are {', '.join(names) or 'none'}")
+    return names.index(name)
+
+
 def _spawn(action: Spawn, cast: Cast) -> None:
     scene, single = cast.scene, action.single
     name = single.name or default_name("spawned", len(cast.bodies))
     if name in cast.bodies.names or name in scene.fixed_names:
         raise ActionError(f"a body or fixed thing is called {name!r} already")
+    if single.layer not in scene.layers:
+        raise ActionError(f"no layer is named {single.layer!r}; the scene speaks of {', '.join(scene.layers)}")
     if len(cast.bodies) >= MAX_BODIES:
         raise ActionError(f"the scene holds {MAX_BODIES:,} bodies already")
     alone = alone_in(scene, single)

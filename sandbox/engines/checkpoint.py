@@ -43,4 +43,6 @@ def cast(bodies: Bodies, frame: Frame) -> Bodies:
         angle=frame.angle[there],
         angular_velocity=frame.angular_velocity[there],
         roll=some.roll if frame.roll is None else frame.roll[there],
+        layer=some.layer if frame.layer is None else frame.layer[there],
+        visits=some.visits if frame.visits is None else frame.visits[there],
     )

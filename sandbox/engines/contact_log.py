@@ -3,7 +3,10 @@
 Vectors are complex numbers, x + iy, until they leave.
 """
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.rows import RowTable
@@ -34,11 +37,19 @@ class ContactLog:
         self._place: ComplexArray = np.empty((256, 2), np.complex128)  # point, normal
         self._impulse: ComplexArray = np.empty(256, np.complex128)
         self._row: IntArray = np.empty(0, np.int64)  # of what touches now
+        self._sign: npt.NDArray[np.floating[Any]] = np.empty(0)  # likewise, of the impulses that go on
+        self._order: IntArray | None = None  # likewise, in which they are entered
+        self.steady = False
+        """Each of what touches has a row of its own: while it is the same that touch, `go_on` will do. Of two that
+        share a row the order in which they are summed tells in the last digit."""
 
     def record(self, time: float, now: Touching) -> None:
         """Enter what touches at a time, s."""
+        self._order, self.steady = None, True
         if self.joints and len(now.a) > 1:
-            now = _ordered(now)
+            self._order = _order(now)
+            k = self._order
+            now = Touching(now.a[k], now.b[k], now.impulse[k], now.normal[k], now.point[k])
         if not len(now.a) and not len(self._row):
             return
         swapped = (now.a < 0) | ((now.b >= 0) & (now.b < now.a))
@@ -60,11 +71,20 @@ class ContactLog:
             self._pair[rows, 0], self._pair[rows, 1] = first[leader], second[leader]
             self._place[rows, 0], self._place[rows, 1] = now.point[leader], -sign[leader] * now.normal[leader]
         self._rows.keep(row)
-        self._row = row
+        self._row, self._sign = row, sign
+        self.steady = not self.joints or len(row) < 2 or len(np.unique(row)) == len(row)
+        self._enter(given)
+
+    def go_on(self, impulse: ComplexArray) -> None:
+        """Enter that the same touch as when last recorded, with these impulses, (K,) N·s, in the order of then."""
+        if len(impulse):
+            self._enter((impulse if self._order is None else impulse[self._order]) * self._sign)
+
+    def _enter(self, given: ComplexArray) -> None:
         if self.joints:
-            np.add.at(self._impulse, row, given)
+            np.add.at(self._impulse, self._row, given)
         else:
-            self._impulse[row] += given
+            self._impulse[self._row] += given
 
     def _opened(self, more: int) -> slice:
         """Return so many new rows, their impulse 0."""
@@ -87,6 +107,8 @@ class ContactLog:
     def take(self) -> Contacts:
         """Return the contacts that were open since the last call, and forget those that have ended."""
         n = self._count
+        if not n:
+            return Contacts.none()
         vectors = (self._place[:n, 0], self._place[:n, 1], self._impulse[:n])
         taken = Contacts(self._time[:n].copy(), self._pair[:n].copy(), *(_plain(vector) for vector in vectors))
         lasting = np.unique(self._row)
@@ -99,10 +121,9 @@ class ContactLog:
         return taken
 
 
-def _ordered(now: Touching) -> Touching:
-    """Return contacts by pair, and those of one pair by place: which one opens a row must not be chance."""
-    order = np.lexsort((now.point.imag, now.point.real, now.b, now.a))
-    return Touching(now.a[order], now.b[order], now.impulse[order], now.normal[order], now.point[order])
+def _order(now: Touching) -> IntArray:
+    """Return the order of contacts by pair, and of one pair by place: which one opens a row must not be chance."""
+    return np.lexsort((now.point.imag, now.point.real, now.b, now.a))
 
 
 def _plain(vector: ComplexArray) -> FloatArray:

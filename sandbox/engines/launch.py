@@ -10,6 +10,7 @@ from sandbox.scene.claimed import generators
 from sandbox.scene.generators import GeneratorError
 from sandbox.scene.layouts import count_of, layout_of
 from sandbox.scene.model import Mover, Scene
+from sandbox.scene.zone import AWAY
 from sandbox.trajectory import BoolArray, Frame
 
 
@@ -43,7 +44,13 @@ def launched(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tupl
     roll = frame.roll
     if roll is not None:  # what a generator makes does not roll yet
         roll = np.where(those[:, None], 0.0, roll)
-    return Frame(time=frame.time, present=frame.present | those, roll=roll, **columns), bodies, those
+    layer, visits = frame.layer, frame.visits
+    if layer is not None:
+        layer = np.where(those, scene.layers.index(generator.layer), layer)
+    if visits is not None:
+        visits = np.where(those[:, None], AWAY, visits)
+    laid = Frame(frame.time, present=frame.present | those, roll=roll, layer=layer, visits=visits, **columns)
+    return replace(laid, drives=frame.drives), bodies, those
 
 
 def _first(scene: Scene, generator: Mover) -> int:

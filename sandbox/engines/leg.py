@@ -95,7 +95,19 @@ class Leg:
         if frame.roll is not None:
             roll = np.zeros((count, 2))
             roll[self.numbers] = frame.roll
-        return Frame(self.time, position, velocity, angle, spin, present, roll)
+        layer = self._whole(frame.layer, self.bodies.layer, self.before.layer)
+        visits = self._whole(frame.visits, np.zeros_like(self.bodies.visits))
+        return Frame(self.time, position, velocity, angle, spin, present, roll, layer, visits, frame.drives)
+
+    def _whole(self, own: IntArray | None, everyone: IntArray, before: IntArray | None = None) -> IntArray | None:
+        """Return an array of the simulation with a row for everyone; who is gone is as before."""
+        if own is None:
+            return None
+        everyone = everyone.copy()
+        if before is not None:
+            everyone[: len(before)] = before
+        everyone[self.numbers] = own
+        return everyone
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call."""
@@ -165,7 +177,7 @@ def begun(
         Refusal: the engine lacks something.
         ActionError: it cannot take over a steady force.
     """
-    simulation = start_engine(scene.placed(cast(bodies, frame), frame.time, broken), engine, wanted)
+    simulation = start_engine(scene.placed(cast(bodies, frame), frame.time, broken, frame.drives), engine, wanted)
     for each in lasting:
         try:
             simulation.apply(each)
@@ -178,5 +190,9 @@ def begun(
     everyone = replace(bodies, **{column: getattr(frame, column) for column in columns})
     if frame.roll is not None:
         everyone = replace(everyone, roll=frame.roll)
+    if frame.layer is not None:
+        everyone = replace(everyone, layer=frame.layer)
+    if frame.visits is not None:
+        everyone = replace(everyone, visits=frame.visits)
     whole = scene.holding(everyone, scene.links, frame.time)
     return Leg(simulation, bodies, frame, numbers, frame.time, whole=whole)

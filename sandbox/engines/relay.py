@@ -12,7 +12,7 @@ from typing import Self
 
 from pydantic import ValidationError
 
-from sandbox.action import Action, ActionError, Launch, Pull, SetParameter, Spawn, Switch
+from sandbox.action import Action, ActionError, Launch, Pull, SetParameter, Spawn, Switch, Throttle
 from sandbox.engines.account import Cause
 from sandbox.engines.checkpoint import Checkpoint
 from sandbox.engines.contract import Divergence, Exhaustion, Observer, Refusal
@@ -138,6 +138,11 @@ class Relay:
     def pulls(self) -> Mapping[str, Pull]:
         """The hands that hold bodies, by the bodies' names."""
         return self._pulls.pulls
+
+    @property
+    def throttles(self) -> Mapping[str, Throttle]:
+        """The throttles that were set, by the names of their thrusts."""
+        return self._lasting.throttles
 
     @property
     def work(self) -> Mapping[str, int]:

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from sandbox.action import ActionError
 from sandbox.engines.acting import derived
 from sandbox.engines.expiry import Expiry
 from sandbox.engines.fixtures import Fixtures, fixtures_of
@@ -84,6 +85,14 @@ class Roster:
     def throttle(self, number: int, level: float) -> None:
         """Open the scene's thrust of that number to a share of its force."""
         self.throttles[number] = level
+
+    def drive(self, number: int, level: float) -> None:
+        """Refuse: no engine of these models drives, so that none gets a scene that has some.
+
+        Raises:
+            ActionError: always.
+        """
+        raise ActionError(f"there is no drive {number} here to ask for a level of {level:g}")
 
     @property
     def moving(self) -> BoolArray:

@@ -25,4 +25,9 @@ class Touching(NamedTuple):
     """(K,) midway in the overlap, m"""
 
 
+def joined(some: Touching, more: Touching) -> Touching:
+    """Return the contacts of both."""
+    return Touching(*(np.concatenate(both) for both in zip(some, more, strict=True)))
+
+
 NOTHING = Touching(np.empty(0, np.int64), np.empty(0, np.int64), *(np.empty(0, np.complex128) for _ in range(3)))

@@ -1,5 +1,6 @@
 """Drive: the loop of a run: step, act, keep frames, up to the end or to what ends it before."""
 
+import math
 from collections.abc import Callable, Sequence
 from itertools import chain, repeat
 from time import perf_counter
@@ -40,6 +41,8 @@ class _Doing:
     def __init__(self, simulation: Simulation, actions: Sequence[Action], bout: Bout | None) -> None:
         self._simulation, self._actions, self._bout = simulation, actions, bout
         self._due = 0
+        self.next = -math.inf
+        """when there is something to be done again, s; of a game at every step"""
         self._done: list[Action] = []
         self._heard: list[Contacts] = []
 
@@ -51,6 +54,7 @@ class _Doing:
             if self._bout is None:
                 self._simulation.apply(self._actions[self._due - 1])
         if self._bout is None:
+            self.next = self._actions[self._due].time if self._due < len(self._actions) else math.inf
             return self._due > begin
         acts = self._turn(self._actions[begin : self._due], last)
         for action in acts:
@@ -112,9 +116,11 @@ def drive(
     doing = _Doing(simulation, actions, bout)
     try:
         for dt in chain.from_iterable(repeat(stretch.dt, stretch.steps) for stretch in stretches):
-            doing.act(simulation.time + ROUNDING * dt)
-            if bout is not None and bout.stops:
-                break
+            now = simulation.time + ROUNDING * dt
+            if now >= doing.next:
+                doing.act(now)
+                if bout is not None and bout.stops:
+                    break
             simulation.step()
             step += 1
             last = step == every and part == 0.0

@@ -10,7 +10,7 @@ from sandbox.engines.contract import Exhaustion
 from sandbox.measure.schedule import schedule
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray, Frame
+from sandbox.trajectory import FloatArray, Frame, IntArray
 
 BYTES_PER_BODY = 6 * 8
 """of a frame: x, y, vx, vy, angle, ω"""
@@ -108,6 +108,8 @@ class Recorder:
         self.angle, self.angular_velocity = (np.full((kept, bodies), np.nan) for _ in range(2))
         self.spin: FloatArray | None = None
         """(T, N, 3) rad/s, where the first frame says that something rolls"""
+        self.layer: IntArray | None = None
+        """(T, N) where the first frame says that there are layers; −1 for a body that is not there yet"""
         self._books = books
         self._energy: FloatArray = np.empty(kept if books else 0)
         self._account: FloatArray = np.empty((kept, causes) if books else (0, 0))
@@ -146,6 +148,10 @@ class Recorder:
             if self.spin is None:
                 self.spin = np.full((*self.angle.shape, 3), np.nan)
             self.spin[k, :n] = spin
+        if frame.layer is not None:
+            if self.layer is None:
+                self.layer = np.full(self.angle.shape, -1, np.int16)
+            self.layer[k, :n] = frame.layer
         if self._books is not None:
             self._energy[k], self._account[k] = self._books()
         self._count += 1
@@ -155,12 +161,16 @@ class Recorder:
         wide = bodies + bodies // 2  # more are to be expected
         if len(self.time) * wide * BYTES_PER_BODY > free_memory() * SHARE:
             raise Exhaustion(f"the frames of {bodies:,} bodies do not fit into memory; use solver.record_every")
-        for name in ("position", "velocity", "angle", "angular_velocity", "spin"):
+        for name in ("position", "velocity", "angle", "angular_velocity", "spin", "layer"):
             old = getattr(self, name)
             if old is not None:
-                new = np.full((len(old), wide, *old.shape[2:]), np.nan)
+                new = np.full((len(old), wide, *old.shape[2:]), -1 if name == "layer" else np.nan, old.dtype)
                 new[: self._count, : old.shape[1]] = old[: self._count]
                 setattr(self, name, new)
+
+    def layers(self, bodies: int) -> IntArray:
+        """Return the layers of the first so many bodies, (T, n); (0, 0) where there is one alone."""
+        return np.empty((0, 0), np.int16) if self.layer is None else self.layer[: self._count, :bodies]
 
     def arrays(self, bodies: int) -> dict[str, FloatArray]:
         """Return what was kept of the first so many bodies."""

@@ -1,6 +1,7 @@
 """Running: a scene on an engine from start to end, recorded and audited."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -24,6 +25,7 @@ from sandbox.measure.schedule import schedule
 from sandbox.measure.versions import versions
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.document import to_document
+from sandbox.scene.meetings import bits_of
 from sandbox.scene.model import Scene
 from sandbox.scene.part import MAX_STEPS
 from sandbox.scene.settings import Settings
@@ -107,6 +109,7 @@ def run(
     if account:
         info["causes"] = [cause.value for cause in Cause]
     trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, end.contacts, retired, broken, missed, info)
+    trajectory = replace(trajectory, layer=recorder.layers(len(bodies)))
     total = energies(trajectory.at([0, -1]), scene, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     info["joint_error"] = joint_error(trajectory, scene)
@@ -191,6 +194,7 @@ class Auditor:
         self._audit = Audit(scene, simulation.bodies)
         self._simulation = simulation
         self._known, self._scene = len(simulation.bodies), simulation.scene
+        self._on = self._layers() if len(scene.layers) > 1 else None
         self.seconds = 0.0
         simulation.watch(self)
 
@@ -204,8 +208,22 @@ class Auditor:
         if len(end) != self._known:
             self._audit.joined(self._simulation.bodies)
             self._known = len(end)
-        self._audit(time, start, end, touching)
+        self._audit(time, start, end, touching, self._shared())
         self.seconds += perf_counter() - began
+
+    def _layers(self) -> IntArray:
+        """Return the layers that bodies are on, as bits, (N,)."""
+        frame = self._simulation.frame()
+        return bits_of(frame.layer, len(frame.position))
+
+    def _shared(self) -> IntArray | None:
+        """Return the layers on which bodies were since the last substep, as bits: none for who has changed its own."""
+        if self._on is None:
+            return None
+        before, self._on = self._on, self._layers()
+        shared = self._on.copy()
+        shared[: len(before)] &= before
+        return shared
 
     @property
     def missed(self) -> tuple[FloatArray, IntArray]:

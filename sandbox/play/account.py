@@ -5,6 +5,7 @@ from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 from sandbox.play.sight import Status
 from sandbox.play.stage import Stage
+from sandbox.scene.zone import notes
 
 
 def account(stage: Stage, claimed: tuple[tuple[str, str], ...], rate: float, recording: str | None) -> Status:
@@ -22,6 +23,7 @@ def account(stage: Stage, claimed: tuple[tuple[str, str], ...], rate: float, rec
     picked = stage.hands.picked
     live = stage.live
     company = live.company if live is not None else None
+    touches = show.contacts.some(~notes(show.contacts.pair, show.scene))
     trust = company.trust if company is not None else None
     return Status(
         title=show.scene.title or (stage.path.stem if stage.path is not None else "scene"),
@@ -42,7 +44,7 @@ def account(stage: Stage, claimed: tuple[tuple[str, str], ...], rate: float, rec
         missed=show.missed,
         recording=recording,
         busy=show.busy,
-        picked=facts(show.bodies, show.frame, show.contacts, picked) if picked is not None else (),
+        picked=facts(show.bodies, show.frame, touches, picked) if picked is not None else (),
         messages=messages,
         faults=stage.faults,
         claimed=claimed,

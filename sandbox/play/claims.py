@@ -1,11 +1,12 @@
 """Claims: the keys that a scene takes for itself, and what they do."""
 
+from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
 
 import pygame
 
-from sandbox.action import Throttle
+from sandbox.action import Action, Drive, Throttle
 from sandbox.play import cue_keys
 from sandbox.play.billiards.gestures import Gestures
 from sandbox.play.cue_keys import Deed
@@ -13,6 +14,7 @@ from sandbox.play.hands import Hands
 from sandbox.play.hosting import control_keys
 from sandbox.play.hosting.host import Host
 from sandbox.play.running.live import Live
+from sandbox.scene.driven import names_of
 from sandbox.scene.model import Scene, default_name
 
 ARROWS = {
@@ -22,7 +24,19 @@ ARROWS = {
     pygame.K_DOWN: (0.0, -1.0),
 }
 
-KEYS = {"left": pygame.K_LEFT, "right": pygame.K_RIGHT, "up": pygame.K_UP, "down": pygame.K_DOWN}
+KEYS = {
+    "left": pygame.K_LEFT,
+    "right": pygame.K_RIGHT,
+    "up": pygame.K_UP,
+    "down": pygame.K_DOWN,
+    "space": pygame.K_SPACE,
+    "left shift": pygame.K_LSHIFT,
+    "right shift": pygame.K_RSHIFT,
+    "z": pygame.K_z,
+    "slash": pygame.K_SLASH,
+    "return": pygame.K_RETURN,
+}
+"""The keys that thrusts and drives may have, as scenes call them."""
 
 
 class Claims(NamedTuple):
@@ -54,30 +68,43 @@ def claims(scene: Scene, hands: Hands, gestures: Gestures | None = None, host: H
         told.append(("Space", f"launch {generator} again"))
     releases: dict[int, Deed] = {}
     played, played_out = ({}, {}) if host is None else control_keys.deeds(host)
-    for k, thrust in enumerate(scene.thrusts):
-        if thrust.key is not None and KEYS[thrust.key] not in played:  # else it is the rules' to fire
-            name = thrust.name or default_name("thrust", k)
-            key = KEYS[thrust.key]
-            deeds[key] = partial(_throttle, thrust=name, level=1.0, also=deeds.get(key))
-            releases[key] = partial(_throttle, thrust=name, level=0.0, also=releases.get(key))
-            told.append((thrust.key.capitalize(), f"fire {name}"))
+    for called, verb, pressed, released in held(scene):
+        key = KEYS[called]
+        if key in played:  # it is the rules' to press
+            continue
+        deeds[key] = partial(_act, action=pressed, also=deeds.get(key))
+        releases[key] = partial(_act, action=released, also=releases.get(key))
+        told.append((called.capitalize(), verb))
     if host is not None:
         deeds |= played
         releases |= played_out
         told += control_keys.told(host.controls)
     if gestures is not None:
-        pressed, released = cue_keys.deeds(gestures)
-        deeds |= pressed
-        releases |= released
+        cue, let_go = cue_keys.deeds(gestures)
+        deeds |= cue
+        releases |= let_go
         told += cue_keys.TOLD
     return Claims(deeds, tuple(told), releases)
 
 
-def _throttle(live: Live, thrust: str, level: float, also: Deed | None) -> None:
-    """Open or close a thrust, after another that has the same key."""
+def held(scene: Scene) -> Iterator[tuple[str, str, Action, Action]]:
+    """Yield the keys that a scene's thrusts and drives have, what each does, and the actions of both its ends."""
+    for k, thrust in enumerate(scene.thrusts):
+        if thrust.key is not None:
+            name = thrust.name or default_name("thrust", k)
+            opened, closed = (Throttle(time=0.0, thrust=name, level=level) for level in (1.0, 0.0))
+            yield thrust.key, f"fire {name}", opened, closed
+    for drive, name in zip(scene.drives, names_of(scene), strict=True):
+        if drive.key is not None:
+            on, off = (Drive(time=0.0, drive=name, level=level) for level in (1.0, 0.0))
+            yield drive.key, f"drive {name}", on, off
+
+
+def _act(live: Live, action: Action, also: Deed | None) -> None:
+    """Do what a key asks for, after another thing that has the same key."""
     if also is not None:
         also(live)
-    live.act(Throttle(time=0.0, thrust=thrust, level=level))
+    live.act(action)
 
 
 def _shift(live: Live, hands: Hands, body: str, by: tuple[float, float]) -> None:

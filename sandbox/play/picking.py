@@ -6,8 +6,10 @@ import numpy as np
 
 from sandbox.play.hulls import Hull, hulls_of, meeting, nearest
 from sandbox.scene.bodies import Bodies
+from sandbox.scene.meetings import bits_of
 from sandbox.scene.model import Scene
 from sandbox.scene.near import near_pairs
+from sandbox.scene.zone import mask_of
 from sandbox.trajectory import BoolArray, FloatArray, Frame
 
 
@@ -40,30 +42,34 @@ def overlapping(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
     position, there = frame.position, frame.present
     count = min(len(position), len(bodies))
     radius, lone = bodies.radius[: len(position)], bodies.round[:count]
-    found = np.zeros(len(position), np.bool_)
+    found, layers = np.zeros(len(position), np.bool_), scene.layers
+    lies = bits_of(frame.layer, len(position))
     sound = there & np.isfinite(position).all(axis=1) & np.isfinite(frame.angle)
     solids = {number: hulls_of(bodies, frame, number) for number in np.flatnonzero(sound & ~lone).tolist()}
     with np.errstate(all="ignore"):
         for plane in scene.planes:
-            normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
-            found |= lone & ((position - np.asarray(plane.point)) @ normal < radius)
+            normal, on = np.asarray(plane.normal) / np.hypot(*plane.normal), lies & mask_of(plane.layers, layers) != 0
+            found |= on & lone & ((position - np.asarray(plane.point)) @ normal < radius)
             for number, hulls in solids.items():
-                found[number] |= any(((h.corners - plane.point) @ normal < h.radius).any() for h in hulls)
+                deep = any(((h.corners - plane.point) @ normal < h.radius).any() for h in hulls)
+                found[number] |= on[number] and deep
         for wall in (wall for wall in scene.walls if wall.solid):
+            on = lies & mask_of(wall.layers, layers) != 0
             points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
             for a, b in pairwise(points):
-                near = _to_segment(position, a, b) < radius + wall.thickness / 2.0
+                near = on & (_to_segment(position, a, b) < radius + wall.thickness / 2.0)
                 found |= near & lone
                 _meet_fixed(found, near, solids, Hull(np.asarray((a, b)), wall.thickness / 2.0))
         for post in (post for post in scene.posts if post.solid):
             near = np.hypot(*(position - np.asarray(post.position)).T) < radius + post.radius
+            near &= lies & mask_of(post.layers, layers) != 0
             found |= near & lone
             _meet_fixed(found, near, solids, Hull(np.asarray((post.position,)), post.radius))
     able = np.flatnonzero(sound)
     reach = 2.0 * float(radius[able].max()) if len(able) else 0.0
     for i, j in near_pairs(position[able], reach):
         a, b = able[i], able[j]
-        over = np.hypot(*(position[a] - position[b]).T) < radius[a] + radius[b]
+        over = (np.hypot(*(position[a] - position[b]).T) < radius[a] + radius[b]) & (lies[a] == lies[b])
         for k in np.flatnonzero(over & ~(lone[a] & lone[b])).tolist():
             one, other = (solids.get(n) or hulls_of(bodies, frame, n) for n in (int(a[k]), int(b[k])))
             over[k] = any(meeting(p, q)[0] < 0.0 for p in one for q in other)

@@ -3,6 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 from sandbox.play.artillery.gunnery import Gunnery
 from sandbox.play.billiards.aim import Aim
@@ -36,6 +37,17 @@ class Flash:
     """s of real time since it was noticed"""
 
 
+class Flame(NamedTuple):
+    """A thrust that fires."""
+
+    body: int
+    """its number"""
+    place: tuple[float, float]
+    """where it begins, from the centre of mass, in the body's own frame, m"""
+    way: tuple[float, float]
+    """from there to its tip, in the body's own frame, m"""
+
+
 @dataclass(frozen=True, eq=False)
 class Sight:
     """One moment of a scene, as it is drawn. Frames may lie between two steps."""
@@ -67,6 +79,8 @@ class Sight:
     """of the next stroke, at a table"""
     gunnery: Gunnery | None = None
     """what is drawn of a game of artillery besides its bodies"""
+    flames: tuple[Flame, ...] = ()
+    """of the thrusts that fire"""
 
     @cached_property
     def links(self) -> Links:

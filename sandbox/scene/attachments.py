@@ -1,9 +1,11 @@
-"""Checks of what refers to bodies: joints, thrusts and attractions."""
+"""Checks of what refers to bodies: joints, thrusts, attractions and drives."""
 
 import math
 from collections.abc import Iterator, Sequence
 
 from sandbox.scene.bodies import Bodies
+from sandbox.scene.driven import driven
+from sandbox.scene.drives import Driven
 from sandbox.scene.faults import Location
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Gear, Groove, Joint, Pivot, Rod, RotaryLimit, Slide
@@ -20,8 +22,8 @@ LEAST_RATIO = 1e-6
 
 
 def attachments(scene: Scene, bodies: Bodies) -> list[Found]:
-    """Return the faults of a scene's joints, thrusts and attractions."""
-    return [*_joints(scene, bodies), *_thrusts(scene, bodies), *_attractions(scene, bodies)]
+    """Return the faults of a scene's joints, thrusts, attractions and drives."""
+    return [*_joints(scene, bodies), *_thrusts(scene, bodies), *_attractions(scene, bodies), *_drives(scene, bodies)]
 
 
 def _joints(scene: Scene, bodies: Bodies) -> Iterator[Found]:
@@ -41,7 +43,7 @@ def _joints(scene: Scene, bodies: Bodies) -> Iterator[Found]:
             yield ("joint", k, where), message
 
 
-def _names(kind: str, those: Sequence[Joint | Thrust | Attraction]) -> Iterator[Found]:
+def _names(kind: str, those: Sequence[Joint | Thrust | Attraction | Driven]) -> Iterator[Found]:
     """Yield those whose name another one of the kind has, stated or by its place in the file."""
     seen: set[str] = set()
     for k, each in enumerate(those):
@@ -103,6 +105,11 @@ def _attractions(scene: Scene, bodies: Bodies) -> Iterator[Found]:
         toward = attraction.toward
         if isinstance(toward, str) and toward not in bodies.names:
             yield ("attraction", k, "toward"), f"no body is named {toward!r}; {_known(bodies)}"
+
+
+def _drives(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    yield from _names("drive", scene.drives)
+    yield from driven(scene, bodies)
 
 
 def _known(bodies: Bodies) -> str:

@@ -5,7 +5,7 @@ in the order of the file.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,10 +19,10 @@ from sandbox.scene.model import Scene, default_name
 from sandbox.scene.near import BoolArray, FloatArray, IntArray
 from sandbox.scene.part import Point
 from sandbox.scene.shapes import Shapes, form_of, shapes_of
-from sandbox.scene.surfaced import Mover, Single
+from sandbox.scene.surfaced import GROUND, Mover, Single
 
 STATE = ("position", "velocity", "angle", "angular_velocity", "fixed")
-COLUMNS = (*STATE, "radius", "core", "thin", "mass", "moment", "group", "born", "lifetime", "roll")
+COLUMNS = (*STATE, "radius", "core", "thin", "mass", "moment", "group", "born", "lifetime", "roll", "layer", "visits")
 
 OF_SPHERE = 0.8
 """of the moment of inertia of a disc, ½ m r²: ⅖ m r²"""
@@ -61,12 +61,18 @@ class Bodies:
     """(N,) s, after which it is gone; inf for ever"""
     roll: FloatArray
     """(N, 2) rad/s, of spheres on a floor, about x and y; about z it is `angular_velocity`"""
+    layer: IntArray
+    """(N,) on which each is, as an index into `layers`"""
+    visits: IntArray
+    """(N, Z) in which zones each is, and how: `zone.AWAY`, `INSIDE`, `HELD` or `LET_GO`"""
     element: IntArray
     """(N,) index into `elements`"""
     elements: tuple[Mover, ...]
     """What the bodies look like and are made of, in scene order."""
     spheres: bool = False
     """whether balls are spheres, as on a floor, and not discs"""
+    layers: tuple[str, ...] = (GROUND,)
+    """the layers of the scene"""
 
     def __len__(self) -> int:
         return len(self.names)
@@ -83,18 +89,24 @@ class Bodies:
 
     def joined_by(self, single: Single, name: str) -> "Bodies":
         """Return these bodies and one more, which gets the next number."""
-        more = _joined([name], (single,), [_singles([single])], self.spheres)
+        more = _joined([name], (single,), [_singles([single])], self.spheres, self.layers, self.visits.shape[1])
         both = {key: np.concatenate((getattr(self, key), getattr(more, key))) for key in COLUMNS}
         element = np.append(self.element, len(self.elements))
         elements = (*self.elements, single)
-        return Bodies(names=(*self.names, name), element=element, elements=elements, spheres=self.spheres, **both)
+        return Bodies(
+            names=(*self.names, name),
+            element=element,
+            elements=elements,
+            spheres=self.spheres,
+            layers=self.layers,
+            **both,
+        )
 
     def some(self, which: IntArray) -> "Bodies":
         """Return some of them, numbered anew."""
         names = self.names if len(which) == len(self) else tuple(self.names[n] for n in which.tolist())
         columns = {key: getattr(self, key)[which] for key in COLUMNS}
-        element = self.element[which]
-        return Bodies(names=names, element=element, elements=self.elements, spheres=self.spheres, **columns)
+        return replace(self, names=names, element=self.element[which], **columns)
 
 
 def expand(scene: Scene) -> Bodies:
@@ -119,10 +131,14 @@ def expand(scene: Scene) -> Bodies:
             layout, stem = layout_of(each, scene.world.seed, k, scene.world.gravity), each.name or default_name(kind, k)
             layouts.append(layout)
             names += [f"{stem}-{ending}" for ending in layout.endings or range(1, len(layout) + 1)]
-    bodies = _joined(names, scene.elements, layouts, scene.surface is not None)
+    bodies = _joined(names, scene.elements, layouts, scene.surface is not None, scene.layers, len(scene.zones))
     for shot in scene.shots:
         if shot.ball in names:
             strike(bodies, names.index(shot.ball), shot)
+    if scene.drives:
+        from sandbox.scene.driven import weighed  # which looks at bodies itself
+
+        return weighed(scene, bodies)
     return bodies
 
 
@@ -164,7 +180,14 @@ def _spin(single: Single) -> Spin:
     return 0.0, 0.0, single.angular_velocity
 
 
-def _joined(names: list[str], elements: tuple[Mover, ...], layouts: list[Layout], spheres: bool) -> Bodies:
+def _joined(
+    names: list[str],
+    elements: tuple[Mover, ...],
+    layouts: list[Layout],
+    spheres: bool,
+    layers: tuple[str, ...],
+    zones: int,
+) -> Bodies:
     """Put layouts one after the other; each has as many of the elements as its bodies are numbered by."""
     layouts = [*layouts, NOBODY]
     used = np.cumsum([0, *(each.elements for each in layouts)])
@@ -191,9 +214,12 @@ def _joined(names: list[str], elements: tuple[Mover, ...], layouts: list[Layout]
         born=np.zeros(len(names)),
         lifetime=np.concatenate(lives),
         roll=np.concatenate(rolls),
+        layer=np.asarray([layers.index(each.layer) for each in elements], dtype=np.int64)[element],
+        visits=np.zeros((len(names), zones), dtype=np.int64),
         element=element,
         elements=elements,
         spheres=spheres,
+        layers=layers,
     )
 
 

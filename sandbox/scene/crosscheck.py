@@ -20,6 +20,7 @@ from sandbox.scene.repeats import repeats
 from sandbox.scene.shapes import form_of
 from sandbox.scene.starts import each_of, has_direction, starts
 from sandbox.scene.surfaces import bearers_of, numbered
+from sandbox.scene.zoned import layered, zoned
 
 Found = tuple[Location, str]
 
@@ -31,7 +32,7 @@ SHORTEST = 1e-9
 def crosscheck(scene: Scene) -> list[Found]:
     """Return every fault that lies between the parts of a scene; none means that it can be run."""
     materials, shapeless = list(_materials(scene)), [*generated(scene), *outlines(scene)]
-    found = [*materials, *_fixed(scene), *shapeless, *_world(scene)]
+    found = [*materials, *_fixed(scene), *zoned(scene), *layered(scene), *shapeless, *_world(scene)]
     if shapeless:  # what follows counts on being able to lay the bodies out
         return [*found, *_of_names(scene, {location[:2] for location, _ in shapeless})]
     found += [*repeats(scene), *_masses(scene)]
@@ -193,7 +194,8 @@ def _names(scene: Scene, bodies: Bodies) -> Iterator[Found]:
             yield (*owners[element][0], "name"), _taken(name)
         seen.add(name)
     pockets = [("pocket", k) for k in range(len(scene.pockets))]
-    for name, location in zip(scene.fixed_names, [*(w for w, _ in _things(scene)), *pockets], strict=True):
+    zones = [("zone", k) for k in range(len(scene.zones))]
+    for name, location in zip(scene.fixed_names, [*(w for w, _ in _things(scene)), *pockets, *zones], strict=True):
         if name in seen:
             yield (*location, "name"), _taken(name)
         seen.add(name)

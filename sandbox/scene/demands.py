@@ -43,11 +43,14 @@ class Demand(StrEnum):
     ROTARY_SPRINGS = "rotary springs"
     ATTRACTION = "attraction"
     THRUST = "thrust"
+    DRIVES = "drives"
     BOUNDS = "bounds"
     LIFETIMES = "lifetimes"
     SURFACE = "surface"
     SPIN = "spin"
     POCKETS = "pockets"
+    LAYERS = "layers"
+    ZONES = "zones"
 
 
 BALLS = frozenset(
@@ -155,6 +158,9 @@ def _items(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
     yield from _surfaces(scene, meet)
     yield from _joints(scene)
     yield from _floor(scene)
+    apart = len(scene.layers) > 1
+    yield Demand.LAYERS, apart, ", ".join(scene.layers) if apart else "all are on the ground"
+    yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     mortal = int(np.isfinite(bodies.lifetime).sum())
     yield Demand.LIFETIMES, mortal > 0, _count(mortal, "body lives for a time", "bodies live for a time", "all stay")
@@ -182,7 +188,11 @@ def _joints(scene: Scene) -> Iterator[tuple[Demand, bool, str]]:
     for kind, demand in OF_LINKS.items():
         count = int(np.count_nonzero(scene.links.kind == kind))
         yield demand, count > 0, f"{count:,}" if count else "none"
-    for demand, things in ((Demand.ATTRACTION, scene.attractions), (Demand.THRUST, scene.thrusts)):
+    for demand, things in (
+        (Demand.ATTRACTION, scene.attractions),
+        (Demand.THRUST, scene.thrusts),
+        (Demand.DRIVES, scene.drives),
+    ):
         yield demand, bool(things), f"{len(things):,}" if things else "none"
 
 

@@ -11,7 +11,7 @@ from sandbox.scene.solids import Capsule
 from sandbox.scene.surfaced import Mover
 from sandbox.scene.weaves import Cloth, Rope
 
-SURFACE = ("material", "restitution", "restitution_falloff", "friction", "colour", "collides")
+SURFACE = ("material", "restitution", "restitution_falloff", "friction", "colour", "collides", "layer")
 
 
 def elements_of(mover: Mover) -> tuple[Mover, ...]:

@@ -6,6 +6,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
+from sandbox.scene.drives import Driven, PlungerDrive, StrokeDrive, TorqueDrive
 from sandbox.scene.faults import Location
 from sandbox.scene.joints import (
     Gear,
@@ -60,10 +61,10 @@ def explain(details: Any) -> tuple[Location, str]:
     if kind == "json_invalid":
         return location, f"the scene cannot be read: {context['error']}"
     if kind == "union_tag_not_found":
-        return location, f"is missing; a joint is one of {', '.join(JOINTS)}"
+        return location, f"is missing; {_one_of(location)}"
     if kind == "union_tag_invalid":
         tag = context["tag"]
-        return location, f"{_shown(tag)} is not right here; a joint is one of {', '.join(JOINTS)}"
+        return location, f"{_shown(tag)} is not right here; {_one_of(location)}"
     if kind == "value_error":
         return location, str(context["error"])
     if kind == "string_pattern_mismatch":
@@ -82,9 +83,9 @@ def explain(details: Any) -> tuple[Location, str]:
 
 
 def place_of(details: Any) -> Location:
-    """Return where in a document one of pydantic's errors is: joints are told apart by a tag, which is no key."""
+    """Return where in a document one of pydantic's errors is: of joints and drives one key is a tag."""
     location: Location = tuple(details["loc"])
-    if len(location) > 2 and location[0] == "joint":
+    if len(location) > 2 and location[0] in TAGGED:
         return location[:2] + location[3:]
     if details["type"] in ("union_tag_invalid", "union_tag_not_found"):
         return (*location, "kind")
@@ -104,11 +105,12 @@ def _known_keys(location: Location) -> str:
 
 
 def model_at(location: Location) -> type[BaseModel]:
-    """Return the model of the table at a location of a scene document, a joint's kind standing after its number."""
+    """Return the model of a table by its location in a document; of joints and drives, the kind follows the number."""
     model: type[BaseModel] = Scene
     for key in location:
-        if model is Scene and key == "joint":
-            return JOINTS.get(str(location[2]), Joined) if len(location) > 2 else Joined
+        if model is Scene and key in TAGGED:
+            kinds, common = TAGGED[str(key)]
+            return kinds.get(str(location[2]), common) if len(location) > 2 else common
         if isinstance(key, str):
             fields = {field.alias or name: field.annotation for name, field in model.model_fields.items()}
             model = next(m for m in (fields[key], *get_args(fields[key])) if _is_model(m))
@@ -121,6 +123,19 @@ JOINTS: dict[str, type[BaseModel]] = {
     for tag in get_args(model.model_fields["kind"].annotation)
 }
 """The kinds of joints by their words."""
+
+DRIVES: dict[str, type[BaseModel]] = {"torque": TorqueDrive, "stroke": StrokeDrive, "plunger": PlungerDrive}
+"""The kinds of drives by theirs."""
+
+TAGGED: dict[str, tuple[dict[str, type[BaseModel]], type[BaseModel]]] = {
+    "joint": (JOINTS, Joined),
+    "drive": (DRIVES, Driven),
+}
+"""Tables of several kinds: these by their words, and what all of them have."""
+
+
+def _one_of(location: Location) -> str:
+    return f"a {location[0]} is one of {', '.join(TAGGED[str(location[0])][0])}"
 
 
 def _is_model(annotation: Any) -> bool:

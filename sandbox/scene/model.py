@@ -14,31 +14,33 @@ from sandbox.scene.artillery.described import Artillery, Terrain
 from sandbox.scene.billiards.described import Billiards
 from sandbox.scene.cue import Shot
 from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
+from sandbox.scene.drives import Drive
 from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
 from sandbox.scene.kick import Kick
-from sandbox.scene.part import Falloff, Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
+from sandbox.scene.part import Acceleration, Falloff, Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule, Compound, Polygon
 from sandbox.scene.spots import Game, Spot
 from sandbox.scene.stacks import Stack
-from sandbox.scene.surfaced import Collides, Mover, Single, Surfaced
+from sandbox.scene.surfaced import GROUND, Collides, Mover, Single, Surfaced
 from sandbox.scene.weaves import Cloth, Rope
+from sandbox.scene.zone import Layers, Zone
 
 if TYPE_CHECKING:
     from sandbox.scene.bodies import Bodies
     from sandbox.scene.links import Links
+    from sandbox.scene.near import FloatArray
 
 __all__ = [
     "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Course",
-    "Disc", "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Pair", "Plane", "Play",
-    "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced", "Thrust",
-    "Wall", "World", "default_name",
+    "Disc", "Drive", "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Pair", "Plane",
+    "Play", "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack", "Surfaced",
+    "Thrust", "Wall", "World", "Zone", "default_name",
 ]  # fmt: skip
 
-Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
 Drag = Annotated[float, Field(ge=0, le=1e9)]
 Height = Annotated[float, Field(gt=0, le=1e9)]
 Course = Annotated[tuple[Point, ...], Field(min_length=2, max_length=100_000)]
@@ -90,6 +92,8 @@ class Plane(Surfaced):
     """any point of the surface, m"""
     normal: Vector
     """out of the solid; any length"""
+    layers: Layers | None = None
+    """on which it is solid; without, on all"""
 
 
 class Wall(Surfaced):
@@ -100,6 +104,8 @@ class Wall(Surfaced):
     """full thickness, m"""
     closed: bool = False
     """Join the last point to the first."""
+    layers: Layers = (GROUND,)
+    """on which it is solid"""
     height: Height | None = None
     """of the nose above a floor, m"""
     kick: Kick | None = None
@@ -114,6 +120,8 @@ class Post(Surfaced):
 
     position: Point
     radius: Radius
+    layers: Layers = (GROUND,)
+    """on which it is solid"""
     height: Height | None = None
     """of the nose above a floor, m"""
     kick: Kick | None = None
@@ -164,6 +172,7 @@ class Scene(Part):
     walls: tuple[Wall, ...] = Field((), alias="wall")
     posts: tuple[Post, ...] = Field((), alias="post")
     pockets: tuple[Pocket, ...] = Field((), alias="pocket")
+    zones: tuple[Zone, ...] = Field((), alias="zone")
     balls: tuple[Ball, ...] = Field((), alias="ball")
     grids: tuple[Grid, ...] = Field((), alias="grid")
     scatters: tuple[Scatter, ...] = Field((), alias="scatter")
@@ -179,6 +188,7 @@ class Scene(Part):
     joints: tuple[Joint, ...] = Field((), alias="joint")
     attractions: tuple[Attraction, ...] = Field((), alias="attraction")
     thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
+    drives: tuple[Drive, ...] = Field((), alias="drive")
     shots: tuple[Shot, ...] = Field((), alias="shot")
 
     @cached_property
@@ -226,38 +236,63 @@ class Scene(Part):
         return tuple(element for mover in self.movers for element in elements_of(mover))
 
     @cached_property
+    def driven(self) -> "FloatArray":
+        """(D, 3) of each drive, as this state of the scene begins: level, torque or pull, pace."""
+        from sandbox.scene.driven import at_rest
+
+        return at_rest(self)
+
+    @cached_property
     def began(self) -> float:
         """The time at which this state of the scene begins, s: 0, but of one that goes on (`placed`)."""
         return 0.0
 
-    def placed(self, bodies: "Bodies", time: float = 0.0, broken: Collection[int] = ()) -> "Scene":
+    def placed(
+        self,
+        bodies: "Bodies",
+        time: float = 0.0,
+        broken: Collection[int] = (),
+        driven: "FloatArray | None" = None,
+    ) -> "Scene":
         """Return this scene with its bodies as they have come to be by a time, s: elsewhere, fewer, or more.
 
-        Joints go with their bodies, and those that are broken, by their numbers, are left out. Only `bodies`, `links`
-        and `began` differ: the file that it would be written to is the same.
+        Joints go with their bodies, and those that are broken, by their numbers, are left out; drives go on as they
+        are, (D, 3). Only `bodies`, `links`, `driven` and `began` differ: the file that it would be
+        written to is the same.
         """
         links = self.links.without(broken).among(bodies.names, self.bodies.names)
-        return self.holding(bodies, links, time)
+        return self.holding(bodies, links, time, driven)
 
-    def holding(self, bodies: "Bodies", links: "Links", began: float = 0.0) -> "Scene":
+    def holding(
+        self, bodies: "Bodies", links: "Links", began: float = 0.0, driven: "FloatArray | None" = None
+    ) -> "Scene":
         """Return this scene with bodies, and joints between them, that it does not lay out itself."""
         scene = self.model_copy()
-        scene.__dict__.update(bodies=bodies, links=links, began=began)  # where cached_property looks first
+        state = {} if driven is None else {"driven": driven}
+        scene.__dict__.update(bodies=bodies, links=links, began=began, **state)  # where cached_property looks first
         return scene
 
     @property
     def fixed(self) -> tuple[Plane | Wall | Post, ...]:
-        """The solid fixed things, in the order of their numbers: planes, walls, posts. Pockets come after them."""
+        """The solid fixed things, in the order of their numbers: planes, walls, posts. Pockets and zones follow."""
         return self.planes + self.walls + self.posts
 
     @cached_property
+    def layers(self) -> tuple[str, ...]:
+        """The layers that the scene speaks of, in the order of their numbers: the ground first."""
+        from sandbox.scene.zone import layers_of
+
+        return layers_of(self)
+
+    @cached_property
     def fixed_names(self) -> tuple[str, ...]:
-        """A name for each fixed thing, pockets last; one without a name is called by its kind and place in the file."""
-        kinds: dict[str, Sequence[Surfaced | Pocket]] = {
+        """A name for each fixed thing, then pockets, then zones; without one, it is its kind and place in the file."""
+        kinds: dict[str, Sequence[Surfaced | Pocket | Zone]] = {
             "plane": self.planes,
             "wall": self.walls,
             "post": self.posts,
             "pocket": self.pockets,
+            "zone": self.zones,
         }
         return tuple(
             thing.name or default_name(kind, k) for kind, things in kinds.items() for k, thing in enumerate(things)

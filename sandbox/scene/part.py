@@ -43,6 +43,7 @@ Velocity = Annotated[Vector, AfterValidator(_speed_in_range)]
 
 AngularVelocity = Annotated[float, Field(ge=-1e12, le=1e12)]
 Radius = Annotated[float, Field(ge=1e-9, le=1e9)]
+Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
 Mass = Annotated[float, Field(ge=1e-15, le=1e30)]
 Density = Annotated[float, Field(ge=1e-30, le=1e30)]
 Restitution = Annotated[float, Field(ge=0, le=1)]

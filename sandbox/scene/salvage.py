@@ -48,7 +48,7 @@ ALOOF: dict[str, dict[str, Any]] = {
 _TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - {"title", "about"}
 
 
-REFERRING = {("joint",), ("attraction",), ("thrust",), ("shot",)}
+REFERRING = {("joint",), ("attraction",), ("thrust",), ("drive",), ("shot",)}
 """Tables that speak of bodies, of which nobody speaks: one that is faulty is left out."""
 
 PARTS = ("ball", "box", "capsule", "polygon")

@@ -18,6 +18,9 @@ from sandbox.scene.part import (
     Velocity,
 )
 
+GROUND = "ground"
+"""The layer of what states none."""
+
 Collides = Literal["all", "fixed", "none"]
 """What a body can meet: everything, only planes, walls, posts and fixed bodies, or nothing at all."""
 
@@ -46,6 +49,8 @@ class Mover(Surfaced):
     angular_velocity: AngularVelocity = 0.0
     """rad/s"""
     collides: Collides = "all"
+    layer: Name = GROUND
+    """where it starts: it meets what shares its layer"""
 
 
 class Single(Mover):

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from sandbox.engines.contract import Exhaustion
 from sandbox.measure import recorder
 from sandbox.measure.recorder import BYTES_PER_BODY, SHARE, Recorder, TooLargeError, frame_count, kept_frames
 from sandbox.scene.file import loads
@@ -129,3 +130,14 @@ def test_scene_without_bodies_has_frames() -> None:
     kept = Recorder(loads('title = "Nobody"'), Settings(), 0)
     kept.keep(frame_at(0.0, 0), 0.0)
     assert kept.arrays(0)["position"].shape == (1, 0, 2)
+
+
+def test_bodies_that_nobody_foresaw_find_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = Recorder(scene_of(0.05), Settings(), 1)
+    for k, count in enumerate((1, 1, 5, 6)):
+        kept.keep(frame_at(0.01 * k, count), 0.01 * k)
+    arrays = kept.arrays(6)
+    assert (~np.isnan(arrays["angle"])).sum(axis=1).tolist() == [1, 1, 5, 6]
+    monkeypatch.setattr(recorder, "free_memory", lambda: 100)
+    with pytest.raises(Exhaustion, match="frames of 60 bodies do not fit into memory"):
+        kept.keep(frame_at(0.04, 60), 0.04)

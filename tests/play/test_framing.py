@@ -211,3 +211,7 @@ def test_of_too_many_bodies_none_leaves_a_trail() -> None:
     one = np.zeros(MOST + 1)
     trails.keep(Frame(0.0, many, many, one, one, np.ones(MOST + 1, np.bool_)))
     assert trails.pieces() == ()
+
+
+def test_scene_may_state_what_is_seen_at_first() -> None:
+    assert framing(scene_of(ball("a", 0, 4), play={"view": [[-3.0, -1.0], [5.0, 2.0]]})) == ((-3.0, -1.0), (5.0, 2.0))

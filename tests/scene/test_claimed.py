@@ -43,6 +43,8 @@ def test_what_is_there_can_be_claimed(play: dict[str, Any]) -> None:
         ({"relaunch": "emitter-2"}, "play.relaunch", "no generator"),
         ({"arrow_step": 0}, "play.arrow_step", "greater than 0"),
         ({"show": "all"}, "play.show", "overlap"),
+        ({"view": [[0, 1], [1, 1]]}, "play.view", "encloses nothing"),
+        ({"game": "chess"}, "play.game", "'landing'"),
         ({"zzz": 1}, "play.zzz", r"\w"),
     ],
 )

@@ -19,6 +19,9 @@ POST: dict[str, Any] = {"position": [0, 0], "radius": 1}
 SPARKS: dict[str, Any] = {"position": [0, 0], "count": 3, "velocity_min": [0, 0], "velocity_max": [1, 1], "lifetime": 2}
 BOX: dict[str, Any] = {"position": [0, 0], "size": [1, 1]}
 NAMED: dict[str, Any] = {**BALL, "name": "a"}
+NAMED_BOX = {"name": "a", "position": [0, 0], "size": [1, 1]}
+PLUNGER = {"kind": "plunger", "body": "a", "direction": [0, 1], "travel": 1, "speed": 1}
+STROKE = {"kind": "stroke", "body": "a", "pivot": [0, 0], "stops": [0, 1], "rate": 1}
 OFF: dict[str, Any] = {"kind": "rod", "between": ["a"], "anchors": [[0, 1], [5, 5]]}
 JOINTED: dict[Demand, dict[str, Any]] = {
     Demand.RODS: {"kind": "rod", "anchors": [[0, 0], [5, 5]]},
@@ -118,6 +121,10 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.ATTRACTION, False, {"ball": [BALL]}, "none"),
     (Demand.THRUST, True, {"ball": [NAMED], "thrust": [{"body": "a", "force": [1, 0]}]}, "1"),
     (Demand.THRUST, False, {"ball": [BALL]}, "none"),
+    (Demand.DRIVES, True, {"box": [NAMED_BOX], "drive": [PLUNGER]}, "1"),
+    (Demand.DRIVES, False, {"ball": [BALL]}, "none"),
+    (Demand.ROTATION, False, {"box": [{**NAMED_BOX, "collides": "none"}], "drive": [PLUNGER]}, "nothing can turn"),
+    (Demand.ROTATION, True, {"box": [{**NAMED_BOX, "collides": "none"}], "drive": [STROKE]}, "1 body can be turned"),
     (Demand.LIFETIMES, True, {"emitter": [SPARKS]}, "3 bodies live for a time"),
     (Demand.LIFETIMES, False, {"ball": [BALL]}, "all stay"),
     (Demand.SURFACE, True, {"surface": {"sliding_friction": 0.2}, "ball": [BALL]}, "sliding 0.2"),
@@ -129,6 +136,10 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.SPIN, False, {"surface": {"rolling_friction": 0.1}, "ball": [{**BALL, "spin": [0, 0, 1]}]}, "but about z"),
     (Demand.POCKETS, True, {"ball": [BALL], "pocket": [{"position": [9, 9], "radius": 1}]}, "1"),
     (Demand.POCKETS, False, {"ball": [BALL]}, "none"),
+    (Demand.LAYERS, True, {"ball": [{**BALL, "layer": "ramp"}]}, "ground, ramp"),
+    (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all are on the ground"),
+    (Demand.ZONES, True, {"ball": [BALL], "zone": [{"position": [9, 9], "radius": 1}]}, "1"),
+    (Demand.ZONES, False, {"ball": [BALL]}, "none"),
 ]
 
 

@@ -74,6 +74,18 @@ DEMANDED = {
     "billiards/stun_draw_follow": ROLLING,
     "billiards/three-cushion": CAROM,
     "billiards/throw": {*ROLLING, Demand.ROTATION},
+    "joints/flipper": {
+        *FALLING,
+        Demand.ROTATION,
+        Demand.BALL_SEGMENT,
+        Demand.BALL_POST,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.POLYGONS,
+        Demand.FALLOFF,
+        Demand.KICKS,
+        Demand.DRIVES,
+    },
     "games/landing": {
         Demand.TRANSLATION,
         Demand.ROTATION,
@@ -121,6 +133,14 @@ DEMANDED = {
     "tutorial/circle_half_plane": {Demand.TRANSLATION, Demand.BALL_PLANE},
     "tutorial/fast_ball": {Demand.TRANSLATION, Demand.BALL_PLANE, Demand.RESTITUTION},
     "tutorial/fireworks": FALLING,
+    "tutorial/overpass": {
+        Demand.TRANSLATION,
+        Demand.BALL_BALL,
+        Demand.BALL_SEGMENT,
+        Demand.RESTITUTION,
+        Demand.LAYERS,
+        Demand.ZONES,
+    },
 }
 
 every_scene = pytest.mark.parametrize("shipped_scene", SCENES, ids=[scene.name for scene in SCENES])
@@ -207,6 +227,20 @@ def test_ball_ends_where_explicit_euler_takes_it() -> None:
     assert frames[-1].position[0, 1] == pytest.approx(5.14405, abs=1e-12)  # 100 roundings of about 1e-15
     exact, _ = run(scene_of("ball", "solver.half_kick=true"))
     assert exact[-1].position[0, 1] == pytest.approx(5.095, abs=1e-12)  # 100 roundings of about 1e-15
+
+
+def test_overpass_is_crossed_by_who_is_fast_enough() -> None:
+    scene = scene_of("overpass")
+    frames, _ = run(scene, 1.7)
+    x, v = (np.asarray([getattr(frame, key)[:2, 0] for frame in frames]) for key in ("position", "velocity"))
+    h, g = scene.solver.h, 3.0
+    on_bridge, behind = (v[np.flatnonzero(x[:, 0] > place)[0], 0] for place in (0.0, 1.15))
+    assert on_bridge == pytest.approx(math.sqrt(9.0 - 2 * g * 0.8), abs=2 * g * h)  # a substep at each edge
+    assert behind == pytest.approx(3.0, abs=4 * g * h)
+    assert frames[-1].position[0].tolist() == [2.2, 0.0]
+    # Explicit Euler is g·h·t/2 too far after t = 2/3 s, and gravity begins up to h late, v·h farther.
+    assert x[:, 1].max() == pytest.approx(-1.1 + 4.0 / (2 * g), abs=g * h * (2 / 3) / 2 + 2.0 * h)
+    assert [frame.layer[1] for frame in frames][-1] == scene.layers.index("ramp")
 
 
 def test_bounces_reach_their_peaks() -> None:

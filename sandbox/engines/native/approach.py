@@ -23,10 +23,12 @@ def _turns(shape: pymunk.Shape) -> bool:
     """Tell whether the spin of a body moves its surface along a normal there: not that of a disc about its centre."""
     body = shape.body
     assert body is not None
-    return body.angular_velocity != 0.0 and not (isinstance(shape, pymunk.Circle) and shape.offset == (0.0, 0.0))
+    return body.angular_velocity != 0.0 and not (
+        isinstance(shape, pymunk.Circle) and shape.offset == body.center_of_gravity
+    )
 
 
 def _turning(body: pymunk.Body, point: pymunk.Vec2d, normal: pymunk.Vec2d) -> float:
     """Return how fast a body's spin moves a point of it along a normal, m/s."""
-    arm = point - body.position
+    arm = point - body.local_to_world(body.center_of_gravity)  # on a hinge that is the hinge
     return float(body.angular_velocity * (arm.x * normal.y - arm.y * normal.x))

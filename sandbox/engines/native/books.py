@@ -8,6 +8,7 @@ from sandbox.engines.account import Account, Cause
 from sandbox.engines.native.hauls import Hauls, Momenta, motors, springs
 from sandbox.engines.native.kicks import Kicks, kicks_of
 from sandbox.engines.native.population import Population
+from sandbox.engines.native.strides import meant, worked
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.potential import Potential
@@ -77,12 +78,15 @@ class Books:
             account.enter(Cause.INTEGRATOR, self._fallen(share))
         if before is None:
             return
-        counts = p.moving
+        counts = p.yielding
         if p.free.even:
             counts[p.free.numbers] = False
+        axles = p.meeting.drives.axles
+        counts[p.meeting.drives.numbers] = False  # whose motion is booked for itself
         whole = self._state()
         now = before.towards(whole, share)
         velocity, spin = self._mean(before, now, counts)
+        meant(axles, before, now, velocity, spin)
         kicks = kicks_of(p, before.velocity, counts, p.h * share)
         kicks.twisted[~self._turnable()] = 0.0
         held = p.meeting.tethers.held
@@ -99,6 +103,11 @@ class Books:
         along, across, by_kicks = points.work(velocity, spin)
         account.touch(along, across)
         account.enter(Cause.KICKS, by_kicks)
+        if axles:
+            gravity = p.scene.world.gravity
+            work = worked(axles, (before, now), (velocity, spin), points, p.bodies, gravity, p.h, share)
+            account.enter(Cause.DRIVES, work.driven)
+            account.enter(Cause.INTEGRATOR, work.weight + work.lifted)
 
         if len(held.rigid):
             given = self._given(before, now, counts, kicks)

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 PYMUNK_WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
 """The one word of each choice that describes what pymunk does."""
 
+OWN = frozenset({Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.LAYERS, Demand.ZONES, Demand.DRIVES})
+
 PERSISTENCE = 3
 """pymunk's own."""
 
@@ -30,9 +32,7 @@ class PymunkEngine:
 
     name: str = "pymunk"
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
-    capabilities: frozenset[Demand] = (
-        BALLS | JOINTS | FLOOR | SURFACES | {Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST}
-    )
+    capabilities: frozenset[Demand] = BALLS | JOINTS | FLOOR | SURFACES | OWN
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that pymunk lacks."""
@@ -54,8 +54,12 @@ class PymunkEngine:
             lacks.append("stretch is for joints held by relaxation, which it has not")
         if settings.half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has drag")
-        if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts):
+        if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
             lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has other forces")
+        if settings.half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
+            lacks.append("half_kick makes uniformly accelerated motion exact, but the scene has zones that change it")
+        if scene.drives and scene.attractions:
+            lacks.append("it does not model attraction and drives together")
         if on_floor(scene):
             lacks += of_floors(scene)
         return tuple(lacks)

@@ -24,7 +24,7 @@ from sandbox.engines.native.overlaps import GAP, IMPULSE_X, NORMAL_X, POINT_X, W
 from sandbox.engines.native.rolling import Balls, find_in_pockets, first_beyond, roll_all
 from sandbox.engines.roster import MEETS
 from sandbox.engines.roster import NOTHING as NOTHING_AT_ALL
-from sandbox.engines.touching import NOTHING, ComplexArray, Touching
+from sandbox.engines.touching import NOTHING, ComplexArray, Touching, joined
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene
@@ -169,7 +169,7 @@ class Felt:
         given = balls.velocity[numbers] * self._mass[numbers, None]
         normal = (centre - place) / reach[:, None]
         fell = Touching(numbers, -1 - self._solid - which, *map(_complex, (-given, normal, place)))
-        self._fell = Touching(*(np.concatenate(both) for both in zip(self._fell, fell, strict=True)))
+        self._fell = joined(self._fell, fell)
         self.pocket[numbers] = which
         balls.plays[numbers] = False
         balls.meets[numbers] = NOTHING_AT_ALL
@@ -184,7 +184,7 @@ class Felt:
         fell, self._fell = self._fell, NOTHING
         if not len(fell.a):
             return self.touching
-        return Touching(*(np.concatenate(both) for both in zip(self.touching, fell, strict=True)))
+        return joined(self.touching, fell)
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a ball that is not finite or beyond all bounds, and what is the matter; else None."""

@@ -20,7 +20,7 @@ def of_floors(scene: Scene, bodies: Bodies | None = None) -> Iterator[str]:
     yield from unlevel(scene, bodies)
     if world.linear_drag or world.quadratic_drag:
         yield "it does not model drag on a floor"
-    if len(scene.links) or scene.attractions or scene.thrusts:
-        yield "it does not model joints, attraction or thrusts on a floor"
+    if len(scene.links) or scene.attractions or scene.thrusts or scene.drives:
+        yield "it does not model joints, attraction, thrusts or drives on a floor"
     if not bodies.round.all():
         yield "it does not model bodies other than balls on a floor"

@@ -10,6 +10,7 @@ from sandbox.engines.native.space import SurfaceSetter, category, fixed_shapes, 
 from sandbox.engines.rebound import stretches
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Plane, Post, Scene, Wall
+from sandbox.scene.zone import mask_of
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 MANY = 5_000
@@ -41,6 +42,7 @@ class Ground:
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
             shapes = self._shapes(thing, body, centre, reach)
             for shape in shapes:
+                shape.filter = _filter(thing, scene)
                 self._setter.dress(shape, number)
             self._space.add(body)
             self._things.append((body, shapes))
@@ -53,10 +55,8 @@ class Ground:
     def _shapes(
         self, thing: Plane | Wall | Post, body: pymunk.Body, centre: FloatArray, reach: float
     ) -> list[pymunk.Shape]:
-        """Return the shapes of a fixed thing, with surfaces yet to be given."""
+        """Return the shapes of a fixed thing; what they meet, and their surfaces, are yet to be said."""
         shapes = list(fixed_shapes(thing, body, centre, reach))
-        for shape in shapes:
-            shape.filter = _filter(thing)
         if isinstance(thing, Wall) and thing.kick is not None:
             parts = stretches(thing.points, thing.closed)
             self._setter.laws.stretches |= dict(zip(shapes, parts, strict=True))
@@ -65,7 +65,7 @@ class Ground:
         return shapes
 
     def reshape(self, before: Scene, after: Scene) -> None:
-        """Let walls take the course that they have in another scene, with surfaces yet to be given."""
+        """Let walls take the course that they have in another scene; `renew` has to follow."""
         if not self._laid or before.walls == after.walls:
             return
         first = len(before.planes)
@@ -84,7 +84,7 @@ class Ground:
     def renew(self, scene: Scene, surface: IntArray) -> None:
         """Give the fixed things their surfaces (F,) anew, and let those be met that now are solid."""
         for (_, shapes), thing, number in zip(self._things, scene.fixed, surface.tolist(), strict=False):
-            passes = _filter(thing)
+            passes = _filter(thing, scene)
             for shape in shapes:
                 self._setter.dress(shape, number)
                 if shape.filter != passes:
@@ -109,9 +109,10 @@ class Ground:
         return bool((np.abs(place - self._middle[0:2]) <= self.reach).all())
 
 
-def _filter(thing: Plane | Wall | Post) -> pymunk.ShapeFilter:
+def _filter(thing: Plane | Wall | Post, scene: Scene) -> pymunk.ShapeFilter:
     """Return whom a fixed thing meets."""
-    return category(True, "all" if isinstance(thing, Plane) or thing.solid else "none")
+    solid = isinstance(thing, Plane) or thing.solid
+    return category(True, "all" if solid else "none", layers=mask_of(thing.layers, scene.layers))
 
 
 def shuffled(count: int) -> list[int]:

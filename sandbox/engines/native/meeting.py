@@ -6,11 +6,13 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.limits import BEYOND, FARTHEST
+from sandbox.engines.native.drives import Drives
 from sandbox.engines.native.field import Field
 from sandbox.engines.native.ground import Ground, shuffled
 from sandbox.engines.native.member import Member
 from sandbox.engines.native.memory import RememberedImpulses, without
 from sandbox.engines.native.points import PointReader, Points
+from sandbox.engines.native.probes import Probes
 from sandbox.engines.native.reader import Reader
 from sandbox.engines.native.space import (
     SurfaceSetter,
@@ -21,7 +23,7 @@ from sandbox.engines.native.space import (
 )
 from sandbox.engines.native.steady import Steady
 from sandbox.engines.native.tethers import Tethers
-from sandbox.engines.touching import NOTHING, Touching
+from sandbox.engines.touching import NOTHING, ComplexArray, Touching
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import Links
 from sandbox.scene.meetings import Meetings
@@ -50,6 +52,11 @@ class MeetingBodies:
         self._surface_of: IntArray = np.empty(0, np.int64)
         self._moments: FloatArray = np.empty(0)
         self._touches: BoolArray = np.empty(0, np.bool_)
+        self._noted: BoolArray = np.empty(0, np.bool_)
+        self.layer: IntArray = scene.bodies.layer
+        """(N,) on which each body is"""
+        self.probes = Probes(self._space, scene.zones)
+        self._resting: dict[int, tuple[float, float]] = {}  # mass and moment of those that zones hold
         self.tethers = Tethers(self._space)
         self._polygons = False
         self._named: dict[str, pymunk.Body] = {}
@@ -57,6 +64,8 @@ class MeetingBodies:
         self._remembered: RememberedImpulses | None = None
         self._points: PointReader | None = None
         self.field = Field(scene)
+        self.drives = Drives(scene, self._space, settings.h)
+        self.drives.weigh(scene.world.gravity, gravity_of(scene))
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.steady = Steady()
         self._moving = 0
@@ -86,39 +95,83 @@ class MeetingBodies:
         for number, state in zip(numbers[order].tolist(), states[order].tolist(), strict=True):
             self._add(number, bodies, state)
         self._register()
+        self.drives.watch(self._kinds)
+
+    def _kinds(self, number: int) -> set[int]:
+        """Return the collision types of a body's shapes."""
+        return {shape.collision_type for _, shape in self._members[number].shapes}
 
     def _add(self, number: int, bodies: Bodies, state: list[float]) -> None:
         """Add a body with its state: x, y, angle, vx, vy, ω, mass, moment."""
         x, y, angle, vx, vy, spin, mass, moment = state
-        fixed = bool(bodies.fixed[number])
-        body = pymunk.Body(mass, moment, body_type=pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC)
-        body.position = x, y
-        if angle:
-            body.angle = angle
-        if not fixed:
-            body.velocity = vx, vy
-            if spin:
-                body.angular_velocity = spin
+        fixed, name = bool(bodies.fixed[number]), bodies.names[number]
+        driven = self.drives.holds(name)
+        if driven:
+            body = self.drives.body(name, number, bodies, state)
             self._moving += 1
+        else:
+            body = pymunk.Body(mass, moment, body_type=pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC)
+            body.position = x, y
+            if angle:
+                body.angle = angle
+            if not fixed:
+                body.velocity = vx, vy
+                if spin:
+                    body.angular_velocity = spin
+                self._moving += 1
         self._space.add(body)
         self._members[number] = Member(body, ())
         if self._touches[number] or fixed:
             self._give_shapes(number, bodies)
-        name = bodies.names[number]
+        if self._noted[number]:
+            self.probes.add(number, body)
         self._named[name], self._name_of[number] = body, name
-        if not fixed and (self.field.attracts or self.field.thrusted(name)):
+        if driven:
+            self.drives.join(name, number, body, state)
+        elif not fixed and (self.field.attracts or self.field.thrusted(name)):
             self.field.drive(name, body, self._named)
 
     def _give_shapes(self, number: int, bodies: Bodies) -> None:
         """Let a body in the space be touched from now on."""
-        body, fixed = self._members[number].body, bool(bodies.fixed[number])
+        body = self._members[number].body
         shapes = tuple(body_shapes(body, bodies, number, self._skin))
+        who = self._filter(number, bodies)
         for piece, shape in shapes:
-            collides = bodies.elements[bodies.element[number]].collides
-            shape.filter = category(fixed, collides, int(bodies.group[number]))
+            shape.filter = who
             self._setter.dress(shape, int(self._surface_of[piece]))
         self._space.add(*(shape for _, shape in shapes))
         self._members[number] = Member(body, shapes)
+
+    def _filter(self, number: int, bodies: Bodies) -> pymunk.ShapeFilter:
+        collides = bodies.elements[bodies.element[number]].collides
+        layers = 1 << int(self.layer[number])
+        return category(bool(bodies.fixed[number]), collides, int(bodies.group[number]), layers)
+
+    def set_layer(self, number: int, bodies: Bodies) -> None:
+        """Let a body meet what is on its layer from now on; what it touched elsewhere it touches no more."""
+        who = self._filter(number, bodies)
+        for _, shape in self._members[number].shapes:
+            shape.filter = who
+
+    def noted(self, number: int) -> bool:
+        """Tell whether a body is here, and zones can note it."""
+        return number in self._members and bool(self._noted[number])
+
+    def hold(self, number: int) -> None:
+        """Let a body stand still where it is, whatever it meets, until it is let go."""
+        body = self._members[number].body
+        self._resting[number] = body.mass, body.moment
+        body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
+        body.body_type = pymunk.Body.KINEMATIC
+        self._state = None
+
+    def let_go(self, number: int) -> None:
+        """Let a body that was held move again."""
+        body = self._members[number].body
+        body.body_type = pymunk.Body.DYNAMIC
+        body.mass, body.moment = self._resting.pop(number)
+        body.force, body.torque = (0.0, 0.0), 0.0  # what thrusts have added up
+        self._state = None
 
     def touched(self, bodies: Bodies) -> None:
         """Give shapes to those that were only joined or driven, and have come to meet something."""
@@ -139,6 +192,9 @@ class MeetingBodies:
             return
         for number in numbers.tolist():
             self.tethers.untie(number)
+            self.probes.drop(number)
+            self._resting.pop(number, None)
+            self.drives.leave(number)
             member = self._members.pop(number)
             self._moving -= member.moves
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
@@ -182,14 +238,18 @@ class MeetingBodies:
         self._ground.reshape(self._scene, scene)
         self._scene = scene
         self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
-        self._touches = meet.touches
+        self._touches, self._noted = meet.touches, meet.noted
         self._setter.renew(meet)
         self._space.gravity = gravity_of(scene)
-        for number, (body, own) in self._members.items():
+        for number, (_, own) in self._members.items():
             for piece, shape in own:
                 self._setter.dress(shape, int(self._surface_of[piece]))
-            if meet.turnable[number] and math.isinf(body.moment):
-                body.moment = float(self._moments[number])
+            heavy = meet.turnable[number] and math.isinf(self.moment(number))
+            if heavy and number not in self.drives.numbers:
+                self.give_moment(number, float(self._moments[number]))
+        if self.drives:
+            self.drives.weigh(scene.world.gravity, gravity_of(scene))
+            self.drives.watch(self._kinds)
         self._ground.renew(scene, self._surface_of_fixed)
 
     def step(self, time: float) -> None:
@@ -200,7 +260,12 @@ class MeetingBodies:
         self._apply_forces()
         if self._setter.gates.walls:
             self._setter.gates.tick += 1
-        self._space.step(self._settings.h)
+        if self.drives:
+            self.drives.before()
+            self._space.step(self._settings.h)
+            self.drives.after()
+        else:
+            self._space.step(self._settings.h)
         self._state = None
 
     def drive(self, velocity: FloatArray) -> None:
@@ -235,14 +300,23 @@ class MeetingBodies:
         at = self._reader.slots
         position[at], velocity[at] = state[:, 0:2], state[:, 3:5]
         angle[at], angular_velocity[at] = state[:, 2], state[:, 5]
+        if self.drives:
+            self.drives.write(position, velocity, angle, angular_velocity)
 
-    def touching(self) -> Touching:
-        """Return who touches whom now, and how (`Reader.touching`); from the first call on, all impulses add up."""
+    def touching(self, steady: bool = False) -> Touching | ComplexArray:
+        """Return who touches whom now, and how; from the first call on, all impulses add up.
+
+        Args:
+            steady: where it is who touched at the last call, in the same order, their impulses alone will do.
+        """
         if not self._moving:
             return NOTHING
-        found = self._reader.touching(self._polygons)
+        same = self._reader.look(self._polygons)
         remembered = self._remember()
+        if same and steady and remembered.pairs and not remembered.found:
+            return self._reader.impulses()
         remembered.pairs = True
+        found = self._reader.touching()
         ids, impulses = remembered.take()
         return without(found, self._reader.numbers(ids), impulses) if len(ids) else found
 
@@ -284,11 +358,14 @@ class MeetingBodies:
 
     def moment(self, number: int) -> float:
         """Return a body's moment of inertia, kg·m²; infinite where nothing in the scene can turn it."""
-        return self._members[number].body.moment
+        return self._resting[number][1] if number in self._resting else self._members[number].body.moment
 
     def give_moment(self, number: int, moment: float) -> None:
         """Let a body turn from now on."""
-        self._members[number].body.moment = moment
+        if number in self._resting:
+            self._resting[number] = self._resting[number][0], moment
+        else:
+            self._members[number].body.moment = moment
 
     def push(self, number: int, force: FloatArray, torque: float) -> None:
         """Let a steady force (N) and torque (N·m) act on a body from now on."""

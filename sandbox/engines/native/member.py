@@ -15,4 +15,4 @@ class Member(NamedTuple):
     @property
     def moves(self) -> bool:
         """It is not fixed."""
-        return self.body.body_type == pymunk.Body.DYNAMIC
+        return self.body.body_type != pymunk.Body.STATIC  # kinematic is what a zone holds, or a drive leads

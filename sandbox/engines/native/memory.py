@@ -44,6 +44,11 @@ class RememberedImpulses:
                 self._ids.append((a.body.id, b.body.id))
                 self._impulses.append((x, y))
 
+    @property
+    def found(self) -> bool:
+        """Whether there are some."""
+        return bool(self._ids)
+
     def take(self) -> tuple[IntArray, FloatArray]:
         """Return the ids (K, 2) of the bodies, and the impulses (K, 2) on the first of each, N·s; forget them."""
         ids, impulses = np.asarray(self._ids, np.int64).reshape(-1, 2), np.asarray(self._impulses).reshape(-1, 2)

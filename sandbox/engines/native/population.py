@@ -17,6 +17,7 @@ from sandbox.engines.native.floors import of_floors, on_floor
 from sandbox.engines.native.free import FreeFlight
 from sandbox.engines.native.meeting import MeetingBodies
 from sandbox.engines.native.overlaps import SKIN
+from sandbox.engines.native.visiting import Visiting
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Collides, Scene, Single
@@ -44,15 +45,20 @@ class Population:
         self._half_kick = 0.5 * settings.h if settings.half_kick else 0.0
         self.velocity[~self.bodies.fixed] += self.ahead
         self.roll = self.bodies.roll.copy()
+        self.layer, self.visits = self.bodies.layer.copy(), self.bodies.visits.copy()
         self.felt = Felt(scene, settings) if on_floor(scene) else None
         """what moves balls where there is a floor"""
         floored = settings.replace(slop=UNCORRECTED), SKIN
         self.meeting = MeetingBodies(scene, *(floored if self.felt is not None else (settings,)))
         self.free = FreeFlight(scene.world, settings.h, self.meeting.field)
+        self.visiting = Visiting(scene, self.meeting) if scene.zones else None
+        """what zones do, where there are some"""
         self._renew(scene, meetings(scene, self.bodies))
         self._live()
         self._place(np.arange(len(self.bodies)))
         self.capture()
+        if self.visiting is not None:
+            self.visiting.begin(np.flatnonzero(self._meet.noted), anew=scene.began == 0.0)
 
     def _renew(self, scene: Scene, meet: Meetings) -> None:
         """Go on with a scene, and with what can meet what in it."""
@@ -62,9 +68,14 @@ class Population:
             nothing = np.zeros_like(meet.surfaces.restitution)
             meet = replace(meet, surfaces=replace(meet.surfaces, restitution=nothing, friction=nothing))
         self.meeting.renew(scene, meet)
+        if self.visiting is not None:
+            self.visiting.renew(scene, self.bodies, meet)
 
     def _live(self) -> None:
-        """Let the felt, if there is one, move the present arrays."""
+        """Let the felt and zones, if there are some, go on with the present arrays."""
+        self.meeting.layer = self.layer
+        if self.visiting is not None:
+            self.visiting.live_in(self.position, self.velocity, self.angular_velocity, self.layer, self.visits)
         if self.felt is not None:
             state = State(self.position, self.velocity, self.roll, self.angular_velocity, self.angle)
             self.felt.live_in(state, self.bodies, self.present)
@@ -75,6 +86,22 @@ class Population:
         if len(fell):
             self.meeting.leave(fell)
         return len(fell) > 0
+
+    @property
+    def stirred(self) -> bool:
+        """Whether somebody has come into a zone, or left one."""
+        return self.visiting is not None and bool(self.meeting.probes.stirred)
+
+    def settle(self) -> None:
+        """Let zones do what they do."""
+        if self.visiting is not None:
+            self.refresh()
+            self.visiting.settle(self.ahead)
+
+    @property
+    def yielding(self) -> BoolArray:
+        """(N,) which bodies are there, not fixed, and held by no zone."""
+        return self.moving if self.visiting is None else self.moving & ~self.visiting.held
 
     @property
     def ahead(self) -> FloatArray:
@@ -134,13 +161,14 @@ class Population:
 
     @property
     def _driven(self) -> BoolArray:
-        """(N,) which only the space can move: with thrusts, and all where bodies attract each other, or on a floor."""
-        field = self.meeting.field
+        """(N,) which only the space can move: with thrusts or drives; all where bodies attract, or on a floor."""
+        field, drives = self.meeting.field, self.scene.drives
         if field.between_bodies or self.felt is not None:
             return np.ones(len(self.bodies), dtype=np.bool_)
-        if not field.level:
+        if not (field.level or drives):
             return np.zeros(len(self.bodies), dtype=np.bool_)
-        return np.asarray([field.thrusted(name) for name in self.bodies.names], dtype=np.bool_)
+        driven = self.meeting.drives.holds
+        return np.asarray([field.thrusted(name) or driven(name) for name in self.bodies.names], dtype=np.bool_)
 
     def change(self, scene: Scene) -> None:
         """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
@@ -181,6 +209,7 @@ class Population:
         if self._plays(number):
             self.velocity[number] = velocity
         else:
+            self._free(number)
             self._home(number).set_velocity(number, velocity + self.ahead)
 
     def set_spin(self, number: int, spin: float) -> None:
@@ -202,6 +231,11 @@ class Population:
         """
         if self._plays(number):
             self.roll[number] = roll
+
+    def _free(self, number: int) -> None:
+        """Let a body go that a zone holds."""
+        if self.visiting is not None:
+            self.visiting.free(number)
 
     def _plays(self, number: int) -> bool:
         """Tell whether a body is a ball on a floor.
@@ -225,6 +259,8 @@ class Population:
             ActionError: it lies in a pocket.
         """
         self._plays(number)
+        if force.any() or torque:
+            self._free(number)
         half = self._home(number)
         if torque and half is self.meeting and not math.isfinite(half.moment(number)):
             half.give_moment(number, float(self.bodies.moment[number]))
@@ -238,9 +274,12 @@ class Population:
             self.felt.free(number)
             self._place(np.asarray([number]))
             return
+        self._free(number)
         half = self.half_of(number)
         if half is not None:
             half.set_position(number, position)
+        if self.visiting is not None:
+            self.visiting.put(number)
 
     def _home(self, number: int) -> FreeFlight | MeetingBodies:
         return self.free if self.free.holds(number) else self.meeting
@@ -248,6 +287,10 @@ class Population:
     def throttle(self, number: int, level: float) -> None:
         """Open the scene's thrust of that number to a share of its force."""
         self.meeting.field.level[number] = level
+
+    def drive(self, number: int, level: float) -> None:
+        """Ask the scene's drive of that number for a level."""
+        self.meeting.drives.set(number, level)
 
     def add(self, single: Single, name: str) -> int:
         """Add a body and return its number.
@@ -270,6 +313,8 @@ class Population:
         self.angular_velocity = np.append(self.angular_velocity, self.bodies.angular_velocity[-1])
         self.roll = np.vstack((self.roll, self.bodies.roll[-1:]))
         self.present = np.append(self.present, True)
+        self.layer = np.append(self.layer, self.bodies.layer[-1])
+        self.visits = np.vstack((self.visits, self.bodies.visits[-1:]))
 
         self._renew(scene, meet)
         self._live()
@@ -277,6 +322,8 @@ class Population:
         out = [n for n in np.flatnonzero(self.present & ~meet.free).tolist() if not self.meeting.holds(n)]
         self._promote(np.asarray([n for n in out if n != number and not self._pocketed(n)], np.int64))
         self._place(np.asarray([number]))
+        if self.visiting is not None:
+            self.visiting.put(number)
         return number
 
     def _promote(self, numbers: IntArray) -> None:
@@ -302,6 +349,8 @@ class Population:
         self.velocity[numbers], self.angular_velocity[numbers], self.roll[numbers] = 0.0, 0.0, 0.0
         if self.felt is not None:
             self.felt.leave(numbers)
+        if self.visiting is not None:
+            self.visiting.gone(numbers)
 
     def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
         """Refuse a place that pymunk cannot start from.

@@ -7,7 +7,7 @@ import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 
 from sandbox.engines.native.ids import IdTable
-from sandbox.engines.touching import NOTHING, Touching
+from sandbox.engines.touching import NOTHING, ComplexArray, Touching
 from sandbox.trajectory import FloatArray, IntArray
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
@@ -42,6 +42,8 @@ class Reader:
         self._bodies, self._arbiters, self._forces = Buffer(), Buffer(), Buffer()
         self._number_of = IdTable({})
         self._moving: IntArray = np.empty(0, np.int64)
+        self._words, self._width = b"", 4  # who touched at the last look, and how many vectors a contact has
+        self._live: IntArray = np.empty(0, np.int64)
         self._moved, self._first, self._all = True, True, 0
         self._rows: IntArray = np.empty(0, np.int64)
         self._numbers: IntArray = np.empty(0, np.int64)
@@ -116,20 +118,40 @@ class Reader:
         live = words[words[:, 2] > 0]
         return np.column_stack([self._number_of.numbers(live[:, k]) for k in (0, 1)])
 
-    def touching(self, polygons: bool = False) -> Touching:
-        """Return what touches now, as arrays of their own; with polygons, which may touch in two points."""
+    def look(self, polygons: bool = False) -> bool:
+        """See what touches now; with polygons, which may touch in two points. Tell whether it is who touched before.
+
+        Those who touch, listed in the same order as at the last look, are the same contacts: then their impulses are
+        all that is new.
+        """
         self._arbiters.clear()
         get_space_arbiters(self._space, TOUCH | SECOND if polygons else TOUCH, self._arbiters)
-        words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
-        if not len(words):
+        self._width = 6 if polygons else 4
+        words = bytes(self._arbiters.int_buf())
+        same = words == self._words
+        if not same:
+            self._words = words
+            # A parted contact is remembered for a while, with no points.
+            self._live = np.flatnonzero(np.frombuffer(words, np.int64)[2::3])
+        return same
+
+    def impulses(self) -> ComplexArray:
+        """Return the impulses (K,) N·s of what touched at the last look, on the first of each."""
+        if not len(self._live):
+            return NOTHING.impulse
+        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128)
+        return vectors.take(self._live * self._width)
+
+    def touching(self) -> Touching:
+        """Return what touched at the last look, as arrays of their own."""
+        live = self._live
+        if not len(live):
             return NOTHING
-        # A parted contact is remembered for a while, with no points.
-        live = np.flatnonzero(words[:, 2])
+        words = np.frombuffer(self._words, np.int64).reshape(-1, 3)
         a, b = (self._number_of.numbers(words[:, k].take(live)) for k in (0, 1))
-        width = 6 if polygons else 4
-        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128).reshape(-1, width).take(live, axis=0)
+        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128).reshape(-1, self._width).take(live, axis=0)
         point = (vectors[:, 2] + vectors[:, 3]) * 0.5
-        if polygons:
+        if self._width > 4:
             twice = words[:, 2].take(live) > 1
             point = np.where(twice, 0.5 * (point + (vectors[:, 4] + vectors[:, 5]) * 0.5), point)
         return Touching(a, b, vectors[:, 0], vectors[:, 1], point)

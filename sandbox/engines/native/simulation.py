@@ -15,6 +15,7 @@ from sandbox.engines.expiry import Expiry
 from sandbox.engines.native.books import Books
 from sandbox.engines.native.population import Population
 from sandbox.engines.running import Running
+from sandbox.engines.touching import Touching, joined
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -120,12 +121,14 @@ class NativeSimulation(Running):
             self._retire()
             self._population.end()
             return
-        before = [array.copy() for array in self._state()]
+        before, drives = [array.copy() for array in self._state()], self._population.meeting.drives
+        driven = drives.told()
         self._substep(int(whole), look=False, share=rest)  # its contacts lie beyond the end
         self._part = part
         self._guard()
         for now, old in zip(self._state(), before, strict=True):
             now[...] = old + (now - old) * rest
+        drives.end(driven, rest)
         self._retire()
         self._population.end()
 
@@ -159,15 +162,19 @@ class NativeSimulation(Running):
             self._still = angle.copy(), angular_velocity.copy()
         angle, angular_velocity = self._still
         roll = None if population.felt is None else population.roll.copy()
-        return Frame(self.time, position, velocity, angle, angular_velocity, population.present.copy(), roll)
+        scene, present = population.scene, population.present.copy()
+        layer = population.layer.copy() if len(scene.layers) > 1 else None
+        visits = population.visits.copy() if scene.zones else None
+        drives = population.meeting.drives.told() if scene.drives else None
+        return Frame(self.time, position, velocity, angle, angular_velocity, present, roll, layer, visits, drives)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
             meeting = self._population.meeting
             scene = self._population.scene
-            self._ledger = ContactLog(len(scene.fixed) + len(scene.pockets), meeting.joints)
-            self._record(self.time)
+            self._ledger = ContactLog(len(scene.fixed_names), meeting.joints)
+            self._record(self.time, opening=True)
         return self._ledger.take()
 
     def account(self) -> Mapping[Cause, float]:
@@ -236,10 +243,20 @@ class NativeSimulation(Running):
             self._books.substep(opening, share)
         if population.meeting.breakable and look:
             self._come_apart(population.torn(), self._after(k + 1))
+        if population.stirred and look:
+            self._settle()
         if self._ledger is not None and look:
             self._record(start + h * share)
             if self._observer is not None and before is not None:
                 self._observer(start, before, self._seen(), self._ledger.pairs())
+
+    def _settle(self) -> None:
+        """Let zones note who came in, and do what they do."""
+        with booked(self._outside, Cause.DRIVES, self):
+            self._population.settle()
+        visiting = self._population.visiting
+        if self._ledger is None and visiting is not None:
+            visiting.told()  # who came in before contacts were asked for is nobody's concern
 
     def _seen(self) -> FloatArray:
         """Return the centres, (N, 2) m, as an observer is told; of balls that lie in pockets nan."""
@@ -254,13 +271,24 @@ class NativeSimulation(Running):
         if self._books is not None and len(numbers):
             self._books.parted(numbers)
 
-    def _record(self, time: float) -> None:
+    def _record(self, time: float, opening: bool = False) -> None:
+        """Enter what touches at a time, s, and who has come into zones; who did at the opening lasts till the next."""
         if self._ledger is not None:
             felt = self._population.felt
-            now = self._population.meeting.touching() if felt is None else felt.told()
-            self._work["contacts"] += len(now.a)
-            self._work["contact_iterations"] += len(now.a) * self._settings.iterations
-            self._ledger.record(time, now)
+            visiting = self._population.visiting
+            came = None if visiting is None else visiting.told(again=opening)
+            steady = self._ledger.steady and came is None
+            now = self._population.meeting.touching(steady) if felt is None else felt.told()
+            if isinstance(now, Touching):
+                self._ledger.record(time, now if came is None else joined(now, came))
+                count = len(now.a)
+            else:
+                self._ledger.go_on(now)
+                count = len(now)
+            if came is not None:
+                self._ledger.steady = False  # a note does not last: next time others touch
+            self._work["contacts"] += count
+            self._work["contact_iterations"] += count * self._settings.iterations
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the present arrays in scene order; they belong to the population."""

@@ -25,6 +25,9 @@ from sandbox.scene.settings import Settings
 FIXED, LOOSE, SOLITARY = 0b001, 0b010, 0b100
 """Collision categories: what never moves, bodies that meet everything, bodies that meet only what is fixed."""
 
+KINDS = 3
+"""how many of these there are on each layer: the bits of layer k are theirs, shifted by 3·k"""
+
 SHORTEST_REACH, LONGEST_REACH = 5e3, 5e6
 """m; pymunk's half-planes are segments, whose noise grows with their length: 3e-13 m at a reach of 5e3."""
 
@@ -51,13 +54,16 @@ def gravity_of(scene: Scene) -> tuple[float, float]:
 
 
 @cache
-def category(fixed: bool, collides: Collides, group: int = 0) -> pymunk.ShapeFilter:
-    """Return the filter of a body; those of one group other than 0 pass through each other."""
+def category(fixed: bool, collides: Collides, group: int = 0, layers: int = 1) -> pymunk.ShapeFilter:
+    """Return the filter of what is on some layers, as bits; those of one group other than 0 pass through each other."""
     if fixed:
-        return pymunk.ShapeFilter(group, categories=FIXED, mask=LOOSE | SOLITARY if collides == "all" else 0)
-    if collides == "all":
-        return pymunk.ShapeFilter(group, categories=LOOSE, mask=FIXED | LOOSE)
-    return pymunk.ShapeFilter(group, categories=SOLITARY, mask=FIXED)
+        own, others = FIXED, LOOSE | SOLITARY if collides == "all" else 0
+    elif collides == "all":
+        own, others = LOOSE, FIXED | LOOSE
+    else:
+        own, others = SOLITARY, FIXED
+    each = sum(1 << KINDS * k for k in range(layers.bit_length()) if layers >> k & 1)
+    return pymunk.ShapeFilter(group, categories=own * each, mask=others * each)
 
 
 def reach_of(scene: Scene, starts: FloatArray, speeds: FloatArray) -> tuple[FloatArray, float]:

@@ -15,7 +15,14 @@ class Steady:
     """A force (N) and a torque (N·m) by the number of the body."""
 
     def __init__(self) -> None:
-        self._of: dict[int, tuple[FloatArray, float]] = {}
+        self._pushes: dict[int, tuple[FloatArray, float]] = {}
+        self._lifts: dict[int, FloatArray] = {}
+        self._of: dict[int, tuple[FloatArray, float]] = {}  # both together
+
+    @property
+    def lifted(self) -> list[int]:
+        """The numbers of the bodies that a zone lifts."""
+        return list(self._lifts)
 
     def __iter__(self) -> Iterator[int]:
         return iter(self._of)
@@ -27,13 +34,34 @@ class Steady:
     def push(self, number: int, force: FloatArray, torque: float) -> None:
         """Let a force and a torque act on a body from now on."""
         if force.any() or torque:
-            self._of[number] = force, torque
+            self._pushes[number] = force, torque
         else:
-            self.drop(number)
+            self._pushes.pop(number, None)
+        self._add_up(number)
+
+    def lift(self, number: int, force: FloatArray | None) -> None:
+        """Let a zone's force (2,), N, act on a body from now on, instead of any other zone's; None is none."""
+        if force is None and number not in self._lifts:
+            return
+        if force is None:
+            del self._lifts[number]
+        else:
+            self._lifts[number] = force
+        self._add_up(number)
+
+    def _add_up(self, number: int) -> None:
+        push, lift = self._pushes.get(number), self._lifts.get(number)
+        if push is not None:
+            self._of[number] = push if lift is None else (push[0] + lift, push[1])
+        elif lift is not None:
+            self._of[number] = lift, 0.0
+        else:
+            self._of.pop(number, None)
 
     def drop(self, number: int) -> None:
         """Let nothing act on a body any more."""
-        self._of.pop(number, None)
+        for each in (self._pushes, self._lifts, self._of):
+            each.pop(number, None)
 
     def apply(self, members: Mapping[int, Member]) -> None:
         """Set forces and torques for the next step, where there is no drag."""
@@ -55,6 +83,7 @@ class Steady:
         """
         numbers, figures = state
         mass = np.asarray([members[n].body.mass for n in numbers.tolist()])[:, None]
+        mass[np.isinf(mass)] = 0.0  # of what a drive moves whatever acts on it
         push = np.zeros((len(numbers), 2))
         for row, number in enumerate(numbers.tolist()):
             if number in self._of:

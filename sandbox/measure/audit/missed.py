@@ -53,7 +53,8 @@ class Audit:
     that lies inside it, for the radius: what passes through that was surely missed, so that there is no false alarm,
     but what only clips a corner is not counted. A body whose core is 0, as its centre of mass lies outside of it, is
     left out. Pairs that a joint keeps from meeting, and bodies of one
-    group, miss nothing.
+    group, miss nothing; nor does who is on different layers, or changes its own within the substep, nor those that
+    strokes and plungers lead through fixed things.
 
     Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
     planes), and among balls with the pairs that are near.
@@ -62,10 +63,12 @@ class Audit:
     def __init__(self, scene: Scene, bodies: Bodies | None = None) -> None:
         self._obstacles = Obstacles.of(scene)
         self._apart = scene.links.apart()
+        self._led = frozenset(drive.body for drive in scene.drives if drive.kind != "torque")
         self._times: list[FloatArray] = []
         self._pairs: list[IntArray] = []
         self._looks = Looks()
         self._looks.add(np.empty((0, 2), np.int64))
+        self._on: IntArray = np.zeros((0, 0), np.int64)  # layers, as bits; without rows where there is one alone
         self._lay_out(scene.bodies if bodies is None else bodies)
 
     def joined(self, bodies: Bodies) -> None:
@@ -79,7 +82,9 @@ class Audit:
         self._obstacles = Obstacles.of(scene)
         self._lay_out(bodies)
 
-    def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
+    def __call__(
+        self, time: float, start: FloatArray, end: FloatArray, touching: IntArray, on: IntArray | None = None
+    ) -> None:
         """Take note of one substep; they are examined some at a time. The arrays are copied.
 
         Args:
@@ -87,6 +92,8 @@ class Audit:
             start: centres (N, 2), m.
             end: centres (N, 2), m.
             touching: pairs (K, 2) in contact at the end, numbered as in `Contacts`.
+            on: (N,) the layers on which each was all the while, as bits, where there are several; who shares none
+                with another misses it rightly.
 
         Raises:
             ValueError: N is not the number of bodies; `joined` tells of new ones.
@@ -98,6 +105,10 @@ class Audit:
         row = len(self._time)
         self._start[row] = start[self._part]
         self._end[row] = end[self._part]
+        if on is not None:
+            if not len(self._on):
+                self._on = np.zeros(self._start.shape[:2], np.int64)
+            self._on[row] = on[self._part]
         self._looks.add(touching)
         self._time.append(time)
         if len(self._time) == len(self._start):
@@ -142,6 +153,9 @@ class Audit:
         self._part = part = slice(self._offset, int(matter[-1]) + 1 if len(matter) else 0)
         self._moves, self._to_all, self._still = moves[part], to_all[part], still[part]
         self._core = bodies.core[part]
+        self._lands = self._moves
+        if self._led:  # what a stroke or a plunger leads passes through what never moves
+            self._lands = self._moves & ~np.isin(bodies.names[part], [*self._led])
         self._group = bodies.group[part] if bodies.group.any() else None
         self._least2 = least[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
         self._neighbours = Neighbours(self._core, member[part], self._meet)
@@ -150,6 +164,7 @@ class Audit:
         self._time: list[float] = []
         self._start = np.empty((batch, len(self._core), 2))
         self._end = np.empty_like(self._start)
+        self._on = np.zeros((0, 0), np.int64)
 
     def _examine(self) -> None:
         """Examine the substeps that wait."""
@@ -180,8 +195,9 @@ class Audit:
 
     def _fixed(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
         """Return when (M,) which pairs (M, 2) of a body and a fixed thing were missed."""
-        when, who = np.nonzero(fast & self._moves)
-        paths = Paths(when, who + self._offset, start[when, who], end[when, who], self._core[who])
+        when, who = np.nonzero(fast & self._lands)
+        on = self._on[when, who] if len(self._on) else None
+        paths = Paths(when, who + self._offset, start[when, who], end[when, who], self._core[who], on)
         return self._obstacles.missed(paths, self._looks)
 
     def _meet(self, i: IntArray, j: IntArray) -> BoolArray:
@@ -199,6 +215,9 @@ class Audit:
     def _balls(self, start: FloatArray, end: FloatArray, fast: BoolArray, nearing: float) -> tuple[IntArray, IntArray]:
         """Return when (M,) which pairs (M, 2) of bodies were missed; none comes nearer by more than `nearing`."""
         when, i, j = self._neighbours.encounters(start, end, fast)
+        if len(self._on):
+            near = (self._on[when, i] & self._on[when, j]) != 0
+            when, i, j = when[near], i[near], j[near]
         parts = len(when) // CHUNK + 1
         at = np.concatenate(
             [

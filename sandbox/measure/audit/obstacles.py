@@ -19,6 +19,7 @@ from sandbox.measure.audit.sweep import (
 )
 from sandbox.scene.model import Plane, Post, Scene, Wall
 from sandbox.scene.part import BACKING, Point
+from sandbox.scene.zone import mask_of
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 PLANE_ROUNDING = 1e-11
@@ -42,10 +43,13 @@ class Paths:
     """(F, 2) m"""
     radius: FloatArray
     """(F,) m"""
+    on: IntArray | None = None
+    """(F,) the layers on which each was all the while, as bits; none where there is one alone"""
 
     def some(self, which: IntArray) -> Self:
         """Return some of them."""
-        return type(self)(self.when[which], self.who[which], self.start[which], self.end[which], self.radius[which])
+        on, radius = None if self.on is None else self.on[which], self.radius[which]
+        return type(self)(self.when[which], self.who[which], self.start[which], self.end[which], radius, on)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +68,10 @@ class Obstacles:
     """(S,) half its thickness, m"""
     number: IntArray
     """(S,) the fixed thing that it is part of, −1 − k"""
+    plane_layers: IntArray
+    """(L,) the layers of each plane, as bits"""
+    layers: IntArray
+    """(S,) the layers of each segment, as bits"""
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
@@ -84,6 +92,8 @@ class Obstacles:
             rows += [(*a, *b) for a, b in pairwise(line)]
             half += [width] * (len(line) - 1)
             number += [-1 - k] * (len(line) - 1)
+        masks = np.asarray([mask_of(thing.layers, scene.layers) for thing in scene.fixed], dtype=np.int64)
+        things = -1 - np.asarray(number, dtype=np.int64)
         ends = np.asarray(rows, dtype=np.float64).reshape(-1, 4)
         return cls(
             point=_rows([plane.point for plane in scene.planes]),
@@ -92,6 +102,8 @@ class Obstacles:
             along=ends[:, 2:] - ends[:, :2],
             half=np.asarray(half, dtype=np.float64),
             number=np.asarray(number, dtype=np.int64),
+            plane_layers=masks[: len(scene.planes)],
+            layers=masks[things],
         )
 
     def __len__(self) -> int:
@@ -121,6 +133,8 @@ class Obstacles:
         came_in &= last < (paths.radius - tolerance)[:, None]
         move = paths.end - paths.start
         came_in &= (dot(move, move) >= (JUMP * paths.radius) ** 2)[:, None]
+        if paths.on is not None:
+            came_in &= (paths.on[:, None] & self.plane_layers) != 0
         i, plane = np.nonzero(came_in)
         when, pair = paths.when[i], np.column_stack((paths.who[i], -1 - plane))
         in_time = looks.found(when + 1, pair) & (last[i, plane] >= -BACKING)
@@ -169,6 +183,8 @@ class Obstacles:
         reach = (paths.radius + 0.5 * np.sqrt(length2))[:, None] + size
         near = across * across + up * up <= reach * reach * (1 + 1e-9)  # rounding must not hide a pair
         near &= length2[:, None] >= (JUMP * (paths.radius[:, None] + self.half)) ** 2
+        if paths.on is not None:
+            near &= (paths.on[:, None] & self.layers) != 0
         i, s = np.nonzero(near)
         first = from_segment(paths.start[i], self.tail[s], self.along[s])
         reach = paths.radius[i] + self.half[s] + np.sqrt(length2[i])

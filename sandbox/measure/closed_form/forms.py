@@ -80,7 +80,7 @@ def solution(scene: Scene) -> Solution | None:
 
     Where no two bodies that move can meet or are joined, each needs a form of its own; else all need one together.
     """
-    if on_floor(scene):
+    if on_floor(scene) or scene.zones or len(scene.layers) > 1:  # of notes and layers no formula knows
         return None
     given = Given.of(scene)
     if given.meet.mutual:

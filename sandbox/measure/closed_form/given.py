@@ -39,7 +39,7 @@ class Given:
     meet: Meetings
     links: Links
     thrust: BoolArray
-    """(N,) carries a thrust"""
+    """(N,) carries a thrust, or has a drive"""
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
@@ -68,7 +68,8 @@ class Given:
 
     def only_plane(self) -> Plane | None:
         """Return the plane that is the one fixed thing there is; None where there are others, or none."""
-        return self.scene.planes[0] if len(self.scene.fixed) == len(self.scene.planes) == 1 else None
+        alone = len(self.scene.fixed) == len(self.scene.planes) == len(self.scene.layers) == 1
+        return self.scene.planes[0] if alone else None
 
     def tie(self, number: int) -> Tie | None:
         """Return the one joint of a body, which never breaks and holds it to the world or a fixed body, or None."""
@@ -91,10 +92,9 @@ class Given:
 
 
 def thrust_on(scene: Scene, bodies: Bodies) -> BoolArray:
-    """Return which bodies carry a thrust, (N,)."""
-    if not scene.thrusts:
-        return np.zeros(len(bodies), np.bool_)
-    return np.isin(bodies.names, [thrust.body for thrust in scene.thrusts])
+    """Return which bodies carry a thrust or have a drive, (N,)."""
+    movers = [each.body for each in (*scene.thrusts, *scene.drives)]
+    return np.isin(bodies.names, movers) if movers else np.zeros(len(bodies), np.bool_)
 
 
 def direction(vector: FloatArray) -> FloatArray:

@@ -87,7 +87,9 @@ def impacts(given: Given) -> Impacts | None:
     scene, bodies = given.scene, given.bodies
     if not 2 <= len(bodies) <= MOST_BALLS or not bodies.round.all() or bodies.fixed.any() or scene.fixed:
         return None
-    if len(given.links) or scene.attractions or scene.thrusts or not given.airless or scene.world.bounds is not None:
+    if len(given.links) or scene.attractions or scene.thrusts or scene.drives:
+        return None
+    if not given.airless or scene.world.bounds is not None:
         return None
     if np.isfinite(bodies.lifetime).any() or any(element.collides != "all" for element in bodies.elements):
         return None

@@ -43,11 +43,13 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
     end the bouncing, which is right then. Before either, what a formula of the whole scene says of a body that does
     more than fly and bounce: that holds to its end.
 
-    A run that actions interfered with has none. Only a ball bounces by formula; other shapes have their flight up to
-    the first contact.
+    A run that actions or zones interfered with has none; what zones only note ends a form as a contact does. Only a
+    ball bounces by formula; other shapes have their flight up to the first contact.
     """
     bodies = scene.bodies
     if trajectory.info.get("actions") or trajectory.names.tolist() != list(bodies.names) or bodies.fixed[number]:
+        return None
+    if any(zone.holds or zone.gravity is not None for zone in scene.zones):
         return None
     form = _solved(trajectory, scene, number) or _bouncing(trajectory, scene, number)
     form = form or _flying(trajectory, scene, bodies, number)

@@ -90,7 +90,7 @@ def standing(given: Given) -> Standing | None:
         return None
     if any(element.collides != "all" for element in bodies.elements) or scene.world.bounds is not None:
         return None
-    if len(given.links) or scene.attractions or scene.thrusts or not given.airless:
+    if len(given.links) or scene.attractions or scene.thrusts or scene.drives or not given.airless:
         return None
     normal = normal_of(plane)
     if not parallel(given.gravity, normal) or float(given.gravity @ normal) >= 0.0:

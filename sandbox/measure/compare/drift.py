@@ -59,20 +59,23 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
     """Return the momentum at the end that nothing explains, as a share of the largest sum of |m v| of any frame.
 
     Explained are gravity, and the recorded impulses between bodies that move and things that do not; joints and
-    attraction between bodies that move keep momentum. None with drag, thrust, a joint to what stands still or an
-    attraction towards it, whose impulses are not recorded; where a body was retired, and took its momentum along;
-    where the run did not reach its end, or ended within a step, of whose contacts there is no record.
+    attraction between bodies that move keep momentum. None with drag, thrust, drives, a joint to what stands still or
+    an attraction towards it, or zones that stop or lift, whose impulses are not recorded; where a body was retired,
+    and took its momentum along; where the run did not reach its end, or ended within a step, of whose contacts there
+    is no record.
     """
     bodies, world = scene.bodies, scene.world
     if run.status != "ok" or np.isfinite(run.retired_time).any():
         return None
     if frame_count(scene, Settings.model_validate(run.info["settings"]))[1] > 0.0:
         return None
-    if world.linear_drag or world.quadratic_drag or scene.thrusts or _anchored(scene):
+    if world.linear_drag or world.quadratic_drag or scene.thrusts or scene.drives or _anchored(scene):
+        return None
+    if any(zone.holds or zone.gravity is not None for zone in scene.zones):
         return None
     mass = np.where(bodies.fixed, 0.0, bodies.mass)
     explained = mass.sum() * np.asarray(world.gravity) * run.time[-1]
-    still = np.append(bodies.fixed, np.ones(len(scene.fixed), dtype=np.bool_))  # −1 − k counts from the end
+    still = np.append(bodies.fixed, np.ones(len(scene.fixed_names), dtype=np.bool_))  # −1 − k counts from the end
     first, second = (still[run.contact_pair[:, side]] for side in (0, 1))
     explained = explained - run.contact_impulse[~first & second].sum(axis=0)
     explained = explained + run.contact_impulse[first & ~second].sum(axis=0)

@@ -9,7 +9,8 @@ import numpy as np
 from sandbox.measure.distance import hull_distance
 from sandbox.measure.lying import gap_above, pieces_over_time
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Plane, Post, Scene, Wall
+from sandbox.scene.model import Plane, Post, Scene, Wall, Zone
+from sandbox.scene.precinct import pieces_of
 from sandbox.trajectory import FloatArray
 
 
@@ -25,6 +26,8 @@ def gap(scene: Scene, bodies: Bodies, position: FloatArray, angle: FloatArray, p
     """
     first, second = pair
     centre = position[:, first]
+    if -1 - second >= len(scene.fixed) + len(scene.pockets):
+        return _from_zone(centre, scene.zones[-1 - second - len(scene.fixed) - len(scene.pockets)])
     if -1 - second >= len(scene.fixed):  # a pocket is in contact with whose centre it holds
         pocket = scene.pockets[-1 - second - len(scene.fixed)]
         return _distance(centre - np.asarray(pocket.position)) - pocket.radius
@@ -44,6 +47,15 @@ def gap(scene: Scene, bodies: Bodies, position: FloatArray, angle: FloatArray, p
         for its_corners, its_radius in others:
             _lower(gaps, corners, its_corners, radius + its_radius)
     return gaps
+
+
+def _from_zone(centre: FloatArray, zone: Zone) -> FloatArray:
+    """Return the distance of a centre from a zone, (T,) m: it is noted when it is inside."""
+    nearest = np.full(len(centre), np.inf)
+    for corners, radius in pieces_of(zone):
+        own = np.broadcast_to(np.asarray(corners), (len(centre), len(corners), 2))
+        _lower(nearest, centre[:, None], own, radius)
+    return nearest
 
 
 def _of_disc(

@@ -33,7 +33,7 @@ def optional(document: Document) -> list[Key]:
     """Return the keys that a document can do without, and still be a scene."""
     keys: list[Key] = [("world", -1, key) for key in document.get("world", {}) if key != "duration"]
     for kind, tables in document.items():
-        if isinstance(tables, list) and kind not in ("material", "pair", "joint", "attraction", "thrust"):
+        if isinstance(tables, list) and kind not in ("material", "pair", "joint", "attraction", "thrust", "drive"):
             keys += [(kind, k, key) for k, table in enumerate(tables) for key in DISPENSABLE if key in table]
     return keys
 
@@ -124,7 +124,7 @@ def _up(value: float, digits: int) -> float:
 def _tables(document: Document) -> Iterator[tuple[str, Document]]:
     """Yield the tables of what can be touched, and the parts of bodies."""
     for kind, tables in document.items():
-        if not isinstance(tables, list) or kind in ("material", "pair", "joint", "attraction", "thrust"):
+        if not isinstance(tables, list) or kind in ("material", "pair", "joint", "attraction", "thrust", "drive"):
             continue
         for table in tables:
             yield kind, table

@@ -7,15 +7,16 @@ from typing import Any
 from sandbox.scene.document import to_document
 from sandbox.scene.elements import mover_of
 from sandbox.scene.model import Emitter, Grid, Mover, Scatter, Scene, Stack
+from sandbox.scene.surfaced import GROUND
 
 Document = dict[str, Any]
 Place = tuple[str, int]
 """A table of a document: its kind, and which of them."""
 
 FIXED = ("plane", "wall", "post")
-BONDS = ("joint", "attraction", "thrust")
+BONDS = ("joint", "attraction", "thrust", "drive")
 SURFACE = (
-    "material", "restitution", "restitution_falloff", "friction", "colour", "mass", "density", "collides",
+    "material", "restitution", "restitution_falloff", "friction", "colour", "mass", "density", "collides", "layer",
 )  # fmt: skip
 
 MOST_SPELLED = 20_000
@@ -125,6 +126,8 @@ def _body(scene: Scene, generator: Mover, number: int) -> tuple[str, Document]:
     table |= {key: value for key in SURFACE if (value := getattr(generator, key)) is not None}
     if table["collides"] == "all":
         del table["collides"]
+    if table["layer"] == GROUND:
+        del table["layer"]
     table |= {"position": bodies.position[number].tolist(), "velocity": bodies.velocity[number].tolist()}
     table |= {"angle": float(bodies.angle[number]), "angular_velocity": float(bodies.angular_velocity[number])}
     table = {key: value for key, value in table.items() if value not in (0.0, [0.0, 0.0])}

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sandbox.measure.collisions import together
 from sandbox.measure.compare.gaps import gap
 from sandbox.scene.model import Scene
 from sandbox.trajectory import FloatArray, Trajectory
@@ -60,7 +61,7 @@ def touches(run: Trajectory, scene: Scene, dt: float, reach: float, until: float
 
 def _ends(run: Trajectory, scene: Scene, pair: Pair, time: FloatArray, reach: float) -> FloatArray:
     """Return until when the two stay within reach after each of the times: the last frame before they part."""
-    apart = ~(gap(scene, scene.bodies, run.position, run.angle, pair) <= reach)
+    apart = ~(gap(scene, scene.bodies, run.position, run.angle, pair) <= reach) | ~together(run, scene, pair)
     # For every frame the number of the next one apart, the frame itself included.
     number = np.where(apart, np.arange(len(apart)), len(apart))
     following = np.minimum.accumulate(number[::-1])[::-1]

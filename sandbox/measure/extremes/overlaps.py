@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 
+from sandbox.measure.collisions import can_meet
 from sandbox.measure.compare.gaps import gap
 from sandbox.measure.lying import gap_above
-from sandbox.scene.meetings import meetings
+from sandbox.scene.meetings import meetings, reach
 from sandbox.scene.model import Plane, Scene
 from sandbox.scene.near import near_pairs
 from sandbox.trajectory import FloatArray, Trajectory
@@ -49,16 +50,20 @@ def deepest(run: Trajectory, scene: Scene) -> FloatArray:
             found = np.maximum(found, -above)
     others = [-1 - k for k, thing in enumerate(scene.fixed) if not isinstance(thing, Plane) and thing.solid]
     pairs = [(number, thing) for number in able[:MOST_APART].tolist() for thing in others]
-    mutual = meetings(scene).mutual
+    mutual = meetings(scene).mutual and len(scene.layers) == 1  # which of two pass over each other is not looked into
     if mutual and not bodies.round[able].all():
         pairs += _beside(scene)
+    # Who can change its layer may lie over what it does not meet: only what can do nothing else is looked at.
+    if len(scene.layers) > 1:
+        sure = reach(scene, bodies)
+        pairs = [pair for pair in pairs if sure[pair[0]].bit_count() == 1 and can_meet(scene, pair)]
     for pair in pairs:
         found = np.maximum(found, -gap(scene, bodies, run.position, run.angle, pair))
     if mutual and bodies.round.all():
         among = np.flatnonzero(meetings(scene).touches)
-        reach = 2.0 * float(bodies.radius[among].max())
+        farthest = 2.0 * float(bodies.radius[among].max())
         for k, position in enumerate(run.position[:, among]):
-            for i, j in near_pairs(position, reach):
+            for i, j in near_pairs(position, farthest):
                 apart = np.hypot(*(position[i] - position[j]).T) - bodies.radius[among[i]] - bodies.radius[among[j]]
                 found[k] = max(found[k], -float(apart.min(initial=np.inf)))
     return found

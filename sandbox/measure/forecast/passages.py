@@ -14,11 +14,13 @@ import numpy as np
 from sandbox.measure.forecast.held import farthest_fall
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings, meetings
+from sandbox.scene.meetings import reach as reach_of
 from sandbox.scene.model import Plane, Post, Scene, Wall
 from sandbox.scene.near import BoolArray, FloatArray
 from sandbox.scene.part import BACKING
 from sandbox.scene.settings import Settings
 from sandbox.scene.starts import height_above
+from sandbox.scene.zone import mask_of
 
 ANOTHER = "another ball"
 ANOTHER_BODY = "another body"
@@ -74,14 +76,18 @@ def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
     found = []
 
     def worst(reach: FloatArray, speeds: FloatArray, thing: str) -> None:
+        if not np.isfinite(reach).any():
+            return
         with np.errstate(divide="ignore", over="ignore"):  # at rest, or as good as: never
             k = int(np.argmin(reach / speeds))
         found.append(Passage(bodies.names[movers[k]], thing, float(speeds[k]), float(reach[k])))
 
+    layers = reach_of(scene, bodies)[movers]
     for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):
         if not isinstance(thing, Plane) and not thing.solid:
             continue
-        worst(half + _half_depth(thing), speed, name)
+        shares = layers & mask_of(thing.layers, scene.layers) != 0
+        worst(np.where(shares, half + _half_depth(thing), np.inf), speed, name)
     among = meet_each_other(bodies)[movers]
     fixed = np.flatnonzero(bodies.fixed & meet.touches)
     if meet.mutual and len(fixed):
@@ -115,7 +121,7 @@ def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
     scenes with other bodies than balls, or joints, also the end of what it hangs on, or past all that could stop it.
     Where balls can meet, any may be hit by the fastest: an equal one takes over its speed, a lighter one gets up to
     twice it. Who is kicked gets up to the speed at which each hit takes as much as it brings. What springs, motors,
-    attraction and thrusts add is left out.
+    attraction, thrusts and drives add is left out.
     """
     bodies, world = scene.bodies, scene.world
     start = np.hypot(*bodies.velocity.T)

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from sandbox.measure.forecast.chains import chain_warnings
+from sandbox.measure.forecast.entries import entry_warnings
 from sandbox.measure.forecast.events import event_warnings
 from sandbox.measure.forecast.kicks import kick_warnings
 from sandbox.measure.forecast.laid import Laid, laid
@@ -44,6 +45,7 @@ def warnings(scene: Scene, settings: Settings | None = None, engine: str | None 
     return [
         *_duration(scene, settings),
         *_tunnelling(scene, settings, meet),
+        *entry_warnings(scene, settings, meet),
         *_overlaps(scene, meet, close),
         *(() if engine == "reference" else _iterations(settings, meet)),
         *_rounding(scene, settings, meet),

@@ -75,8 +75,10 @@ def usual_metric(judge: Judge) -> Metric:
 
 
 def keeps_energy(scene: Scene) -> bool:
-    """Tell whether nothing in a scene takes energy: no drag, no friction, no damper, elastic contacts, no thrust."""
-    if scene.world.linear_drag or scene.world.quadratic_drag or scene.thrusts or scene.links.figures[:, 2].any():
+    """Tell whether nothing in a scene takes energy: no drag, friction, damper, thrust or drive, elastic contacts."""
+    if scene.world.linear_drag or scene.world.quadratic_drag or scene.thrusts or scene.drives:
+        return False
+    if scene.links.figures[:, 2].any():
         return False
     meet = meetings(scene)
     elastic = (meet.surfaces.restitution == 1.0) & meet.surfaces.fixed_coefficients

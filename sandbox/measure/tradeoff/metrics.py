@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.measure.collisions import are_collisions, collisions, together
 from sandbox.measure.compare.drift import energy_drift
 from sandbox.measure.compare.gaps import gap
 from sandbox.measure.compare.runs import common_frames, there
@@ -60,9 +61,9 @@ def bounce_height(run: Trajectory, judge: Judge) -> float | None:
     truth = judge.truth.trajectory
     mine, its = common_frames(run, truth)
     both = there(run, mine) & there(truth, its) & (truth.time[its] <= judge.until)[:, None]
-    worst = None
+    worst, hits = None, are_collisions(truth)
     for number in np.flatnonzero(judge.moving).tolist():
-        touched = truth.contact_time[(truth.contact_pair == number).any(axis=1)]
+        touched = truth.contact_time[(truth.contact_pair == number).any(axis=1) & hits]
         kept = both[:, number] & (truth.time[its] >= np.min(touched, initial=np.inf))
         if kept.any():
             own, right = run.position[mine[kept], number], truth.position[its[kept], number]
@@ -89,12 +90,13 @@ def joints(run: Trajectory, judge: Judge) -> float | None:
 
 def penetration(run: Trajectory, judge: Judge) -> float | None:
     """Return the deepest overlap of any two that touched, in any frame, m. None where nothing touches."""
-    pairs = np.unique(run.contact_pair, axis=0)
+    pairs = np.unique(run.contact_pair[are_collisions(run)], axis=0)
     if not len(pairs):
         return None
     scene = judge.scene
     with np.errstate(over="ignore", invalid="ignore"):
         gaps = [gap(scene, scene.bodies, run.position, run.angle, (a, b)) for a, b in pairs.tolist()]
+        gaps = [np.where(together(run, scene, (a, b)), each, np.inf) for each, (a, b) in zip(gaps, pairs, strict=True)]
         return max(0.0, -min(float(np.nanmin(each, initial=np.inf)) for each in gaps))
 
 
@@ -114,9 +116,9 @@ def missed_contacts(run: Trajectory, _: Judge) -> float | None:
 def passes(run: Trajectory, _: Judge) -> float | None:
     """Return the share of all meetings that were passed through unseen: 0.1 is 1 bullet in 10. None without any."""
     missed = run.missed_contacts
-    if missed is None or not missed + len(run.contact_time):
+    if missed is None or not missed + collisions(run):
         return None
-    return missed / (missed + len(run.contact_time))
+    return missed / (missed + collisions(run))
 
 
 def settle_time(run: Trajectory, judge: Judge) -> float | None:

@@ -107,7 +107,7 @@ def _gears(view: View, gears: Held) -> None:
     dashes(view.surface, [((ax, ay), (bx, by)) for ax, ay, bx, by in rows.tolist()], INK, 2.0 * view.unit)
     places = rows[:, 2:]
     for x, y in places[view.inside(places, 2.0 * LARGE)][:MOST_DIALS].tolist():
-        _arc(view, (x, y), 0.7 * SMALL * view.unit, 0.0, math.tau, INK, 1.2)
+        arc(view, (x, y), 0.7 * SMALL * view.unit, 0.0, math.tau, INK, 1.2)
 
 
 def _slides(view: View, slides: Held) -> None:
@@ -143,20 +143,20 @@ def _grooves(view: View, grooves: Held) -> None:
             start, end = (ax + shift[0], ay + shift[1]), (bx + shift[0], by + shift[1])
             stroke(view.surface, start, end, SKY, 1.4 * view.unit, view.antialias)
         turned = math.atan2(-uy, ux)
-        _arc(view, (ax, ay), half, turned + 0.5 * math.pi, math.pi, SKY, 1.4)
-        _arc(view, (bx, by), half, turned - 0.5 * math.pi, math.pi, SKY, 1.4)
+        arc(view, (ax, ay), half, turned + 0.5 * math.pi, math.pi, SKY, 1.4)
+        arc(view, (bx, by), half, turned - 0.5 * math.pi, math.pi, SKY, 1.4)
 
 
 def _limits(view: View, limits: Held) -> None:
     """Draw the arc within which the second body may turn, and a hand that shows where it is."""
     for (x, y), size, base, turned, (least, most, _) in _dials(view, limits):
         first, span = base + least, min(max(most - least, 0.0), math.tau)
-        _arc(view, (x, y), size, first, span, INK, 2.0)
+        arc(view, (x, y), size, first, span, INK, 2.0)
         for stop in (first, first + span):
-            inner, outer = _spot((x, y), 0.8 * size, stop), _spot((x, y), 1.2 * size, stop)
-            _path(view, [inner, outer], INK, 2.0)
-        tip, foot = _spot((x, y), 1.1 * size, base + turned), _spot((x, y), 0.45 * size, base + turned)
-        _path(view, [foot, tip], YELLOW, 2.0)
+            inner, outer = spot((x, y), 0.8 * size, stop), spot((x, y), 1.2 * size, stop)
+            path(view, [inner, outer], INK, 2.0)
+        tip, foot = spot((x, y), 1.1 * size, base + turned), spot((x, y), 0.45 * size, base + turned)
+        path(view, [foot, tip], YELLOW, 2.0)
 
 
 def _turning_springs(view: View, springs: Held) -> None:
@@ -167,10 +167,10 @@ def _turning_springs(view: View, springs: Held) -> None:
         colour = tuple(SHADES[round(32.0 + 32.0 * strained / (abs(strained) + 0.5))].tolist())
         count = 28
         spots = [
-            _spot((x, y), size * (0.25 + 0.75 * k / count), base + turned - wound * (1.0 - k / count))
+            spot((x, y), size * (0.25 + 0.75 * k / count), base + turned - wound * (1.0 - k / count))
             for k in range(count + 1)
         ]
-        _path(view, spots, (colour[0], colour[1], colour[2]), 1.4)
+        path(view, spots, (colour[0], colour[1], colour[2]), 1.4)
 
 
 def _motors(view: View, motors: Held) -> None:
@@ -178,9 +178,9 @@ def _motors(view: View, motors: Held) -> None:
     for (x, y), size, base, _, (rate, _, _) in _dials(view, motors):
         way = 1.0 if rate >= 0.0 else -1.0
         first, span = base - way * 0.75 * math.pi, way * 1.35 * math.pi
-        _arc(view, (x, y), 1.15 * size, first, span, INK, 2.2)
+        arc(view, (x, y), 1.15 * size, first, span, INK, 2.2)
         last = first + span
-        neck, tip = _spot((x, y), 1.15 * size, last - way * 0.15), _spot((x, y), 1.15 * size, last + way * 0.35)
+        neck, tip = spot((x, y), 1.15 * size, last - way * 0.15), spot((x, y), 1.15 * size, last + way * 0.35)
         arrow(view.surface, neck, tip, INK, 2.2 * view.unit, view.antialias, BACKGROUND)
 
 
@@ -214,22 +214,21 @@ def _from_bodies(view: View, joints: Held) -> FloatArray:
     return np.asarray(ends[np.isfinite(ends).all(axis=1)])
 
 
-def _spot(centre: Pixel, radius: float, angle: float) -> Pixel:
+def spot(centre: Pixel, radius: float, angle: float) -> Pixel:
+    """Return the place on a circle at an angle that counts as in the world, px."""
     return centre[0] + radius * math.cos(angle), centre[1] - radius * math.sin(angle)
 
 
-def _arc(view: View, centre: Pixel, radius: float, first: float, span: float, colour: Colour, width: float) -> None:
+def arc(view: View, centre: Pixel, radius: float, first: float, span: float, colour: Colour, width: float) -> None:
     """Draw part of a circle, counted as in the world, with a dark edge that sets it off."""
     low, half = min(first, first + span), min(0.5 * abs(span), math.pi)
     middle = low + half
     row = [1.0, *centre, radius, math.cos(middle), -math.sin(middle), math.cos(half)]
-    tips = [
-        [0.0, *spot, *spot, 0.0, 0.0] for spot in (_spot(centre, radius, low), _spot(centre, radius, low + 2 * half))
-    ]
+    tips = [[0.0, *tip, *tip, 0.0, 0.0] for tip in (spot(centre, radius, low), spot(centre, radius, low + 2 * half))]
     _traced(view, np.asarray([row, *tips]), colour, width)
 
 
-def _path(view: View, spots: list[Pixel], colour: Colour, width: float) -> None:
+def path(view: View, spots: list[Pixel], colour: Colour, width: float) -> None:
     """Draw a line through places, with a dark edge."""
     rows = [[0.0, *a, *b, 0.0, 0.0] for a, b in pairwise(spots)]
     _traced(view, np.asarray(rows), colour, width)
@@ -240,7 +239,8 @@ def _traced(view: View, edge: FloatArray, colour: Colour, width: float) -> None:
     half, halo = 0.5 * width * view.unit, 1.2 * view.unit
     distance = outline_distance(edge)
     reach = edge[:, 3].max() if edge[0, 0] == 1.0 else 0.0
-    low, high = edge[:, 1:3].min(axis=0) - reach, edge[:, 1:3].max(axis=0) + reach
+    spots = np.vstack((edge[:, 1:3], edge[edge[:, 0] == 0.0, 3:5]))  # of straight lines both ends
+    low, high = spots.min(axis=0) - reach, spots.max(axis=0) + reach
     margin = half + halo + 1.0
     box = float(low[0] - margin), float(low[1] - margin), float(high[0] + margin), float(high[1] + margin)
     within = clipped_box(box, view.surface.get_clip())

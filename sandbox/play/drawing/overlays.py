@@ -4,7 +4,9 @@ import numpy as np
 
 from sandbox.play.drawing.arrows import draw_contacts, draw_impulses, draw_velocities
 from sandbox.play.drawing.discs import Discs
+from sandbox.play.drawing.drives import draw_hinges, draw_stops
 from sandbox.play.drawing.fittings import draw_fittings
+from sandbox.play.drawing.flames import draw_flames
 from sandbox.play.drawing.joints import draw_joints, held
 from sandbox.play.drawing.marks import (
     draw_boxes,
@@ -46,18 +48,24 @@ class Overlays:
         """Draw what bodies cover."""
         if "trails" in view.sight.overlays:
             draw_trails(view, self._points)
+        if "shapes" in view.sight.overlays and view.sight.flames:
+            draw_flames(view)
         if "shapes" in view.sight.overlays and len(view.sight.links):
             draw_joints(view, held(view), self._discs)
 
     def above(self, view: View) -> None:
         """Draw what covers bodies."""
-        overlays = view.sight.overlays
+        overlays, drives = view.sight.overlays, view.sight.scene.drives
+        if drives and "shapes" in overlays:
+            draw_hinges(view, self._discs)
         if view.sight.ghost is not None:
             self._ghost(view)
         if "bounds" in overlays:
             draw_boxes(view, self._polygons)
         if "joints" in overlays and len(view.sight.links):
             draw_fittings(view, held(view), self._discs)
+        if drives and "joints" in overlays:
+            draw_stops(view)
         if "centres" in overlays:
             draw_centres(view)
         if view.sight.overlapping is not None:

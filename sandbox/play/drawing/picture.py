@@ -10,6 +10,7 @@ from sandbox.play.drawing.ageing import Ageing
 from sandbox.play.drawing.artillery.fire import draw_above, draw_below
 from sandbox.play.drawing.artillery.guns import draw_guns
 from sandbox.play.drawing.artillery.land import draw_land
+from sandbox.play.drawing.decks import draw_deck, layers_among, on_layer
 from sandbox.play.drawing.discs import Discs, spokes
 from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
 from sandbox.play.drawing.grid import draw_grid, draw_scale
@@ -21,6 +22,7 @@ from sandbox.play.drawing.table.aiming import draw_aim, draw_ways
 from sandbox.play.drawing.table.balls import Balls
 from sandbox.play.drawing.table.cloth import draw_table
 from sandbox.play.drawing.view import View
+from sandbox.play.drawing.zones import draw_zones
 from sandbox.play.sight import Sight
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import meetings
@@ -132,10 +134,9 @@ class Picture:
             own = _drawn_otherwise(sight)
             large = np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None
             if len(own):
-                large = np.setdiff1d(
-                    np.arange(len(shown)) if large is None else large, np.flatnonzero(np.isin(shown, own))
-                )
-            self._draw_bodies(view, large)
+                others = np.flatnonzero(~np.isin(shown, own))
+                large = others if large is None else np.intersect1d(large, others)
+            self._draw_layers(view, large)
             if sight.gunnery is not None:
                 draw_guns(view, sight.gunnery, {n: tuple(self._colours[n].tolist()) for n in own.tolist()})
         self._overlays.above(view)
@@ -144,6 +145,19 @@ class Picture:
         if sight.gunnery is not None:
             draw_above(view, sight.gunnery)
         draw_scale(surface, camera, unit, foot)
+
+    def _draw_layers(self, view: View, which: IntArray | None) -> None:
+        """Draw the bodies that are no points, from the ground up, with what is fixed on each layer above it."""
+        scene = view.sight.scene
+        if len(scene.layers) == 1:
+            self._draw_bodies(view, which)
+            return
+        which = np.arange(len(view.shown)) if which is None else which
+        layer = layers_among(view.sight.frame, view.shown[which])
+        for k in range(len(scene.layers)):
+            if k > 0:
+                draw_deck(view.surface, view.camera, on_layer(scene, k), view.unit, view.antialias)
+            self._draw_bodies(view, which[layer == k])
 
     def _draw_bodies(self, view: View, which: IntArray | None) -> None:
         """Draw the bodies that are no points: all, or those at some places of the view."""
@@ -226,7 +240,9 @@ class Picture:
                 draw_land(drawn, camera, sight.scene, unit, antialias)
             elif area is None:
                 draw_grid(drawn, camera, unit)
-                draw_fixtures(drawn, camera, sight.scene, unit, antialias)
+                draw_zones(drawn, camera, sight.scene, unit, antialias)
+                ground = sight.scene if len(sight.scene.layers) == 1 else on_layer(sight.scene, 0)
+                draw_fixtures(drawn, camera, ground, unit, antialias)
             else:
                 draw_table(drawn, camera, sight.scene, area, unit, antialias)
             if wanted.bounds:

@@ -24,6 +24,7 @@ from sandbox.scene.bodies import Bodies
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
+from sandbox.scene.zone import notes
 from sandbox.trajectory import BoolArray, Contacts, FloatArray, Frame, Trajectory
 
 LINGER = 0.12
@@ -94,7 +95,8 @@ class Film:
         velocity, spin = between(run.velocity), between(run.angular_velocity)
         velocity[gone], spin[gone] = 0.0, 0.0
         roll = between(run.spin)[:, :2] if len(run.spin) else None
-        return Frame(time, between(run.position), velocity, between(run.angle), spin, present, roll)
+        layer = run.layer[k].astype(np.int64).clip(0) if len(run.layer) else None
+        return Frame(time, between(run.position), velocity, between(run.angle), spin, present, roll, layer)
 
     def _steady(self, k: int, after: int, span: float) -> BoolArray:
         """Tell who moves from one frame to the next as bodies do: neither retired between them nor put elsewhere."""
@@ -134,7 +136,8 @@ class Film:
     def contacts(self, time: float, speed: float = 1.0) -> Contacts:
         """Return the contacts that are in sight at a time, s: those that began a moment of the film ago."""
         run = self.trajectory
-        rows = np.flatnonzero((run.contact_time > time - LINGER * speed) & (run.contact_time <= time))
+        recent = (run.contact_time > time - LINGER * speed) & (run.contact_time <= time)
+        rows = np.flatnonzero(recent & ~notes(run.contact_pair, self.scene))
         columns = (run.contact_point, run.contact_normal, run.contact_impulse)
         return Contacts(run.contact_time[rows], run.contact_pair[rows], *(column[rows] for column in columns))
 

@@ -11,7 +11,8 @@ from sandbox.play.instruments.plates import plate, shortened, wrapped
 RIGHT = 66.0
 """px at unit 1 beside it, for how many pictures a second there are"""
 NARROWEST = 300.0
-LETTERS = 14.0
+LETTERS = (14.0, 12.5, 11.0)
+"""px at unit 1: the largest at which all stands in one row; else the smallest"""
 MOST_LINES = 8
 
 
@@ -26,14 +27,18 @@ def draw_score(surface: pygame.Surface, board: Board, free: pygame.Rect, left: i
         unit: px of a pixel at 1080 lines.
     """
     scale = unit * min(1.0, free.width / (520.0 * unit), free.height / (360.0 * unit))
-    size, margin = LETTERS * scale, round(10 * scale)
-    pad, gap = round(0.7 * size), round(1.1 * size)
+    margin = round(10 * scale)
     right = free.right - round(RIGHT * unit)
     above = right - left >= NARROWEST * unit
     if not above:
         left, right = free.left + margin, free.right - margin
-    room = right - left - 2 * pad
-    rows = _rows(board, room, size, gap)
+    for letters in LETTERS:
+        size = letters * scale
+        pad, gap = round(0.7 * size), round(1.1 * size)
+        room = right - left - 2 * pad
+        rows = _rows(board, room, size, gap)
+        if len(rows) == 1:
+            break
     end = wrapped(_told(board), size, room - 1.4 * size, 2, bold=True) if board.over is not None else ()
     wide = max(max(sum(cells) + gap * (len(cells) - 1) for _, cells in rows), *(_wide(line, size) for line in end), 0)
     tall = round(2.75 * size)

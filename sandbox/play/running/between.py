@@ -1,5 +1,7 @@
 """Between: the picture that lies between two states."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from sandbox.trajectory import FloatArray, Frame
@@ -31,7 +33,7 @@ def between(before: Frame, after: Frame, share: float) -> Frame:
         if before.angle is not after.angle:  # which those share who cannot turn
             angle = after.angle.copy()
             angle[:known] -= (after.angle[:known] - before.angle[:known]) * (flew * (1.0 - share))
-    return Frame(time, position, after.velocity, angle, after.angular_velocity, after.present, after.roll)
+    return replace(after, time=time, position=position, angle=angle)
 
 
 def _squared(vectors: FloatArray) -> FloatArray:

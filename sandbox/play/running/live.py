@@ -10,6 +10,7 @@ from sandbox.play.breaks import BreakNotes, broken_by
 from sandbox.play.footage.film import Film
 from sandbox.play.picking import overlapping
 from sandbox.play.running.between import between
+from sandbox.play.running.burning import burning
 from sandbox.play.running.company import Company
 from sandbox.play.running.journey import Journey
 from sandbox.play.running.pace import Pace
@@ -19,6 +20,7 @@ from sandbox.play.sight import Sight
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
+from sandbox.scene.zone import notes
 from sandbox.trajectory import Contacts, Frame
 
 LEAST, MOST = 0.012, 0.03
@@ -300,12 +302,13 @@ class Live:
         """
         session, present = self.session, self._peek is None
         frame = between(session.previous, session.frame, self.between_steps) if present else self.frame
+        touches = self._contacts.some(~notes(self._contacts.pair, session.scene))
         return Sight(
             scene=session.scene,
             bodies=self.bodies,
             frame=frame,
             overlays=overlays,
-            contacts=self._contacts if present else Contacts.none(),
+            contacts=touches if present else Contacts.none(),
             seconds=self._since,
             ghost=self.company.ghost_frame if present else None,
             trails=self.company.trails.pieces() if "trails" in overlays and present else (),
@@ -316,6 +319,9 @@ class Live:
             picked=picked,
             pull=pull,
             broken=broken_by(session.breaks, frame.time),
+            flames=burning(session.scene, self.bodies, session.relay.throttles, session.time)
+            if present and session.scene.thrusts
+            else (),
         )
 
     def close(self) -> None:

@@ -1,0 +1,48 @@
+"""Collisions: which of a run's contacts are some, and not notes of zones; and who could touch whom, frame by frame."""
+
+import numpy as np
+
+from sandbox.scene.meetings import reach
+from sandbox.scene.model import Scene
+from sandbox.scene.zone import mask_of
+from sandbox.trajectory import BoolArray, IntArray, Trajectory
+
+SOLID = ("plane", "wall", "post", "pocket")
+
+
+def are_collisions(run: Trajectory) -> BoolArray:
+    """Tell which contacts of a run are collisions, or falls into pockets, (C,)."""
+    scene = run.info["scene"]
+    if not scene.get("zone"):
+        return np.ones(len(run.contact_pair), np.bool_)
+    return np.asarray(run.contact_pair[:, 1] >= -sum(len(scene.get(kind, ())) for kind in SOLID))
+
+
+def collisions(run: Trajectory) -> int:
+    """Return how many contacts of a run are collisions."""
+    return int(are_collisions(run).sum())
+
+
+def layers_of_fixed(scene: Scene) -> IntArray:
+    """Return the layers of each fixed thing as bits, (F,)."""
+    return np.asarray([mask_of(thing.layers, scene.layers) for thing in scene.fixed], dtype=np.int64)
+
+
+def together(run: Trajectory, scene: Scene, pair: tuple[int, int]) -> BoolArray:
+    """Tell in which frames two share a layer, (T,); of what zones note and of pockets that is always so."""
+    always = np.ones(len(run.time), np.bool_)
+    first, second = pair
+    if not len(run.layer) or -1 - second >= len(scene.fixed):
+        return always
+    own = 1 << run.layer[:, first].clip(0).astype(np.int64)
+    if second < 0:
+        return np.asarray(own & layers_of_fixed(scene)[-1 - second] != 0)
+    return np.asarray(run.layer[:, first] == run.layer[:, second])
+
+
+def can_meet(scene: Scene, pair: tuple[int, int]) -> bool:
+    """Tell whether two can ever be on one layer."""
+    first, second = pair
+    own = reach(scene, scene.bodies)
+    other = own[second] if second >= 0 else layers_of_fixed(scene)[-1 - second]
+    return bool(own[first] & other)

@@ -1,0 +1,65 @@
+"""Flippers: scenes with the bat of a pinball machine, whose figures Visual Pinball gives."""
+
+import math
+from typing import Any
+
+from sandbox.action import Drive
+from sandbox.engines.relay import Relay
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Scene
+
+LENGTH = 0.0702  # m
+MASS = 0.080  # kg
+MOMENT = MASS * LENGTH**2 / 3.0
+REST, END = math.radians(-31.0), math.radians(20.0)
+BALL = 0.01349  # m, its radius
+
+TORQUE = {
+    "kind": "torque",
+    "stops": [REST, END],
+    "torque": 0.513,
+    "ramp": 0.030,
+    "return_ratio": 0.058,
+    "hold_ratio": 0.75,
+    "hold_within": math.radians(6.0),
+    "bounce": 0.3,
+    "moment": MOMENT,
+}
+
+
+def bat(**drive: Any) -> dict[str, Any]:
+    """Return the tables of a bat about the origin that lies at rest, and of its drive."""
+    angle = drive.pop("angle", REST)
+    outline = [[-0.0116, 0.0], [0.0, -0.0116], [LENGTH, -0.007], [LENGTH + 0.007, 0.0], [LENGTH, 0.007], [0.0, 0.0116]]
+    body = {"name": "bat", "points": outline, "angle": angle, "mass": MASS, "restitution": 0.8, "friction": 0.6}
+    return {"polygon": [body], "drive": [{"name": "flip", "body": "bat", "pivot": [0.0, 0.0], **TORQUE, **drive}]}
+
+
+def bar(angle: float = 0.0, **drive: Any) -> dict[str, Any]:
+    """Return the tables of a straight bar, 80 by 20 mm, about its left end, and of its drive."""
+    place = [0.04 * math.cos(angle), 0.04 * math.sin(angle)]
+    body = {"name": "bar", "size": [0.08, 0.02], "position": place, "angle": angle, "mass": MASS, "restitution": 1.0}
+    own = {**TORQUE, "stops": [0.0, 0.5], **drive}
+    del own["moment"]
+    return {"box": [body], "drive": [{"name": "flip", "body": "bar", "pivot": [0.0, 0.0], **own}]}
+
+
+BAR_MOMENT = MASS * (0.08**2 + 0.02**2) / 12.0 + MASS * 0.04**2
+
+
+def ball(x: float, y: float, vx: float = 0.0, vy: float = 0.0, **keys: Any) -> dict[str, Any]:
+    """Return the table of a pinball."""
+    return {"name": "ball", "position": [x, y], "velocity": [vx, vy], "radius": BALL, "mass": MASS, **keys}
+
+
+def scene(*tables: dict[str, Any], gravity: tuple[float, float] = (0.0, 0.0), dt: float = 1e-3, **more: Any) -> Scene:
+    """Return a scene of some tables."""
+    document: dict[str, Any] = {"world": {"gravity": list(gravity), "duration": 1.0}, "solver": {"dt": dt, **more}}
+    for each in tables:
+        document |= each
+    return from_document(document)
+
+
+def press(running: Relay, level: float = 1.0, drive: str = "flip") -> None:
+    """Ask a drive for a level."""
+    running.apply(Drive(time=0.0, drive=drive, level=level))

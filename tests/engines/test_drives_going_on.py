@@ -1,0 +1,175 @@
+"""Drives as part of a running scene: what is known of them is handed over, replayed, refused, taken away."""
+
+import math
+
+import numpy as np
+import pytest
+from flippers import END, ball, bat, press, scene
+
+import sandbox
+from sandbox.action import ActionError, Drive, Impulse, Move, Pull, Remove, SetParameter, Spawn, Switch
+from sandbox.engines.contract import Refusal
+from sandbox.engines.relay import Relay, start
+from sandbox.measure.replay import rerun
+from sandbox.recording import Recording
+from sandbox.scene.demands import Demand, demands
+from sandbox.scene.file import dumps, loads
+from sandbox.scene.model import Ball
+
+TABLES = bat(), {"ball": [ball(0.05, 0.2)]}
+LEVER = {
+    "box": [{"name": "rod", "size": [0.02, 0.1], "position": [1.0, 0.0]}],
+    "drive": [
+        {"name": "flip", "kind": "plunger", "body": "rod", "direction": [0, 1], "travel": 0.1, "speed": 1.0},
+    ],
+}
+
+
+def stepped(running, steps):
+    for _ in range(steps):
+        running.step()
+    return running.frame()
+
+
+@pytest.mark.parametrize("tables", [TABLES, (LEVER,)], ids=["torque", "plunger"])
+@pytest.mark.parametrize("at", [5, 25, 33, 40, 60, 80, 130])
+def test_checkpoint_goes_on_bit_for_bit(tables, at):
+    """Pressed at 0, let go at 70 ms: in every phase of a stroke."""
+
+    def pressed(running, k):
+        if k in (0, 70):
+            press(running, float(k == 0))
+        running.step()
+
+    first = start(scene(*tables, gravity=(0.0, -0.77)))
+    for k in range(at):
+        pressed(first, k)
+    second = Relay.resumed(first.checkpoint())
+    assert second.state_hash() == first.state_hash()
+    for k in range(at, 200):
+        pressed(first, k)
+        pressed(second, k)
+        assert second.state_hash() == first.state_hash(), k
+
+
+def test_level_and_torque_are_part_of_the_state():
+    running, other = start(scene(bat())), start(scene(bat()))
+    assert running.state_hash() == other.state_hash()
+    press(running)
+    assert running.state_hash() != other.state_hash()
+    np.testing.assert_array_equal(stepped(running, 15).drives, [[1.0, 0.5 * 0.513, 0.0]])
+
+
+def test_switch_takes_level_and_torque_along():
+    running, other = start(scene(bat())), start(scene(bat()))
+    for each in (running, other):
+        press(each)
+        stepped(each, 20)
+    running.apply(Switch(time=0.0, settings={"iterations": 20}))
+    assert stepped(running, 20).state_hash() == stepped(other, 20).state_hash()
+    with pytest.raises(ActionError, match="does not model drives"):
+        running.apply(Switch(time=0.0, engine="reference"))
+
+
+@pytest.mark.parametrize("engine", ["reference", "exact"])
+def test_engine_without_drives_refuses(engine):
+    assert Demand.DRIVES in demands(scene(bat()))
+    with pytest.raises(Refusal, match="does not model drives"):
+        start(scene(bat()), engine)
+
+
+def test_recorded_strokes_are_replayed_to_the_same_state():
+    made = scene(*TABLES, gravity=(0.0, -0.77))
+    actions = tuple(Drive(time=t, drive="flip", level=level) for t, level in ((0.1, 1.0), (0.2, 0.0), (0.32, 0.6)))
+    run = sandbox.run(made, actions=actions)
+    again = sandbox.run(loads(dumps(made)), actions=actions)
+    assert run.info["state_hash"] == again.info["state_hash"]
+    assert run.angle[:, 1].max() == END
+
+
+def test_cut_step_ends_between_its_ends():
+    whole, cut = start(scene(bat())), start(scene(bat()))
+    for running in (whole, cut):
+        press(running)
+        stepped(running, 20)
+    before = whole.frame()
+    whole.step()
+    cut.finish(0.25)
+    after, between = whole.frame(), cut.frame()
+    for key in ("angle", "angular_velocity", "position", "drives"):
+        old, new = getattr(before, key), getattr(after, key)
+        np.testing.assert_allclose(getattr(between, key), old + 0.25 * (new - old), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        Move(time=0.0, body="bat", position=(1.0, 0.0)),
+        Impulse(time=0.0, body="bat", impulse=(1.0, 0.0)),
+        Pull(time=0.0, body="bat", target=(1.0, 0.0)),
+    ],
+    ids=lambda action: action.kind,
+)
+def test_nothing_but_its_drive_moves_a_driven_body(action):
+    running = start(scene(bat()))
+    before = running.state_hash()
+    with pytest.raises(ActionError, match="'bat' is held by its drive; only that moves it: a `drive` action on 'flip'"):
+        running.apply(action)
+    assert running.state_hash() == before
+
+
+def test_drive_of_no_such_name():
+    with pytest.raises(ActionError, match="no drive is named 'flop'; there are flip"):
+        press(start(scene(bat())), drive="flop")
+
+
+def test_bat_can_be_taken_away_and_others_join():
+    running = start(scene(*TABLES, gravity=(0.0, -0.77)))
+    press(running)
+    running.apply(Spawn(time=0.0, ball=Ball(name="new", position=(0.06, 0.1), radius=0.01)))
+    running.apply(SetParameter(time=0.0, path="polygon.bat.restitution", value=0.1))
+    running.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, -9.81]))
+    assert stepped(running, 40).angle[1] > 0.0
+    running.apply(Remove(time=0.0, body="bat"))
+    press(running, 0.0)
+    frame = stepped(running, 20)
+    assert frame.present.tolist() == [True, False, True]
+    resumed = Relay.resumed(running.checkpoint())
+    assert stepped(resumed, 5).present.tolist() == [True, False, True]
+
+
+def test_other_bodies_do_not_feel_that_there_is_a_drive():
+    """A ball that meets no bat flies as in a scene without, bit for bit."""
+    wall = {"points": [[-5, 0.3], [5, 0.3]], "restitution": 1.0}
+    own = {"ball": [ball(0.05, 0.5, 1.0, restitution=0.9)], "wall": [wall]}
+    with_bat = sandbox.run(scene(bat(), own, gravity=(0.0, -0.77)))
+    fixed = bat()
+    del fixed["drive"]
+    fixed["polygon"][0]["fixed"] = True
+    without = sandbox.run(scene(fixed, own, gravity=(0.0, -0.77)))
+    np.testing.assert_array_equal(with_bat.position[:, 0], without.position[:, 0])
+
+
+@pytest.mark.parametrize("drag", [0.0, 0.5])
+def test_gravity_and_air_do_not_move_a_hinge(drag):
+    """Level with its hinge, at a weak torque: τ = m g d falls it; drag is not felt."""
+    tables = bat(torque=1e-9, ramp=0.0, stops=[-0.5, 0.5], angle=0.0)
+    made = scene(tables, gravity=(0.0, -9.81))
+    world = made.world.model_copy(update={"linear_drag": drag})
+    running = start(made.model_copy(update={"world": world}))
+    arm, moment = float(running.bodies.position[0, 0]), 0.080 * 0.0702**2 / 3.0
+    frame = stepped(running, 10)
+    rate = -0.080 * 9.81 * arm / moment
+    assert frame.angular_velocity[0] == pytest.approx(rate * 0.01, rel=1e-3)  # cos of 1 mrad and less
+    assert math.hypot(*frame.position[0]) == pytest.approx(arm, rel=1e-14)
+
+
+def test_session_with_drives_is_recorded(tmp_path):
+    made = scene(*TABLES, gravity=(0.0, -0.77))
+    running = start(made)
+    press(running)
+    frame = stepped(running, 60)
+    actions = (Drive(time=0.0, drive="flip", level=1.0),)
+    recording = Recording(made, "pymunk", running.settings, actions, 0.06, frame.state_hash())
+    path = recording.save(tmp_path / "session.json")
+    assert rerun(Recording.load(path)).info["state_hash"] == frame.state_hash()

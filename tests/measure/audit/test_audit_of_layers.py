@@ -1,0 +1,37 @@
+"""The audit of layers: who flies through what is on another layer misses nothing; on its own it does."""
+
+from typing import Any
+
+import pytest
+
+import sandbox
+from sandbox.scene.file import from_document
+
+WALL = {"points": [[0.5, -1], [0.5, 1]], "layers": ["up"]}
+POST = {"position": [0.5, 0.0], "radius": 0.01, "layers": ["up"]}
+PLANE = {"point": [0.5, 0.0], "normal": [-1.0, 0.0], "layers": ["up"]}
+TARGET = {"position": [0.5, 0.0], "radius": 0.01, "layer": "up"}
+BULLET: dict[str, Any] = {"position": [0.0, 0.0], "velocity": [70.0, 0.0], "radius": 0.01}
+
+
+@pytest.mark.parametrize("thing", ["wall", "post", "ball"])
+@pytest.mark.parametrize(("layer", "missed"), [("ground", 0), ("up", 1)])
+def test_bullet_misses_what_is_on_its_own_layer(thing: str, layer: str, missed: int) -> None:
+    more: dict[str, Any] = {"wall": {"wall": [WALL]}, "post": {"post": [POST]}, "ball": {}}[thing]
+    balls = [{**BULLET, "layer": layer}, *([TARGET] if thing == "ball" else [])]
+    run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": balls, **more}))
+    assert run.missed_contacts == missed
+
+
+def test_who_has_just_come_to_a_layer_is_audited_there() -> None:
+    mouth = {"position": [0.0, 0.0], "radius": 0.05, "to_layer": "up"}
+    run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": [BULLET], "wall": [WALL], "zone": [mouth]}))
+    assert run.missed_contacts == 1
+
+
+def test_plane_of_another_layer_is_not_missed() -> None:
+    for layer in ("ground", "up"):
+        ball = {**BULLET, "layer": layer}
+        run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": [ball], "plane": [PLANE]}))
+        assert run.missed_contacts == 0
+        assert len(run.contact_time) == (layer == "up")

@@ -1,0 +1,59 @@
+"""Zones in a session: the way back and forth leads through the same visits, and a recording to the same end."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sandbox.action import Impulse
+from sandbox.measure.replay import rerun
+from sandbox.play.running.session import Session
+from sandbox.recording import Recording
+from sandbox.scene.file import from_document, load
+from sandbox.scene.model import Scene
+from sandbox.scene.shipped import find
+from sandbox.scene.zone import HELD
+
+HOLES: list[dict[str, Any]] = [
+    {"name": "mouth", "points": [[0.3, -1], [0.3, 1]], "thickness": 0.1, "to_layer": "up"},
+    {"name": "slope", "position": [0.8, 0], "radius": 0.3, "layers": ["up"], "gravity": [-0.5, 0.0]},
+    {"name": "hole", "position": [1.5, 0], "radius": 0.1, "layers": ["up"], "holds": True},
+]
+
+
+def played(scene: Scene, steps: int, kick: int | None = None) -> Session:
+    session = Session(scene)
+    while session.step_number < steps:
+        session.advance()
+        if session.step_number == kick:
+            session.act(Impulse(time=0.0, body=session.bodies.names[0], impulse=(0.3, 0.1)))
+    return session
+
+
+def course() -> Scene:
+    ball = {"name": "ball", "position": [0, 0], "velocity": [1.5, 0], "radius": 0.1}
+    return from_document({"ball": [ball], "zone": HOLES})
+
+
+@pytest.mark.parametrize("name", ["holes", "overpass"])
+def test_way_back_and_forth_leads_through_the_same_visits(name: str) -> None:
+    """Long enough that checkpoints are made, in zones too; each state that is passed is held against the first."""
+    session = played(course() if name == "holes" else load(find(name)), 320, kick=200)
+    known = {k: session.history.known(k) for k in range(321)}
+    assert session.history.marks
+    assert {int(mark) for frame in known.values() if frame is not None for mark in np.unique(frame.visits)} >= {0, 1}
+    for step in (150, 40, 210, 199, 320, 0, 320):
+        for _ in session.seek(step):
+            pass
+        assert session.frame.state_hash() == known[step].state_hash()
+        assert np.array_equal(session.frame.visits, known[step].visits)
+        assert np.array_equal(session.frame.layer, known[step].layer)
+    assert session.history.marking  # no checkpoint has led elsewhere
+
+
+def test_recording_leads_to_the_same_end() -> None:
+    session = played(course(), 260, kick=200)
+    assert any(frame.visits[0, 2] == HELD for k in range(200) if (frame := session.history.known(k)) is not None)
+    recording = session.recording()
+    again = Recording.from_json(recording.to_json())
+    assert rerun(again, audit=False).info["state_hash"] == recording.state_hash

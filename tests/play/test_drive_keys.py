@@ -1,0 +1,49 @@
+"""Keys that a scene's drives have: held they are at level 1, and two things may have one key."""
+
+import pygame
+import pytest
+
+from sandbox.action import Drive, Throttle
+from sandbox.play.claims import KEYS, claims, held
+from sandbox.play.hands import Hands
+from sandbox.scene.drives import DriveKey
+from sandbox.scene.file import from_document
+from sandbox.scene.forces import ThrustKey
+
+BOX = {"name": "rod", "position": [0.0, 0.0], "size": [1.0, 1.0]}
+PLUNGER = {"kind": "plunger", "body": "rod", "direction": [0.0, 1.0], "travel": 1.0, "speed": 1.0}
+
+
+class Told:
+    """Stands for a session, and keeps what it is told."""
+
+    def __init__(self):
+        self.actions = []
+
+    def act(self, action):
+        self.actions.append(action)
+
+
+def test_every_key_that_a_scene_may_name_is_a_key_of_the_window():
+    assert {*DriveKey.__args__} == {*KEYS} >= {*ThrustKey.__args__}
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_key_that_is_held_is_level_1(key):
+    scene = from_document({"box": [BOX], "drive": [{**PLUNGER, "key": key}]})
+    claimed, live = claims(scene, Hands()), Told()
+    claimed.deeds[KEYS[key]](live)
+    claimed.releases[KEYS[key]](live)
+    assert live.actions == [Drive(time=0.0, drive="drive-1", level=level) for level in (1.0, 0.0)]
+    assert claimed.deed(KEYS[key], again=True) is None  # a key that repeats is still held
+    assert claimed.told == ((key.capitalize(), "drive drive-1"),)
+
+
+def test_thrust_and_drive_on_one_key_both_act():
+    ship = {"name": "ship", "position": [5.0, 0.0], "size": [1.0, 1.0]}
+    thrust = {"name": "main", "body": "ship", "force": [1.0, 0.0], "key": "up"}
+    scene = from_document({"box": [BOX, ship], "thrust": [thrust], "drive": [{**PLUNGER, "key": "up"}]})
+    live = Told()
+    claims(scene, Hands()).deeds[pygame.K_UP](live)
+    assert [type(action) for action in live.actions] == [Throttle, Drive]
+    assert len([*held(scene)]) == 2

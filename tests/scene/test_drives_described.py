@@ -1,0 +1,93 @@
+"""Drives as a scene file describes them: what they stand for, and what is wrong with them."""
+
+from typing import Any
+
+import pytest
+
+from sandbox.scene.driven import mounts
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import dumps, from_document, loads
+
+BAR = '[[box]]\nname = "bar"\nposition = [1, 0]\nsize = [2, 1]\n'
+TORQUE = {"kind": "torque", "body": "bar", "pivot": [0, 0], "stops": [0, 1], "torque": 1}
+STROKE = {"kind": "stroke", "body": "bar", "pivot": [0, 0], "stops": [0, 1], "rate": 1}
+PLUNGER = {"kind": "plunger", "body": "bar", "direction": [0, 1], "travel": 1, "speed": 1}
+BOX = {"name": "bar", "position": [1, 0], "size": [2, 1]}
+
+
+def faults(document: dict[str, Any]) -> list[str]:
+    with pytest.raises(SceneError) as caught:
+        from_document(document)
+    return [f"{fault.path}: {fault.message}" for fault in caught.value.faults]
+
+
+@pytest.mark.parametrize(
+    ("box", "drive", "told"),
+    [
+        ({}, {**TORQUE, "body": "car"}, "drive[0].body: no body is named 'car'; there are 'bar'"),
+        ({"fixed": True}, TORQUE, "drive[0].body: 'bar' is fixed; leave that out, its drive holds it"),
+        ({"velocity": [1, 0]}, PLUNGER, "drive[0].body: 'bar' starts with a velocity; a driven body starts at rest"),
+        ({"angle": 2}, STROKE, "drive[0].stops: 'bar' starts at an angle of 2, not between 0 and 1 rad"),
+        ({}, {**STROKE, "stops": [1, 1]}, "drive[0].stops: are one and the same angle; give two, where it rests and"),
+        ({}, {**PLUNGER, "direction": [0, 0]}, "drive[0].direction: [0.0, 0.0] has no direction; such as [0, 1] for"),
+        # 1 kg at 1 m
+        ({}, {**TORQUE, "moment": 0.9}, "drive[0].moment: its mass alone makes 1 kg·m² about that pivot; state more"),
+    ],
+)
+def test_fault_of_a_drive_is_told(box: dict[str, Any], drive: dict[str, Any], told: str) -> None:
+    (found,) = faults({"box": [{**BOX, **box}], "drive": [drive]})
+    assert found.startswith(told)
+
+
+def test_body_has_one_drive_and_no_thrust() -> None:
+    thrust = {"body": "bar", "force": [1, 0]}
+    found = faults({"box": [BOX], "drive": [{**TORQUE, "name": "a"}, {**STROKE, "name": "a"}], "thrust": [thrust]})
+    assert "drive.a.name: a second drive named 'a'; names are unique" in found
+    assert sum("has a drive already" in each for each in found) == 1
+    assert sum("carries a thrust" in each for each in found) == 2
+
+
+def test_one_of_many_bodies_has_no_drive() -> None:
+    grid = {"name": "g", "origin": [0, 0], "spacing": [3, 3], "columns": 2, "rows": 1, "radius": 1}
+    (found,) = faults({"grid": [grid], "drive": [{**PLUNGER, "body": "g-1"}]})
+    assert found == "drive[0].body: 'g-1' is one of many; a drive holds a body with a table of its own"
+
+
+def test_fault_in_a_figure_names_line_and_range() -> None:
+    with pytest.raises(SceneError) as caught:
+        loads(BAR + '[[drive]]\nkind = "stroke"\nbody = "bar"\npivot = [0, 0]\nstops = [0, 1]\nrate = 0\n')
+    (fault,) = caught.value.faults
+    assert (fault.line, fault.path) == (10, "drive[0].rate")
+    assert fault.message == "0 is not right here; it should be greater than 0"
+
+
+def test_kind_that_no_drive_is_and_key_that_it_lacks() -> None:
+    assert faults({"box": [BOX], "drive": [{**STROKE, "kind": "strike"}]}) == [
+        'drive[0].kind: "strike" is not right here; a drive is one of torque, stroke, plunger'
+    ]
+    assert faults({"box": [BOX], "drive": [{**STROKE, "rat": 1}]}) == [
+        "drive[0].rat: unknown key; did you mean 'rate'?"
+    ]
+
+
+@pytest.mark.parametrize("drive", [TORQUE, STROKE, PLUNGER], ids=lambda drive: drive["kind"])
+def test_drive_is_read_as_it_was_written(drive: dict[str, Any]) -> None:
+    scene = from_document({"box": [BOX], "drive": [{**drive, "name": "d", "key": "left shift"}]})
+    assert loads(dumps(scene)) == scene
+
+
+def test_moment_about_the_hinge_is_that_which_is_stated() -> None:
+    """I = 2 kg·m² about the hinge, 1 m from the middle of 1 kg, leaves 1 kg·m² about that."""
+    scene = from_document({"box": [BOX], "drive": [{**TORQUE, "moment": 2}]})
+    assert scene.bodies.moment[0] == pytest.approx(1.0, rel=1e-15)
+    assert mounts(scene)["bar"].hinge == (-1.0, 0.0)
+
+
+def test_value_of_a_drive_can_be_set_by_its_path() -> None:
+    from sandbox.scene.address import assign
+
+    document, where = assign({"box": [BOX], "drive": [{**TORQUE, "name": "left"}]}, "drive.left.torque", 3.0)
+    assert where == ("drive", 0, "torque")
+    drive = from_document(document).drives[0]
+    assert drive.kind == "torque"
+    assert drive.torque == 3.0

@@ -1,0 +1,21 @@
+"""A game with rules in a real window: played by real keys, saved, started again."""
+
+from driving import Play
+
+from sandbox.measure.replay import rerun
+
+
+def test_keys_fly_the_ship_and_the_session_keeps_the_game(drive: Play) -> None:
+    window = drive("play", "landing")
+    window.hold("Up")
+    window.wait_for(lambda: window.session().presses, "the engine")
+    window.let_go("Up")
+    window.wait_for(lambda: len(window.session().presses) == 2, "the engine stopped")
+    session = window.session()
+    assert [(press.control, press.value) for press in session.presses] == [("engine", 1.0), ("engine", 0.0)]
+    run = rerun(session)
+    assert run.info["state_hash"] == session.state_hash
+    assert run.info["game"]["score"] == session.score == 0
+    assert run.info["game"]["otherwise"] is None
+    window.key("r")
+    window.wait_for(lambda: not window.session().presses, "a new game")
