@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from sandbox.scene.cue import Stroke
-from sandbox.scene.model import Ball, Box, Capsule, Compound, Polygon, Single
+from sandbox.scene.model import Ball, Box, Capsule, Compound, Course, Polygon, Single
 from sandbox.scene.part import MAX_SPEED, Name, Part, Point, Velocity
 
 Amount = Annotated[float, Field(ge=-1e42, le=1e42)]
@@ -143,6 +143,16 @@ class Throttle(Timed):
     """share of its force, from now on"""
 
 
+class Reshape(Timed):
+    """Change the course of a wall from now on: ground that is dug away or heaped up. Who stands in it is parted."""
+
+    kind: Literal["reshape"] = "reshape"
+    thing: Name
+    """a wall"""
+    points: Course
+    """m, in place of those that it had"""
+
+
 class Drive(Timed):
     """Ask a drive of the scene for a level from now on."""
 
@@ -187,6 +197,7 @@ Action = Annotated[
     | Pull
     | Launch
     | Throttle
+    | Reshape
     | Drive
     | Toggle
     | Strike

@@ -24,6 +24,10 @@ from sandbox.scene.shipped import find
 FOLDER = Path(__file__).resolve().parent / "pictures"
 SIZE = (1280, 800)
 FRAME = 1.0 / 60.0  # s
+GUNNER = ("right", 0.5, 0.7), ("up", 0.5, 1.18), ("fire", 9.0, 9.1)
+"""What is held in the duel's first turn, and from when until when, s: it comes down near the other."""
+AFTER_FIRE = 14.0
+"""s, when the shell is over the hills, and what the window told at the beginning is gone"""
 FLIGHT = (
     (2.6, "turn left", 1.0),
     (3.1, "turn left", 0.0),
@@ -46,6 +50,22 @@ def window(scene: str, seconds: float, overlays: set[str], *, ghost: bool, trust
     if stage.live is not None:
         stage.live.company.show_trust(trust)
     while stage.show is not None and stage.show.frame.time < seconds:
+        opened.turn(FRAME)
+    pygame.image.save(opened.surface, FOLDER / file)
+    opened.close()
+
+
+def duel(file: str) -> None:
+    """Fire once, and keep what is seen of the shell on its way."""
+    opened = Window(Stage(), size=SIZE)
+    opened.stage.open(find("duel"))
+    opened.desk.panel.visible = False
+    host = opened.stage.host
+    assert host is not None
+    while opened.stage.show is not None and opened.stage.show.frame.time < AFTER_FIRE:
+        time = opened.stage.show.frame.time
+        for control, begin, end in GUNNER:
+            host.hold("script", control, float(begin <= time < end))
         opened.turn(FRAME)
     pygame.image.save(opened.surface, FOLDER / file)
     opened.close()
@@ -141,6 +161,7 @@ if __name__ == "__main__":
     film("pile", "pile.gif", "--size", "320x400", "--fps", "15", "--until", "2")
     film("ragdoll_stairs", "ragdoll.gif", "--size", "640x300", "--fps", "20", "--until", "2.5")
     table("table.png")
+    duel("duel.png")
     landing("landing.png")
     rolling("break.gif", 2.6)
     film("tearing_cloth", "tearing.gif", "--size", "640x340", "--fps", "20", "--until", "1.6")

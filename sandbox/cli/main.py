@@ -25,6 +25,7 @@ COMMANDS = {
     "schema": "print the JSON Schema of a scene file",
     "export": "a stored run as csv, parquet, gif, mp4 or png",
     "replay": "a stored run or a recorded session in the window",
+    "miss": "by how much a shot misses, by engine, integrator and step",
     "match": "frames of billiards between bots, and the score",
 }
 """Each command's line of help stands here, so that help needs to import none of them."""

@@ -17,6 +17,7 @@ from sandbox.action import (
     Move,
     Pull,
     Remove,
+    Reshape,
     SetParameter,
     Spawn,
     Strike,
@@ -28,7 +29,7 @@ from sandbox.action import (
 )
 from sandbox.scene.address import AddressError, assign
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.crosscheck import MAX_SURFACES, crosscheck
+from sandbox.scene.crosscheck import MAX_SURFACES, course, crosscheck
 from sandbox.scene.cue import MISCUE, miscues, struck
 from sandbox.scene.demands import on_floor
 from sandbox.scene.document import to_document
@@ -90,7 +91,7 @@ class Cast(Protocol):
         """
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs alone in air, gravity, coefficients, or in which walls and posts are solid.
+        """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
 
         Raises:
             ActionError: it asks for what the settings or the engine cannot go on with.
@@ -139,6 +140,8 @@ def perform(action: Action, cast: Cast) -> int | None:
             _set(action, cast)
         case Throttle():
             cast.throttle(_thrust_number(action.thrust, cast.scene), action.level)
+        case Reshape():
+            _reshape(action, cast)
         case Drive():
             cast.drive(_drive_number(action.drive, cast.scene), action.level)
         case Toggle():
@@ -271,6 +274,22 @@ def _thrust_number(name: str, scene: Scene) -> int:
     if name not in names:
         raise ActionError(f"no thrust is named {name!r}; there are {', '.join(names) or 'none'}")
     return names.index(name)
+
+
+def _reshape(action: Reshape, cast: Cast) -> None:
+    scene = cast.scene
+    names = scene.fixed_names[len(scene.planes) : len(scene.planes) + len(scene.walls)]
+    if action.thing not in names:
+        raise ActionError(f"no wall is named {action.thing!r}; there are {', '.join(map(repr, names)) or 'none'}")
+    if on_floor(scene):
+        raise ActionError(f"{action.thing!r} is a cushion; what stands on a [surface] keeps its course")
+    number = names.index(action.thing)
+    wall = scene.walls[number].model_copy(update={"points": action.points})
+    faults = [f"{'.'.join(map(str, where))} {message}" for where, message in course(wall)]
+    if faults:
+        raise ActionError(f"the wall {action.thing!r}: {'; '.join(faults)}")
+    walls = (*scene.walls[:number], wall, *scene.walls[number + 1 :])
+    cast.change(_going_on(scene.model_copy(update={"walls": walls}), scene))
 
 
 def _drive_number(name: str, scene: Scene) -> int:

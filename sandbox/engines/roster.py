@@ -144,15 +144,17 @@ class Roster:
         """Refuse no place: bodies may start from anywhere."""
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs alone in air, gravity, coefficients, or in which walls and posts are solid.
+        """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
 
         Raises:
             ActionError: it has more surfaces than a scene may have.
         """
         spawned = self.bodies.elements[len(self.scene.elements) :]
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
-        self._assume(scene, bodies, derived(scene, bodies))
-        self.fixtures = fixtures_of(scene)
+        meet = derived(scene, bodies)
+        if scene.fixed != self.scene.fixed:
+            self.fixtures = fixtures_of(scene)
+        self._assume(scene, bodies, meet)
 
     def add(self, single: Single, name: str) -> int:
         """Add a body that was checked, and return its number.

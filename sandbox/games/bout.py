@@ -5,7 +5,7 @@ from typing import Any
 
 from sandbox.action import Action
 from sandbox.games.referee import Referee
-from sandbox.games.rules import Policy, Press, Rules
+from sandbox.games.rules import Logged, Policy, Press, Rules
 from sandbox.trajectory import Contacts, Frame
 
 
@@ -76,6 +76,8 @@ class Bout:
 
     def told(self, game: str) -> dict[str, Any]:
         """Return the outcome as JSON values."""
+        rules = self._referee.rules
+        log = {"log": [list(entry) for entry in rules.log]} if isinstance(rules, Logged) else {}
         return {
             "name": game,
             "player": self.player,
@@ -84,4 +86,5 @@ class Bout:
             "lines": [list(line) for line in self._referee.rules.lines()],
             "presses": [list(press) for press in self.presses],
             "otherwise": self.otherwise,
+            **log,
         }

@@ -11,7 +11,15 @@ from sandbox.scene.bodies import Bodies
 from sandbox.scene.faults import Fault, Lines, SceneError
 from sandbox.scene.model import Scene
 
+
+def _artillery(scene: Scene, bodies: Bodies) -> Rules:
+    from sandbox.games.artillery.rules import ArtilleryRules  # numpy, and the integrators of an engine
+
+    return ArtilleryRules(scene, bodies)
+
+
 RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {
+    "artillery": _artillery,
     "curling": Curling,
     "landing": Landing,
     "pinball": Pinball,

@@ -13,13 +13,13 @@ deterministic; all chance comes from the scene's seed.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from sandbox.action import Action
 from sandbox.recording import Press
 from sandbox.trajectory import Contacts, Frame
 
-__all__ = ["Control", "Policy", "Press", "Rules", "Seen", "UnfitError"]
+__all__ = ["Control", "Logged", "Policy", "Press", "Rules", "Seen", "UnfitError"]
 
 
 class UnfitError(ValueError):
@@ -80,6 +80,15 @@ class Rules(Protocol):
 
     def cues(self) -> Sequence[str]:
         """Return the names of the sounds since the last call."""
+
+
+@runtime_checkable
+class Logged(Protocol):
+    """Rules that tell, besides, what has happened."""
+
+    @property
+    def log(self) -> Sequence[tuple[float, str]]:
+        """When, s, and what, in order."""
 
 
 class Policy(Protocol):

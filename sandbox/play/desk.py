@@ -5,6 +5,7 @@ from pathlib import Path
 import pygame
 
 from sandbox.play.account import account
+from sandbox.play.artillery.seen import over
 from sandbox.play.billiards.game import PLAYERS
 from sandbox.play.camera import Camera
 from sandbox.play.claims import Claims, claims
@@ -162,6 +163,8 @@ class Desk:
             sight = show.sight(frozenset(self.overlays), stage.hands.picked, pull)
             if stage.gestures is not None:
                 sight = stage.gestures.seen.over(sight)
+            if stage.host is not None:
+                sight = over(stage.host.rules, sight)
             foot = float(self._area.height)
             self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=foot)
             if show.contacts is not self._heard:

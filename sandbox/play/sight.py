@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
+from sandbox.play.artillery.gunnery import Gunnery
 from sandbox.play.billiards.aim import Aim
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import Links
@@ -76,6 +77,8 @@ class Sight:
     """numbers of the scene's joints that have broken by then"""
     aim: Aim | None = None
     """of the next stroke, at a table"""
+    gunnery: Gunnery | None = None
+    """what is drawn of a game of artillery besides its bodies"""
     flames: tuple[Flame, ...] = ()
     """of the thrusts that fire"""
 

@@ -282,6 +282,8 @@ class Stage:
         doubt = self.host.doubt() if self.host is not None else None
         if doubt is not None:
             self.messages.tell(doubt, "warning")
+        for text in self.host.news() if self.host is not None else ():
+            self.messages.tell(text)
         if isinstance(self.show, Live) and self.show.wants_pause:
             self.paused, self.show.wants_pause = True, False
         elif isinstance(self.show, Stored) and self.show.at_end:

@@ -13,7 +13,7 @@ from sandbox.scene.faults import Location
 from sandbox.scene.floored import floored
 from sandbox.scene.generated import generated, tied
 from sandbox.scene.generators import GeneratorError
-from sandbox.scene.model import Material, Mover, Pair, Scene, Single, Surfaced
+from sandbox.scene.model import Material, Mover, Pair, Scene, Single, Surfaced, Wall
 from sandbox.scene.outlines import outlines, sound
 from sandbox.scene.part import MAX_POSITION, MAX_SPEED, MAX_STEPS
 from sandbox.scene.repeats import repeats
@@ -133,13 +133,8 @@ def _fixed(scene: Scene) -> Iterator[Found]:
         if not has_direction(plane):
             yield ("plane", k, "normal"), f"{list(plane.normal)} has no direction; such as [0, 1] for a floor"
     for k, wall in enumerate(scene.walls):
-        if wall.closed and len(wall.points) < 3:
-            yield ("wall", k, "closed"), "two points enclose nothing; a closed wall has three or more"
-        ends = (*wall.points[1:], wall.points[0]) if wall.closed else wall.points[1:]
-        for n, (a, b) in enumerate(zip(wall.points, ends, strict=False)):
-            if math.dist(a, b) < SHORTEST:
-                message = f"lies on the point after it; neighbours are at least {SHORTEST:g} m apart"
-                yield ("wall", k, "points", n), message
+        for where, message in course(wall):
+            yield ("wall", k, *where), message
     yield from _gates(scene)
 
 
@@ -166,6 +161,16 @@ def _gates(scene: Scene) -> Iterator[Found]:
                     (kind, k, "restitution_falloff"),
                     "is not of balls on a [surface], which rebound alike at any speed",
                 )
+
+
+def course(wall: Wall) -> Iterator[Found]:
+    """Yield the faults of a wall's course, by their places in the wall."""
+    if wall.closed and len(wall.points) < 3:
+        yield ("closed",), "two points enclose nothing; a closed wall has three or more"
+    ends = (*wall.points[1:], wall.points[0]) if wall.closed else wall.points[1:]
+    for n, (a, b) in enumerate(zip(wall.points, ends, strict=False)):
+        if math.dist(a, b) < SHORTEST:
+            yield ("points", n), f"lies on the point after it; neighbours are at least {SHORTEST:g} m apart"
 
 
 def _world(scene: Scene) -> Iterator[Found]:

@@ -102,7 +102,9 @@ def from_document(
         found = [((), f"the scene cannot be read: {error}")]
     else:
         if not whole:
-            found = list(presets.faults_of(scene))
+            from sandbox.scene.expanding import faults_of  # few scenes need it
+
+            found = list(faults_of(scene))
             if not found:  # it was mended by what was set
                 return from_document(document, file, unset, text)
         else:

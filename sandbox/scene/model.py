@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
+from sandbox.scene.artillery.described import Artillery, Terrain
 from sandbox.scene.billiards.described import Billiards
 from sandbox.scene.cue import Shot
 from sandbox.scene.curling import CurlingMatch
@@ -39,14 +40,15 @@ if TYPE_CHECKING:
     from sandbox.scene.near import FloatArray
 
 __all__ = [
-    "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Disc",
-    "Drive", "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Paint", "Pair", "Plane",
-    "Play", "PlayPart", "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single", "Stack",
-    "Surfaced", "Thrust", "Wall", "World", "Zone", "default_name",
+    "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Course",
+    "Disc", "Drive", "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Paint", "Pair",
+    "Plane", "Play", "PlayPart", "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single",
+    "Stack", "Surfaced", "Thrust", "Wall", "World", "Zone", "default_name",
 ]  # fmt: skip
 
 Drag = Annotated[float, Field(ge=0, le=1e9)]
 Height = Annotated[float, Field(gt=0, le=1e9)]
+Course = Annotated[tuple[Point, ...], Field(min_length=2, max_length=100_000)]
 
 
 class World(Part):
@@ -102,7 +104,7 @@ class Plane(Surfaced):
 class Wall(Surfaced):
     """A polyline with round ends, solid on both sides."""
 
-    points: Annotated[tuple[Point, ...], Field(min_length=2, max_length=100_000)]
+    points: Course
     thickness: Annotated[float, Field(ge=0, le=1e9)] = 0.0
     """full thickness, m"""
     closed: bool = False
@@ -174,6 +176,10 @@ class Scene(Part):
     """None once the scene was read: by then it is written out"""
     pinball: Pinball | None = None
     """None once the scene was read, likewise"""
+    terrain: Terrain | None = None
+    """likewise"""
+    artillery: Artillery | None = None
+    """who plays; their tanks are written out"""
     surface: Floor | None = None
     contact_models: ContactModels = Field(default_factory=ContactModels)
     materials: tuple[Material, ...] = Field((), alias="material")

@@ -1,6 +1,6 @@
 """Presets: what of a document stands for other parts of it, written out before anything else is made of it."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
 from sandbox.scene.address import AddressError, assign, parse_path
@@ -8,7 +8,7 @@ from sandbox.scene.document import read_model, to_document
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene
 
-KEYS = ("billiards", "pinball")
+KEYS = ("billiards", "pinball", "terrain", "artillery")
 """Their tables."""
 
 Assignment = tuple[str, Any]
@@ -24,25 +24,13 @@ def has_preset(document: dict[str, Any], paths: Iterable[str] = ()) -> bool:
 
 def written_out(document: dict[str, Any]) -> dict[str, Any] | None:
     """Return the document of primitives that one with presets stands for; None where it has faults."""
-    from sandbox.scene.billiards.expanding import expanded  # few scenes need these
-    from sandbox.scene.pinball.expanding import expanded as built
+    from sandbox.scene.expanding import expanded, faults_of  # few scenes need it
 
     try:
         scene = read_model(document)
     except (RecursionError, ValueError):  # told, with all others, by who reads it next
         return None
-    return None if any(faults_of(scene)) else to_document(built(expanded(scene)))
-
-
-def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
-    """Yield why a scene's presets stand for nothing."""
-    from sandbox.scene.billiards.expanding import faults_of as of_billiards
-    from sandbox.scene.pinball.faulting import faults_of as of_pinball
-
-    if scene.billiards is not None and scene.pinball is not None:
-        yield ("pinball",), "stands beside [billiards]; a scene is one table or the other"
-    yield from of_billiards(scene)
-    yield from of_pinball(scene)
+    return None if any(faults_of(scene)) else to_document(expanded(scene))
 
 
 def set_first(
@@ -74,7 +62,7 @@ def place_of(location: Location, document: dict[str, Any], stated: dict[str, Any
     if not _is_written(location, stated):
         return location
     if "pinball" not in stated:
-        return (KEYS[0],)
+        return (next((key for key in KEYS if key in stated), KEYS[0]),)
     from sandbox.scene.pinball.expanding import origins
 
     those, number = document.get(str(location[0])), location[1] if len(location) > 1 else None

@@ -9,6 +9,7 @@ TableGame = Literal["8-ball", "9-ball", "three-cushion", "straight-rail", "snook
 
 Game = Literal[
     TableGame,
+    "artillery",
     "curling",
     "landing",
     "pinball",

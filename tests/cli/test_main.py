@@ -15,7 +15,7 @@ from sandbox.scene.shipped import shipped
 
 
 def test_commands_are_those_promised() -> None:
-    promised = "run play compare tradeoff shots extremes report check scenes engines schema export replay match"
+    promised = "run play compare tradeoff shots extremes report check scenes engines schema export replay miss match"
     assert list(COMMANDS) == promised.split()
 
 

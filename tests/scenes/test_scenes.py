@@ -41,6 +41,8 @@ PINBALL = {
     Demand.DRIVES,
 }
 DEMANDED = {
+    "artillery/duel": {*BOX, Demand.DRAG},
+    "artillery/four": {*BOX, Demand.DRAG},
     "benchmark/bounce_to_rest": {*FALLING, Demand.BALL_PLANE, Demand.RESTITUTION},
     "benchmark/box_slides": BOX,
     "benchmark/box_sticks": BOX,

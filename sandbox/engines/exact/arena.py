@@ -5,7 +5,7 @@ events only, so nothing accumulates from frame to frame.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -106,9 +106,6 @@ class Arena(NamedTuple):
 def arena_of(roster: Roster) -> Arena:
     """Lay out a roster as it stands at time 0, every ball in free flight."""
     number = len(roster.bodies)
-    fixtures = fixtures_of(roster.scene, everything=True)
-    knobs, knob_thing, ends = _knobs(fixtures)
-    flats, flat_thing, flat_knobs = _flats(fixtures, ends)
     state = np.zeros((number, WIDTH))
     state[:, X : Y + 1], state[:, VX : VY + 1] = roster.position, roster.velocity
     state[:, ANGLE], state[:, SPIN] = roster.angle, roster.angular_velocity
@@ -122,16 +119,32 @@ def arena_of(roster: Roster) -> Arena:
         movers=np.empty(0, np.int64),
         others=np.empty(0, np.int64),
         surfaces=np.empty((3, 0, 0)),
-        flats=flats,
-        flat_tags=np.column_stack((flat_thing, flat_thing, flat_knobs)),
-        knobs=knobs,
-        knob_tags=np.column_stack((knob_thing, knob_thing)),
+        **_laid(roster.scene),
         world=np.zeros(11),
         counts=np.zeros(12, np.int64),
         log=np.empty((0, 7)),
         log_pair=np.empty((0, 2), np.int64),
     )
     return renewed(arena, roster)
+
+
+def _laid(scene: Scene) -> dict[str, Any]:
+    """Return the arrays of an arena that say where what is fixed stands, solid or not."""
+    fixtures = fixtures_of(scene, everything=True)
+    knobs, knob_thing, ends = _knobs(fixtures)
+    flats, flat_thing, flat_knobs = _flats(fixtures, ends)
+    return {
+        "flats": flats,
+        "flat_tags": np.column_stack((flat_thing, flat_thing, flat_knobs)),
+        "knobs": knobs,
+        "knob_tags": np.column_stack((knob_thing, knob_thing)),
+    }
+
+
+def reshaped(arena: Arena, roster: Roster) -> Arena:
+    """Return the arena with the walls that a roster now has. No ball may rest on anything: what flats mean changes."""
+    arena.tags[:, LAST_KIND] = NONE  # whom each met last was one of those that were
+    return arena._replace(**_laid(roster.scene))
 
 
 def renewed(arena: Arena, roster: Roster) -> Arena:

@@ -44,6 +44,7 @@ from sandbox.engines.exact.arena import (
     Y,
     arena_of,
     renewed,
+    reshaped,
 )
 from sandbox.engines.exact.books import Books
 from sandbox.engines.exact.driven import EventDriven
@@ -177,6 +178,11 @@ class ExactSimulation(EventDriven):
         arena = self._arena
         for i in troupe.moved:
             freed(arena, i)
+        if troupe.reshaped:
+            for i in arena.movers.tolist():
+                arrive(arena, i, now, 0.0)
+                freed(arena, i)
+            self._arena = arena = reshaped(arena, troupe)
         if troupe.renewed:
             known = len(arena.state)
             self._arena = arena = renewed(arena, troupe)

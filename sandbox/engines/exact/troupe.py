@@ -23,13 +23,15 @@ class Troupe(Roster):
         self.moved: set[int] = set()
         """whose place it has"""
         self.renewed = False
-        """whether it has changed gravity, coefficients or who there is"""
+        """whether it has changed gravity, coefficients, walls or who there is"""
+        self.reshaped = False
+        """whether it has changed walls"""
 
     def settled(self) -> None:
         """Forget what the last action did."""
         self.kicked.clear()
         self.moved.clear()
-        self.renewed = False
+        self.renewed = self.reshaped = False
 
     def set_velocity(self, number: int, velocity: FloatArray) -> None:
         """Give a body a velocity, m/s.
@@ -76,7 +78,7 @@ class Troupe(Roster):
         self.moved.add(number)
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs alone in gravity, coefficients, or in which walls and posts are solid.
+        """Go on with a scene that differs alone in gravity, coefficients, the course of walls, or in what is solid.
 
         Raises:
             ActionError: it has drag, or gravity along a floor, or more surfaces than a scene may have; or a ball
@@ -93,8 +95,9 @@ class Troupe(Roster):
             found = overlapping_things(self.position[meets], self.radius[meets], fixtures_of(scene))
             if found is not None:
                 raise ActionError(told(self.bodies.names[meets[found[0]]], scene.fixed_names[found[1]], found[2]))
+        reshaped = [wall.points for wall in scene.walls] != [wall.points for wall in self.scene.walls]
         super().change(scene)
-        self.renewed = True
+        self.renewed, self.reshaped = True, reshaped
 
     def add(self, single: Single, name: str) -> int:
         """Add a body that was checked, and return its number.

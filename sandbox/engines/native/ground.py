@@ -40,15 +40,10 @@ class Ground:
         every: list[pymunk.Shape] = []
         for thing, number in zip(scene.fixed, surface.tolist(), strict=True):
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
-            shapes = list(fixed_shapes(thing, body, centre, reach))
+            shapes = self._shapes(thing, body, centre, reach)
             for shape in shapes:
                 shape.filter = _filter(thing, scene)
                 self._setter.dress(shape, number)
-            if isinstance(thing, Wall) and thing.kick is not None:
-                parts = stretches(thing.points, thing.closed)
-                self._setter.laws.stretches |= dict(zip(shapes, parts, strict=True))
-            if isinstance(thing, Wall) and thing.one_way:
-                self._setter.gates.walls.update(shapes)
             self._space.add(body)
             self._things.append((body, shapes))
             every += shapes
@@ -56,6 +51,35 @@ class Ground:
             self._space.add(every[k])
         where = min(self.reach, FARTHEST)
         self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
+
+    def _shapes(
+        self, thing: Plane | Wall | Post, body: pymunk.Body, centre: FloatArray, reach: float
+    ) -> list[pymunk.Shape]:
+        """Return the shapes of a fixed thing; what they meet, and their surfaces, are yet to be said."""
+        shapes = list(fixed_shapes(thing, body, centre, reach))
+        if isinstance(thing, Wall) and thing.kick is not None:
+            parts = stretches(thing.points, thing.closed)
+            self._setter.laws.stretches |= dict(zip(shapes, parts, strict=True))
+        if isinstance(thing, Wall) and thing.one_way:
+            self._setter.gates.walls.update(shapes)
+        return shapes
+
+    def reshape(self, before: Scene, after: Scene) -> None:
+        """Let walls take the course that they have in another scene; `renew` has to follow."""
+        if not self._laid or before.walls == after.walls:
+            return
+        first = len(before.planes)
+        for number, (old, new) in enumerate(zip(before.walls, after.walls, strict=True), first):
+            if old.points == new.points:
+                continue
+            body, shapes = self._things[number]
+            self._space.remove(*shapes)
+            for shape in shapes:
+                self._setter.laws.stretches.pop(shape, None)
+                self._setter.gates.walls.discard(shape)
+            shapes[:] = self._shapes(new, body, np.zeros(2), self.reach)  # a wall is as long as it is
+            for k in shuffled(len(shapes)):
+                self._space.add(shapes[k])
 
     def renew(self, scene: Scene, surface: IntArray) -> None:
         """Give the fixed things their surfaces (F,) anew, and let those be met that now are solid."""

@@ -234,7 +234,8 @@ class MeetingBodies:
         return self._ground.several or any(len(member.shapes) > 1 for member in self._members.values())
 
     def renew(self, scene: Scene, meet: Meetings) -> None:
-        """Go on with a scene's changed air, gravity or coefficients, or with more surfaces."""
+        """Go on with a scene's changed air, gravity, coefficients or walls, or with more surfaces."""
+        self._ground.reshape(self._scene, scene)
         self._scene = scene
         self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
         self._touches, self._noted = meet.touches, meet.noted

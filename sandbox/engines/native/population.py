@@ -171,7 +171,7 @@ class Population:
         return np.asarray([field.thrusted(name) or driven(name) for name in self.bodies.names], dtype=np.bool_)
 
     def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs alone in air, gravity, coefficients, or in which walls and posts are solid.
+        """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
 
         Raises:
             ActionError: it asks for what the settings or the engine cannot go on with.

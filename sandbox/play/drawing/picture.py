@@ -7,6 +7,9 @@ import pygame
 
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.ageing import Ageing
+from sandbox.play.drawing.artillery.fire import draw_above, draw_below
+from sandbox.play.drawing.artillery.guns import draw_guns
+from sandbox.play.drawing.artillery.land import draw_land
 from sandbox.play.drawing.decks import Decks, layers_among, on_layer
 from sandbox.play.drawing.discs import Discs, spokes
 from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
@@ -127,16 +130,27 @@ class Picture:
         self._overlays.below(view)
         if sight.aim is not None:
             draw_ways(view, sight.aim, self._colours)
+        if sight.gunnery is not None:
+            draw_below(view, sight.gunnery)
         if "shapes" in sight.overlays and sight.scene.surface is not None and not sizes.side:
             if sight.scene.surface.bodies == "pucks" and sight.bodies.round.all():
                 draw_pucks(view, self._discs)
             else:
                 self._balls.draw(view)
         elif "shapes" in sight.overlays:
-            self._draw_layers(view, np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None)
+            own = _drawn_otherwise(sight)
+            large = np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None
+            if len(own):
+                others = np.flatnonzero(~np.isin(shown, own))
+                large = others if large is None else np.intersect1d(large, others)
+            self._draw_layers(view, large)
+            if sight.gunnery is not None:
+                draw_guns(view, sight.gunnery, {n: tuple(self._colours[n].tolist()) for n in own.tolist()})
         self._overlays.above(view)
         if sight.aim is not None:
             draw_aim(view, sight.aim)
+        if sight.gunnery is not None:
+            draw_above(view, sight.gunnery)
         draw_scale(surface, camera, unit, foot)
 
     def _draw_layers(self, view: View, which: IntArray | None) -> None:
@@ -231,6 +245,8 @@ class Picture:
             area = sight.scene.play.area
             if sight.scene.play.paints:
                 draw_painted(drawn, camera, sight.scene, unit, antialias)
+            elif sight.scene.artillery is not None:
+                draw_land(drawn, camera, sight.scene, unit, antialias)
             elif area is None:
                 draw_grid(drawn, camera, unit)
                 draw_markings(drawn, camera, sight.scene, unit, antialias)
@@ -258,6 +274,11 @@ def _in_sight(camera: Camera, sight: Sight, among: IntArray | None) -> IntArray:
     with np.errstate(invalid="ignore", over="ignore"):  # what is far out of sight may overflow, or be nan
         seen = np.flatnonzero(camera.in_sight(position, radius) & present)
     return seen if among is None else among[seen]
+
+
+def _drawn_otherwise(sight: Sight) -> IntArray:
+    """Return the numbers of the bodies that are more than their shapes: tanks."""
+    return np.asarray([] if sight.gunnery is None else [gun.number for gun in sight.gunnery.guns], np.int64)
 
 
 def _by_contact(overlapping: BoolArray, count: int) -> ColourArray:

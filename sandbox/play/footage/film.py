@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import pygame
 
-from sandbox.action import ActionError, Spawn, actions_from_json, in_order
+from sandbox.action import Action, ActionError, Spawn, actions_from_json, in_order
 from sandbox.play.breaks import broken_by
 from sandbox.play.camera import Box, Camera
 from sandbox.play.drawing.palette import FAINT, INK
@@ -16,6 +16,7 @@ from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.footage.crowd import anchors_of, crowd
 from sandbox.play.footage.run_graph import RunGraph
+from sandbox.play.footage.scenery import Scenery
 from sandbox.play.framing import framing
 from sandbox.play.picking import overlapping
 from sandbox.play.sight import Flash, Sight
@@ -51,6 +52,7 @@ class Film:
         self.trajectory = trajectory
         self.scene = scene_of(trajectory, name)
         self.bodies = bodies_of(trajectory, self.scene, name)
+        self._scenery = Scenery(self.scene, actions_of(trajectory, name))
         self._picture = Picture()
         self._last: Frame | None = None  # one picture asks for the same time again and again
         try:
@@ -118,7 +120,7 @@ class Film:
         frame = self.frame(time)
         by_contact = self.scene.play.show == "overlap"
         return Sight(
-            scene=self.scene,
+            scene=self._scenery.at(time),
             bodies=self.bodies,
             frame=frame,
             overlays=overlays,
@@ -235,17 +237,25 @@ def scene_of(trajectory: Trajectory, name: str = "<run>") -> Scene:
     return from_document(document, name)
 
 
+def actions_of(trajectory: Trajectory, name: str = "<run>") -> tuple[Action, ...]:
+    """Return what was done in a run, in order of time.
+
+    Raises:
+        SceneError: that is not said correctly.
+    """
+    try:
+        return in_order(actions_from_json(json.dumps(trajectory.info.get("actions", []))))
+    except ActionError as error:
+        raise SceneError([Fault(name, None, "info.actions", line) for line in str(error).splitlines()]) from None
+
+
 def bodies_of(trajectory: Trajectory, scene: Scene, name: str = "<run>") -> Bodies:
     """Return the bodies of a run: its scene's, and those that were spawned.
 
     Raises:
         SceneError: the run has others than its scene and actions make.
     """
-    bodies = scene.bodies
-    try:
-        actions = in_order(actions_from_json(json.dumps(trajectory.info.get("actions", []))))
-    except ActionError as error:
-        raise SceneError([Fault(name, None, "info.actions", line) for line in str(error).splitlines()]) from None
+    bodies, actions = scene.bodies, actions_of(trajectory, name)
     spawned = [action.single for action in actions if isinstance(action, Spawn)]
     names = [str(name) for name in trajectory.names.tolist()]
     for single, called in zip(spawned, names[len(bodies) :], strict=False):  # a run that ended early lacks the last

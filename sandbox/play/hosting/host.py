@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sandbox.games.referee import Referee
 from sandbox.games.registry import rules_of
-from sandbox.games.rules import Control, Rules, UnfitError
+from sandbox.games.rules import Control, Logged, Rules, UnfitError
 from sandbox.play.messages import Messages
 from sandbox.play.running.live import Live
 from sandbox.scene.model import Scene
@@ -49,6 +49,7 @@ class Host:
         self._held: dict[str, dict[object, float]] = {control.name: {} for control in self.controls}
         self._game: Referee | None = None  # whose cues were heard last
         self._told = False
+        self._read = 0  # entries of the game's log
 
     @property
     def rules(self) -> Rules:
@@ -99,6 +100,14 @@ class Host:
             return None
         self._told = True
         return f"from {game.otherwise:g} s on the rules would have done something else than was recorded"
+
+    def news(self) -> list[str]:
+        """Return what a game with a log has told since the last call; of what is taken back it may tell again."""
+        if not isinstance(self.rules, Logged):
+            return []
+        log, known = self.rules.log, self._read
+        self._read = len(log)
+        return [text for _, text in log[known:]]
 
     def board(self) -> Board:
         """Return what is shown."""

@@ -1,0 +1,73 @@
+"""`sandbox miss`: by how much a shot misses, by engine, integrator and step."""
+
+import math
+import sys
+from typing import Any
+
+import click
+
+from sandbox.cli.reading import path_of, print_json, refused
+from sandbox.cli.table import WIDE
+from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.file import load
+from sandbox.scene.model import Scene
+
+STEP = click.FloatRange(min=1e-6, max=1.0)
+SPEED = click.FloatRange(0.0, 1e6, min_open=True)
+
+
+@click.command(name="miss")
+@click.argument("scene")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
+@click.option("--speed", type=SPEED, default=50.0, metavar="M/S", help="by default 50")
+@click.option("--angle", type=click.FloatRange(0.0, 180.0), default=45.0, metavar="DEG", help="by default 45")
+@click.option("--dt", "dts", type=STEP, multiple=True, metavar="S", help="a step; by default 1/15, 1/60 and 1/240")
+@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
+def command(
+    scene: str, overrides: tuple[str, ...], speed: float, angle: float, dts: tuple[float, ...], as_json: bool
+) -> int:
+    """Fly a shot over level ground in a scene's air, on every engine, and tell how far off each comes down."""
+    from sandbox.games.artillery.miss import STEPS, miss_table  # the engines, which help needs none of
+
+    try:
+        read = load(path_of(scene), overrides)
+        found = miss_table(read.world, speed, math.radians(angle), dts or STEPS)
+    except SceneError as error:
+        return refused(error.faults, as_json, scene=scene)
+    except ValueError as error:
+        return refused([Fault(scene, None, "world.gravity", str(error))], as_json, scene=scene)
+    if as_json:
+        rows = [row._asdict() for row in found.rows]
+        refusals = [{"engine": engine, "reason": reason} for engine, reason in found.refused]
+        print_json({"scene": scene, "range": found.range, "time": found.time, "rows": rows, "refused": refusals})
+        return 0
+    _print(scene, read, found, f"{speed:g} m/s at {angle:g}°")
+    return 0
+
+
+def _print(name: str, scene: Scene, found: Any, shot: str) -> None:
+    """Print a row an engine and integrator, and a column a step."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from sandbox.games.artillery.shot import length
+
+    world = scene.world
+    air = f"drag {world.linear_drag:g} 1/s and {world.quadratic_drag:g} 1/m, wind {world.wind[0]:g} m/s"
+    truth = f"{shot}, {air}: exactly {found.range:.4f} m, after {found.time:.5f} s"
+    click.echo(f"{name}: {truth}")
+    dts = list(dict.fromkeys(row.dt for row in found.rows))
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("engine", no_wrap=True)
+    table.add_column("integrator", no_wrap=True)
+    for dt in dts:
+        table.add_column(f"dt {dt:.4g} s", justify="right", no_wrap=True)
+    for engine, integrator in dict.fromkeys((row.engine, row.integrator) for row in found.rows):
+        those = {row.dt: row.off for row in found.rows if (row.engine, row.integrator) == (engine, integrator)}
+        cells = [f"{'+' if those[dt] >= 0 else '−'}{length(abs(those[dt]))}" for dt in dts]
+        table.add_row(engine, integrator or "", *(cell if cell[1:2] != "l" else cell[1:] for cell in cells))
+    console = Console(width=None if sys.stdout.isatty() else WIDE)
+    console.print(table)
+    for engine, reason in found.refused:
+        console.print(Text(f"{engine}: {reason}"), soft_wrap=True)

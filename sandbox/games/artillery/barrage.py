@@ -1,0 +1,192 @@
+"""Barrage: the shells of a turn, from the muzzle to where each goes off."""
+
+import math
+
+import numpy as np
+
+from sandbox.action import Action, Move, Remove, Spawn
+from sandbox.games.artillery.field import LIFT, Field
+from sandbox.games.artillery.flight import landing
+from sandbox.games.artillery.shells import MASS, RADIUS, Shell, Step, returned
+from sandbox.games.artillery.shot import Shot
+from sandbox.games.artillery.tanks import Tank
+from sandbox.games.artillery.weapons import FRAGMENTS, SPREAD, Weapon
+from sandbox.games.rules import Seen
+from sandbox.scene.discs import Ball
+from sandbox.scene.model import World
+from sandbox.trajectory import FloatArray
+
+ROLLER = 0.5
+"""m, the radius of what rolls"""
+HARDLY = 0.5
+"""m/s: what rolls more slowly for as many seconds goes off"""
+ROLLS = 8.0
+"""s, at most"""
+
+
+class Barrage:
+    """What flies and rolls."""
+
+    def __init__(self, field: Field) -> None:
+        self._field, self._edges = field, field.artillery.edges
+        self.shells: list[Shell] = []
+        self.shots: list[Shot] = []
+        """that have come down, or left, in the whole game"""
+        self.ways: dict[str, list[tuple[float, float]]] = {}
+        """m, where each shell of the last shot has been"""
+        self._fired = 0
+
+    def fire(self, time: float, world: World, tank: Tank, weapon: Weapon, speed: float) -> list[Action]:
+        """Fire from a tank at a time, s, in the air of a world, at a speed, m/s."""
+        field = self._field
+        place = field.tanks.muzzle(tank, np.array([tank.angle]))[0]
+        velocity = speed * np.array([math.cos(tank.angle), math.sin(tank.angle)])
+        field.cues.append("fire")
+        field.blasts.clear()
+        self.ways.clear()
+        action = self._shell(time, tank, weapon, place, velocity)
+        exact = landing(world, place, velocity, field.ground, self._edges, field.tanks.discs)
+        self.shells[-1].exact = exact
+        return [action]
+
+    def know(self, seen: Seen) -> None:
+        """Find the numbers of the shells that have been spawned since: the last bodies, in the order of the actions."""
+        new = [shell for shell in self.shells if shell.number is None]
+        if not new:
+            return
+        own = {shell.name for shell in new}
+        spawned = [action.single.name for action in seen.actions if isinstance(action, Spawn)]
+        others = sum(name not in own for name in spawned)
+        first = len(seen.frame.position) - len(new) - others
+        for k, shell in enumerate(new):  # what the rules spawn stands before what a hand does
+            shell.number = first + k
+
+    def follow(self, seen: Seen, passed: float) -> list[Action]:
+        """Look where all shells have gone since the last frame, a time before, s."""
+        actions: list[Action] = []
+        for shell in [*self.shells]:
+            number = shell.number
+            if number is None:
+                continue
+            if not seen.frame.present[number]:  # who leaves the world's bounds is retired
+                self._gone(shell, seen.time)
+                continue
+            before = shell.place, shell.velocity
+            shell.place, shell.velocity = seen.frame.position[number].copy(), seen.frame.velocity[number].copy()
+            if shell.rolling is not None:
+                actions += self._roll(shell, seen.time)
+            else:
+                actions += self._fly(shell, before, seen.time, passed)
+            x, y = shell.place.tolist()
+            self.ways[shell.name].append((x, y))
+        return actions
+
+    def _fly(self, shell: Shell, before: tuple[FloatArray, FloatArray], time: float, passed: float) -> list[Action]:
+        """Let a shell go on from the last frame to this."""
+        field, place = self._field, shell.place
+        step = Step(before, (place, shell.velocity), passed)
+        beyond = returned(place, shell.velocity, field.ground, self._edges)
+        until = 1.0
+        if beyond is not None:
+            wall = field.ground.width if place[0] > 0.0 else 0.0
+            until = min(max(float((wall - before[0][0]) / (place[0] - before[0][0])), 0.0), 1.0)
+        found = step.meets(field.ground, field.tanks.discs, until)
+        if found is not None:
+            return self._come_down(shell, step, *found, time, passed)
+        if shell.weapon.kind == "cluster" and shell.whole and before[1][1] > 0.0 >= shell.velocity[1]:
+            return self._split(shell, time)
+        if beyond is not None:
+            shell.place, shell.velocity = beyond
+            (x, y), (vx, vy) = (each.tolist() for each in beyond)
+            return [Move(time=time, body=shell.name, position=(x, y), velocity=(vx, vy))]
+        if place[1] < -1.0 and not 0.0 <= place[0] <= field.ground.width:
+            return self._left(shell, time)
+        return []
+
+    def _come_down(
+        self, shell: Shell, step: Step, share: float, struck: int | None, time: float, passed: float
+    ) -> list[Action]:
+        """Let a shell go off where it came down at a share of the last step, or begin to roll there."""
+        x, y = step.at(share).tolist()
+        shell.place = np.array([x, y])
+        self._tell(shell, (x, y), time - (1.0 - share) * passed)
+        if shell.weapon.kind != "roller" or struck is not None:
+            return self._go_off(shell, (x, y), time)
+        ground = self._field.ground
+        low, high = max(x - 0.5, 0.0), min(x + 0.5, ground.width)
+        along = np.array([high - low, float(ground.surface(high) - ground.surface(low))])
+        along /= np.hypot(*along)
+        place = np.array([x, y]) + (ROLLER + LIFT) * np.array([-along[1], along[0]])
+        velocity = float(step.velocity(share) @ along) * along
+        self.shells.remove(shell)
+        rolling = self._shell(time, shell.shooter, shell.weapon, place, velocity, rolls=True)
+        return [Remove(time=time, body=shell.name), rolling]
+
+    def _roll(self, shell: Shell, time: float) -> list[Action]:
+        """Let what rolls go off where it meets a tank, comes to rest, or has rolled for too long."""
+        assert shell.rolling is not None
+        discs = self._field.tanks.discs
+        near = np.hypot(*(discs[:, :2] - shell.place).T) <= discs[:, 2] + ROLLER
+        if float(np.hypot(*shell.velocity)) > HARDLY:
+            shell.slow = None
+        elif shell.slow is None:
+            shell.slow = time
+        still = shell.slow is not None and time - shell.slow >= HARDLY
+        if near.any() or still or time - shell.rolling > ROLLS:
+            x, y = shell.place.tolist()
+            return self._go_off(shell, (x, y - ROLLER), time)
+        return [] if 0.0 <= shell.place[0] <= self._field.ground.width else self._left(shell, time)
+
+    def _split(self, shell: Shell, time: float) -> list[Action]:
+        """Let a cluster come apart: its momentum stays, the fragments fly on beside each other."""
+        self.shells.remove(shell)
+        actions: list[Action] = [Remove(time=time, body=shell.name)]
+        for k in range(FRAGMENTS):
+            aside = np.array([SPREAD * (k - 0.5 * (FRAGMENTS - 1)), 0.0])
+            actions.append(self._shell(time, shell.shooter, shell.weapon, shell.place, shell.velocity + aside))
+            self.shells[-1].whole = False
+        self._field.cues.append("split")
+        return actions
+
+    def _go_off(self, shell: Shell, place: tuple[float, float], time: float) -> list[Action]:
+        self.shells.remove(shell)
+        return [
+            Remove(time=time, body=shell.name),
+            *self._field.blast(time, shell.shooter, place, shell.weapon),
+        ]
+
+    def _left(self, shell: Shell, time: float) -> list[Action]:
+        self._gone(shell, time)
+        return [Remove(time=time, body=shell.name)]
+
+    def _gone(self, shell: Shell, time: float) -> None:
+        self.shells.remove(shell)
+        self._tell(shell, None, time)
+
+    def _tell(self, shell: Shell, place: tuple[float, float] | None, time: float) -> None:
+        """Note what a shot came to, if it is one that was fired and came down by itself."""
+        if shell.whole and shell.rolling is None:
+            exact = None if shell.exact is None else shell.exact.place
+            self.shots.append(Shot(shell.shooter.name, shell.weapon.name, place, exact, time - shell.fired, time))
+
+    def _shell(
+        self, time: float, tank: Tank, weapon: Weapon, place: FloatArray, velocity: FloatArray, rolls: bool = False
+    ) -> Spawn:
+        self._fired += 1
+        shell = Shell(f"shell {self._fired}", tank, weapon, place, velocity, fired=time)
+        shell.rolling = time if rolls else None
+        self.shells.append(shell)
+        (x, y), (vx, vy) = place.tolist(), velocity.tolist()
+        self.ways[shell.name] = [(x, y)]
+        ball = Ball(
+            name=shell.name,
+            position=(x, y),
+            velocity=(vx, vy),
+            radius=ROLLER if rolls else RADIUS,
+            mass=MASS,
+            collides="fixed" if rolls else "none",
+            friction=0.3,
+            restitution=0.2,
+            colour="#f2e6c8",
+        )
+        return Spawn(time=time, ball=ball)

@@ -1,0 +1,144 @@
+"""Miss: how far from where it should a shot comes down on level ground, by engine, integrator and step."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.engines.contract import Refusal
+from sandbox.engines.reference.integrators import INTEGRATORS
+from sandbox.engines.registry import ENGINES, start
+from sandbox.games.artillery.flight import NOBODY, Landing, landing
+from sandbox.games.artillery.ground import Ground
+from sandbox.games.artillery.shells import MASS, RADIUS, Step
+from sandbox.scene.discs import Ball
+from sandbox.scene.model import Scene, World
+from sandbox.scene.settings import Settings
+from sandbox.trajectory import FloatArray, Frame
+
+STEPS = 1 / 15, 1 / 60, 1 / 240
+"""s, of the table"""
+LONGEST = 1_000_000
+"""steps that a shot is followed"""
+FAR = 1e6
+"""m, beyond which no shot is looked for"""
+
+
+class Missed(NamedTuple):
+    """A row of the table."""
+
+    engine: str
+    integrator: str | None
+    """none where an engine has but one way to fly"""
+    dt: float
+    """s"""
+    place: float
+    """m, how far off it comes down"""
+    time: float
+    """s, after which"""
+    off: float
+    """m, by how much that is too far; negative where it falls short"""
+    late: float
+    """s, by how much it is in the air for too long"""
+
+
+class Table(NamedTuple):
+    """Where a shot should come down, and where it does."""
+
+    range: float
+    """m"""
+    time: float
+    """s"""
+    rows: tuple[Missed, ...]
+    refused: tuple[tuple[str, str], ...]
+    """engines that do not fly it, and why"""
+
+
+def miss_table(world: World, speed: float, angle: float, dts: Sequence[float] = STEPS) -> Table:
+    """Fly a shot over level ground on every engine, with every integrator and step, and return by how much each misses.
+
+    The truth is the closed form, or with quadratic drag Runge–Kutta's flight at steps of 1/128 s.
+
+    Args:
+        world: gives gravity, drag and wind.
+        speed: m/s.
+        angle: rad, anticlockwise from the right.
+        dts: steps, s.
+
+    Raises:
+        ValueError: the shot never comes down.
+    """
+    velocity = speed * np.array([math.cos(angle), math.sin(angle)])
+    world = World(**{key: getattr(world, key) for key in ("gravity", "linear_drag", "quadratic_drag", "wind")})
+    true = _exact(world, velocity)
+    rows: list[Missed] = []
+    refused: list[tuple[str, str]] = []
+    for engine, integrator in _ways():
+        for dt in dts:
+            settings = Settings(dt=dt, integrator=integrator)  # type: ignore[arg-type]  # of the table of integrators
+            try:
+                down = flown(world, velocity, engine, settings)
+            except Refusal as refusal:
+                refused.append((engine, "; ".join(refusal.reasons)))
+                break
+            x, time = down.place[0], down.time
+            rows.append(Missed(engine, integrator, dt, x, time, x - true.place[0], time - true.time))
+    return Table(true.place[0], true.time, tuple(rows), tuple(refused))
+
+
+def _ways() -> Iterator[tuple[str, str | None]]:
+    for engine in ENGINES:
+        for integrator in INTEGRATORS if engine == "reference" else (None,):
+            yield engine, integrator
+
+
+def _exact(world: World, velocity: FloatArray) -> Landing:
+    """Return where a shot comes down that starts on level ground, from there on.
+
+    Raises:
+        ValueError: it never does.
+    """
+    near = _from(FAR, world, velocity)
+    return _from(1.0 + 2.0 * abs(near.place[0]), world, velocity)  # nearer to 0, where there is less to round
+
+
+def _from(half: float, world: World, velocity: FloatArray) -> Landing:
+    """Return the same, found on ground that goes so far to either side, m."""
+    down = landing(world, np.array([half, 0.0]), velocity, Ground(np.zeros(2), 2.0 * half))
+    if down is None:
+        raise ValueError("the shot never comes down")
+    return down._replace(place=(down.place[0] - half, down.place[1]))
+
+
+def flown(world: World, velocity: FloatArray, engine: str, settings: Settings) -> Landing:
+    """Return where an engine lets a shot come down on level ground, from the cubic through its last two frames.
+
+    Raises:
+        Refusal: it does not fly it.
+        ValueError: the shot never comes down.
+    """
+    vx, vy = velocity.tolist()
+    ball = Ball(position=(0.0, 0.0), velocity=(vx, vy), radius=RADIUS, mass=MASS, collides="none")
+    scene = Scene(world=world, solver=settings, balls=(ball,))
+    simulation = start(scene, engine, settings)
+    before, now = simulation.frame(), simulation.frame()
+    for _ in range(LONGEST):
+        before = now
+        simulation.step()
+        now = simulation.frame()
+        if now.position[0, 1] <= 0.0:
+            break
+    else:
+        raise ValueError("the shot never comes down")
+    simulation.close()
+    half = 1.0 + 2.0 * abs(float(now.position[0, 0]))
+    step = Step(_state(before, half), _state(now, half), now.time - before.time)
+    found = step.meets(Ground(np.zeros(2), 2.0 * half), NOBODY, 1.0)
+    share = 1.0 if found is None else found[0]
+    return Landing(before.time + share * (now.time - before.time), (float(step.at(share)[0]) - half, 0.0))
+
+
+def _state(frame: Frame, aside: float) -> tuple[FloatArray, FloatArray]:
+    """Return place and velocity of the one body, moved aside, m."""
+    return frame.position[0] + np.array([aside, 0.0]), frame.velocity[0]

@@ -1,0 +1,185 @@
+"""Artillery's rules: turns of aiming, flying and settling, until one tank is left."""
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+from sandbox.action import Action, SetParameter
+from sandbox.games.artillery.aim import Aim
+from sandbox.games.artillery.barrage import Barrage
+from sandbox.games.artillery.bot import aimed, chances, choose
+from sandbox.games.artillery.field import PAUSE, Field
+from sandbox.games.artillery.gunner import CONTROLS, Gunner
+from sandbox.games.artillery.shot import Shot
+from sandbox.games.artillery.tanks import Tank
+from sandbox.games.artillery.weapons import WEAPONS
+from sandbox.games.rules import Control, Seen
+from sandbox.scene.bodies import Bodies
+from sandbox.scene.model import Scene
+
+Phase = Literal["begin", "aim", "fly", "settle"]
+"""Of a turn: the next player gets the gun, aims it; shells are in the air; ground and tanks come to rest."""
+
+
+class ArtilleryRules:
+    """A game of artillery that is being played."""
+
+    def __init__(self, scene: Scene, bodies: Bodies) -> None:
+        """Begin.
+
+        Raises:
+            UnfitError: the scene has no players, or no ground.
+        """
+        self.field = Field(scene, bodies)
+        self.artillery = self.field.artillery
+        self.barrage = Barrage(self.field)
+        self.world = scene.world
+        """with the wind of the turn"""
+        self.turn = 0
+        """counted from 1, of all players together"""
+        self.phase: Phase = "begin"
+        self._gunner = Gunner()
+        self._time, self._since, self._number = 0.0, 0.0, 0
+        self._aim: Aim | None = None
+        self._over: str | None = None
+
+    @property
+    def controls(self) -> tuple[Control, ...]:
+        """What a gunner can do."""
+        return CONTROLS
+
+    @property
+    def score(self) -> int:
+        """Points of the first who is a person; where none is, of the best."""
+        tanks = self.field.tanks.every
+        persons = [tank.points for tank in tanks if tank.player.bot is None]
+        return persons[0] if persons else max(tank.points for tank in tanks)
+
+    @property
+    def over(self) -> str | None:
+        """Who has won."""
+        return self._over
+
+    @property
+    def shooter(self) -> Tank:
+        """Whose turn it is."""
+        return self.field.tanks.every[self._number]
+
+    @property
+    def shots(self) -> list[Shot]:
+        """What all shots came to."""
+        return self.barrage.shots
+
+    @property
+    def log(self) -> Sequence[tuple[float, str]]:
+        """What all shots came to, and when, s."""
+        return [(shot.time, f"{shot.shooter}, {shot.weapon}: {shot.told}") for shot in self.shots]
+
+    def speed(self, tank: Tank) -> float:
+        """Return how fast a shell leaves a tank as it is set, m/s."""
+        return tank.power * self.artillery.speed
+
+    def control(self, name: str, value: float) -> Sequence[Action]:
+        """Turn the barrel, change the power or the weapon, or fire."""
+        self._gunner.press(name, value)
+        if self.phase != "aim" or self.shooter.player.bot is not None or value <= 0.0:
+            return ()
+        if name == "fire":
+            return self._fire()
+        self._gunner.touch(name, self.shooter)
+        if name == "weapon":
+            self.field.cues.append("click")
+        return ()
+
+    def look(self, seen: Seen) -> Sequence[Action]:
+        """Go on with the turn: aim as long as keys are held, follow what flies, wait until all is still."""
+        passed, self._time = seen.time - self._time, seen.time
+        self.barrage.know(seen)
+        self.field.tanks.see(seen.frame)
+        match self.phase:
+            case "begin":
+                return self._begin_turn()
+            case "aim":
+                return self._set_gun(passed)
+            case "fly":
+                actions = self.barrage.follow(seen, passed)
+                if not self.barrage.shells:
+                    self.phase = "settle"
+                    self.field.begin_to_settle(seen.time)
+                return actions
+            case "settle":
+                done, actions = self.field.settle(seen, self.shooter)
+                if done:
+                    self.phase = "begin"
+                return actions
+
+    def lines(self) -> Sequence[tuple[str, str]]:
+        """Return who has what, how the gun is set, and what the last shot came to."""
+        told = []
+        for tank in self.field.tanks.every:
+            mark = "> " if tank is self.shooter and self._over is None else ""
+            state = f"{tank.health:.0f} %, {tank.points} pt, {tank.money} $"
+            told.append((f"{mark}{tank.name}", state if tank.alive else f"out, {tank.points} pt"))
+        wind = self.world.wind[0]
+        side = "to the right" if wind > 0 else "to the left"
+        told.append(("wind", f"{abs(wind):.1f} m/s {side}" if wind else "none"))
+        tank, weapon = self.shooter, WEAPONS[self.shooter.weapon]
+        told.append(("gun", f"{math.degrees(tank.angle):.1f}°, {tank.power:.1%}, {self.speed(tank):.1f} m/s"))
+        told.append(("weapon", f"{weapon.name}, {weapon.cost} $" if weapon.cost else weapon.name))
+        if self.shots:
+            told.append(("last shot", self.shots[-1].told))
+        return told
+
+    def cues(self) -> Sequence[str]:
+        """Return the sounds since the last call."""
+        cues, self.field.cues = self.field.cues, []
+        return cues
+
+    def _begin_turn(self) -> list[Action]:
+        """Let the next who is alive have the gun, in a wind of the turn's own; or end the game."""
+        tanks, alive = self.field.tanks.every, self.field.tanks.alive
+        if len(alive) < 2:
+            return self._end(f"{alive[0].name} wins" if alive else "nobody is left")
+        if self.turn >= self.artillery.rounds * len(tanks):
+            best = max(tanks, key=lambda tank: (tank.points, tank.health))
+            return self._end(f"out of shells; {best.name} wins on points")
+        first = self._number + 1 if self.turn else 0
+        order = (k % len(tanks) for k in range(first, first + len(tanks)))
+        self._number = next(k for k in order if tanks[k].alive)
+        self.turn += 1
+        self.phase, self._since, self._aim = "aim", self._time, None
+        if WEAPONS[self.shooter.weapon].cost > self.shooter.money:
+            self.shooter.weapon = 0
+        self.field.cues.append("turn")
+        most = self.artillery.wind
+        if not most:
+            return []
+        wind = (float(chances(self.world.seed, 2 * self.turn).uniform(-most, most)), 0.0)
+        self.world = self.world.model_copy(update={"wind": wind})
+        return [SetParameter(time=self._time, path="world.wind", value=list(wind))]
+
+    def _end(self, why: str) -> list[Action]:
+        self._over = why
+        self.field.cues.append("win")
+        return []
+
+    def _set_gun(self, passed: float) -> list[Action]:
+        """Set the gun as long as keys are held; a bot finds its shot, brings the gun there and fires."""
+        tank = self.shooter
+        if tank.player.bot is None:
+            self._gunner.hold(tank, passed)
+            return []
+        if self._aim is None:
+            random = chances(self.world.seed, 2 * self.turn + 1)
+            target, tank.weapon = choose(self.field.tanks, tank, random)
+            radius = WEAPONS[tank.weapon].radius
+            self._aim = aimed(self.world, self.field, tank, target, radius, random)
+        there = self._gunner.bring(tank, self._aim.angle, self._aim.speed / self.artillery.speed, passed)
+        return self._fire() if there and self._time - self._since >= PAUSE else []
+
+    def _fire(self) -> list[Action]:
+        tank = self.shooter
+        weapon = WEAPONS[tank.weapon]
+        tank.money -= weapon.cost
+        self.phase = "fly"
+        return self.barrage.fire(self._time, self.world, tank, weapon, self.speed(tank))

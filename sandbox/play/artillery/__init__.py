@@ -1,0 +1,1 @@
+"""What a game of artillery adds to the sight of a moment."""

@@ -1,0 +1,74 @@
+"""Gunnery: what is drawn of a game of artillery besides its bodies, as values."""
+
+from dataclasses import dataclass
+
+from sandbox.scene.part import Point
+from sandbox.trajectory import FloatArray
+
+
+@dataclass(frozen=True)
+class Gun:
+    """A tank and its gun."""
+
+    number: int
+    """of its body"""
+    name: str
+    angle: float
+    """of the barrel, rad, anticlockwise from the right"""
+    power: float
+    """share of full speed"""
+    health: float
+    """0 to 1"""
+    aiming: bool
+    """It is its turn, and nothing has been fired yet."""
+
+
+@dataclass(frozen=True)
+class Burst:
+    """A blast a moment ago."""
+
+    age: float
+    """s"""
+    place: Point
+    """m"""
+    radius: float
+    """m"""
+    dirt: bool
+
+
+@dataclass(frozen=True)
+class Clod:
+    """Dirt of one column that is falling."""
+
+    left: float
+    """m"""
+    right: float
+    """m"""
+    bottom: float
+    """m, of where it is now"""
+    top: float
+    """m"""
+    floor: float
+    """m, that it falls onto"""
+
+
+@dataclass(frozen=True, eq=False)
+class Gunnery:
+    """A moment of a game."""
+
+    guns: tuple[Gun, ...]
+    """those that still fight"""
+    size: tuple[float, float]
+    """of a tank, m"""
+    wind: float
+    """m/s, to the right"""
+    ways: tuple[FloatArray, ...] = ()
+    """(P, 2) m, where the shells of the last shot have been"""
+    flying: tuple[int, ...] = ()
+    """numbers of the shells' bodies"""
+    bursts: tuple[Burst, ...] = ()
+    clods: tuple[Clod, ...] = ()
+    tracer: FloatArray | None = None
+    """(P, 2) m, where a shot would go"""
+    landed: tuple[Point, Point] | None = None
+    """where the last shot came down, and where it would have exactly, m"""

@@ -1,0 +1,1 @@
+"""How artillery is drawn: sky and ground, tanks, and what flies."""

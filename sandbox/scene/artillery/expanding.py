@@ -1,0 +1,122 @@
+"""Expanding: `[terrain]` to a wall, and the players of `[artillery]` to boxes that stand on it."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from sandbox.scene.artillery.columns import columns_of, course_of
+from sandbox.scene.artillery.described import Artillery
+from sandbox.scene.artillery.landscape import heights_of, levelled
+from sandbox.scene.faults import Location
+from sandbox.scene.model import Scene, Wall
+from sandbox.scene.part import Point
+from sandbox.scene.solids import Box
+
+GROUND = "terrain"
+"""What the wall is called."""
+
+FRICTION = 0.8
+"""of ground that says nothing of its own"""
+
+DEEP, HIGH = 0.08, 0.5
+"""of the ground's width, below and above its lowest column, that the window shows"""
+
+MARGIN = 1.0
+"""columns beyond a tank to either side that are level with it"""
+
+COLOURS = ("#e05a4f", "#4f9de0", "#63c26b", "#e0b84f", "#b07be0", "#4fd0c8", "#e07bb0", "#a3b34a", "#d98a4a", "#8b97a8")
+
+
+def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
+    """Yield why a scene's `[terrain]` or `[artillery]` stands for nothing."""
+    terrain, artillery = scene.terrain, scene.artillery
+    walls = {wall.name: wall for wall in scene.walls}
+    if terrain is not None and GROUND in walls:
+        yield ("terrain",), f"stands for a wall named {GROUND!r}, and there is one; leave one of the two out"
+        return
+    if terrain is not None and terrain.heights is not None and terrain.model_fields_set & {"base", "height", "columns"}:
+        yield ("terrain", "heights"), "say it all; leave out `columns`, `base` and `height`"
+    if artillery is None:
+        return
+    if artillery.wind and not (scene.world.linear_drag or scene.world.quadratic_drag):
+        yield ("artillery", "wind"), "pushes nothing without world.linear_drag or world.quadratic_drag; state one"
+    if terrain is not None:
+        width = terrain.width
+    elif GROUND not in walls:
+        yield ("artillery",), f"is played on ground; state a [terrain], or a wall named {GROUND!r}"
+        return
+    else:
+        columns = columns_of(walls[GROUND].points)
+        if columns is None:
+            message = f"needs columns of one width in the wall {GROUND!r}; [terrain] makes such a wall"
+            yield ("artillery",), message
+            return
+        width = columns[1]
+    names = [player.name for player in artillery.players]
+    for k, player in enumerate(artillery.players):
+        if player.name in names[:k]:
+            yield ("artillery", "player", k, "name"), f"a second player is called {player.name!r}; names are unique"
+        half = 0.5 * artillery.tank[0]
+        if not half <= player.position <= width - half:
+            yield (
+                ("artillery", "player", k, "position"),
+                f"is beside the ground, on which a tank stands from {half:g} to {width - half:g} m",
+            )
+
+
+def expanded(scene: Scene) -> Scene:
+    """Return the scene of walls and boxes that one with a sound `[terrain]` or `[artillery]` stands for."""
+    terrain, artillery = scene.terrain, scene.artillery
+    if terrain is None and artillery is None:
+        return scene
+    changes: dict[str, Any] = {"terrain": None}
+    walls = scene.walls
+    if terrain is not None:
+        heights = heights_of(terrain, scene.world.seed)
+        for at, half in _pads(artillery, terrain.width / len(heights)):
+            heights = levelled(heights, terrain.width, at, half)
+        own = {key: getattr(terrain, key) for key in ("material", "restitution", "friction", "colour")}
+        if own["material"] is None and own["friction"] is None:
+            own["friction"] = FRICTION
+        walls = (*walls, Wall(name=GROUND, points=course_of(heights, terrain.width), **own))
+        changes["walls"] = walls
+    if artillery is not None:
+        ground = next(wall for wall in walls if wall.name == GROUND)
+        taken = {each.name for movers in scene.kinds.values() for each in movers}
+        tanks = tuple(
+            _tank(artillery, k, ground) for k, player in enumerate(artillery.players) if player.name not in taken
+        )
+        changes["boxes"] = (*scene.boxes, *tanks)
+        play = {"game": "artillery", "view": _view(ground)}
+        stated = scene.play.model_fields_set
+        changes["play"] = scene.play.model_copy(update={k: v for k, v in play.items() if k not in stated})
+    return scene.model_copy(update=changes)
+
+
+def _view(ground: Wall) -> tuple[Point, Point]:
+    """Return what the window shows: the ground from somewhat below its lowest column up to where shells fly, m."""
+    width, low = ground.points[-1][0], min(y for _, y in ground.points)
+    return (0.0, low - DEEP * width), (width, low + HIGH * width)
+
+
+def _pads(artillery: Artillery | None, each: float) -> Iterator[tuple[float, float]]:
+    """Yield where tanks stand, m, and how far to either side the ground is level there, m."""
+    if artillery is not None:
+        for player in artillery.players:
+            yield player.position, 0.5 * artillery.tank[0] + MARGIN * each
+
+
+def _tank(artillery: Artillery, k: int, ground: Wall) -> Box:
+    player = artillery.players[k]
+    columns = columns_of(ground.points)
+    assert columns is not None
+    heights, width = columns
+    each, half = width / len(heights), 0.5 * artillery.tank[0]
+    under = [h for n, h in enumerate(heights) if abs((n + 0.5) * each - player.position) <= half + each]
+    return Box(
+        name=player.name,
+        position=(player.position, max(under) + 0.5 * ground.thickness + 0.5 * artillery.tank[1]),
+        size=artillery.tank,
+        mass=artillery.mass,
+        friction=artillery.friction,
+        colour=player.colour or COLOURS[k],
+    )

@@ -1,0 +1,57 @@
+"""`sandbox miss`: the table, the document, what is refused."""
+
+import math
+from pathlib import Path
+
+import pytest
+from calling import json_of, lines_of
+
+AIR = """
+[world]
+gravity = [0.0, -9.81]
+[[ball]]
+position = [0.0, 0.0]
+radius = 1.0
+"""
+
+
+@pytest.fixture
+def air(tmp_path: Path) -> str:
+    file = tmp_path / "air.toml"
+    file.write_text(AIR)
+    return str(file)
+
+
+def test_document_has_a_row_an_engine_integrator_and_step(capfd: pytest.CaptureFixture[str], air: str) -> None:
+    status, document, _ = json_of(capfd, "miss", air, "--dt", "0.1", "--dt", "0.05", "--set", "world.linear_drag=0.2")
+    assert status == 0
+    assert {(row["engine"], row["integrator"]) for row in document["rows"]} == {
+        ("pymunk", None),
+        *(("reference", name) for name in ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog")),
+        ("reference", "rk4"),
+    }
+    assert [refusal["engine"] for refusal in document["refused"]] == ["exact"]
+    for row in document["rows"]:
+        assert row["off"] == pytest.approx(row["place"] - document["range"], abs=1e-12)  # rounding of a difference
+        assert row["late"] == pytest.approx(row["time"] - document["time"], abs=1e-12)
+
+
+def test_table_tells_the_truth_and_by_how_much_each_misses(capfd: pytest.CaptureFixture[str], air: str) -> None:
+    status, out, _ = lines_of(capfd, "miss", air, "--dt", "0.1", "--angle", "30", "--speed", "40")
+    assert status == 0
+    assert f"exactly {1600.0 * math.sin(math.radians(60.0)) / 9.81:.4f} m" in out[0]
+    exact = next(line for line in out if line.startswith("exact"))
+    assert "less than 1 nm" in exact
+    euler = next(line for line in out if "explicit_euler" in line)
+    # v_x h is 3.464 m; of the cubic's way within the last step that Euler's velocities bend, a centimetre.
+    assert float(euler.split()[2]) == pytest.approx(40.0 * math.cos(math.radians(30.0)) * 0.1, abs=0.02)
+
+
+def test_what_is_wrong_is_told(capfd: pytest.CaptureFixture[str], air: str) -> None:
+    status, _, err = lines_of(capfd, "miss", air, "--set", "world.gravity=[0.0, 0.0]")
+    assert status == 2
+    assert "never comes down" in err[0]
+    status, _, err = lines_of(capfd, "miss", "nowhere")
+    assert status == 2
+    status, _, err = lines_of(capfd, "miss", air, "--angle", "200")
+    assert (status, "--angle" in err[0]) == (2, True)

@@ -1,0 +1,36 @@
+"""Grounds and worlds for tests of artillery."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from sandbox.games.artillery.ground import Ground
+from sandbox.scene.artillery.columns import settled
+from sandbox.scene.artillery.described import Terrain
+from sandbox.scene.artillery.landscape import heights_of, levelled
+from sandbox.scene.model import World
+from sandbox.trajectory import FloatArray
+
+G = 9.81
+
+
+def world(linear: float = 0.0, quadratic: float = 0.0, wind: float = 0.0) -> World:
+    return World(gravity=(0.0, -G), linear_drag=linear, quadratic_drag=quadratic, wind=(wind, 0.0))
+
+
+def shot(speed: float, degrees: float) -> FloatArray:
+    angle = math.radians(degrees)
+    return speed * np.array([math.cos(angle), math.sin(angle)])
+
+
+def flat(height: float, width: float = 400.0, columns: int = 400) -> Ground:
+    return Ground(np.full(columns, settled(height)), width)
+
+
+def hills(seed: int, roughness: float, pads: Sequence[float] = (), width: float = 300.0) -> Ground:
+    """Ground as a scene has it, level at some places."""
+    heights = heights_of(Terrain(width=width, columns=300, roughness=roughness), seed)
+    for at in pads:
+        heights = levelled(heights, width, at, 2.5)
+    return Ground(np.array(heights), width)

@@ -1,0 +1,279 @@
+"""Games of artillery: turns, weapons, damage and the end; on the engines, recorded, and seen again."""
+
+import copy
+import json
+import math
+
+import numpy as np
+import pytest
+
+from sandbox.action import Action, actions_from_json
+from sandbox.games.artillery.bot import chances
+from sandbox.games.artillery.field import Field
+from sandbox.games.artillery.rules import ArtilleryRules
+from sandbox.games.artillery.tanks import PER_KILL
+from sandbox.games.artillery.weapons import WEAPONS, Weapon
+from sandbox.games.bout import Bout
+from sandbox.games.policies import Nobody, Script
+from sandbox.games.registry import rules_of
+from sandbox.games.rules import Press, UnfitError
+from sandbox.measure.replay import rerun
+from sandbox.measure.run import run
+from sandbox.recording import Recording
+from sandbox.scene.file import loads
+from sandbox.scene.model import Scene
+from sandbox.trajectory import Trajectory
+
+TEXT = """
+[world]
+gravity = [0.0, -9.81]
+linear_drag = 0.03
+duration = 14.0
+seed = 2
+[solver]
+dt = 0.02
+[terrain]
+width = 240.0
+columns = 240
+height = 20.0
+[artillery]
+speed = 60.0
+wind = 6.0
+[[artillery.player]]
+name = "Red"
+position = 50.0
+[[artillery.player]]
+name = "Blue"
+position = 190.0
+"""
+BOTS = TEXT.replace("position = 50.0", "position = 50.0\nbot = 1.0").replace("190.0", "190.0\nbot = 0.9")
+RK4 = {"integrator": "rk4"}
+
+
+def played(
+    scene: Scene, presses: tuple[Press, ...] = (), engine: str = "pymunk", **settings: object
+) -> tuple[ArtilleryRules, Trajectory, Bout]:
+    rules = rules_of(scene)
+    assert isinstance(rules, ArtilleryRules)
+    bout = Bout(rules, Script(presses) if presses else Nobody(), "script")
+    trajectory = run(scene, engine, bout=bout, **settings)  # type: ignore[arg-type]
+    assert trajectory.status == "ok", trajectory.reason
+    return rules, trajectory, bout
+
+
+def taps(*names: str, begin: float = 0.1) -> tuple[Press, ...]:
+    """Press and let go of controls, one after another."""
+    each = ((begin + 0.02 * k, name) for k, name in enumerate(names))
+    return tuple(press for time, name in each for press in (Press(time, name, 1.0), Press(time + 0.01, name, 0.0)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_bots_fight_to_the_end_and_the_recording_ends_alike(engine: str) -> None:
+    scene = loads(BOTS, overrides=["world.duration=120"])
+    rules, made, bout = played(scene, engine=engine)
+    assert rules.over is not None
+    assert "wins" in rules.over
+    assert len(rules.field.tanks.alive) == 1
+    assert made.missed_contacts == 0
+    shots = rules.shots
+    assert len(shots) >= 2
+    assert {shot.shooter for shot in shots} == {"Red", "Blue"}
+
+    actions = actions_from_json(json.dumps(made.info["actions"]))
+    end = made.time[-1], made.info["state_hash"]
+    recording = Recording(scene, engine, scene.solver, actions, *end, bout.presses)
+    again = rerun(Recording.from_json(recording.to_json()))
+    assert again.info["state_hash"] == made.info["state_hash"]
+    assert again.info["game"]["score"] == rules.score == made.info["game"]["score"]
+    assert again.info["game"]["otherwise"] is None
+
+
+def test_a_shot_is_seen_again_with_the_same_hash_and_score() -> None:
+    scene = loads(TEXT)
+    rules, made, bout = played(scene, taps("left", "up", "fire"))
+    end = made.time[-1], made.info["state_hash"]
+    recording = Recording(
+        scene, "pymunk", scene.solver, actions_from_json(json.dumps(made.info["actions"])), *end, bout.presses
+    )
+    again = rerun(recording, audit=False)
+    assert (again.info["state_hash"], again.info["game"]["score"]) == (end[1], rules.score)
+    assert again.info["game"]["otherwise"] is None
+    assert again.info["game"]["log"] == made.info["game"]["log"]
+    assert len(again.info["game"]["log"]) == 1
+
+
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
+def test_a_perfect_gunner_hits_with_its_first_shot(seed: int) -> None:
+    scene = loads(BOTS, overrides=[f"world.seed={seed}", "world.duration=12"])
+    rules = played(scene, engine="reference", **RK4)[0]
+    first = rules.shots[0]
+    x, y = 190.0, float(scene.bodies.position[1, 1])
+    assert first.place is not None
+    assert math.dist(first.place, (x, y)) <= WEAPONS[0].radius
+    assert first.off is not None
+    assert first.off < 1e-5  # Runge–Kutta's error and the cubic's at 20 ms
+    assert rules.field.tanks.every[1].health < 100.0
+
+
+@pytest.mark.parametrize("edges", ["open", "rubber", "wrap"])
+def test_shells_at_the_sides_go_the_exact_way(edges: str) -> None:
+    """At full power half the shots meet a side: taken back there at the next frame, and not before, in a light wind."""
+    scene = loads(TEXT, overrides=[f"artillery.edges={edges}", "artillery.wind=0", "world.duration=24"])
+    presses = taps("fire") + taps("fire", begin=11.0)
+    rules = rules_of(scene)
+    assert isinstance(rules, ArtilleryRules)
+    for tank, angle in zip(rules.field.tanks.every, (120.0, 60.0), strict=True):  # both outwards
+        tank.angle, tank.power = math.radians(angle), 0.8
+    run(scene, "reference", bout=Bout(rules, Script(presses), "script"), **RK4)  # type: ignore[arg-type]
+    assert len(rules.shots) == 2
+    for shot in rules.shots:
+        assert (shot.place is None) == (shot.exact is None) == (edges == "open")
+        if shot.off is not None:
+            assert shot.off < 1e-5  # at 20 ms; nothing of the way is lost: both sides are passed in still air, exactly
+
+
+def test_ground_is_dug_away_and_engine_and_rules_agree_on_it() -> None:
+    scene = loads(TEXT)
+    rules, made, _ = played(scene, taps("fire"))
+    reshaped = [action for action in made.info["actions"] if action["kind"] == "reshape"]
+    assert len(reshaped) == 1
+    assert tuple(map(tuple, reshaped[0]["points"])) == rules.field.ground.points
+    before = Field(scene, scene.bodies).ground.heights
+    assert rules.field.ground.heights.sum() < before.sum()
+    assert rules.turn == 2
+    assert rules.shooter.name == "Blue"
+
+
+def test_wind_is_of_the_turn_and_of_the_seed() -> None:
+    winds = []
+    for seed in (2, 3):
+        rules, made, _ = played(loads(TEXT, overrides=[f"world.seed={seed}"]), taps("fire"))
+        winds.append([a["value"][0] for a in made.info["actions"] if a["kind"] == "set"])
+        assert rules.world.wind[0] == winds[-1][-1]
+        assert all(abs(wind) <= 6.0 for wind in winds[-1])
+    assert len(winds[0]) == 2
+    assert winds[0] != winds[1]
+    assert winds[0] == [float(chances(2, 2 * turn).uniform(-6.0, 6.0)) for turn in (1, 2)]
+
+
+def test_dirt_lifts_who_stands_under_it() -> None:
+    scene = loads(TEXT, overrides=["artillery.wind=0"])
+    rules = rules_of(scene)
+    assert isinstance(rules, ArtilleryRules)
+    red = rules.field.tanks.every[0]
+    red.weapon, red.angle, red.power = 4, math.radians(90.0), 0.3  # straight up: it comes down on its own tank
+    assert WEAPONS[red.weapon].kind == "dirt"
+    made = run(scene, bout=Bout(rules, Script(taps("fire")), "script"))
+    assert made.status == "ok"
+    lifted = float(rules.field.ground.surface(50.0)) - float(Field(scene, scene.bodies).ground.surface(50.0))
+    assert lifted == pytest.approx(2.0 * WEAPONS[4].radius, rel=0.1)  # a chord near the middle of the disc
+    assert made.position[-1, 0, 1] == pytest.approx(scene.bodies.position[0, 1] + lifted, abs=0.3)  # it may tilt
+    assert red.health == 100.0
+
+
+def test_money_is_paid_and_earned() -> None:
+    red, blue = played(loads(TEXT), taps("weapon", "fire"))[0].field.tanks.every
+    taken = red.points - (0 if blue.alive else PER_KILL)
+    assert red.money == 1000 - WEAPONS[1].cost + 5 * max(taken, 0)
+
+
+def test_a_pit_under_a_tank_costs_health_by_its_depth() -> None:
+    scene = loads(TEXT, overrides=["artillery.wind=0"])
+    x, y = scene.bodies.position[1].tolist()
+    pit = Weapon("pit", "shell", 8.0, 0.0, 0)
+
+    class Digs(ArtilleryRules):
+        """Fires nothing, but takes the ground from under Blue."""
+
+        def _fire(self) -> list[Action]:
+            self.phase = "fly"
+            return self.field.blast(self._time, self.shooter, (x, y - 0.75), pit)
+
+    digs = Digs(scene, scene.bodies)
+    made = run(scene, bout=Bout(digs, Script(taps("fire")), "script"))
+    assert made.status == "ok"
+    blue = digs.field.tanks.every[1]
+    fallen = y - float(made.position[-1, 1, 1])
+    assert fallen > 5.0
+    assert 100.0 - blue.health == pytest.approx(
+        3.0 * (fallen - 1.0), abs=1.5
+    )  # half a metre: in its pit it still rocks, slowly
+    assert digs.field.tanks.every[0].points == round(100.0 - blue.health)
+
+
+def test_a_cluster_comes_apart_and_keeps_its_momentum() -> None:
+    made = played(loads(TEXT), taps("weapon", "weapon", "fire"))[1]
+    spawned = [action["ball"] for action in made.info["actions"] if action["kind"] == "spawn"]
+    assert len(spawned) == 6
+    names = [ball["name"] for ball in spawned]
+    number = made.number(names[0])
+    velocity = made.velocity[:, number]
+    last = velocity[~np.isnan(velocity[:, 0])]
+    moving = last[np.hypot(*last.T) > 0.0][-1]
+    mean = np.mean([ball["velocity"] for ball in spawned[1:]], axis=0)
+    assert mean == pytest.approx(moving, abs=1e-9)
+    craters = [action for action in made.info["actions"] if action["kind"] == "reshape"]
+    assert len(craters) == 5
+
+
+def test_a_roller_rolls_before_it_goes_off() -> None:
+    made = played(loads(TEXT), taps("weapon", "weapon", "weapon", "fire"))[1]
+    kinds = [action["kind"] for action in made.info["actions"]]
+    assert kinds.count("spawn") == 2
+    assert kinds.count("reshape") == 1
+    first, second = (action for action in made.info["actions"] if action["kind"] == "spawn")
+    assert second["time"] > first["time"] + 1.0
+    roller = made.number(second["ball"]["name"])
+    way = made.position[:, roller, 0]
+    way = way[~np.isnan(way)]
+    assert abs(way[-1] - way[0]) > 1.0
+    assert (made.contact_pair == [roller, -1]).all(axis=1).any()
+
+
+def test_keys_set_the_gun_and_only_in_turn() -> None:
+    rules = rules_of(loads(TEXT))
+    assert isinstance(rules, ArtilleryRules)
+    red, blue = rules.field.tanks.every
+    before = red.angle, red.power
+    held = (Press(0.1, "left", 1.0), Press(0.6, "left", 0.0), Press(1.0, "up", 1.0), Press(2.0, "up", 0.0))
+    run(loads(TEXT, overrides=["world.duration=3"]), bout=Bout(rules, Script(held), "script"))
+    assert math.degrees(red.angle - before[0]) == pytest.approx(0.1 + 0.5 * 5.0, abs=0.06)  # a step of 10 ms
+    assert red.power - before[1] == pytest.approx(0.001 + 0.05 * 0.6 + 8 * 0.05 * 0.4, abs=0.01)
+    assert (blue.angle, blue.power) == (math.radians(120.0), 0.6)
+
+
+def test_rounds_end_a_game_that_nobody_wins() -> None:
+    scene = loads(TEXT, overrides=["artillery.rounds=1", "world.duration=26"])
+    away = taps("fire") + taps("fire", begin=12.0)
+    rules, _, _ = played(scene, away)
+    assert rules.over is not None
+    assert rules.over.startswith("out of shells")
+
+
+def test_a_copy_goes_on_by_itself() -> None:
+    rules = rules_of(loads(BOTS))
+    assert isinstance(rules, ArtilleryRules)
+    other = copy.deepcopy(rules)
+    run(loads(BOTS, overrides=["world.duration=12"]), bout=Bout(rules, Nobody(), "none"))
+    assert other.turn == 0
+    assert rules.turn > 0
+    assert other.field.ground is not rules.field.ground
+    assert other.field is other.barrage._field
+
+
+def test_lines_and_cues_tell_what_goes_on() -> None:
+    rules, _, _ = played(loads(TEXT), taps("fire"))
+    lines = dict(rules.lines())
+    assert set(lines) >= {"Red", "> Blue", "wind", "gun", "weapon", "last shot"}
+    assert "exactly" in lines["last shot"] or "gone" in lines["last shot"]
+    cues = rules.cues()
+    assert list(cues)[:2] == ["turn", "fire"]
+    assert "blast" in cues
+    assert rules.cues() == []
+
+
+def test_a_scene_without_players_is_unfit() -> None:
+    scene = loads('[play]\ngame = "artillery"\n[[ball]]\nposition = [0.0, 0.0]\nradius = 1.0')
+    with pytest.raises(UnfitError, match="needs \\[artillery\\]"):
+        rules_of(scene)

@@ -1,0 +1,224 @@
+"""Artillery as it is drawn: ground and craters, dirt in the air, tanks and guns; and in the window."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+from pressing import key, key_up
+
+from sandbox.action import Reshape
+from sandbox.games.artillery.rules import ArtilleryRules
+from sandbox.games.bout import Bout
+from sandbox.games.policies import Nobody
+from sandbox.measure.run import run
+from sandbox.play.artillery.gunnery import Burst, Clod, Gunnery
+from sandbox.play.artillery.seen import gunnery_of
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.artillery.sky import sky, tone
+from sandbox.play.drawing.picture import Picture
+from sandbox.play.footage.film import Film
+from sandbox.play.footage.still import offscreen
+from sandbox.play.running.live import Live
+from sandbox.play.sight import Sight
+from sandbox.play.stage import Stage
+from sandbox.play.window import Window
+from sandbox.recording import Recording
+from sandbox.scene.artillery.columns import course_of
+from sandbox.scene.file import loads
+from sandbox.scene.model import Scene
+from sandbox.trajectory import Frame
+
+SIZE = (400, 240)
+TEXT = """
+[world]
+gravity = [0.0, -9.81]
+linear_drag = 0.05
+duration = 5.0
+seed = 1
+[terrain]
+width = 100.0
+columns = 100
+base = 10.0
+height = 2.0
+[artillery]
+wind = 5.0
+edges = "{edges}"
+tracer = true
+speed = 30.0
+[[artillery.player]]
+name = "Red"
+position = 20.0
+[[artillery.player]]
+name = "Blue"
+position = 80.0
+bot = 1.0
+"""
+CAMERA = Camera((50.0, 20.0), 4.0, SIZE)
+"""100 m wide and 60 m high, from −10 m up"""
+
+
+def duel(edges: str = "open") -> Scene:
+    return loads(TEXT.format(edges=edges))
+
+
+def drawn(scene: Scene, gunnery: Gunnery | None = None, camera: Camera = CAMERA) -> np.ndarray:
+    bodies = scene.bodies
+    columns = bodies.position, bodies.velocity, bodies.angle, bodies.angular_velocity
+    frame = Frame(0.0, *(each.copy() for each in columns), np.ones(len(bodies), np.bool_))
+    surface = offscreen(SIZE)
+    Picture().draw(surface, camera, Sight(scene, bodies, frame, gunnery=gunnery))
+    return pygame.surfarray.array3d(surface).astype(int)
+
+
+def pixel(x: float, y: float) -> tuple[int, int]:
+    across, down = CAMERA.to_screen(np.array([x, y])).tolist()
+    return int(across), int(down)
+
+
+def test_ground_is_below_its_surface_and_sky_above() -> None:
+    picture, above = drawn(duel()), pygame.surfarray.array3d(sky(SIZE)).astype(int)
+    for x in (35.0, 50.0, 65.0):
+        assert (picture[pixel(x, 16.0)] == above[pixel(x, 16.0)]).all()
+        red, _, blue = picture[pixel(x, 8.5)].tolist()
+        assert red > blue  # soil, under a blue sky
+        assert picture[pixel(x, 2.0)].sum() < picture[pixel(x, 8.5)].sum()  # darker the deeper
+
+
+def test_a_crater_shows_the_sky_behind_it() -> None:
+    scene = duel()
+    heights = [12.0] * 100
+    heights[45:55] = [2.0] * 10
+    wall = scene.walls[0].model_copy(update={"points": course_of(heights, 100.0)})
+    picture = drawn(scene.model_copy(update={"walls": (wall,)}))
+    above = pygame.surfarray.array3d(sky(SIZE)).astype(int)
+    assert (picture[pixel(50.0, 6.0)] == above[pixel(50.0, 6.0)]).all()
+    assert (picture[pixel(40.0, 6.0)] != above[pixel(40.0, 6.0)]).any()
+
+
+@pytest.mark.parametrize("edges", ["rubber", "wrap"])
+def test_sides_that_hold_shells_are_seen(edges: str) -> None:
+    at = int(CAMERA.to_screen(np.array([100.0, 0.0]))[0])
+    columns = slice(at - 3, min(at + 3, SIZE[0]))
+    rest = slice(0, 100)  # above the ground
+    assert (drawn(duel(edges))[columns, rest] != drawn(duel())[columns, rest]).any()
+
+
+def test_dirt_in_the_air_hangs_over_sky() -> None:
+    scene = duel()
+    rules = ArtilleryRules(scene, scene.bodies)
+    plain = gunnery_of(rules, 0.0)
+    clod = Clod(left=48.0, right=52.0, bottom=22.0, top=26.0, floor=8.0)
+    falling = Gunnery(plain.guns, plain.size, 0.0, clods=(clod,))
+    picture, above = drawn(scene, falling), pygame.surfarray.array3d(sky(SIZE)).astype(int)
+    red, _, blue = picture[pixel(50.0, 23.0)].tolist()
+    assert red > blue
+    assert (picture[pixel(50.0, 9.0)] == above[pixel(50.0, 9.0)]).all()  # where it is to lie, it does not lie yet
+
+
+def test_tanks_guns_blasts_and_wind_are_drawn_where_they_are() -> None:
+    scene = duel()
+    rules = ArtilleryRules(scene, scene.bodies)
+    run_to_aim(rules, scene)
+    gunnery = gunnery_of(rules, 0.0)
+    assert [gun.name for gun in gunnery.guns] == ["Red", "Blue"]
+    assert [gun.aiming for gun in gunnery.guns] == [True, False]
+    assert gunnery.tracer is not None
+    plain = drawn(scene)
+    picture = drawn(scene, gunnery)
+    for x in (20.0, 80.0):
+        i, j = pixel(x, float(scene.bodies.position[0, 1]) + 2.0)
+        assert (picture[i - 12 : i + 12, j - 10 : j + 20] != plain[i - 12 : i + 12, j - 10 : j + 20]).any()
+    burst = Burst(0.1, (50.0, 30.0), 6.0, dirt=False)
+    bright = drawn(scene, Gunnery((), gunnery.size, 0.0, bursts=(burst,)))[pixel(50.0, 30.0)]
+    assert bright.sum() > plain[pixel(50.0, 30.0)].sum()
+
+
+def run_to_aim(rules: ArtilleryRules, scene: Scene) -> None:
+    short = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.05})})
+    run(short, bout=Bout(rules, Nobody(), "none"))
+    assert rules.phase == "aim"
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e3, 1e9])
+@pytest.mark.parametrize("centre", [(50.0, 10.0), (-1e9, 1e9), (1e15, 0.0)])
+def test_no_camera_is_too_far_or_too_near(centre: tuple[float, float], scale: float) -> None:
+    scene = duel("rubber")
+    rules = ArtilleryRules(scene, scene.bodies)
+    run_to_aim(rules, scene)
+    clods = (Clod(48.0, 52.0, 22.0, 26.0, 8.0),)
+    way = np.array([[20.0, 12.0], [1e9, 1e9], [60.0, 12.0]])
+    told = gunnery_of(rules, 0.0)
+    wild = Gunnery(told.guns, told.size, 900.0, (way,), (0,), (Burst(0.2, (50.0, 1e12), 5.0, True),), clods, way)
+    drawn(scene, wild, Camera(centre, scale, SIZE))
+
+
+def test_the_sky_goes_from_its_first_tone_to_its_last() -> None:
+    assert (tone(0.0), tone(2.0)) == ((13, 17, 34), (240, 186, 140))
+
+
+def test_films_show_the_ground_as_it_was() -> None:
+    scene = duel()
+    pit = Reshape(time=1.0, thing="terrain", points=course_of([2.0] * 100, 100.0))
+    film = Film(run(scene, actions=[pit]))
+    before, after = film.sight(0.5, frozenset()).scene, film.sight(1.5, frozenset()).scene
+    assert before.walls == scene.walls
+    assert after.walls[0].points == pit.points
+    assert film.sight(1.6, frozenset()).scene is after  # one object, so that its picture is kept
+
+
+@pytest.fixture
+def window(tmp_path: Path) -> Iterator[Window]:
+    file = tmp_path / "duel.toml"
+    file.write_text(TEXT.format(edges="open"))
+    stage = Stage()
+    stage.take(file)
+    opened = Window(stage, size=(640, 400), folder=tmp_path, say=lambda _: None)
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+def turn(window: Window, *events: pygame.event.Event) -> ArtilleryRules:
+    for event in events:
+        pygame.event.post(event)
+    window.turn(0.05)
+    assert window.stage.host is not None
+    rules = window.stage.host.rules
+    assert isinstance(rules, ArtilleryRules)
+    return rules
+
+
+def test_keys_aim_and_fire_and_going_back_takes_back(window: Window, tmp_path: Path) -> None:
+    rules = turn(window)
+    red = rules.shooter
+    angle, power = red.angle, red.power
+    turn(window, key(pygame.K_LEFT))
+    turn(window, key_up(pygame.K_LEFT), key(pygame.K_UP))
+    rules = turn(window, key_up(pygame.K_UP), key(pygame.K_w))
+    red = rules.shooter
+    assert red.angle > angle
+    assert red.power > power
+    assert red.weapon == 1
+    fired = window.stage.show.step_number if window.stage.show is not None else 0
+    turn(window, key_up(pygame.K_w), key(pygame.K_SPACE))
+    while (rules := turn(window)).phase == "fly":
+        pass
+    live = window.stage.show
+    assert isinstance(live, Live)
+    crater = live.scene.walls[0].points
+    assert rules.phase == "settle"
+    assert rules.field.ground.points == crater
+    assert any("shell: at" in text for _, text in window.stage.messages.shown())
+    recording = tmp_path / "duel.json"
+    kept = live.session.recording()
+    kept.save(recording)
+    assert kept.score == rules.score
+    assert Recording.load(recording).presses == kept.presses
+    live.seek(fired)
+    live.arrive()
+    rules = turn(window)
+    assert rules.shots == []
+    assert live.scene.walls[0].points != crater
