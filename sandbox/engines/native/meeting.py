@@ -159,6 +159,8 @@ class MeetingBodies:
 
     def hold(self, number: int) -> None:
         """Let a body stand still where it is, whatever it meets, until it is let go."""
+        if number in self._resting:  # it rests already: what pymunk tells then is no mass
+            return
         body = self._members[number].body
         self._resting[number] = body.mass, body.moment
         body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
