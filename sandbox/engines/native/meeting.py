@@ -165,6 +165,7 @@ class MeetingBodies:
         self._resting[number] = body.mass, body.moment
         body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
         body.body_type = pymunk.Body.KINEMATIC
+        pymunk.Body.update_position(body, 0.0)  # forgets by how much overlaps would still have shifted it
         self._state = None
 
     def let_go(self, number: int) -> None:
