@@ -218,6 +218,12 @@ def test_overrides_reach_elements_and_what_they_stand_for() -> None:
         ({"kicker": [{"position": [0, 0]}]}, "pinball.kicker[0].out", "must be given"),
         ({"art": [{"colour": "#000000", "radius": 1.0}]}, "pinball.art[0]", "has no shape"),
         ({"art": [{"position": [0, 0], "radius": 1.0}]}, "pinball.art[0].colour", "must be given"),
+        (
+            {"art": [{"points": [[0, 0], [1, 0, 5], [1, 1]], "colour": "#000000"}]},
+            "pinball.art[0].points[1]",
+            "rounded by",
+        ),
+        ({"wall": [{"points": [[0, 0], [0, 0]]}]}, "pinball.wall[0].points[1]", "is no line"),
         ({"outline": [[0, 0], [1, 0, 5], [1, 1]]}, "pinball.outline[1]", "rounded by too much"),
     ],
 )

@@ -57,7 +57,7 @@ def rounded(corners: Sequence[Corner], closed: bool = False, tolerance: float = 
         tolerance: how far a chord may lie from its arc, m.
 
     Raises:
-        RoundingError: an edge is too short for the arcs at its ends, a corner turns right back, or all lie on each other.
+        RoundingError: an edge is too short for the arcs at its ends, a corner turns right back, or all are one point.
     """
     arcs = [arc_at(corners, k, closed) for k in range(len(corners))]
     _fit(corners, arcs, closed)
