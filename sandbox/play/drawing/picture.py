@@ -16,8 +16,8 @@ from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
 from sandbox.play.drawing.grid import draw_grid, draw_scale
 from sandbox.play.drawing.markings import draw_markings
 from sandbox.play.drawing.overlays import Overlays
-from sandbox.play.drawing.painted import draw_painted
 from sandbox.play.drawing.palette import BACKGROUND, CLEAR, TOUCHING, ColourArray, colour_of
+from sandbox.play.drawing.playfield import draw_playfield
 from sandbox.play.drawing.points import LARGEST, Packed, Points, packed
 from sandbox.play.drawing.polygons import Polygons
 from sandbox.play.drawing.pucks import draw_pucks
@@ -243,8 +243,8 @@ class Picture:
             drawn = pygame.Surface(surface.get_size(), 0, surface)
             drawn.fill(BACKGROUND)
             area = sight.scene.play.area
-            if sight.scene.play.paints:
-                draw_painted(drawn, camera, sight.scene, unit, antialias)
+            if sight.scene.play.ground == "playfield":
+                draw_playfield(drawn, camera, sight.scene, unit, antialias)
             elif sight.scene.artillery is not None:
                 draw_land(drawn, camera, sight.scene, unit, antialias)
             elif area is None:

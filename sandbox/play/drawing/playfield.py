@@ -1,4 +1,4 @@
-"""Painted: a scene with paint on its ground, as a playfield has: paint, lamps, shadows of what is fixed, caps."""
+"""Playfield: a ground of markings alone, with lamps, shadows of what is fixed, and caps on posts that kick."""
 
 from itertools import pairwise
 
@@ -8,12 +8,12 @@ import pygame
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.decks import on_layer
 from sandbox.play.drawing.fixtures import draw_fixtures
+from sandbox.play.drawing.markings import draw_markings
 from sandbox.play.drawing.palette import BACKGROUND, INK, Colour, colour_of_fixed, hex_colour, mixed
 from sandbox.play.drawing.shade import Look, disc_distance, paint
-from sandbox.play.drawing.strokes import Pixel, clipped, cut, fill, stroke
+from sandbox.play.drawing.strokes import Pixel, clipped, stroke
 from sandbox.play.drawing.zones import draw_zones
 from sandbox.scene.model import Post, Scene
-from sandbox.scene.paint import Paint
 from sandbox.scene.part import Point
 from sandbox.scene.surfaced import GROUND
 
@@ -31,12 +31,11 @@ RAISED = 0.62
 """of the radius of a post that kicks: its cap"""
 
 
-def draw_painted(
+def draw_playfield(
     surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
 ) -> None:
-    """Draw the ground of a painted scene and what is fixed on it, as far as it is in sight."""
-    for area in scene.play.paints:
-        _area(surface, camera, area, antialias)
+    """Draw such a ground and what is fixed on it, as far as it is in sight."""
+    draw_markings(surface, camera, scene, unit, antialias)
     _shadows(surface, camera, scene)
     for part in scene.play.parts:
         if part.light is not None:
@@ -53,16 +52,6 @@ def draw_painted(
 def _coloured(scene: Scene) -> Scene:
     """Return a scene with only those zones that have a colour of their own; paint and lamps mark the others."""
     return scene.model_copy(update={"zones": tuple(zone for zone in scene.zones if zone.colour is not None)})
-
-
-def _area(surface: pygame.Surface, camera: Camera, area: Paint, antialias: bool) -> None:
-    colour = hex_colour(area.colour)
-    if area.points is not None:
-        corners = cut([(x, y) for x, y in camera.to_screen(np.asarray(area.points)).tolist()], surface.get_clip())
-        if corners:
-            fill(surface, corners, colour, antialias)
-    elif area.position is not None and area.radius is not None:
-        _disc(surface, camera, area.position, area.radius, Look(colour, colour, 0.0, 1.0, antialias))
 
 
 def _cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
