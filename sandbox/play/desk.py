@@ -1,5 +1,6 @@
 """Desk: everything that is drawn, from the picture of the scene to the panel, and who takes which event first."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pygame
@@ -182,7 +183,7 @@ class Desk:
             if stage.gestures is not None:
                 sight = stage.gestures.seen.over(sight)
             if stage.host is not None:
-                sight = over(stage.host.rules, sight)
+                sight = over(stage.host.rules, replace(sight, lit=stage.host.lit()))
             foot = float(self._area.height)
             self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=foot)
             if show.contacts is not self._heard:

@@ -64,7 +64,11 @@ class Building:
 
     def part(self, name: str, role: Role, element: Scoring | None = None, **more: Any) -> None:
         """Say which part something plays; of an element that rules hear of, with what it states."""
-        stated = {} if element is None else {key: getattr(element, key) for key in ("score", "group", "step", "light")}
+        stated = (
+            {}
+            if element is None
+            else {key: getattr(element, key) for key in ("score", "group", "step", "light", "colour")}
+        )
         self.parts.append(PlayPart(name=name, role=role, **{**stated, **more}))
 
     def paint(self, colour: str | None, points: Sequence[Point]) -> None:
