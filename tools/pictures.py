@@ -16,6 +16,8 @@ from PIL import Image
 
 from sandbox.cli.main import call
 from sandbox.games.billiards.bot.bot import Bot
+from sandbox.games.pinball.hand import Hand
+from sandbox.games.rules import Seen
 from sandbox.play.messages import Messages
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
@@ -101,6 +103,24 @@ def landing(file: str) -> None:
     opened.close()
 
 
+def pinball(scene: str, file: str, seconds: float) -> None:
+    """Let a player who watches the ball play for so long, and keep what is seen."""
+    opened = Window(Stage(), size=SIZE)
+    opened.stage.open(find(scene))
+    opened.turn(FRAME)
+    opened.stage.messages = Messages()
+    live, host = opened.stage.live, opened.stage.host
+    assert live is not None
+    assert host is not None
+    player = Hand(live.scene.world.seed)
+    while live.frame.time < seconds:
+        for control, value in player.decide(Seen(live.frame.time, live.frame, live.contacts, ()), host.rules):
+            host.hold("player", control, value)
+        opened.turn(FRAME)
+    pygame.image.save(opened.surface, FOLDER / file)
+    opened.close()
+
+
 def table(file: str) -> None:
     """Break, aim as a good player would, and keep what is seen; the numbers of the bot are those of its seed."""
     opened = sit_down("8-ball")
@@ -163,5 +183,6 @@ if __name__ == "__main__":
     table("table.png")
     duel("duel.png")
     landing("landing.png")
+    pinball("full", "pinball.png", 30.0)
     rolling("break.gif", 2.6)
     film("tearing_cloth", "tearing.gif", "--size", "640x340", "--fps", "20", "--until", "1.6")

@@ -12,6 +12,9 @@ from sandbox.scene.parts import Role
 from sandbox.scene.pinball.element import Corner, Scoring
 from sandbox.scene.pinball.rounding import rounded
 
+STATED = "score", "group", "step", "light", "colour"
+"""what a part has from its element"""
+
 
 @dataclass
 class Building:
@@ -64,11 +67,7 @@ class Building:
 
     def part(self, name: str, role: Role, element: Scoring | None = None, **more: Any) -> None:
         """Say which part something plays; of an element that rules hear of, with what it states."""
-        stated = (
-            {}
-            if element is None
-            else {key: getattr(element, key) for key in ("score", "group", "step", "light", "colour")}
-        )
+        stated = {} if element is None else {key: getattr(element, key) for key in STATED}
         self.parts.append(PlayPart(name=name, role=role, **{**stated, **more}))
 
     def paint(self, colour: str | None, points: Sequence[Point]) -> None:

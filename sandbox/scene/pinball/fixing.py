@@ -111,4 +111,5 @@ def _plate(face: Point, out: Vector, width: float, thickness: float) -> tuple[Po
 
 
 def moved(point: Point, way: Vector, distance: float) -> Point:
+    """Return a point moved so far, m, along a unit vector."""
     return point[0] + way[0] * distance, point[1] + way[1] * distance

@@ -38,7 +38,7 @@ def kicker(to: Building, name: str, of: Kicker) -> None:
     to.zone(name, position=of.position, radius=of.radius, colour=of.colour, holds=True)
     to.dot(of.colour, of.position, 1.25 * of.radius)
     to.dot(DARK, of.position, of.radius)
-    light = of.light or moved(of.position, unit(of.out), of.radius + BEFORE)
+    light = of.light or (moved(of.position, unit(of.out), of.radius + BEFORE) if any(of.out) else None)
     to.part(name, "kicker", of, out=of.out, at=of.position, light=light)
 
 
