@@ -20,7 +20,7 @@ AMBER: Colour = (255, 196, 84)
 WHITE: Colour = (255, 255, 255)
 RADIUS = 0.0065
 """m"""
-GLOW, STRENGTH = 5.0, 0.55
+GLOW, STRENGTH = 6.5, 0.75
 """how far the light reaches, in radii of the lamp, and how much it adds beside it"""
 LARGEST = 400.0
 """px, radius of a lamp so near that its glow would cost more than it shows"""
