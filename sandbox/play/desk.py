@@ -175,6 +175,7 @@ class Desk:
         if self.picker is not None:
             self.picker.draw(surface, self.unit)
             return
+        foot = self.foot + self.covered(stage)[1]
         if show is None:
             surface.fill(BACKGROUND)
         else:
@@ -184,8 +185,7 @@ class Desk:
                 sight = stage.gestures.seen.over(sight)
             if stage.host is not None:
                 sight = over(stage.host.rules, replace(sight, lit=stage.host.lit()))
-            foot = float(self._area.height)
-            self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=foot)
+            self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=float(foot))
             if show.contacts is not self._heard:
                 self._heard = show.contacts
                 self._sounds.hits(show.contacts, show.bodies)
@@ -194,7 +194,7 @@ class Desk:
         if stage.game is None:
             self.tools.foot = 0
         status = self.status(stage, rate, recording)
-        self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot + self.tools.foot)
+        self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=foot + self.tools.foot)
         if show is not None and not self.manual.open:
             if stage.gestures is not None:
                 self.tools.draw(surface, stage.gestures.person, self._free, self._hud_width(show), self.unit)
