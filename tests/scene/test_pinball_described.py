@@ -159,11 +159,11 @@ def test_ramp_has_rails_on_its_layer_a_mouth_that_lifts_and_an_end_that_lets_dow
 
 def test_what_has_a_colour_inside_is_painted_and_lies_over_the_playfield() -> None:
     wall = {"points": [[0, 0], [0.1, 0], [0.1, 0.1, 0.02]], "closed": True, "fill": "#123456"}
-    paints = table(wall=[wall]).play.paints
-    assert [paint.colour for paint in paints[:3]] == ["#14304a", "#e9b44c", "#123456"]
-    assert paints[2].points is not None
-    assert len(paints[2].points) > 3  # one corner is round
-    assert max(y for _, y in paints[0].points or ()) == pytest.approx(1.0, abs=2e-5)  # the tolerance
+    markings = table(wall=[wall]).play.markings
+    assert [marking.colour for marking in markings[:3]] == ["#14304a", "#e9b44c", "#123456"]
+    assert markings[2].points is not None
+    assert len(markings[2].points) > 3  # one corner is round
+    assert max(y for _, y in markings[0].points or ()) == pytest.approx(1.0, abs=2e-5)  # the tolerance
 
 
 def test_what_the_scene_states_outranks_the_table() -> None:
