@@ -77,7 +77,7 @@ def _clods(rules: ArtilleryRules, time: float) -> tuple[Clod, ...]:
 def _tracer(rules: ArtilleryRules) -> FloatArray | None:
     """Return the way of a shot as the gun is set now, as far as the first side or the ground."""
     tank, field = rules.shooter, rules.field
-    start = field.tanks.muzzle(tank, np.array([tank.angle]))[0]
+    start = field.tanks.muzzle(tank).at(np.array([tank.angle]))[0]
     velocity = rules.speed(tank) * np.array([math.cos(tank.angle), math.sin(tank.angle)])
     flight, down = Flight(rules.world, start, velocity), landing(rules.world, start, velocity, field.ground)
     until = down.time if down is not None else LONGEST_TRACER
