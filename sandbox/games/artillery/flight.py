@@ -149,11 +149,7 @@ def _first(flight: Flight, ground: Ground, edges: Edges, discs: FloatArray, long
     for first in range(0, int(longest / FINE), count):
         places = flight.places(first, count + 1)
         low = np.minimum(places[:-1, 1], places[1:, 1]) <= top
-        beside = (
-            np.zeros(count, np.bool_)
-            if edges == "open"
-            else ~((places[1:, 0] >= 0.0) & (places[1:, 0] <= ground.width))
-        )
+        beside = (places[1:, 0] < 0.0) | (places[1:, 0] > ground.width)
         for k in np.flatnonzero(low | beside).tolist():  # elsewhere is nothing to meet
             a, b = places[k], places[k + 1]
             begin, end = (first + k) * FINE, (first + k + 1) * FINE

@@ -1,4 +1,4 @@
-"""Volley: shells in thought, which all fly at once, as the bodies of one state, by the engine `reference`'s Runge–Kutta.
+"""Volley: shells in thought, all flying at once as the bodies of one state, by the engine `reference`'s Runge–Kutta.
 
 It flies by and by: whoever asks for a part of the way, and then for the next, gets the same as who asks for all of it.
 """
