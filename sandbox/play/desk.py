@@ -164,7 +164,7 @@ class Desk:
             if stage.gestures is not None:
                 sight = stage.gestures.seen.over(sight)
             if stage.host is not None:
-                sight = over(stage.host.rules, sight)
+                sight = over(stage.host.rules, sight, present=not stage.host.live.peeking)
             foot = float(self._area.height)
             self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=foot)
             if show.contacts is not self._heard:

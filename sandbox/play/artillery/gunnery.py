@@ -17,8 +17,8 @@ class Gun:
     """of the barrel, rad, anticlockwise from the right"""
     power: float
     """share of full speed"""
-    health: float
-    """0 to 1"""
+    health: float | None
+    """0 to 1, where it is known"""
     aiming: bool
     """It is its turn, and nothing has been fired yet."""
 
@@ -57,7 +57,7 @@ class Gunnery:
     """A moment of a game."""
 
     guns: tuple[Gun, ...]
-    """those that still fight"""
+    """those that still fight, or did then"""
     size: tuple[float, float]
     """of a tank, m"""
     wind: float

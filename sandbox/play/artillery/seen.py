@@ -21,9 +21,21 @@ LONGEST_TRACER = 10.0
 """s, of a shot that comes down nowhere"""
 
 
-def over(rules: Rules, sight: Sight) -> Sight:
-    """Return a sight with what a game adds to it; of other games than artillery the sight as it is."""
-    return replace(sight, gunnery=gunnery_of(rules, sight.frame.time)) if isinstance(rules, ArtilleryRules) else sight
+def over(rules: Rules, sight: Sight, present: bool = True) -> Sight:
+    """Return a sight with what a game adds to it; of other games than artillery the sight as it is.
+
+    Args:
+        rules: as they stand.
+        sight: of the scene.
+        present: the sight is of now. The rules know no other time: then all that they add is what tanks look like.
+    """
+    if not isinstance(rules, ArtilleryRules):
+        return sight
+    if present:
+        return replace(sight, gunnery=gunnery_of(rules, sight.frame.time))
+    tanks = rules.field.tanks
+    guns = tuple(Gun(tank.number, tank.name, tank.angle, tank.power, None, aiming=False) for tank in tanks.every)
+    return replace(sight, gunnery=Gunnery(guns, tanks.size, wind=0.0))
 
 
 def gunnery_of(rules: ArtilleryRules, time: float) -> Gunnery:
