@@ -9,6 +9,7 @@ from sandbox.play.artillery.seen import over
 from sandbox.play.billiards.game import PLAYERS
 from sandbox.play.camera import Camera
 from sandbox.play.claims import Claims, claims
+from sandbox.play.drawing.inset import Inset
 from sandbox.play.drawing.palette import BACKGROUND, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
@@ -49,7 +50,7 @@ class Desk:
         self._honours = HonoursPanel()
         self._timeline = Timeline()
         self._graph = EnergyGraph()
-        self._picture = Picture()
+        self._picture, self._inset = Picture(), Inset()
         self._sounds = Sounds()
         self._knobs = Knobs()
         self._size = size
@@ -78,6 +79,11 @@ class Desk:
     def _area(self) -> pygame.Rect:
         """Where the timeline lies."""
         return pygame.Rect(0, self._size[1] - self.foot, self._size[0] - self.panel.width, self.foot)
+
+    @property
+    def _free(self) -> pygame.Rect:
+        """What neither the panel nor the timeline covers."""
+        return pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
 
     def claims(self, stage: Stage) -> Claims:
         """Return the keys that the scene claims."""
@@ -167,6 +173,8 @@ class Desk:
                 sight = over(stage.host.rules, sight, present=not stage.host.live.peeking)
             foot = float(self._area.height)
             self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=foot)
+            aside = round(GRAPH[0] * self.unit) if "energy" in self.overlays else 0
+            self._inset.draw(surface, camera, sight, self._free, antialias=self.antialias, unit=self.unit, aside=aside)
             if show.contacts is not self._heard:
                 self._heard = show.contacts
                 self._sounds.hits(show.contacts, show.bodies)
@@ -178,14 +186,12 @@ class Desk:
         self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot + self.tools.foot)
         words = f"{status.engine}  ·  {status.settings}"
         if stage.gestures is not None and not self.manual.open:
-            free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
-            self.tools.draw(surface, stage.gestures.person, free, hud_width(words, self.unit), self.unit)
+            self.tools.draw(surface, stage.gestures.person, self._free, hud_width(words, self.unit), self.unit)
         elif stage.host is not None and not self.manual.open:
-            free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
-            draw_score(surface, stage.host.board(), free, hud_width(words, self.unit), self.unit)
+            draw_score(surface, stage.host.board(), self._free, hud_width(words, self.unit), self.unit)
             for note in self._honours.watch(stage.host):
                 stage.messages.tell(note, "warning")
-            self._honours.draw(surface, free, self.unit)
+            self._honours.draw(surface, self._free, self.unit)
         if show is not None:
             self._draw_graph(surface, stage)
             if self.foot:

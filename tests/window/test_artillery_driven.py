@@ -1,4 +1,4 @@
-"""Artillery in a real window: aimed and fired by real keys; the ground is another then, and the session keeps it all."""
+"""Artillery in a real window: aimed and fired by real keys; ground is dug away, and the session keeps it all."""
 
 from pathlib import Path
 
