@@ -60,8 +60,8 @@ class Gunnery:
     """those that still fight, or did then"""
     size: tuple[float, float]
     """of a tank, m"""
-    wind: float
-    """m/s, to the right"""
+    wind: float | None
+    """m/s, to the right, where it is known"""
     ways: tuple[FloatArray, ...] = ()
     """(P, 2) m, where the shells of the last shot have been"""
     flying: tuple[int, ...] = ()

@@ -35,7 +35,7 @@ def over(rules: Rules, sight: Sight, present: bool = True) -> Sight:
         return replace(sight, gunnery=gunnery_of(rules, sight.frame.time))
     tanks = rules.field.tanks
     guns = tuple(Gun(tank.number, tank.name, tank.angle, tank.power, None, aiming=False) for tank in tanks.every)
-    return replace(sight, gunnery=Gunnery(guns, tanks.size, wind=0.0))
+    return replace(sight, gunnery=Gunnery(guns, tanks.size, wind=None))
 
 
 def gunnery_of(rules: ArtilleryRules, time: float) -> Gunnery:
