@@ -39,7 +39,9 @@ def choose(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tuple[Ta
 class Thought:
     """A bot's thought about its turn, by and by. A copy goes on by itself."""
 
-    def __init__(self, world: World, field: Field, shooter: Tank, random: np.random.Generator) -> None:
+    def __init__(
+        self, world: World, field: Field, shooter: Tank, random: np.random.Generator, skill: float | None = None
+    ) -> None:
         """Choose a target and a weapon, and begin to look for the shot.
 
         Args:
@@ -47,10 +49,11 @@ class Thought:
             field: as it lies.
             shooter: who thinks.
             random: the chances of the turn.
+            skill: 0 to 1; by default that of the shooter, who is a bot.
         """
         target, self.weapon = choose(field.tanks, shooter, random)
         self._full = field.artillery.speed
-        self._lack = 1.0 - (shooter.player.bot or 0.0)
+        self._lack = 1.0 - ((shooter.player.bot or 0.0) if skill is None else skill)
         self._errors = random.standard_normal(2).tolist()
         self._search = Search(
             Range(
