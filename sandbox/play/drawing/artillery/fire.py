@@ -125,7 +125,7 @@ def _wind(view: View, wind: float) -> None:
     middle, top = 96.0 * view.unit, 150.0 * view.unit
     half = min(max(7.0 * abs(wind), 8.0), 84.0) * view.unit
     told = f"wind {abs(wind):.1f} m/s" if wind else "no wind"
-    _back(view, (middle, top + 7.0 * view.unit), (184.0 * view.unit, 44.0 * view.unit))
+    _back(view, (middle, top + 7.0 * view.unit), (172.0 * view.unit, 44.0 * view.unit))
     write(view.surface, told, (middle + 1, top + 9 * view.unit + 1), size, BACKGROUND, "midtop", bold=True)
     write(view.surface, told, (middle, top + 9 * view.unit), size, INK, "midtop", bold=True)
     if wind:
