@@ -72,13 +72,17 @@ class Script:
 
 
 def _skilled(scene: Scene) -> Policy:
-    """Return a player who watches the ball, of the one game that has one.
+    """Return a player who watches the ball, or aims a gun.
 
     Raises:
-        UnfitError: it is another game.
+        UnfitError: it is a game that none knows.
     """
+    if scene.play.game == "artillery":
+        from sandbox.games.artillery.hand import Hand as Gunner  # an engine's integrators, which others do without
+
+        return Gunner(scene.world.seed)
     if scene.play.game != "pinball":
-        raise UnfitError(f"skilled plays pinball alone, not {scene.play.game}; random plays everything")
+        raise UnfitError(f"skilled plays pinball and artillery, not {scene.play.game}; random plays everything")
     return Hand(scene.world.seed)
 
 

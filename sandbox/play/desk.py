@@ -10,6 +10,7 @@ from sandbox.play.artillery.seen import over
 from sandbox.play.billiards.game import PLAYERS
 from sandbox.play.camera import Camera
 from sandbox.play.claims import Claims, claims
+from sandbox.play.drawing.inset import Inset
 from sandbox.play.drawing.palette import BACKGROUND, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
@@ -53,7 +54,7 @@ class Desk:
         self._honours = HonoursPanel()
         self._timeline = Timeline()
         self._graph = EnergyGraph()
-        self._picture = Picture()
+        self._picture, self._inset = Picture(), Inset()
         self._sounds = Sounds()
         self._knobs = Knobs()
         self._size = size
@@ -184,8 +185,12 @@ class Desk:
             if stage.gestures is not None:
                 sight = stage.gestures.seen.over(sight)
             if stage.host is not None:
-                sight = over(stage.host.rules, replace(sight, lit=stage.host.lit()))
-            self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=float(foot))
+                lit = replace(sight, lit=stage.host.lit())
+                sight = over(stage.host.rules, lit, present=not stage.host.live.peeking)
+            depth = float(foot)
+            self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=depth)
+            aside = round(GRAPH[0] * self.unit) if "energy" in self.overlays else 0
+            self._inset.draw(surface, camera, sight, self._free, antialias=self.antialias, unit=self.unit, aside=aside)
             if show.contacts is not self._heard:
                 self._heard = show.contacts
                 self._sounds.hits(show.contacts, show.bodies)

@@ -119,7 +119,7 @@ class Stage:
         self.hands.forget()
         self.faults = ()
         if isinstance(show, Live):
-            few = len(show.bodies) <= FEW
+            few = len(show.bodies) <= FEW and self.host is None  # what rules and hands do next, no twin can tell
             show.company.show_trust(few if self._trusting is None else self._trusting)
             if self._ghosted and not show.company.ghosted:
                 show.company.show_ghost(True)

@@ -17,7 +17,7 @@ def claimed(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
     if relaunch is not None and relaunch not in names:
         yield ("play", "relaunch"), f"no generator is named {relaunch!r}; there are {_some(names)}"
     spots = [spot.name for spot in scene.play.spots]
-    for key, box in (("area", scene.play.area), ("view", scene.play.view)):
+    for key, box in (("area", scene.play.area), ("view", scene.play.view), ("inset", scene.play.inset)):
         if box is not None and not all(low < high for low, high in zip(*box, strict=True)):
             yield ("play", key), "encloses nothing; give the lower left and then the upper right corner"
     for k, marking in enumerate(scene.play.markings):

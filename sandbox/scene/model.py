@@ -150,6 +150,8 @@ class Play(Part):
     """lower left and upper right corner of a table's playing area, m"""
     view: tuple[Point, Point] | None = None
     """lower left and upper right corner of what the window shows at first, m; by default what the bodies may reach"""
+    inset: tuple[Point, Point] | None = None
+    """lower left and upper right corner of what is besides shown larger in a corner of the picture, m"""
     spots: tuple[Spot, ...] = Field((), alias="spot")
     curling: CurlingMatch | None = None
     """of a match of curling"""

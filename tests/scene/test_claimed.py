@@ -44,6 +44,7 @@ def test_what_is_there_can_be_claimed(play: dict[str, Any]) -> None:
         ({"arrow_step": 0}, "play.arrow_step", "greater than 0"),
         ({"show": "all"}, "play.show", "overlap"),
         ({"view": [[0, 1], [1, 1]]}, "play.view", "encloses nothing"),
+        ({"inset": [[0, 0], [0, 1]]}, "play.inset", "encloses nothing"),
         ({"game": "chess"}, "play.game", "'landing'"),
         ({"zzz": 1}, "play.zzz", r"\w"),
         ({"part": [{"name": "a.b", "role": "lamp"}]}, "play.part.a.b.role", "one of 'ball', 'bumper'"),

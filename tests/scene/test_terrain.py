@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sandbox.measure.seeds import seeded
 from sandbox.scene.artillery.columns import QUANTUM, columns_of, course_of, settled
 from sandbox.scene.artillery.described import Terrain
 from sandbox.scene.artillery.landscape import heights_of
@@ -72,7 +73,8 @@ def test_tanks_stand_on_level_ground() -> None:
     scene = loads(DUEL)
     heights = columns(scene)
     assert scene.play.game == "artillery"
-    assert scene.terrain is None
+    assert scene.terrain is not None
+    assert scene.terrain.laid == scene.world.seed
     assert [box.name for box in scene.boxes] == ["Red", "Blue"]
     for box in scene.boxes:
         under = {h for k, h in enumerate(heights) if abs(2.0 * k + 1.0 - box.position[0]) <= 1.5 + 2.0}
@@ -91,6 +93,24 @@ def test_it_is_the_same_read_written_and_read_again() -> None:
     moved = loads(DUEL, overrides=["artillery.player.Red.position=60", "wall.terrain.restitution=0.3"])
     assert moved.boxes[0].position[0] == 60.0
     assert moved.walls[0].restitution == 0.3
+
+
+@given(st.integers(0, 2**63 - 1))
+def test_another_seed_lays_out_other_hills_also_where_they_were_written_out(seed: int) -> None:
+    scene = loads(DUEL)
+    assert seeded(scene, seed) == loads(DUEL, overrides=[f"world.seed={seed}"])
+    assert seeded(seeded(scene, seed), scene.world.seed) == scene
+
+
+def test_another_seed_leaves_what_was_changed_by_hand() -> None:
+    scene = loads(DUEL, overrides=["wall.terrain.restitution=0.3", "box.Red.position=[30.0, 90.0]"])
+    other = seeded(scene, 6)
+    assert columns(other) == columns(loads(DUEL, overrides=["world.seed=6"]))
+    assert other.walls[0].restitution == 0.3
+    assert other.boxes[0].position == (30.0, 90.0)
+    points = course_of([2.0] * 100, 200.0)
+    flat = from_document(to_document(scene), "<scene>", [("wall.terrain.points", [list(each) for each in points])])
+    assert columns(seeded(flat, 6)) == (2.0,) * 100
 
 
 def test_stated_heights_are_the_ground() -> None:

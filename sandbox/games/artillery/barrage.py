@@ -39,7 +39,7 @@ class Barrage:
     def fire(self, time: float, world: World, tank: Tank, weapon: Weapon, speed: float) -> list[Action]:
         """Fire from a tank at a time, s, in the air of a world, at a speed, m/s."""
         field = self._field
-        place = field.tanks.muzzle(tank, np.array([tank.angle]))[0]
+        place = field.tanks.muzzle(tank).at(np.array([tank.angle]))[0]
         velocity = speed * np.array([math.cos(tank.angle), math.sin(tank.angle)])
         field.cues.append("fire")
         field.blasts.clear()

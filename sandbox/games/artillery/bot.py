@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 
-from sandbox.games.artillery.aim import Aim, best_aim
+from sandbox.games.artillery.aim import Aim, Range, Search
 from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.tanks import Tank, Tanks
 from sandbox.games.artillery.weapons import WEAPONS
 from sandbox.scene.model import World
-from sandbox.trajectory import FloatArray
 
 STREAM = 12
 """of the scene's seed; ground has another"""
@@ -19,6 +18,8 @@ NEAR = 0.2
 """of the crater's radius: a shot that comes down as near to the target as this is as good as any"""
 BIG = 0.5
 """the chance of a shot that costs, where there is money for it"""
+WORK = 6_000
+"""of the search for a shot, at each look of the rules: 1 to 4 ms, so that a window stays smooth, and some 80 looks"""
 
 
 def chances(seed: int, turn: int) -> np.random.Generator:
@@ -35,16 +36,43 @@ def choose(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tuple[Ta
     return target, able[-1] if able and big and target.health > WEAPONS[0].damage else 0
 
 
-def aimed(world: World, field: Field, shooter: Tank, target: Tank, radius: float, random: np.random.Generator) -> Aim:
-    """Return the shot that a bot takes at a target: the best there is, but for its error."""
-    full = field.artillery.speed
+class Thought:
+    """A bot's thought about its turn, by and by. A copy goes on by itself."""
 
-    def muzzle(angle: FloatArray) -> FloatArray:
-        return field.tanks.muzzle(shooter, angle)
+    def __init__(
+        self, world: World, field: Field, shooter: Tank, random: np.random.Generator, skill: float | None = None
+    ) -> None:
+        """Choose a target and a weapon, and begin to look for the shot.
 
-    aim = best_aim(world, muzzle, field.ground, field.artillery.edges, full, target.place, NEAR * radius)
-    lack = 1.0 - (shooter.player.bot or 0.0)
-    turned, faster = random.standard_normal(2).tolist()
-    angle = min(max(aim.angle + lack * ANGLE_ERROR * turned, 0.0), math.pi)
-    speed = min(max(aim.speed * (1.0 + lack * SPEED_ERROR * faster), 0.0), full)
-    return aim._replace(angle=angle, speed=speed)
+        Args:
+            world: with the wind of the turn.
+            field: as it lies.
+            shooter: who thinks.
+            random: the chances of the turn.
+            skill: 0 to 1; by default that of the shooter, who is a bot.
+        """
+        target, self.weapon = choose(field.tanks, shooter, random)
+        self._full = field.artillery.speed
+        self._lack = 1.0 - ((shooter.player.bot or 0.0) if skill is None else skill)
+        self._errors = random.standard_normal(2).tolist()
+        self._search = Search(
+            Range(
+                world=world,
+                muzzle=field.tanks.muzzle(shooter),
+                ground=field.ground,
+                edges=field.artillery.edges,
+                full=self._full,
+                at=target.place[0],
+                near=NEAR * WEAPONS[self.weapon].radius,
+            )
+        )
+
+    def go_on(self, work: int = WORK) -> Aim | None:
+        """Think on, for so much work; return the shot once there is one: the best, but for the bot's error."""
+        aim = self._search.go_on(work)
+        if aim is None:
+            return None
+        turned, faster = self._errors
+        angle = min(max(aim.angle + self._lack * ANGLE_ERROR * turned, 0.0), math.pi)
+        speed = min(max(aim.speed * (1.0 + self._lack * SPEED_ERROR * faster), 0.0), self._full)
+        return aim._replace(angle=angle, speed=speed)

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.engines.reference.motion import Inputs, State, transition
+from sandbox.engines.reference.motion import Inputs
 from sandbox.games.artillery.ground import Ground
 from sandbox.games.artillery.roots import bracketed
 from sandbox.scene.artillery.described import Edges
@@ -24,6 +23,9 @@ FINE = 1.0 / 128.0
 LONGEST = 120.0
 """s, of a flight that is followed"""
 
+Knot = tuple[float, float, float, float]
+"""Place, m, and velocity, m/s"""
+
 INSTANT = 1e-13
 """s, to which the time of a landing is found: at 100 m/s 1e-11 m"""
 
@@ -33,29 +35,48 @@ def inputs_of(world: World, count: int) -> Inputs:
     return Inputs(np.tile(world.gravity, (count, 1)), world.linear_drag, world.quadratic_drag, world.wind)
 
 
+def rk4(world: World, knot: Knot, h: float) -> Knot:
+    """Return place and velocity of one shell a step h later, s.
+
+    What the engine `reference` does with its method of that name, but in plain floats: for a single shell that is some
+    ten times as fast as arrays of one row.
+    """
+    (gx, gy), (wind_x, wind_y), linear, quadratic = world.gravity, world.wind, world.linear_drag, world.quadratic_drag
+    x, y, vx, vy = knot
+    sum_x = sum_y = sum_vx = sum_vy = ax = ay = 0.0
+    for weight, share in ((1.0, 0.0), (2.0, 0.5), (2.0, 0.5), (1.0, 1.0)):
+        here_x, here_y = vx + share * h * ax, vy + share * h * ay
+        aside, up = here_x - wind_x, here_y - wind_y
+        drag = linear + quadratic * math.sqrt(aside * aside + up * up)
+        ax, ay = gx - drag * aside, gy - drag * up
+        sum_x, sum_y = sum_x + weight * here_x, sum_y + weight * here_y
+        sum_vx, sum_vy = sum_vx + weight * ax, sum_vy + weight * ay
+    sixth = h / 6.0
+    return x + sixth * sum_x, y + sixth * sum_y, vx + sixth * sum_vx, vy + sixth * sum_vy
+
+
 class Flight:
     """The way of one shell through the air of a world, from a place, m, at a velocity, m/s."""
 
     def __init__(self, world: World, position: FloatArray, velocity: FloatArray) -> None:
         self._world = world
         self._start = np.asarray(position, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
-        self._inputs = inputs_of(world, 1)
-        self._knots: list[State] = [np.stack(self._start)[:, None, :]]
+        x, y, vx, vy = (float(each) for part in self._start for each in part)
+        self._knots: list[Knot] = [(x, y, vx, vy)]
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Return place and velocity, (2,) each, at a time ≥ 0, s."""
         if not self._world.quadratic_drag:
             place, velocity = free_flight(np.array([time]), *self._start, self._world)
             return place[0], velocity[0]
-        step = INTEGRATORS["rk4"].step
         count = int(time / FINE)
         while len(self._knots) <= count:
-            self._knots.append(step(transition, 0.0, self._knots[-1], self._inputs, FINE))
-        state = self._knots[count]
+            self._knots.append(rk4(self._world, self._knots[-1], FINE))
+        knot = self._knots[count]
         rest = time - count * FINE
         if rest > 0.0:
-            state = step(transition, 0.0, state, self._inputs, rest)
-        return state[0, 0], state[1, 0]
+            knot = rk4(self._world, knot, rest)
+        return np.array(knot[:2]), np.array(knot[2:])
 
     def places(self, first: int, count: int) -> FloatArray:
         """Return the places (count, 2), m, at the times k·`FINE` from k = first on."""
@@ -64,7 +85,7 @@ class Flight:
             return free_flight(times, *self._start, self._world)[0]
         self.at(FINE * (first + count - 1))
         self.at(FINE * (first + count))  # rounding of the time must not leave the last out
-        return np.stack([knot[0, 0] for knot in self._knots[first : first + count]])
+        return np.array([knot[:2] for knot in self._knots[first : first + count]])
 
 
 class Landing(NamedTuple):
@@ -127,7 +148,9 @@ def _first(flight: Flight, ground: Ground, edges: Edges, discs: FloatArray, long
     count, top = 64, max(float(ground.heights.max()), float((discs[:, 1] + discs[:, 2]).max(initial=0.0)))
     for first in range(0, int(longest / FINE), count):
         places = flight.places(first, count + 1)
-        for k in range(count):
+        low = np.minimum(places[:-1, 1], places[1:, 1]) <= top
+        beside = (places[1:, 0] < 0.0) | (places[1:, 0] > ground.width)
+        for k in np.flatnonzero(low | beside).tolist():  # elsewhere is nothing to meet
             a, b = places[k], places[k + 1]
             begin, end = (first + k) * FINE, (first + k + 1) * FINE
             side = 0 if edges == "open" else int(b[0] > ground.width) - int(b[0] < 0.0)

@@ -7,7 +7,7 @@ from typing import Literal
 from sandbox.action import Action, SetParameter
 from sandbox.games.artillery.aim import Aim
 from sandbox.games.artillery.barrage import Barrage
-from sandbox.games.artillery.bot import aimed, chances, choose
+from sandbox.games.artillery.bot import Thought, chances
 from sandbox.games.artillery.field import PAUSE, Field
 from sandbox.games.artillery.gunner import CONTROLS, Gunner
 from sandbox.games.artillery.shot import Shot
@@ -40,6 +40,7 @@ class ArtilleryRules:
         self.phase: Phase = "begin"
         self._gunner = Gunner()
         self._time, self._since, self._number = 0.0, 0.0, 0
+        self._thought: Thought | None = None  # of a bot whose turn it is
         self._aim: Aim | None = None
         self._over: str | None = None
 
@@ -64,6 +65,11 @@ class ArtilleryRules:
     def shooter(self) -> Tank:
         """Whose turn it is."""
         return self.field.tanks.every[self._number]
+
+    @property
+    def thinking(self) -> bool:
+        """Whether a bot has the gun, and does not know yet where to aim."""
+        return self._thought is not None and self._aim is None
 
     @property
     def shots(self) -> list[Shot]:
@@ -124,7 +130,8 @@ class ArtilleryRules:
         side = "to the right" if wind > 0 else "to the left"
         told.append(("wind", f"{abs(wind):.1f} m/s {side}" if wind else "none"))
         tank, weapon = self.shooter, WEAPONS[self.shooter.weapon]
-        told.append(("gun", f"{math.degrees(tank.angle):.1f}°, {tank.power:.1%}, {self.speed(tank):.1f} m/s"))
+        gun = f"{math.degrees(tank.angle):.1f}°, {tank.power:.1%}, {self.speed(tank):.1f} m/s"
+        told.append(("gun", f"{tank.name} is thinking" if self.thinking else gun))
         told.append(("weapon", f"{weapon.name}, {weapon.cost} $" if weapon.cost else weapon.name))
         if self.shots:
             told.append(("last shot", self.shots[-1].told))
@@ -147,7 +154,8 @@ class ArtilleryRules:
         order = (k % len(tanks) for k in range(first, first + len(tanks)))
         self._number = next(k for k in order if tanks[k].alive)
         self.turn += 1
-        self.phase, self._since, self._aim = "aim", self._time, None
+        self.phase, self._since = "aim", self._time
+        self._thought, self._aim = None, None
         if WEAPONS[self.shooter.weapon].cost > self.shooter.money:
             self.shooter.weapon = 0
         self.field.cues.append("turn")
@@ -164,16 +172,18 @@ class ArtilleryRules:
         return []
 
     def _set_gun(self, passed: float) -> list[Action]:
-        """Set the gun as long as keys are held; a bot finds its shot, brings the gun there and fires."""
+        """Set the gun as long as keys are held; a bot thinks, then brings the gun there and fires."""
         tank = self.shooter
         if tank.player.bot is None:
             self._gunner.hold(tank, passed)
             return []
+        if self._thought is None:
+            self._thought = Thought(self.world, self.field, tank, chances(self.world.seed, 2 * self.turn + 1))
+            tank.weapon = self._thought.weapon
         if self._aim is None:
-            random = chances(self.world.seed, 2 * self.turn + 1)
-            target, tank.weapon = choose(self.field.tanks, tank, random)
-            radius = WEAPONS[tank.weapon].radius
-            self._aim = aimed(self.world, self.field, tank, target, radius, random)
+            self._aim = self._thought.go_on()
+        if self._aim is None:
+            return []
         there = self._gunner.bring(tank, self._aim.angle, self._aim.speed / self.artillery.speed, passed)
         return self._fire() if there and self._time - self._since >= PAUSE else []
 

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -32,6 +32,19 @@ class Struck(Protocol):
     @property
     def damage(self) -> float:
         """To a tank that is struck."""
+
+
+class Muzzle(NamedTuple):
+    """Where shells begin: on a circle about a gun."""
+
+    centre: Point
+    """m"""
+    reach: float
+    """m"""
+
+    def at(self, angle: FloatArray) -> FloatArray:
+        """Return where shells leave at angles (K,), rad; (K, 2) m."""
+        return np.asarray(np.array(self.centre) + self.reach * np.column_stack((np.cos(angle), np.sin(angle))))
 
 
 @dataclass
@@ -104,10 +117,9 @@ class Tanks:
         those = [tank.number for tank in self.alive]
         return bool((np.hypot(*frame.velocity[those].T) <= speed).all())
 
-    def muzzle(self, tank: Tank, angle: FloatArray) -> FloatArray:
-        """Return where shells leave at angles (K,), rad; (K, 2) m."""
-        way = np.column_stack((np.cos(angle), np.sin(angle)))
-        return np.asarray(np.array(tank.place) + BARREL * self.size[0] * way)
+    def muzzle(self, tank: Tank) -> Muzzle:
+        """Return where a tank's shells leave."""
+        return Muzzle(tank.place, BARREL * self.size[0])
 
     def blast(self, shooter: Tank, place: Point, weapon: Struck) -> list[tuple[Tank, float]]:
         """Hurt who stands near a blast, and reward the shooter; return who lost how much."""

@@ -17,8 +17,8 @@ class Gun:
     """of the barrel, rad, anticlockwise from the right"""
     power: float
     """share of full speed"""
-    health: float
-    """0 to 1"""
+    health: float | None
+    """0 to 1, where it is known"""
     aiming: bool
     """It is its turn, and nothing has been fired yet."""
 
@@ -57,11 +57,11 @@ class Gunnery:
     """A moment of a game."""
 
     guns: tuple[Gun, ...]
-    """those that still fight"""
+    """those that still fight, or did then"""
     size: tuple[float, float]
     """of a tank, m"""
-    wind: float
-    """m/s, to the right"""
+    wind: float | None
+    """m/s, to the right, where it is known"""
     ways: tuple[FloatArray, ...] = ()
     """(P, 2) m, where the shells of the last shot have been"""
     flying: tuple[int, ...] = ()

@@ -21,9 +21,21 @@ LONGEST_TRACER = 10.0
 """s, of a shot that comes down nowhere"""
 
 
-def over(rules: Rules, sight: Sight) -> Sight:
-    """Return a sight with what a game adds to it; of other games than artillery the sight as it is."""
-    return replace(sight, gunnery=gunnery_of(rules, sight.frame.time)) if isinstance(rules, ArtilleryRules) else sight
+def over(rules: Rules, sight: Sight, present: bool = True) -> Sight:
+    """Return a sight with what a game adds to it; of other games than artillery the sight as it is.
+
+    Args:
+        rules: as they stand.
+        sight: of the scene.
+        present: the sight is of now. The rules know no other time: then all that they add is what tanks look like.
+    """
+    if not isinstance(rules, ArtilleryRules):
+        return sight
+    if present:
+        return replace(sight, gunnery=gunnery_of(rules, sight.frame.time))
+    tanks = rules.field.tanks
+    guns = tuple(Gun(tank.number, tank.name, tank.angle, tank.power, None, aiming=False) for tank in tanks.every)
+    return replace(sight, gunnery=Gunnery(guns, tanks.size, wind=None))
 
 
 def gunnery_of(rules: ArtilleryRules, time: float) -> Gunnery:
@@ -77,7 +89,7 @@ def _clods(rules: ArtilleryRules, time: float) -> tuple[Clod, ...]:
 def _tracer(rules: ArtilleryRules) -> FloatArray | None:
     """Return the way of a shot as the gun is set now, as far as the first side or the ground."""
     tank, field = rules.shooter, rules.field
-    start = field.tanks.muzzle(tank, np.array([tank.angle]))[0]
+    start = field.tanks.muzzle(tank).at(np.array([tank.angle]))[0]
     velocity = rules.speed(tank) * np.array([math.cos(tank.angle), math.sin(tank.angle)])
     flight, down = Flight(rules.world, start, velocity), landing(rules.world, start, velocity, field.ground)
     until = down.time if down is not None else LONGEST_TRACER

@@ -96,6 +96,7 @@ class Picture:
         antialias: bool = True,
         unit: float = 1.0,
         foot: float = 0.0,
+        scale: bool = True,
     ) -> None:
         """Draw one moment over the whole of a surface.
 
@@ -106,6 +107,7 @@ class Picture:
             antialias: whether edges are smooth; without, it takes about half the time.
             unit: px, of a line that is one pixel wide on a 1080p display; all widths and letters grow with it.
             foot: px at the lower edge that something else will cover.
+            scale: draw the bar that tells how long things are.
         """
         self._blit_background(surface, camera, sight, antialias, unit)
         if sight.lit:
@@ -155,7 +157,8 @@ class Picture:
             draw_aim(view, sight.aim)
         if sight.gunnery is not None:
             draw_above(view, sight.gunnery)
-        draw_scale(surface, camera, unit, foot)
+        if scale:
+            draw_scale(surface, camera, unit, foot)
 
     def _draw_layers(self, view: View, which: IntArray | None) -> None:
         """Draw the bodies that are no points, from the ground up, with what is fixed on each layer above it."""

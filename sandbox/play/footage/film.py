@@ -11,6 +11,7 @@ import pygame
 from sandbox.action import Action, ActionError, Spawn, actions_from_json, in_order
 from sandbox.play.breaks import broken_by
 from sandbox.play.camera import Box, Camera
+from sandbox.play.drawing.inset import Inset
 from sandbox.play.drawing.palette import FAINT, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
@@ -53,7 +54,7 @@ class Film:
         self.scene = scene_of(trajectory, name)
         self.bodies = bodies_of(trajectory, self.scene, name)
         self._scenery = Scenery(self.scene, actions_of(trajectory, name))
-        self._picture = Picture()
+        self._picture, self._inset = Picture(), Inset()
         self._last: Frame | None = None  # one picture asks for the same time again and again
         try:
             self.breaks: FloatArray = trajectory.breaks(len(self.scene.links))
@@ -187,7 +188,9 @@ class Film:
             caption: write title, engine and time into the upper left corner, where there is room for them.
         """
         unit = unit_of(surface.get_size())
-        self._picture.draw(surface, camera, self.sight(time, overlays, speed), unit=unit)
+        sight = self.sight(time, overlays, speed)
+        self._picture.draw(surface, camera, sight, unit=unit)
+        self._inset.draw(surface, camera, sight, surface.get_rect(), unit=unit)
         if "energy" in overlays:
             self._graph.draw(surface, time, unit)
         if caption and surface.get_width() >= NARROW:

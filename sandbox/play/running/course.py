@@ -7,6 +7,7 @@ from sandbox.action import Action, ActionError, Pull
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.relay import Relay
 from sandbox.games.referee import Referee
+from sandbox.play.footage.scenery import Scenery
 from sandbox.play.running.history import Mark
 from sandbox.play.running.script import ROUNDING, Script
 from sandbox.recording import Recording
@@ -92,6 +93,10 @@ class Course:
     def actions(self) -> tuple[Action, ...]:
         """All that was done, up to now."""
         return self._script.so_far
+
+    def scenery(self) -> Scenery:
+        """Return what the scene is at any time, also later than now, as far as walls and posts go."""
+        return Scenery(self._start[0], self._script.whole)
 
     @property
     def ahead(self) -> bool:

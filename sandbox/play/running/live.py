@@ -8,6 +8,7 @@ from sandbox.engines.compiling import COMPILING
 from sandbox.engines.energy import energy_of
 from sandbox.play.breaks import BreakNotes, broken_by
 from sandbox.play.footage.film import Film
+from sandbox.play.footage.scenery import Scenery
 from sandbox.play.picking import overlapping
 from sandbox.play.running.between import between
 from sandbox.play.running.burning import burning
@@ -54,12 +55,27 @@ class Live:
         self.wants_pause = False
         """It has come to the end of what was recorded; whoever pauses it takes this back."""
         self._peek: tuple[int, Frame] | None = None
+        self._scenery: Scenery | None = None  # as long as another state than the present one is looked at
         self._anew = False  # what runs beside it has seen what was taken back
 
     @property
     def scene(self) -> Scene:
         """What runs, with all that was set since."""
         return self.session.scene
+
+    @property
+    def shown(self) -> Scene:
+        """The scene of the state that is shown: with its walls as they were then."""
+        if self._peek is None:
+            self._scenery = None
+            return self.scene
+        self._scenery = self._scenery or self.session.scenery()
+        return self._scenery.at(self._peek[1].time)
+
+    @property
+    def peeking(self) -> bool:
+        """Whether another state than the present one is shown."""
+        return self._peek is not None
 
     @property
     def bodies(self) -> Bodies:
@@ -300,11 +316,11 @@ class Live:
             picked: number of the picked body.
             pull: where a body is held, and the hand, m.
         """
-        session, present = self.session, self._peek is None
+        session, present, scene = self.session, self._peek is None, self.shown
         frame = between(session.previous, session.frame, self.between_steps) if present else self.frame
         touches = self._contacts.some(~notes(self._contacts.pair, session.scene))
         return Sight(
-            scene=session.scene,
+            scene=scene,
             bodies=self.bodies,
             frame=frame,
             overlays=overlays,
@@ -312,9 +328,7 @@ class Live:
             seconds=self._since,
             ghost=self.company.ghost_frame if present else None,
             trails=self.company.trails.pieces() if "trails" in overlays and present else (),
-            overlapping=overlapping(session.scene, self.bodies, frame)
-            if session.scene.play.show == "overlap"
-            else None,
+            overlapping=overlapping(scene, self.bodies, frame) if scene.play.show == "overlap" else None,
             flashes=self.company.flashes,
             picked=picked,
             pull=pull,

@@ -21,6 +21,11 @@ class Script:
         return tuple(self._actions[: self.done])
 
     @property
+    def whole(self) -> tuple[Action, ...]:
+        """What was done, also later than now."""
+        return tuple(self._actions)
+
+    @property
     def ahead(self) -> bool:
         """Whether more was done than up to now."""
         return self.done < len(self._actions)

@@ -33,6 +33,9 @@ class Terrain(Surfaced):
     """0 for rolling hills, 1 for a saw: each halving of the distance leaves this power of 2 less to differ by"""
     heights: Annotated[tuple[Level, ...], Field(min_length=2, max_length=MAX_COLUMNS)] | None = None
     """m, of each column, instead of all that"""
+    laid: Annotated[int, Field(ge=0, lt=2**63)] | None = None
+    """the seed that the wall `terrain` beside it was laid out from, as a scene says that was written out; whoever then
+    sets another seed has the hills laid out anew"""
 
 
 class Player(Part):

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from sandbox.scene.artillery.columns import columns_of, course_of
-from sandbox.scene.artillery.described import Artillery
+from sandbox.scene.artillery.described import Artillery, Terrain
 from sandbox.scene.artillery.landscape import heights_of, levelled
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene, Wall
@@ -30,7 +30,7 @@ def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
     """Yield why a scene's `[terrain]` or `[artillery]` stands for nothing."""
     terrain, artillery = scene.terrain, scene.artillery
     walls = {wall.name: wall for wall in scene.walls}
-    if terrain is not None and GROUND in walls:
+    if terrain is not None and GROUND in walls and terrain.laid is None:
         yield ("terrain",), f"stands for a wall named {GROUND!r}, and there is one; leave one of the two out"
         return
     if terrain is not None and terrain.heights is not None and terrain.model_fields_set & {"base", "height", "columns"}:
@@ -68,17 +68,16 @@ def expanded(scene: Scene) -> Scene:
     terrain, artillery = scene.terrain, scene.artillery
     if terrain is None and artillery is None:
         return scene
+    if terrain is not None and terrain.laid is not None:
+        scene = _laid_anew(scene, terrain, terrain.laid)
     changes: dict[str, Any] = {"terrain": None}
     walls = scene.walls
     if terrain is not None:
-        heights = heights_of(terrain, scene.world.seed)
-        for at, half in _pads(artillery, terrain.width / len(heights)):
-            heights = levelled(heights, terrain.width, at, half)
-        own = {key: getattr(terrain, key) for key in ("material", "restitution", "friction", "colour")}
-        if own["material"] is None and own["friction"] is None:
-            own["friction"] = FRICTION
-        walls = (*walls, Wall(name=GROUND, points=course_of(heights, terrain.width), **own))
-        changes["walls"] = walls
+        if not any(wall.name == GROUND for wall in walls):
+            walls = (*walls, _wall(terrain, artillery, scene.world.seed))
+            changes["walls"] = walls
+        if terrain.heights is None:
+            changes["terrain"] = terrain.model_copy(update={"laid": scene.world.seed})
     if artillery is not None:
         ground = next(wall for wall in walls if wall.name == GROUND)
         taken = {each.name for movers in scene.kinds.values() for each in movers}
@@ -89,6 +88,48 @@ def expanded(scene: Scene) -> Scene:
         play = {"game": "artillery", "view": _view(ground)}
         stated = scene.play.model_fields_set
         changes["play"] = scene.play.model_copy(update={k: v for k, v in play.items() if k not in stated})
+    return scene.model_copy(update=changes)
+
+
+def _wall(terrain: Terrain, artillery: Artillery | None, seed: int) -> Wall:
+    """Return the ground that a seed lays out."""
+    heights = heights_of(terrain, seed)
+    for at, half in _pads(artillery, terrain.width / len(heights)):
+        heights = levelled(heights, terrain.width, at, half)
+    own = {key: getattr(terrain, key) for key in ("material", "restitution", "friction", "colour")}
+    if own["material"] is None and own["friction"] is None:
+        own["friction"] = FRICTION
+    return Wall(name=GROUND, points=course_of(heights, terrain.width), **own)
+
+
+def _laid_anew(scene: Scene, terrain: Terrain, laid: int) -> Scene:
+    """Return a scene, whose ground a seed has laid out, as its own seed does, if that is another.
+
+    Ground that has been given another course since stays as it is, and tanks that have been moved stay where they are.
+    """
+    walls = {wall.name: wall for wall in scene.walls}
+    before, after = (_wall(terrain, scene.artillery, seed) for seed in (laid, scene.world.seed))
+    if laid == scene.world.seed or GROUND not in walls or walls[GROUND].points != before.points:
+        return scene
+    changes: dict[str, Any] = {
+        "walls": tuple(
+            wall.model_copy(update={"points": after.points}) if wall.name == GROUND else wall for wall in scene.walls
+        )
+    }
+    if scene.artillery is not None:
+        count = range(len(scene.artillery.players))
+        stood, stand = (
+            {tank.name: tank for tank in (_tank(scene.artillery, k, ground) for k in count)}
+            for ground in (before, after)
+        )
+        changes["boxes"] = tuple(
+            box.model_copy(update={"position": stand[box.name].position})
+            if box.name in stood and box.position == stood[box.name].position
+            else box
+            for box in scene.boxes
+        )
+        if scene.play.view == _view(before):
+            changes["play"] = scene.play.model_copy(update={"view": _view(after)})
     return scene.model_copy(update=changes)
 
 

@@ -1,5 +1,6 @@
 """Bots: without error they hit from any ground, in any air; with it they miss as much as their skill says."""
 
+import copy
 import math
 from typing import Any
 
@@ -9,14 +10,14 @@ from grounds import hills, world
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.games.artillery.aim import best_aim
-from sandbox.games.artillery.bot import ANGLE_ERROR, aimed, chances
+from sandbox.games.artillery.aim import Aim, Range, Search
+from sandbox.games.artillery.bot import ANGLE_ERROR, Thought, chances, choose
 from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.flight import landing
+from sandbox.games.artillery.tanks import Muzzle
 from sandbox.games.artillery.weapons import WEAPONS
 from sandbox.scene.artillery.described import Edges
 from sandbox.scene.file import loads
-from sandbox.trajectory import FloatArray
 
 AIRS = [(0.0, 0.0), (0.06, 0.0), (0.0, 0.002)]
 RADIUS = WEAPONS[0].radius
@@ -53,15 +54,10 @@ def hits(
 ) -> None:
     ground, air = hills(seed, roughness, (a, b)), world(*drags, wind)
     here, there = (b, a) if back else (a, b)
-    own = np.array([here, ground.under(here, 1.5) + 0.75])
-
-    def muzzle(angle: FloatArray) -> FloatArray:
-        return own + 2.25 * np.column_stack((np.cos(angle), np.sin(angle)))
-
-    target = there, ground.under(there, 1.5) + 0.75
-    aim = best_aim(air, muzzle, ground, edges, 75.0, target, 0.2 * RADIUS)
+    muzzle = Muzzle((here, ground.under(here, 1.5) + 0.75), 2.25)
+    aim = Search(Range(air, muzzle, ground, edges, 75.0, there, 0.2 * RADIUS)).all()
     velocity = aim.speed * np.array([math.cos(aim.angle), math.sin(aim.angle)])
-    found = landing(air, muzzle(np.array([aim.angle]))[0], velocity, ground, edges)
+    found = landing(air, muzzle.at(np.array([aim.angle]))[0], velocity, ground, edges)
     assert found is not None
     assert abs(found.place[0] - there) == pytest.approx(abs(aim.miss), abs=1e-9)
     assert abs(found.place[0] - there) <= RADIUS
@@ -74,6 +70,7 @@ gravity = [0.0, -9.81]
 [terrain]
 width = 300.0
 [artillery]
+money = 0
 [[artillery.player]]
 name = "Red"
 position = 60.0
@@ -84,20 +81,45 @@ position = 240.0
 """
 
 
-def test_less_skill_errs_normally_and_by_the_turn() -> None:
-    scene = loads(DUEL)
+def laid_out(bot: float) -> Field:
+    scene = loads(DUEL, overrides=[f"artillery.player.0.bot={bot}"])
     field = Field(scene, scene.bodies)
-    red, blue = field.tanks.every
-    for tank in (red, blue):
+    for tank in field.tanks.every:
         x, y = scene.bodies.position[tank.number].tolist()
         tank.place = (x, y)
-    true = aimed(scene.world, field, red, blue, RADIUS, chances(0, 0))
-    red.player = red.player.model_copy(update={"bot": 1.0})
-    best = aimed(scene.world, field, red, blue, RADIUS, chances(0, 0))
-    assert best == aimed(scene.world, field, red, blue, RADIUS, chances(0, 1))  # no error, whatever the chances
+    return field
+
+
+def thought_of(turn: int, bot: float) -> Aim:
+    field = laid_out(bot)
+    aim = Thought(loads(DUEL).world, field, field.tanks.every[0], chances(0, turn)).go_on(10**9)
+    assert aim is not None
+    return aim
+
+
+@pytest.mark.parametrize("edges", ["open", "rubber", "wrap"])
+def test_search_by_and_by_and_by_copies_finds_what_one_go_does(edges: Edges) -> None:
+    ground, air = hills(5, 0.4, (60.0, 240.0)), world(0.05, 0.0, 4.0)
+    muzzle = Muzzle((60.0, ground.under(60.0, 1.5) + 0.75), 2.25)
+    range_ = Range(air, muzzle, ground, edges, 75.0, 240.0, 0.2 * RADIUS)
+    at_once, slow, copies = Search(range_).all(), Search(range_), 0
+    while slow.go_on(20_000) is None:
+        left_behind, slow = slow, copy.deepcopy(slow)
+        left_behind.go_on(50_000)  # what goes on elsewhere is none of the copy's
+        copies += 1
+    assert copies >= 10
+    assert slow.found == at_once
+
+
+def test_less_skill_errs_normally_and_by_the_turn() -> None:
+    true = thought_of(0, bot=0.75)
+    best = thought_of(0, bot=1.0)
+    assert best == thought_of(1, bot=1.0)  # no error, whatever the chances
     assert true.angle != best.angle
     errors = np.array([chances(3, turn).standard_normal(2) for turn in range(400)])
     assert abs(errors.mean()) < 4.0 / math.sqrt(800)  # 4 σ of a mean
     assert errors.std() == pytest.approx(1.0, abs=4.0 / math.sqrt(1600))
-    first = chances(0, 0).standard_normal(2)
+    random = chances(0, 0)
+    choose(laid_out(0.75).tanks, laid_out(0.75).tanks.every[0], random)
+    first = random.standard_normal(2)
     assert true.angle - best.angle == pytest.approx(0.25 * ANGLE_ERROR * first[0], abs=1e-12)

@@ -19,6 +19,7 @@ from sandbox.games.registry import rules_of
 from sandbox.games.rules import Press, UnfitError
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
+from sandbox.measure.seeds import seeded
 from sandbox.recording import Recording
 from sandbox.scene.file import loads
 from sandbox.scene.model import Scene
@@ -114,6 +115,15 @@ def test_a_perfect_gunner_hits_with_its_first_shot(seed: int) -> None:
     assert first.off is not None
     assert first.off < 1e-5  # Runge–Kutta's error and the cubic's at 20 ms
     assert rules.field.tanks.every[1].health < 100.0
+
+
+@pytest.mark.slow
+def test_seeds_are_other_games() -> None:
+    """Other hills, other winds, other errors."""
+    scene = loads(BOTS, overrides=["world.duration=12", "artillery.player.Red.bot=0.5"])
+    rules = [played(seeded(scene, seed))[0] for seed in range(6)]
+    assert len({each.field.ground.points for each in rules}) == 6
+    assert len({each.shots[0].place for each in rules}) == 6
 
 
 @pytest.mark.parametrize("edges", ["open", "rubber", "wrap"])

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from sandbox.games.artillery.flight import Flight, crossing, landing, strike
+from sandbox.engines.reference.integrators import INTEGRATORS
+from sandbox.engines.reference.motion import transition
+from sandbox.games.artillery.flight import Flight, crossing, inputs_of, landing, rk4, strike
 from sandbox.games.artillery.ground import Ground
 from sandbox.games.artillery.miss import _exact
 from sandbox.scene.model import World
@@ -20,6 +22,15 @@ def down(air: World, velocity: np.ndarray) -> tuple[float, float]:
     """Return how far off and when a shot over level ground comes down."""
     found = _exact(air, velocity)
     return found.place[0], found.time
+
+
+def test_plain_floats_fly_as_the_engine_reference_does() -> None:
+    air, h = World(gravity=(0.4, -G), linear_drag=0.03, quadratic_drag=0.002, wind=(6.0, -1.0)), 0.05
+    knot, state = (3.0, 7.0, 40.0, 55.0), np.array([[[3.0, 7.0]], [[40.0, 55.0]]])
+    for _ in range(200):
+        knot = rk4(air, knot, h)
+        state = INTEGRATORS["rk4"].step(transition, 0.0, state, inputs_of(air, 1), h)
+    assert knot == pytest.approx(state.reshape(-1).tolist(), rel=1e-12)  # roundings of 200 steps
 
 
 def test_range_in_vacuum() -> None:

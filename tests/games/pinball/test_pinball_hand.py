@@ -74,7 +74,7 @@ def test_hand_is_by_its_seed_alone() -> None:
     assert plays(1) != plays(2)
 
 
-def test_skilled_is_a_policy_of_pinball_alone() -> None:
+def test_skilled_does_not_play_what_it_does_not_know() -> None:
     assert isinstance(POLICIES["skilled"](table()), Hand)
     ship = loads('[play]\ngame = "landing"\n[[ball]]\nposition = [0.0, 0.0]\nradius = 0.1\n')
     with pytest.raises(UnfitError, match="not landing"):

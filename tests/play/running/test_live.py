@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Spawn, Toggle
+from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Reshape, Spawn, Toggle
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
 from sandbox.play.footage.film import Film
@@ -134,6 +134,34 @@ def test_scrub_looks_and_settle_goes_there() -> None:
     assert (show.session.step_number, show.session.frame.state_hash()) == (70, seen)
     show.settle()
     assert show.end == pytest.approx(0.15, rel=1e-12)  # rounding
+
+
+def test_scrub_shows_walls_as_they_were_then() -> None:
+    """Also while the session stands before or behind that time; and each time is one scene, which is drawn once."""
+    shelf = {"name": "shelf", "points": [[-1, 0], [1, 0]]}
+    ball = {"name": "ball", "position": [0, 5.0], "radius": 0.1}
+    show = Live(Session(from_document({"ball": [ball], "wall": [shelf]}), "pymunk"))
+    courses = [((-1.0, 0.0), (1.0, 0.0))]
+    for k in (1.0, 2.0):
+        show.step()
+        courses.append(((-1.0, k), (1.0, k)))
+        show.act(Reshape(time=0.0, thing="shelf", points=courses[-1]))
+        show.act(Toggle(time=0.0, thing="shelf", solid=k == 2.0))
+    show.step()
+    dt = show.settings.dt
+    for stand in (3, 0, 2):
+        show.seek(stand)
+        arrived(show)
+        seen = []
+        for step in (0, 1, 2, 3, 0):
+            show.scrub(step * dt)
+            seen.append(show.sight(ALL).scene)
+            assert (seen[-1].walls[0].points, seen[-1].walls[0].solid) == (courses[min(step, 2)], step != 1)
+        assert seen[0] is seen[-1]
+        assert show.sight(ALL).scene is seen[0]
+    show.settle()
+    arrived(show)
+    assert show.sight(ALL).scene is show.scene
 
 
 def test_scrub_shows_bodies_that_have_not_come_yet() -> None:

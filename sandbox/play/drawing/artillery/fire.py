@@ -48,7 +48,8 @@ def draw_above(view: View, gunnery: Gunnery) -> None:
         _burst(view, burst)
     if gunnery.landed is not None and not gunnery.flying:
         _landed(view, gunnery.landed)
-    _wind(view, gunnery.wind)
+    if gunnery.wind is not None:
+        _wind(view, gunnery.wind)
 
 
 def _way(view: View, way: FloatArray, flying: bool) -> None:
@@ -109,12 +110,22 @@ def _landed(view: View, landed: tuple[tuple[float, float], tuple[float, float]])
         dot(view.surface, (ex, ey), 7.0 * view.unit, YELLOW, 1.4 * view.unit)
 
 
+def _back(view: View, middle: tuple[float, float], size: tuple[float, float]) -> None:
+    """Darken what lies behind words."""
+    box = pygame.Rect(0, 0, round(size[0]), round(size[1]))
+    shade = pygame.Surface(box.size, pygame.SRCALPHA)
+    pygame.draw.rect(shade, (*BACKGROUND, 120), box, border_radius=round(6.0 * view.unit))
+    box.center = round(middle[0]), round(middle[1])
+    view.surface.blit(shade, box)
+
+
 def _wind(view: View, wind: float) -> None:
     """Draw which way the wind blows, and how hard, at the left, below what is told of the run."""
     size = 13.0 * view.unit
     middle, top = 96.0 * view.unit, 150.0 * view.unit
     half = min(max(7.0 * abs(wind), 8.0), 84.0) * view.unit
     told = f"wind {abs(wind):.1f} m/s" if wind else "no wind"
+    _back(view, (middle, top + 7.0 * view.unit), (172.0 * view.unit, 44.0 * view.unit))
     write(view.surface, told, (middle + 1, top + 9 * view.unit + 1), size, BACKGROUND, "midtop", bold=True)
     write(view.surface, told, (middle, top + 9 * view.unit), size, INK, "midtop", bold=True)
     if wind:

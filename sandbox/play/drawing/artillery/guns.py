@@ -109,9 +109,10 @@ def _label(view: View, gun: Gun, at: Pixel, tint: Colour) -> None:
     """Write a name, and draw what health is left under it."""
     wide, high = 44.0 * view.unit, 4.0 * view.unit
     box = pygame.Rect(round(at[0] - 0.5 * wide), round(at[1] - high), round(wide), round(high))
-    pygame.draw.rect(view.surface, BACKGROUND, box.inflate(3, 3), border_radius=3)
-    colour = mixed(WARNING, GREEN, gun.health)
-    pygame.draw.rect(view.surface, colour, pygame.Rect(box.topleft, (round(box.width * gun.health), box.height)))
+    if gun.health is not None:
+        pygame.draw.rect(view.surface, BACKGROUND, box.inflate(3, 3), border_radius=3)
+        colour = mixed(WARNING, GREEN, gun.health)
+        pygame.draw.rect(view.surface, colour, pygame.Rect(box.topleft, (round(box.width * gun.health), box.height)))
     size = 13.0 * view.unit
     name = mixed(tint, INK, 0.45)
     write(view.surface, gun.name, (at[0] + 1, box.top - 2 * view.unit + 1), size, BACKGROUND, "midbottom", bold=True)

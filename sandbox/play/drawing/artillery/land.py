@@ -80,7 +80,7 @@ def _sides(surface: pygame.Surface, camera: Camera, scene: Scene, wall: Wall, un
         return
     rubber = scene.artillery.edges == "rubber"
     for x in (wall.points[0][0], wall.points[-1][0]):
-        (px, foot), _ = camera.to_screen(np.array([(x, 0.0), (x, 1.0)])).tolist()
+        px, foot = float(camera.to_screen(np.array((x, 0.0)))[0]), surface.get_height() + 1.0  # as far as dirt is seen
         if rubber:
             stroke(surface, (px, foot), (px, -1.0), (58, 62, 92), 5.0 * unit, antialias)
             stroke(surface, (px, foot), (px, -1.0), FAINT, 1.5 * unit, antialias)

@@ -1,0 +1,88 @@
+"""Hand: a player of artillery at the keys, who aims as a bot does and brings the gun there by holding and tapping."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from sandbox.games.artillery.aim import Aim
+from sandbox.games.artillery.bot import Thought
+from sandbox.games.artillery.gunner import PER_SECOND, POWER, TURN
+from sandbox.games.artillery.rules import ArtilleryRules
+from sandbox.games.artillery.tanks import Tank
+from sandbox.games.rules import Rules, Seen, UnfitError
+
+STREAM = 0x61696D73
+"""Sets these chances apart from all else that the seed decides: the letters of `aims`."""
+NEAR = 12.0
+"""Taps, from which on a key is no longer held but tapped."""
+
+
+class Hand:
+    """Plays for whoever's turn it is and who is no bot. Other games than artillery it cannot play."""
+
+    def __init__(self, seed: int, skill: float = 0.8) -> None:
+        """Sit down.
+
+        Raises:
+            ValueError: the skill is not from 0 to 1.
+        """
+        if not 0.0 <= skill <= 1.0:
+            raise ValueError(f"a skill of {skill:g} is none; it is 0 to 1")
+        self.skill = skill
+        self._seed, self._turn, self._time = seed, 0, 0.0
+        self._thought: Thought | None = None
+        self._down: set[str] = set()
+
+    def decide(self, seen: Seen, rules: Rules) -> Sequence[tuple[str, float]]:
+        """Return the controls that are pressed and let go of now.
+
+        Raises:
+            UnfitError: the rules are those of another game.
+        """
+        if not isinstance(rules, ArtilleryRules):
+            raise UnfitError("this player plays artillery alone")
+        step, self._time = seen.time - self._time, seen.time
+        wanted: set[str] = set()
+        if rules.phase == "aim" and rules.shooter.player.bot is None:
+            aim = self._thought_of(rules)
+            if aim is not None:
+                wanted = self._wanted(rules, aim, step)
+        changed = [(name, 0.0) for name in sorted(self._down - wanted)]
+        changed += [(name, 1.0) for name in sorted(wanted - self._down)]
+        self._down = wanted
+        return changed
+
+    def _thought_of(self, rules: ArtilleryRules) -> Aim | None:
+        """Think on about this turn; return the shot once there is one."""
+        if self._thought is None or self._turn != rules.turn:
+            random = np.random.default_rng([STREAM, self._seed, rules.turn])
+            self._thought = Thought(rules.world, rules.field, rules.shooter, random, self.skill)
+            self._turn = rules.turn
+        return self._thought.go_on()
+
+    def _wanted(self, rules: ArtilleryRules, aim: Aim, step: float) -> set[str]:
+        """Return the keys that are to be down now; a key is tapped by being up every other time."""
+        tank, found = rules.shooter, set[str]()
+        assert self._thought is not None
+        if tank.weapon != self._thought.weapon:
+            found |= {"weapon"} - self._down
+        lacks = self._lacks(rules, tank, aim)
+        for (lack, tap, rate), (more, less) in zip(lacks, (("left", "right"), ("up", "down")), strict=True):
+            key = more if lack > 0.0 else less
+            if abs(lack) > max(0.5 * (tap + rate * step), 0.5 * tap) and (
+                key not in self._down or abs(lack) > NEAR * tap
+            ):
+                found.add(key)
+        if not found and not self._down:
+            found.add("fire")
+        return found
+
+    @staticmethod
+    def _lacks(rules: ArtilleryRules, tank: Tank, aim: Aim) -> tuple[tuple[float, float, float], ...]:
+        """Return by how much angle and power are to grow, and by how much they do by a tap, and a second."""
+        power = aim.speed / rules.artillery.speed
+        return (
+            (min(max(aim.angle, 0.0), math.pi) - tank.angle, TURN, PER_SECOND[0]),
+            (power - tank.power, POWER, PER_SECOND[1]),
+        )

@@ -1,0 +1,66 @@
+"""The player at the keys: without error it hits as a bot does, and what it pressed is all that a script needs."""
+
+import math
+
+import pytest
+
+from sandbox.games.artillery.hand import Hand
+from sandbox.games.artillery.rules import ArtilleryRules
+from sandbox.games.artillery.weapons import WEAPONS
+from sandbox.games.bout import Bout
+from sandbox.games.policies import POLICIES, Script
+from sandbox.games.registry import rules_of
+from sandbox.games.rules import Policy, UnfitError
+from sandbox.measure.run import run
+from sandbox.scene.file import load, loads
+from sandbox.scene.shipped import find
+
+FIELD = """
+[world]
+gravity = [0.0, -9.81]
+duration = 12.0
+[solver]
+dt = 0.02
+[terrain]
+width = 240.0
+columns = 240
+height = 20.0
+[artillery]
+money = 0
+[[artillery.player]]
+name = "Red"
+position = 50.0
+[[artillery.player]]
+name = "Blue"
+position = 190.0
+bot = 0.0
+"""
+
+
+def played(policy: Policy) -> tuple[ArtilleryRules, Bout, str]:
+    scene = loads(FIELD)
+    rules = rules_of(scene)
+    assert isinstance(rules, ArtilleryRules)
+    bout = Bout(rules, policy, "hand")
+    trajectory = run(scene, "reference", bout=bout, integrator="rk4", audit=False)
+    return rules, bout, trajectory.info["state_hash"]
+
+
+def test_full_skill_hits_by_keys_alone() -> None:
+    rules, bout, state = played(Hand(1, skill=1.0))
+    own = [shot for shot in rules.shots if shot.shooter == "Red"]
+    assert own
+    first, blue = own[0], loads(FIELD).bodies.position[1].tolist()
+    assert first.place is not None
+    assert math.dist(first.place, blue) <= WEAPONS[0].radius
+    assert rules.score > 0
+    again, seen, same = played(Script(bout.presses))
+    assert (again.score, seen.presses, same) == (rules.score, bout.presses, state)
+
+
+def test_skill_is_a_share_and_the_game_has_to_be_artillery() -> None:
+    with pytest.raises(ValueError, match="0 to 1"):
+        Hand(1, skill=1.5)
+    assert isinstance(POLICIES["skilled"](loads(FIELD)), Hand)
+    with pytest.raises(UnfitError, match="pinball and artillery"):
+        POLICIES["skilled"](load(find("landing")))
