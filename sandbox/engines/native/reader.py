@@ -26,8 +26,8 @@ TOUCH = (
 
 WHO = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID | ArbiterFields.CONTACT_COUNT
 
-SECOND = ArbiterFields.POINT_A_2 | ArbiterFields.POINT_B_2
-"""What polygons have besides: they touch in two points."""
+SECOND = TOUCH | ArbiterFields.POINT_A_2 | ArbiterFields.POINT_B_2
+"""What polygons have: they touch in two points."""
 
 
 class Reader:
@@ -125,7 +125,7 @@ class Reader:
         all that is new.
         """
         self._arbiters.clear()
-        get_space_arbiters(self._space, TOUCH | SECOND if polygons else TOUCH, self._arbiters)
+        get_space_arbiters(self._space, SECOND if polygons else TOUCH, self._arbiters)
         self._width = 6 if polygons else 4
         words = bytes(self._arbiters.int_buf())
         same = words == self._words

@@ -50,6 +50,7 @@ class Pinball:
             self.holes, Ramps(board), self.modes, self.multiball, self.nudge,
             Search(board, self.holes, self.banks),
         )  # fmt: skip
+        self._ticking = tuple(each for each in self.machines if type(each).tick is not Machine.tick)
         self.course = Course(board, self.holes, self.nudge)
         self.course.machines = self.machines
         self.up: set[str] = set()
@@ -104,7 +105,7 @@ class Pinball:
         actions += self._settled(self.course.missed(now), now)
         self._refresh(now)
         tilted = self.nudge.tilted
-        for machine in self.machines:
+        for machine in self._ticking:
             actions += self._settled(machine.tick(now), now)
         if self.nudge.tilted and not tilted:
             self.course.save(0.0)
