@@ -82,7 +82,7 @@ class Pinball:
         return "all balls were played" if self.course.balls_left else "no ball is left on the table"
 
     def control(self, name: str, value: float) -> Sequence[Action]:
-        """Do what a player asks for; a tilted table obeys nobody, but lets go.
+        """Do what a player asks for; a tilted table obeys nobody, but lets go, and its plunger is only a rod.
 
         Raises:
             KeyError: there is no such control.
@@ -93,7 +93,7 @@ class Pinball:
         if name in FLIPPERS:
             return self._flipped(FLIPPERS[name], value > 0.0 and alive, now)
         if name == PLUNGER:
-            return self._settled(self._plunged(value if alive else 0.0, now), now)
+            return self._settled(self._plunged(value if self.course.phase == "play" else 0.0, now), now)
         direction = NUDGES[name] * complex(*self.board.up)
         return self._settled(self.nudge.jolt(direction, value, now), now) if alive and value > 0.0 else ()
 
