@@ -34,7 +34,14 @@ from sandbox.scene.model import Scene
 from sandbox.scene.shipped import find
 from sandbox.trajectory import Contacts, FloatArray
 
-GAMES = {"Landing": ("games/landing", 5)}
+GAMES = {
+    "ArtilleryDuel": ("artillery/duel", 10),
+    "ArtilleryFour": ("artillery/four", 10),
+    "Curling": ("games/curling", 10),
+    "Landing": ("games/landing", 5),
+    "PinballClassic": ("pinball/classic", 2),
+    "PinballFull": ("pinball/full", 2),
+}
 """By the name in an id, the shipped scene, and how many steps an action lasts."""
 LIMIT = 1e6
 """of every number that is observed, which is cut off there: spaces without bounds are ill-suited to learning"""

@@ -35,6 +35,7 @@ def trajectory(frames: int = 4, bodies: int = 3, contacts: int = 2, **info: Any)
         missed_time=draw(1),
         missed_pair=np.array([[0, 1]]),
         spin=draw((frames, bodies, 3)),
+        layer=np.arange(frames * bodies, dtype=np.int16).reshape(frames, bodies),
         info={"status": "ok", "reason": None, "audited": True, **info},
     )
 

@@ -1,13 +1,10 @@
 """Acting: what each action does to the bodies of a running scene. Everything is checked before anything changes."""
 
 import math
-from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
 from sandbox.action import (
-    SETTABLE,
     Action,
     ActionError,
     Drive,
@@ -24,99 +21,17 @@ from sandbox.action import (
     Switch,
     Throttle,
     Toggle,
-    is_settable,
     speed_limit,
 )
-from sandbox.scene.address import AddressError, assign
+from sandbox.engines.cast import Cast
+from sandbox.engines.surroundings import reshape, set_parameter, toggle
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.crosscheck import MAX_SURFACES, course, crosscheck
+from sandbox.scene.crosscheck import MAX_SURFACES, crosscheck
 from sandbox.scene.cue import MISCUE, miscues, struck
-from sandbox.scene.demands import on_floor
-from sandbox.scene.document import to_document
 from sandbox.scene.driven import names_of
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import from_document
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Ball, Box, Capsule, Collides, Compound, Polygon, Post, Scene, Single, Wall, default_name
 from sandbox.scene.part import BACKING, MAX_BODIES
-from sandbox.trajectory import BoolArray, FloatArray
-
-
-class Cast(Protocol):
-    """The bodies of a running scene, as an engine keeps them."""
-
-    @property
-    def scene(self) -> Scene:
-        """What runs, with all that was set since."""
-
-    @property
-    def bodies(self) -> Bodies:
-        """The bodies by number; spawned ones at the end."""
-
-    @property
-    def h(self) -> float:
-        """The substep, s."""
-
-    @property
-    def present(self) -> BoolArray:
-        """(N,) which bodies are there."""
-
-    def motion(self, number: int) -> tuple[FloatArray, float]:
-        """Return a body's velocity (2,), m/s, and angular velocity, rad/s."""
-
-    def set_velocity(self, number: int, velocity: FloatArray) -> None:
-        """Give a body a velocity, m/s."""
-
-    def set_spin(self, number: int, spin: float) -> None:
-        """Give a body an angular velocity, rad/s."""
-
-    def set_roll(self, number: int, roll: tuple[float, float]) -> None:
-        """Give a sphere on a floor an angular velocity about x and y, rad/s."""
-
-    def push(self, number: int, force: FloatArray, torque: float) -> None:
-        """Let a steady force, N, and torque, N·m, act on a body from now on.
-
-        Raises:
-            ActionError: the engine models no such force.
-        """
-
-    def put(self, number: int, position: FloatArray) -> None:
-        """Put a body somewhere, m."""
-
-    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
-        """Refuse a place that this engine cannot start from, though others may.
-
-        Raises:
-            ActionError: it is one.
-        """
-
-    def change(self, scene: Scene) -> None:
-        """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
-
-        Raises:
-            ActionError: it asks for what the settings or the engine cannot go on with.
-        """
-
-    def throttle(self, number: int, level: float) -> None:
-        """Open the scene's thrust of that number to a share of its force.
-
-        Raises:
-            ActionError: the engine models no thrust.
-        """
-
-    def drive(self, number: int, level: float) -> None:
-        """Ask the scene's drive of that number for a level.
-
-        Raises:
-            ActionError: the engine models no drives.
-        """
-
-    def add(self, single: Single, name: str) -> int:
-        """Add a body that was checked, and return its number.
-
-        Raises:
-            ActionError: the engine cannot.
-        """
 
 
 def perform(action: Action, cast: Cast) -> int | None:
@@ -137,15 +52,15 @@ def perform(action: Action, cast: Cast) -> int | None:
         case Remove():
             return _number(action.body, cast)
         case SetParameter():
-            _set(action, cast)
+            set_parameter(action, cast)
         case Throttle():
             cast.throttle(_thrust_number(action.thrust, cast.scene), action.level)
         case Reshape():
-            _reshape(action, cast)
+            reshape(action, cast)
         case Drive():
             cast.drive(_drive_number(action.drive, cast.scene), action.level)
         case Toggle():
-            _toggle(action, cast)
+            toggle(action, cast)
         case Strike():
             _strike(action, cast)
         case Pull() | Launch() | Switch():
@@ -252,44 +167,11 @@ def _strike(action: Strike, cast: Cast) -> None:
     cast.set_roll(number, spin[:2])
 
 
-def _toggle(action: Toggle, cast: Cast) -> None:
-    scene = cast.scene
-    begin = len(scene.planes)
-    names = scene.fixed_names[begin : len(scene.fixed)]
-    if action.thing not in names:
-        raise ActionError(f"no wall or post is named {action.thing!r}; there are {', '.join(names) or 'none'}")
-    if scene.surface is not None or scene.pockets:
-        raise ActionError("cushions of a table on a floor are solid; none can be toggled")
-    number = names.index(action.thing)
-    things: list[Wall | Post] = [*scene.walls, *scene.posts]
-    if things[number].solid == action.solid:
-        return
-    things[number] = things[number].model_copy(update={"solid": action.solid})
-    walls, posts = tuple(things[: len(scene.walls)]), tuple(things[len(scene.walls) :])
-    cast.change(_going_on(scene.model_copy(update={"walls": walls, "posts": posts}), scene))
-
-
 def _thrust_number(name: str, scene: Scene) -> int:
     names = [thrust.name or default_name("thrust", k) for k, thrust in enumerate(scene.thrusts)]
     if name not in names:
         raise ActionError(f"no thrust is named {name!r}; there are {', '.join(names) or 'none'}")
     return names.index(name)
-
-
-def _reshape(action: Reshape, cast: Cast) -> None:
-    scene = cast.scene
-    names = scene.fixed_names[len(scene.planes) : len(scene.planes) + len(scene.walls)]
-    if action.thing not in names:
-        raise ActionError(f"no wall is named {action.thing!r}; there are {', '.join(map(repr, names)) or 'none'}")
-    if on_floor(scene):
-        raise ActionError(f"{action.thing!r} is a cushion; what stands on a [surface] keeps its course")
-    number = names.index(action.thing)
-    wall = scene.walls[number].model_copy(update={"points": action.points})
-    faults = [f"{'.'.join(map(str, where))} {message}" for where, message in course(wall)]
-    if faults:
-        raise ActionError(f"the wall {action.thing!r}: {'; '.join(faults)}")
-    walls = (*scene.walls[:number], wall, *scene.walls[number + 1 :])
-    cast.change(_going_on(scene.model_copy(update={"walls": walls}), scene))
 
 
 def _drive_number(name: str, scene: Scene) -> int:
@@ -333,34 +215,3 @@ def alone_in(scene: Scene, single: Single) -> Scene:
     keys = ("world", "surface", "contact_models", "materials", "pairs")
     surroundings = {key: getattr(scene, key) for key in keys}
     return Scene.model_validate(surroundings).model_copy(update={kinds[type(single)]: (single,)})
-
-
-def _going_on(scene: Scene, running: Scene) -> Scene:
-    """Return a scene, changed as `Cast.change` allows, with the bodies and joints of the running one.
-
-    Laid out anew they would be those of the file: with who is gone, with what is broken, and hanging along the new
-    gravity.
-    """
-    joined = running.bodies.elements[len(running.elements) :]  # spawned before the present engine took over
-    bodies = replace(running.bodies, elements=(*scene.elements, *joined))
-    return scene.holding(bodies, running.links, running.began)
-
-
-def _set(action: SetParameter, cast: Cast) -> None:
-    if not is_settable(action.path):
-        raise ActionError(f"{action.path!r} cannot be changed while a scene runs; what can: {SETTABLE}")
-    try:
-        document, _ = assign(to_document(cast.scene), action.path, action.value)
-        world = cast.scene.world
-        if world.duration == 0.0:  # of a session that has only just begun, as no scene's is
-            document["world"]["duration"] = cast.scene.solver.dt
-        scene = from_document(document)
-        if world.duration == 0.0:
-            scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.0})})
-    except AddressError as error:
-        raise ActionError(str(error)) from None
-    except SceneError as error:
-        raise ActionError("; ".join(f"{f.path}: {f.message}" for f in error.faults)) from None
-    if on_floor(scene) != on_floor(cast.scene):
-        raise ActionError(f"{action.path}: a floor cannot begin to rub, nor cease to, while a scene runs")
-    cast.change(_going_on(scene, cast.scene))

@@ -27,7 +27,7 @@ def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(registry.RULES, "landing", Toy)
 
 
-@pytest.mark.parametrize("player", POLICIES)
+@pytest.mark.parametrize("player", [name for name in POLICIES if name != "skilled"])  # which plays pinball alone
 @pytest.mark.parametrize("engine", ENGINES)
 def test_game_leads_to_the_same_from_its_recording(engine: str, player: str) -> None:
     game = play_out(toy_scene(), player, engine)

@@ -9,7 +9,7 @@ import sandbox
 from sandbox.engines import registry
 from sandbox.engines.contract import Engine
 from sandbox.engines.native.engine import PymunkEngine
-from sandbox.measure import run as running
+from sandbox.measure import drive
 from sandbox.measure.compare import compare
 from sandbox.measure.compare import truth as truth_module
 from sandbox.measure.compare.truth import truth_of
@@ -144,7 +144,7 @@ def test_exact_is_the_truth_where_it_models_the_scene(monkeypatch: pytest.Monkey
 def test_exact_that_takes_too_long_gives_way_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch, exact=Recalled("exact"))
     monkeypatch.setattr(truth_module, "PATIENCE", -1.0)
-    monkeypatch.setattr(running, "REPORT_EVERY", -1.0)  # looked at after every step
+    monkeypatch.setattr(drive, "REPORT_EVERY", -1.0)  # looked at after every step
     scene = load(find("two_balls"), ["solver.dt=0.01", BOUNDED])
     truth = truth_of(scene, scene.solver, 1e-3)
     assert truth is not None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from runs_by_hand import scene_of
 
-from sandbox.measure import run as running
+from sandbox.measure import drive
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.run import run
 from sandbox.scene.file import load
@@ -20,7 +20,7 @@ def test_run_in_time_is_the_run() -> None:
 
 
 def test_run_out_of_time_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "REPORT_EVERY", -1.0)  # looked at after every step
+    monkeypatch.setattr(drive, "REPORT_EVERY", -1.0)  # looked at after every step
     scene = load(find("bounce"))
     with pytest.raises(TookTooLongError, match=r"given up after 0 s, \d+% done"):
         patient_run(scene, "pymunk", scene.solver, 0.0)

@@ -1,0 +1,95 @@
+"""Surroundings: what actions change of a running scene besides its bodies: its air, its figures, its walls.
+
+Everything is checked before anything changes.
+"""
+
+from dataclasses import replace
+
+from sandbox.action import SETTABLE, ActionError, Reshape, SetParameter, Toggle, is_settable
+from sandbox.engines.cast import Cast
+from sandbox.scene.address import AddressError, assign
+from sandbox.scene.crosscheck import course
+from sandbox.scene.demands import on_floor
+from sandbox.scene.document import to_document
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Post, Scene, Wall
+
+
+def set_parameter(action: SetParameter, cast: Cast) -> None:
+    """Change a value of the scene.
+
+    Raises:
+        ActionError: it cannot be changed, or not to this.
+    """
+    if not is_settable(action.path):
+        raise ActionError(f"{action.path!r} cannot be changed while a scene runs; what can: {SETTABLE}")
+    try:
+        document, _ = assign(to_document(cast.scene), action.path, action.value)
+        world = cast.scene.world
+        if world.duration == 0.0:  # of a session that has only just begun, as no scene's is
+            document["world"]["duration"] = cast.scene.solver.dt
+        scene = from_document(document)
+        if world.duration == 0.0:
+            scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.0})})
+    except AddressError as error:
+        raise ActionError(str(error)) from None
+    except SceneError as error:
+        raise ActionError("; ".join(f"{f.path}: {f.message}" for f in error.faults)) from None
+    if on_floor(scene) != on_floor(cast.scene):
+        raise ActionError(f"{action.path}: a floor cannot begin to rub, nor cease to, while a scene runs")
+    cast.change(_going_on(scene, cast.scene))
+
+
+def toggle(action: Toggle, cast: Cast) -> None:
+    """Make a wall or post solid, or no longer.
+
+    Raises:
+        ActionError: there is no such thing, or it stands on a floor.
+    """
+    scene = cast.scene
+    begin = len(scene.planes)
+    names = scene.fixed_names[begin : len(scene.fixed)]
+    if action.thing not in names:
+        raise ActionError(f"no wall or post is named {action.thing!r}; there are {', '.join(names) or 'none'}")
+    if scene.surface is not None or scene.pockets:
+        raise ActionError("cushions of a table on a floor are solid; none can be toggled")
+    number = names.index(action.thing)
+    things: list[Wall | Post] = [*scene.walls, *scene.posts]
+    if things[number].solid == action.solid:
+        return
+    things[number] = things[number].model_copy(update={"solid": action.solid})
+    walls, posts = tuple(things[: len(scene.walls)]), tuple(things[len(scene.walls) :])
+    cast.change(_going_on(scene.model_copy(update={"walls": walls, "posts": posts}), scene))
+
+
+def reshape(action: Reshape, cast: Cast) -> None:
+    """Give a wall another course.
+
+    Raises:
+        ActionError: there is no such wall, it stands on a floor, or that is no course.
+    """
+    scene = cast.scene
+    names = scene.fixed_names[len(scene.planes) : len(scene.planes) + len(scene.walls)]
+    if action.thing not in names:
+        raise ActionError(f"no wall is named {action.thing!r}; there are {', '.join(map(repr, names)) or 'none'}")
+    if on_floor(scene):
+        raise ActionError(f"{action.thing!r} is a cushion; what stands on a [surface] keeps its course")
+    number = names.index(action.thing)
+    wall = scene.walls[number].model_copy(update={"points": action.points})
+    faults = [f"{'.'.join(map(str, where))} {message}" for where, message in course(wall)]
+    if faults:
+        raise ActionError(f"the wall {action.thing!r}: {'; '.join(faults)}")
+    walls = (*scene.walls[:number], wall, *scene.walls[number + 1 :])
+    cast.change(_going_on(scene.model_copy(update={"walls": walls}), scene))
+
+
+def _going_on(scene: Scene, running: Scene) -> Scene:
+    """Return a scene, changed as `Cast.change` allows, with the bodies and joints of the running one.
+
+    Laid out anew they would be those of the file: with who is gone, with what is broken, and hanging along the new
+    gravity.
+    """
+    joined = running.bodies.elements[len(running.elements) :]  # spawned before the present engine took over
+    bodies = replace(running.bodies, elements=(*scene.elements, *joined))
+    return scene.holding(bodies, running.links, running.began)
