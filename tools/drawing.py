@@ -92,6 +92,7 @@ def played(which: Scene, kept: bool) -> Callable[[], float]:
         which: the game, as long as it is played.
         kept: the window's way: what does not change is drawn once.
     """
+    pictures = PICTURES if kept else 1  # which takes a second
     done = deque(sandbox.play_out(which, "random").recording.actions)
     simulation, sights = sandbox.start(which), list[Sight]()
     while simulation.time < which.world.duration - which.solver.dt:
@@ -103,10 +104,10 @@ def played(which: Scene, kept: bool) -> Callable[[], float]:
     camera, surface, picture = Camera.fitting(framing(which), SIZE), pygame.Surface(SIZE), Picture()
 
     def draw() -> None:
-        for sight in sights[-PICTURES:]:
+        for sight in sights[-pictures:]:
             (picture if kept else Picture()).draw(surface, camera, sight, antialias=True)
 
-    return lambda: PICTURES / timed(draw)
+    return lambda: pictures / timed(draw)
 
 
 def particles(which: Scene, steps: int) -> Callable[[], float]:

@@ -16,6 +16,7 @@ from sandbox.games.pinball.search import PATIENCE
 from sandbox.games.policies import Chance
 from sandbox.games.referee import Referee
 from sandbox.games.rules import Policy
+from sandbox.measure.play_out import play_out
 from sandbox.measure.run import Auditor
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
@@ -148,3 +149,21 @@ def test_multiball_of_the_full_table_puts_all_balls_into_play() -> None:
         most = max(most, len(rules.trough.flown))
     assert rules.sheet.score >= 10_000
     assert most == 3
+
+
+SCRIPT = """\
+0.5, plunger, 1  # all the way, which takes a while
+1.7, plunger, 0
+5.0, left flipper, 1
+5.2, left flipper, 0
+5.5, right flipper, 1
+5.7, right flipper, 0
+"""
+
+
+@pytest.mark.parametrize("path", TABLES, ids=lambda path: path.stem)
+def test_script_of_one_shot_scores(path: Path, tmp_path: Path) -> None:
+    (tmp_path / "shot.txt").write_text(SCRIPT)
+    scene = load(path, ("world.duration=10.0",))
+    assert play_out(scene, str(tmp_path / "shot.txt")).score > 0
+    assert play_out(scene, "none").score == 0
