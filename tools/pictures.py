@@ -16,6 +16,8 @@ from PIL import Image
 
 from sandbox.cli.main import call
 from sandbox.games.billiards.bot.bot import Bot
+from sandbox.games.pinball.hand import Hand
+from sandbox.games.rules import Seen
 from sandbox.play.messages import Messages
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
@@ -24,6 +26,9 @@ from sandbox.scene.shipped import find
 FOLDER = Path(__file__).resolve().parent / "pictures"
 SIZE = (1280, 800)
 FRAME = 1.0 / 60.0  # s
+UPRIGHT = (960, 900)
+SKILL, LIT = 0.95, 65.0
+"""of the player of pinball; and when many a lamp is lit, s"""
 GUNNER = ("right", 0.5, 0.7), ("up", 0.5, 1.18), ("fire", 9.0, 9.1)
 """What is held in the duel's first turn, and from when until when, s: it comes down near the other."""
 AFTER_FIRE = 14.0
@@ -101,6 +106,28 @@ def landing(file: str) -> None:
     opened.close()
 
 
+def pinball(file: str) -> None:
+    """Let a player who watches the ball play for a while, and keep what is seen."""
+    opened = Window(Stage(), size=UPRIGHT)
+    opened.stage.open(find("pinball/full"))
+    opened.desk.panel.visible = False
+    opened.desk.overlays |= {"trails"}
+    opened.home()
+    opened.turn(FRAME)
+    opened.stage.messages = Messages()
+    live, host = opened.stage.live, opened.stage.host
+    assert live is not None
+    assert host is not None
+    live.company.show_trust(False)
+    player = Hand(live.scene.world.seed, SKILL)
+    while live.frame.time < LIT:
+        for control, value in player.decide(Seen(live.frame.time, live.frame, live.contacts, ()), host.rules):
+            host.hold("player", control, value)
+        opened.turn(FRAME)
+    pygame.image.save(opened.surface, FOLDER / file)
+    opened.close()
+
+
 def table(file: str) -> None:
     """Break, aim as a good player would, and keep what is seen; the numbers of the bot are those of its seed."""
     opened = sit_down("8-ball")
@@ -163,5 +190,6 @@ if __name__ == "__main__":
     table("table.png")
     duel("duel.png")
     landing("landing.png")
+    pinball("pinball.png")
     rolling("break.gif", 2.6)
     film("tearing_cloth", "tearing.gif", "--size", "640x340", "--fps", "20", "--until", "1.6")

@@ -19,7 +19,7 @@ from sandbox.action import Action
 from sandbox.recording import Press
 from sandbox.trajectory import Contacts, Frame
 
-__all__ = ["Control", "Logged", "Policy", "Press", "Rules", "Seen", "UnfitError"]
+__all__ = ["Control", "Lit", "Logged", "Policy", "Press", "Rules", "Seen", "UnfitError"]
 
 
 class UnfitError(ValueError):
@@ -91,6 +91,14 @@ class Logged(Protocol):
     @property
     def log(self) -> Sequence[tuple[float, str]]:
         """When, s, and what, in order."""
+
+
+@runtime_checkable
+class Lit(Protocol):
+    """Rules that light lamps, besides."""
+
+    def lit(self) -> frozenset[str]:
+        """Return the names of the parts, `[[play.part]]`, whose lamps are lit now."""
 
 
 class Policy(Protocol):

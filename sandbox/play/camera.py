@@ -40,6 +40,7 @@ class Camera:
         inset: int = 0,
         foot: int = 0,
         turned: bool = False,
+        head: int = 0,
     ) -> Self:
         """Return the camera that shows a box whole.
 
@@ -50,16 +51,18 @@ class Camera:
             inset: px at the right that something else covers.
             foot: px at the bottom that something else covers.
             turned: whether the picture is.
+            head: px at the top that something else covers.
         """
         (left, bottom), (right, top) = box
-        free = max(size[0] - inset, size[0] // 3, 1), max(size[1] - foot, size[1] // 3, 1)
+        free = max(size[0] - inset, size[0] // 3, 1), max(size[1] - head - foot, size[1] // 3, 1)
         room = 1.0 - 2.0 * margin
         width, height = max(right - left, 1e-9), max(top - bottom, 1e-9)
         if turned:
             width, height = height, width
         scale = min(max(min(free[0] * room / width, free[1] * room / height), FARTHEST), CLOSEST)
         whole = cls(((left + right) / 2.0, (bottom + top) / 2.0), scale, size, turned)
-        return whole.panned(((free[0] - size[0]) / 2.0, (free[1] - size[1]) / 2.0))
+        above = max(min(head, size[1] - free[1]), 0)
+        return whole.panned(((free[0] - size[0]) / 2.0, above + (free[1] - size[1]) / 2.0))
 
     def to_screen(self, points: FloatArray) -> FloatArray:
         """Return where points (…, 2), m, lie in the picture, (…, 2) px from its upper left corner."""

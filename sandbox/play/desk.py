@@ -1,5 +1,6 @@
 """Desk: everything that is drawn, from the picture of the scene to the panel, and who takes which event first."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pygame
@@ -12,6 +13,8 @@ from sandbox.play.claims import Claims, claims
 from sandbox.play.drawing.palette import BACKGROUND, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
+from sandbox.play.facts import told
+from sandbox.play.hosting.host import Host
 from sandbox.play.instruments.graph import EnergyGraph
 from sandbox.play.instruments.honours_panel import HonoursPanel
 from sandbox.play.instruments.hud import draw_hud, hud_width
@@ -20,11 +23,12 @@ from sandbox.play.instruments.manual import Manual
 from sandbox.play.instruments.panel import Panel
 from sandbox.play.instruments.picker import Picker
 from sandbox.play.instruments.plates import plate
-from sandbox.play.instruments.score_panel import draw_score
+from sandbox.play.instruments.score_panel import covered, draw_score
 from sandbox.play.instruments.timeline import HEIGHT, Timeline
 from sandbox.play.instruments.tools import Tools
 from sandbox.play.knobs import Knobs
 from sandbox.play.running.live import Live
+from sandbox.play.running.stored import Stored
 from sandbox.play.shelf import to_pick
 from sandbox.play.sight import OVERLAYS, Status
 from sandbox.play.sound import Sounds
@@ -73,6 +77,21 @@ class Desk:
     def foot(self) -> int:
         """What the timeline covers at the bottom of the window, px."""
         return round(HEIGHT * self.unit) if self.panel.visible else 0
+
+    def covered(self, stage: Stage) -> tuple[int, int]:
+        """Return what the score panel covers at the top and at the bottom of the window, px."""
+        if stage.host is None or stage.gestures is not None or stage.show is None:
+            return 0, 0
+        return covered(stage.host.board(), self._free, self._hud_width(stage.show), self.unit)
+
+    @property
+    def _free(self) -> pygame.Rect:
+        """What neither the panel nor the timeline covers."""
+        return pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
+
+    def _hud_width(self, show: Live | Stored) -> int:
+        """Return how far to the right the state of things reaches, px."""
+        return hud_width(f"{show.engine}  ·  {told(show.settings)}", self.unit)
 
     @property
     def _area(self) -> pygame.Rect:
@@ -156,6 +175,7 @@ class Desk:
         if self.picker is not None:
             self.picker.draw(surface, self.unit)
             return
+        foot = self.foot + self.covered(stage)[1]
         if show is None:
             surface.fill(BACKGROUND)
         else:
@@ -164,9 +184,8 @@ class Desk:
             if stage.gestures is not None:
                 sight = stage.gestures.seen.over(sight)
             if stage.host is not None:
-                sight = over(stage.host.rules, sight)
-            foot = float(self._area.height)
-            self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=foot)
+                sight = over(stage.host.rules, replace(sight, lit=stage.host.lit()))
+            self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=float(foot))
             if show.contacts is not self._heard:
                 self._heard = show.contacts
                 self._sounds.hits(show.contacts, show.bodies)
@@ -175,17 +194,12 @@ class Desk:
         if stage.game is None:
             self.tools.foot = 0
         status = self.status(stage, rate, recording)
-        self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=self.foot + self.tools.foot)
-        words = f"{status.engine}  ·  {status.settings}"
-        if stage.gestures is not None and not self.manual.open:
-            free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
-            self.tools.draw(surface, stage.gestures.person, free, hud_width(words, self.unit), self.unit)
-        elif stage.host is not None and not self.manual.open:
-            free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
-            draw_score(surface, stage.host.board(), free, hud_width(words, self.unit), self.unit)
-            for note in self._honours.watch(stage.host):
-                stage.messages.tell(note, "warning")
-            self._honours.draw(surface, free, self.unit)
+        self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=foot + self.tools.foot)
+        if show is not None and not self.manual.open:
+            if stage.gestures is not None:
+                self.tools.draw(surface, stage.gestures.person, self._free, self._hud_width(show), self.unit)
+            elif stage.host is not None:
+                self._draw_game(surface, stage, stage.host, self._hud_width(show))
         if show is not None:
             self._draw_graph(surface, stage)
             if self.foot:
@@ -196,6 +210,12 @@ class Desk:
             self.panel.draw(surface)
         if self.manual.open:
             self.manual.draw(surface, self.unit, self.claims(stage).told)
+
+    def _draw_game(self, surface: pygame.Surface, stage: Stage, host: Host, left: int) -> None:
+        draw_score(surface, host.board(), self._free, left, self.unit)
+        for note in self._honours.watch(host):
+            stage.messages.tell(note, "warning")
+        self._honours.draw(surface, self._free, self.unit)
 
     def draw_wait(self, surface: pygame.Surface, what: str) -> None:
         """Say over whatever was drawn what everything waits for; who was drawing may have locked the surface."""
@@ -223,7 +243,7 @@ class Desk:
         self._graph.add(show.frame.time, *show.energy())
         width, height = round(GRAPH[0] * self.unit), round(GRAPH[1] * self.unit)
         margin = round(10 * self.unit)
-        free = pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self._area.height)
+        free = self._free
         rect = pygame.Rect(free.right - width - margin, free.bottom - height - margin, width, height)
         self._graph.draw(surface, rect.clip(free), self.unit)
 

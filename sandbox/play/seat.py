@@ -37,6 +37,7 @@ class Seat:
         self.camera = Camera((0.0, 0.0), 100.0, surface.get_size())
         self.at_home = True
         """whether the camera is where Home puts it; a new scene is then seen whole"""
+        self._covered = (0, 0)  # px at the top and bottom that the score panel took as it came home
         self.leaving: int | None = None
         """the exit status, once the window is to close"""
 
@@ -82,11 +83,19 @@ class Seat:
             self.at_home = False
 
     def _fit(self, box: Box) -> None:
-        """Show a box whole, beside what the panel and the timeline cover."""
-        size, covered = self.surface.get_size(), self.desk.panel.width
+        """Show a box whole, beside what the panels and the timeline cover."""
+        size, inset = self.surface.get_size(), self.desk.panel.width
+        self._covered = head, foot = self.desk.covered(self.stage)
+        foot += self.desk.foot
         show = self.stage.show
-        lies = show is not None and lies_down(show.scene, (size[0] - covered, size[1] - self.desk.foot))
-        self.camera = Camera.fitting(box, size, inset=covered, foot=self.desk.foot, turned=lies)
+        lies = show is not None and lies_down(show.scene, (size[0] - inset, size[1] - foot))
+        self.camera = Camera.fitting(box, size, inset=inset, foot=foot, turned=lies, head=head)
+
+    def make_room(self) -> None:
+        """Come home again where the score panel has grown, with another row or with how the game ended."""
+        covered = self.desk.covered(self.stage)
+        if self.at_home and any(now > then for now, then in zip(covered, self._covered, strict=True)):
+            self.home()
 
     def resize(self, surface: pygame.Surface) -> None:
         """Go on with a surface of another size."""

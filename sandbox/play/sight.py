@@ -79,6 +79,8 @@ class Sight:
     """of the next stroke, at a table"""
     gunnery: Gunnery | None = None
     """what is drawn of a game of artillery besides its bodies"""
+    lit: frozenset[str] = frozenset()
+    """names of the parts, `[[play.part]]`, whose lamps are lit"""
     flames: tuple[Flame, ...] = ()
     """of the thrusts that fire"""
 

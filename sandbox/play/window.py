@@ -89,6 +89,7 @@ class Window(Seat):
 
     def draw(self) -> None:
         """Draw what is on, and what surrounds it."""
+        self.make_room()
         self.desk.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
 
     def _show_wait(self, what: str) -> None:

@@ -16,7 +16,7 @@ class Marking(Part):
     position: Point | None = None
     """of the centre of a disc or ring"""
     radius: Radius | None = None
-    points: Annotated[tuple[Point, ...], Field(max_length=1000)] = ()
+    points: Annotated[tuple[Point, ...], Field(max_length=10_000)] = ()
     """of a line, or the corners of a polygon"""
     filled: bool = True
     """whether it is a disc or a polygon; else it is a ring, or a line"""

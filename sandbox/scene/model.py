@@ -21,7 +21,6 @@ from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
 from sandbox.scene.kick import Kick
 from sandbox.scene.marking import Marking
-from sandbox.scene.paint import Paint
 from sandbox.scene.part import Acceleration, Falloff, Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
 from sandbox.scene.parts import PlayPart
 from sandbox.scene.pinball.described import Pinball
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Attraction", "Ball", "Billiards", "Box", "Capsule", "Cloth", "Collides", "Compound", "ContactModels", "Course",
-    "Disc", "Drive", "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Paint", "Pair",
+    "Disc", "Drive", "Emitter", "Floor", "Generator", "Grid", "Joint", "Kick", "Material", "Mover", "Pair",
     "Plane", "Play", "PlayPart", "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single",
     "Stack", "Surfaced", "Thrust", "Wall", "World", "Zone", "default_name",
 ]  # fmt: skip
@@ -159,8 +158,9 @@ class Play(Part):
     """of a game that they play in turn, such as pinball"""
     parts: tuple[PlayPart, ...] = Field((), alias="part")
     """which thing is what to the rules of the game"""
-    paints: tuple[Paint, ...] = Field((), alias="paint")
-    """what the window draws below everything"""
+    ground: Literal["grid", "playfield"] = "grid"
+    """what is drawn below everything: a grid; or a playfield of markings alone, on which what is fixed casts a shadow,
+    and zones are seen if they state a colour"""
 
 
 class Scene(Part):

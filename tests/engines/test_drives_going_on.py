@@ -9,6 +9,7 @@ from flippers import END, ball, bat, press, scene
 import sandbox
 from sandbox.action import ActionError, Drive, Impulse, Move, Pull, Remove, SetParameter, Spawn, Switch
 from sandbox.engines.contract import Refusal
+from sandbox.engines.energy import total_energy
 from sandbox.engines.relay import Relay, start
 from sandbox.measure.replay import rerun
 from sandbox.recording import Recording
@@ -96,9 +97,25 @@ def test_cut_step_ends_between_its_ends():
     whole.step()
     cut.finish(0.25)
     after, between = whole.frame(), cut.frame()
-    for key in ("angle", "angular_velocity", "position", "drives"):
+    for key in ("angle", "angular_velocity", "drives"):
         old, new = getattr(before, key), getattr(after, key)
         np.testing.assert_allclose(getattr(between, key), old + 0.25 * (new - old), rtol=1e-12)
+    arm = np.hypot(*before.position[0])  # about the origin, where the hinge is
+    np.testing.assert_allclose(np.hypot(*between.position[0]), arm, rtol=1e-14)  # on the arc, not on its chord
+    across = between.angular_velocity[0] * np.array([-between.position[0, 1], between.position[0, 0]])
+    np.testing.assert_allclose(between.velocity[0], across, rtol=1e-13)
+
+
+def test_account_closes_where_a_step_is_cut():
+    running = start(scene(bat(), gravity=(0.0, -9.81)))
+    running.account()
+    press(running)
+    stepped(running, 20)
+    running.finish(0.77)
+    booked, energy = sum(running.account().values()), total_energy(running)
+    assert energy > 0.03  # J, amid the stroke
+    start_energy = total_energy(start(scene(bat(), gravity=(0.0, -9.81))))
+    assert abs(energy - start_energy - booked) < 1e-14  # J, rounding of 0.1 J
 
 
 @pytest.mark.parametrize(

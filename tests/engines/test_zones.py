@@ -221,6 +221,43 @@ def test_let_go_body_weighs_what_it_did_and_is_caught_when_it_comes_back() -> No
     assert relay.frame().position.tolist() == [[1.0, 0.0]]
 
 
+@pytest.mark.parametrize(
+    "release",
+    [
+        Impulse(time=0.0, body="ball", impulse=(0.3, 0.0)),
+        Move(time=0.0, body="ball", position=(2.0, 0.0), velocity=(1.0, 0.0)),
+    ],
+    ids=["kicked", "moved"],
+)
+def test_body_that_starts_in_a_hole_can_be_let_go(release: Action) -> None:
+    scene = scene_of({"position": [0.0, 0.0], "radius": 0.2, "holds": True}, ball={"mass": 0.3})
+    relay = started(scene, 0.1)
+    assert relay.frame().visits is not None and relay.frame().visits.tolist() == [[HELD]]
+    relay.apply(release)
+    relay.step()
+    np.testing.assert_allclose(relay.frame().velocity[0], [1.0, 0.0], rtol=1e-15)
+
+
+def test_what_is_held_amid_an_overlap_is_not_shifted_by_it() -> None:
+    """Half of the ball is in the wall as it joins; pymunk would go on to push it out after it was caught."""
+    hole = {"position": [1.0, 0.0], "radius": 0.1, "holds": True}
+    wall = {"points": [[0.0, -0.05], [2.0, -0.05]], "thickness": 0.02}
+    relay = started(scene_of(hole, ball={"position": [-5.0, 0.0]}, wall=[wall]), 0.0)
+    relay.account()
+    relay.apply(Spawn(time=0.0, ball=Ball(name="late", position=(1.0, 0.03), radius=0.2)))
+    for _ in range(3):
+        relay.step()
+    assert relay.frame().position[1].tolist() == [1.0, 0.0]
+
+
+@pytest.mark.parametrize("drag", [{"linear_drag": 0.5}, {"quadratic_drag": 0.5, "wind": [2.0, 0.0]}])
+def test_air_does_not_move_who_is_held_under_another_gravity(drag: dict[str, Any]) -> None:
+    hole = {"position": [0.0, 0.0], "radius": 0.2, "holds": True, "gravity": [3.0, 4.0]}
+    relay = started(scene_of(hole, world={"duration": 1.0, **drag}), 0.2)
+    assert relay.frame().position.tolist() == [[0.0, 0.0]]
+    assert relay.frame().velocity.tolist() == [[0.0, 0.0]]
+
+
 def test_hole_holds_one_at_a_time() -> None:
     balls = [
         {"name": name, "position": [x, 0.0], "velocity": [1.0, 0.0], "radius": 0.05}

@@ -50,6 +50,15 @@ def test_fitting_shows_a_box_beside_what_is_covered() -> None:
     assert camera.scale > upright.scale
 
 
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("head", [0, 80, 5000])
+def test_fitting_leaves_the_head_free_where_there_is_room(head: int, turned: bool) -> None:
+    camera = Camera.fitting(((0.0, 0.0), (1.0, 2.0)), (900, 600), foot=34, turned=turned, head=head)
+    y = camera.to_screen(np.array([[0.0, 0.0], [1.0, 2.0]]))[:, 1]
+    assert min(y) > min(head, 400)  # of 600 px a third is always the scene's
+    assert max(y) < 600 - 34 or head > 400
+
+
 def test_tables_lie_down_in_wide_pictures_alone() -> None:
     assert lies_down(TABLE, (800, 500))
     assert not lies_down(TABLE, (500, 800))

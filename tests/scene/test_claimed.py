@@ -53,8 +53,8 @@ def test_what_is_there_can_be_claimed(play: dict[str, Any]) -> None:
             "no body, fixed thing or zone is named 'zzz'",
         ),
         ({"part": 2 * [{"name": "a.b", "role": "ball"}]}, "play.part.a.b.name", "plays a part already"),
-        ({"paint": [{"colour": "#000000"}]}, "play.paint[0]", "has no shape"),
-        ({"paint": [{"colour": "#000000", "radius": 1.0, "points": [[0, 0]] * 3}]}, "play.paint[0]", "has no shape"),
+        ({"marking": [{"colour": "#000000"}]}, "play.marking[0]", "state one of them"),
+        ({"ground": "sand"}, "play.ground", "'playfield'"),
     ],
 )
 def test_what_is_not_there_is_a_fault_where_it_stands(play: dict[str, Any], path: str, words: str) -> None:

@@ -159,11 +159,11 @@ def test_ramp_has_rails_on_its_layer_a_mouth_that_lifts_and_an_end_that_lets_dow
 
 def test_what_has_a_colour_inside_is_painted_and_lies_over_the_playfield() -> None:
     wall = {"points": [[0, 0], [0.1, 0], [0.1, 0.1, 0.02]], "closed": True, "fill": "#123456"}
-    paints = table(wall=[wall]).play.paints
-    assert [paint.colour for paint in paints[:3]] == ["#14304a", "#e9b44c", "#123456"]
-    assert paints[2].points is not None
-    assert len(paints[2].points) > 3  # one corner is round
-    assert max(y for _, y in paints[0].points or ()) == pytest.approx(1.0, abs=2e-5)  # the tolerance
+    markings = table(wall=[wall]).play.markings
+    assert [marking.colour for marking in markings[:3]] == ["#14304a", "#e9b44c", "#123456"]
+    assert markings[2].points is not None
+    assert len(markings[2].points) > 3  # one corner is round
+    assert max(y for _, y in markings[0].points or ()) == pytest.approx(1.0, abs=2e-5)  # the tolerance
 
 
 def test_what_the_scene_states_outranks_the_table() -> None:
@@ -218,6 +218,12 @@ def test_overrides_reach_elements_and_what_they_stand_for() -> None:
         ({"kicker": [{"position": [0, 0]}]}, "pinball.kicker[0].out", "must be given"),
         ({"art": [{"colour": "#000000", "radius": 1.0}]}, "pinball.art[0]", "has no shape"),
         ({"art": [{"position": [0, 0], "radius": 1.0}]}, "pinball.art[0].colour", "must be given"),
+        (
+            {"art": [{"points": [[0, 0], [1, 0, 5], [1, 1]], "colour": "#000000"}]},
+            "pinball.art[0].points[1]",
+            "rounded by",
+        ),
+        ({"wall": [{"points": [[0, 0], [0, 0]]}]}, "pinball.wall[0].points[1]", "is no line"),
         ({"outline": [[0, 0], [1, 0, 5], [1, 1]]}, "pinball.outline[1]", "rounded by too much"),
     ],
 )

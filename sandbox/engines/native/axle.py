@@ -88,11 +88,15 @@ class Axle:
 
     def settle(self) -> None:
         """Work out where the centre of mass of a body on a hinge is, and how fast."""
+        self.place, self.velocity = self.seated(self.angle, self.spin)
+
+    def seated(self, angle: float, spin: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return where the centre of mass is at an angle, rad, and how fast at a spin, rad/s: m and m/s."""
         x, y = self.mount.hinge
-        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        cos, sin = math.cos(angle), math.sin(angle)
         dx, dy = sin * y - cos * x, -sin * x - cos * y
-        self.place = self._seat[0] + dx, self._seat[1] + dy
-        self.velocity = 0.0 - self.spin * dy, 0.0 + self.spin * dx  # no −0, which is another state bit by bit
+        place = self._seat[0] + dx, self._seat[1] + dy
+        return place, (0.0 - spin * dy, 0.0 + spin * dx)  # no −0, which is another state bit by bit
 
     def _aim(self, angle: float, spin: float) -> None:
         """Have the next step bring the body to an angle, by a rate that it has meanwhile."""

@@ -85,6 +85,8 @@ class Books:
         counts[p.meeting.drives.numbers] = False  # whose motion is booked for itself
         whole = self._state()
         now = before.towards(whole, share)
+        if now is not whole:
+            p.meeting.drives.seat(now.position, now.velocity, now.angle, now.spin)
         velocity, spin = self._mean(before, now, counts)
         meant(axles, before, now, velocity, spin)
         kicks = kicks_of(p, before.velocity, counts, p.h * share)

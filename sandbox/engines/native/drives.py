@@ -131,6 +131,16 @@ class Drives:
             angle[n], angular_velocity[n] = axle.angle, axle.spin
             self._note(k, axle)
 
+    def seat(self, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray) -> None:
+        """Put the centres of what turns about a hinge where their angles have them: between two states, on the arc.
+
+        Of arrays in scene order, which were interpolated; places and velocities are written to.
+        """
+        for axle in self._axles.values():
+            n = axle.number
+            if not isinstance(axle, Plunger):
+                position[n], velocity[n] = axle.seated(float(angle[n]), float(spin[n]))
+
     def _note(self, number: int, axle: Axle) -> None:
         self.state[number] = axle.state
 

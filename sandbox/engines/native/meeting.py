@@ -159,10 +159,13 @@ class MeetingBodies:
 
     def hold(self, number: int) -> None:
         """Let a body stand still where it is, whatever it meets, until it is let go."""
+        if number in self._resting:  # it rests already: what pymunk tells then is no mass
+            return
         body = self._members[number].body
         self._resting[number] = body.mass, body.moment
         body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
         body.body_type = pymunk.Body.KINEMATIC
+        pymunk.Body.update_position(body, 0.0)  # forgets by how much overlaps would still have shifted it
         self._state = None
 
     def let_go(self, number: int) -> None:

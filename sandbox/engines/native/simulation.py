@@ -128,6 +128,8 @@ class NativeSimulation(Running):
         self._guard()
         for now, old in zip(self._state(), before, strict=True):
             now[...] = old + (now - old) * rest
+        position, velocity, angle, spin = self._state()
+        drives.seat(position, velocity, angle, spin)
         drives.end(driven, rest)
         self._retire()
         self._population.end()

@@ -93,10 +93,10 @@ class Steady:
         """
         numbers, figures = state
         mass = np.asarray([members[n].body.mass for n in numbers.tolist()])[:, None]
-        mass[np.isinf(mass)] = 0.0  # of what a drive moves whatever acts on it
+        mass[np.isinf(mass)] = 0.0  # of what a drive moves, or a zone holds, whatever acts on it
         push = np.zeros((len(numbers), 2))
         for row, number in enumerate(numbers.tolist()):
-            if number in self._of:
+            if number in self._of and mass[row]:
                 push[row] = self._of[number][0] * (1.0 / mass[row])
         reader.push(mass * acceleration(world, figures[:, 3:5], push, h))
         self._twist(members)

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from sandbox.action import Toggle
 from sandbox.games.pinball.board import Board, Element
-from sandbox.games.pinball.effects import Award, Cue, Effect, Machine, Now, points_of
+from sandbox.games.pinball.effects import Award, Cue, Effect, Light, Machine, Now, points_of
 from sandbox.games.pinball.switches import Hit
 from sandbox.scene.part import Point
 
@@ -74,6 +74,11 @@ class Drops(Machine):
             self.down.add(place)
         self.falling.clear()
         yield from self.raised(now)
+
+    def lights(self, now: Now) -> Iterator[Light]:
+        """Show which targets are down; a full bank blinks until it rises."""
+        full = len(self.down) == len(self.members)
+        return (Light(self.members[place].name, full) for place in sorted({*self.down, *self.falling}))
 
     def _covers(self, place: int, ball: int, now: Now) -> bool:
         """Tell whether a ball lies where a target would rise."""

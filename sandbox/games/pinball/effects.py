@@ -75,6 +75,15 @@ class Again(NamedTuple):
 Effect: TypeAlias = Award | Cue | Say | Take | Serve | Save | Again | Action
 
 
+class Light(NamedTuple):
+    """That a lamp is lit."""
+
+    name: str
+    """of its element"""
+    blinks: bool = False
+    """Call for the player; for half of the time such a lamp is dark, also where another machine has lit it."""
+
+
 @dataclass
 class Now:
     """How things stand at a look."""
@@ -111,6 +120,10 @@ class Machine:
 
     def begin(self, now: Now) -> Iterator[Effect]:
         """Make ready for a new ball."""
+        return iter(())
+
+    def lights(self, now: Now) -> Iterator[Light]:
+        """Tell which lamps are lit by it."""
         return iter(())
 
 

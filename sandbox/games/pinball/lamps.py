@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Literal
 
 from sandbox.games.pinball.board import Board, Element
-from sandbox.games.pinball.effects import Again, Award, Cue, Effect, Machine, Now, Say
+from sandbox.games.pinball.effects import Again, Award, Cue, Effect, Light, Machine, Now, Say
 from sandbox.games.pinball.sheet import MOST
 from sandbox.games.pinball.switches import Hit
 
@@ -67,6 +67,10 @@ class Lamps(Machine):
         """Darken everything."""
         self.lit = [False] * len(self.lit)
         return iter(())
+
+    def lights(self, now: Now) -> Iterator[Light]:
+        """Show what was hit."""
+        return (Light(name) for name, on in zip(self.names, self.lit, strict=True) if on)
 
 
 def lamps_of(board: Board) -> tuple[Lamps, ...]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from sandbox.games.pinball.board import Board
-from sandbox.games.pinball.effects import Award, Cue, Effect, Machine, Now, Say
+from sandbox.games.pinball.effects import Award, Cue, Effect, Light, Machine, Now, Say
 from sandbox.scene.parts import Role
 
 
@@ -74,6 +74,12 @@ class Modes(Machine):
         """End what runs with the ball."""
         self.mode, self.ready = None, False
         return iter(())
+
+    def lights(self, now: Now) -> Iterator[Light]:
+        """Show what to shoot at: what the mode counts, or the holes that begin one."""
+        if self.mode is not None:
+            return (Light(each.name, True) for each in self.board.of_role(*self.mode.roles))
+        return (Light(each.name, True) for each in self.board.of_role("kicker") if self.ready)
 
     def _begun(self, now: Now) -> Iterator[Effect]:
         self.mode = self.modes[now.sheet.modes % len(self.modes)]

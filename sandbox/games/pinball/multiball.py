@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from sandbox.games.pinball.board import Board
-from sandbox.games.pinball.effects import Award, Cue, Effect, Machine, Now, Save, Say, Serve, Take
+from sandbox.games.pinball.effects import Award, Cue, Effect, Light, Machine, Now, Save, Say, Serve, Take
 
 MOST = 3
 """balls, of a table that has so many"""
@@ -32,7 +32,8 @@ class Multiball(Machine):
     """
 
     def __init__(self, board: Board) -> None:
-        self.locks = any(each.group == LOCKS for each in board.of_role("kicker"))
+        self.holes = tuple(each.name for each in board.of_role("kicker") if each.group == LOCKS)
+        self.locks = bool(self.holes)
         self.size = min(MOST, len(board.balls)) if self.locks else 1
         self.jackpots = "ramp" if board.of_role("ramp") else "bank" if board.of_role("drop") else "standups"
         self.on = False
@@ -73,6 +74,10 @@ class Multiball(Machine):
         """Begin a ball with one."""
         self.on = False
         return iter(())
+
+    def lights(self, now: Now) -> Iterator[Light]:
+        """Show the holes that lock."""
+        return (Light(name) for name in self.holes if now.sheet.lit and not self.on)
 
     def _begun(self, now: Now) -> Iterator[Effect]:
         """Let out all the balls; the one in the hole is the last."""

@@ -30,6 +30,10 @@ SAID = 3.0
 """s, that a message stays"""
 
 
+BLINK = 0.4
+"""s, from one blink to the next"""
+
+
 class Pinball:
     """A game of three balls for one to four players."""
 
@@ -123,6 +127,16 @@ class Pinball:
             message, until = "TILT!", time + SAID
         saved = 0.0 if course.fresh else course.saved - time
         return panel(course.sheets, course.turn, self.modes, saved, message if time < until else "")
+
+    def lit(self) -> frozenset[str]:
+        """Return whose lamps are lit; a tilted table is dark."""
+        now = self._now
+        if now is None or self.nudge.tilted:
+            return frozenset()
+        lights = [light for machine in self.machines for light in machine.lights(now)]
+        blinking = {light.name for light in lights if light.blinks}
+        on = blinking if now.time % BLINK < 0.5 * BLINK else set[str]()
+        return frozenset(on | {light.name for light in lights} - blinking)
 
     def cues(self) -> Sequence[str]:
         """Return the sounds since the last call."""

@@ -9,13 +9,13 @@ import pygame
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import Colour, hex_colour
 from sandbox.play.drawing.shade import Look, disc_distance, paint
-from sandbox.play.drawing.strokes import Pixel, fill, stroke
+from sandbox.play.drawing.strokes import Pixel, cut, fill, stroke
 from sandbox.scene.marking import Marking
 from sandbox.scene.model import Scene
 from sandbox.scene.part import Point
 
 BEYOND = 16_000.0
-"""px to which corners of a polygon and widths of lines are cut: SDL counts in 32 bits, and draws all of it"""
+"""px to which widths of lines are cut: SDL counts in 32 bits, and draws all of it"""
 
 
 def draw_markings(
@@ -27,8 +27,10 @@ def draw_markings(
         if marking.position is not None and marking.radius is not None:
             _circle(surface, camera, marking, (marking.position, marking.radius), colour, unit, antialias)
         elif marking.filled:
-            corners = np.clip(camera.to_screen(np.asarray(marking.points)), -BEYOND, BEYOND)
-            fill(surface, [(x, y) for x, y in corners.tolist()], colour, antialias)
+            corners = camera.to_screen(np.asarray(marking.points)).tolist()
+            kept = cut([(x, y) for x, y in corners], surface.get_clip())
+            if kept:
+                fill(surface, kept, colour, antialias)
         else:
             places: list[Pixel] = [(x, y) for x, y in camera.to_screen(np.asarray(marking.points)).tolist()]
             width = min(max(marking.width * camera.scale, unit), BEYOND)

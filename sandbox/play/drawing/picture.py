@@ -14,10 +14,11 @@ from sandbox.play.drawing.decks import Decks, layers_among, on_layer
 from sandbox.play.drawing.discs import Discs, spokes
 from sandbox.play.drawing.fixtures import draw_bounds, draw_fixtures
 from sandbox.play.drawing.grid import draw_grid, draw_scale
+from sandbox.play.drawing.lamps import Lamps, draw_lamps
 from sandbox.play.drawing.markings import draw_markings
 from sandbox.play.drawing.overlays import Overlays
-from sandbox.play.drawing.painted import draw_painted
 from sandbox.play.drawing.palette import BACKGROUND, CLEAR, TOUCHING, ColourArray, colour_of
+from sandbox.play.drawing.playfield import draw_playfield
 from sandbox.play.drawing.points import LARGEST, Packed, Points, packed
 from sandbox.play.drawing.polygons import Polygons
 from sandbox.play.drawing.pucks import draw_pucks
@@ -76,6 +77,7 @@ class Picture:
         self._polygons = Polygons()
         self._balls = Balls()
         self._decks = Decks()
+        self._lamps = Lamps()
         self._overlays = Overlays(self._discs, self._points, self._polygons)
         self._background: tuple[Kept, pygame.Surface] | None = None
         self._sizes: Sizes | None = None
@@ -106,6 +108,8 @@ class Picture:
             foot: px at the lower edge that something else will cover.
         """
         self._blit_background(surface, camera, sight, antialias, unit)
+        if sight.lit:
+            self._lamps.draw(surface, camera, sight.scene, sight.lit)
         self._know(sight)
         sizes = self._sized(sight.bodies, camera.scale, unit)
         colours, ageing = self._colours, self._ageing
@@ -243,13 +247,14 @@ class Picture:
             drawn = pygame.Surface(surface.get_size(), 0, surface)
             drawn.fill(BACKGROUND)
             area = sight.scene.play.area
-            if sight.scene.play.paints:
-                draw_painted(drawn, camera, sight.scene, unit, antialias)
+            if sight.scene.play.ground == "playfield":
+                draw_playfield(drawn, camera, sight.scene, unit, antialias)
             elif sight.scene.artillery is not None:
                 draw_land(drawn, camera, sight.scene, unit, antialias)
             elif area is None:
                 draw_grid(drawn, camera, unit)
                 draw_markings(drawn, camera, sight.scene, unit, antialias)
+                draw_lamps(drawn, camera, sight.scene, unit, antialias)
                 draw_zones(drawn, camera, sight.scene, unit, antialias)
                 ground = sight.scene if len(sight.scene.layers) == 1 else on_layer(sight.scene, 0)
                 draw_fixtures(drawn, camera, ground, unit, antialias)

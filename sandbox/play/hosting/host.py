@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sandbox.games.referee import Referee
 from sandbox.games.registry import rules_of
-from sandbox.games.rules import Control, Logged, Rules, UnfitError
+from sandbox.games.rules import Control, Lit, Logged, Rules, UnfitError
 from sandbox.play.messages import Messages
 from sandbox.play.running.live import Live
 from sandbox.scene.model import Scene
@@ -114,6 +114,10 @@ class Host:
         rules = self.rules
         score = f"{rules.score:,}" if isinstance(rules.score, int) else f"{rules.score:,.1f}"
         return Board(score.replace(",", " "), tuple(rules.lines()), rules.over)
+
+    def lit(self) -> frozenset[str]:
+        """Return the names of the parts whose lamps are lit."""
+        return self.rules.lit() if isinstance(self.rules, Lit) else frozenset()
 
     def cues(self) -> tuple[str, ...]:
         """Return the sounds of what happened since the last call; what is seen again on a way back is not heard."""

@@ -1,5 +1,7 @@
 """Score panel: how a game with rules stands, as a row of labelled figures, and how it ended."""
 
+from typing import NamedTuple
+
 import pygame
 
 from sandbox.play.drawing.palette import FAINT, GREEN, INK, LINE, WARNING
@@ -16,11 +18,30 @@ LETTERS = (14.0, 12.5, 11.0)
 MOST_LINES = 8
 
 
-def draw_score(surface: pygame.Surface, board: Board, free: pygame.Rect, left: int, unit: float) -> pygame.Rect:
-    """Draw it at the top of what is free, or where that is too narrow, at the bottom; return what it covers.
+Cell = tuple[str, str]
+"""Label and text."""
+
+
+class Laid(NamedTuple):
+    """Where it lies, and what stands in it."""
+
+    rect: pygame.Rect
+    above: bool
+    """whether it lies at the top"""
+    rows: list[tuple[list[Cell], list[int]]]
+    """cells and their widths, px"""
+    end: tuple[str, ...]
+    """how the game ended"""
+    size: float
+    """px, of letters"""
+    gap: int
+    """px between cells"""
+
+
+def laid(board: Board, free: pygame.Rect, left: int, unit: float) -> Laid:
+    """Lay it at the top of what is free, or where that is too narrow, at the bottom.
 
     Args:
-        surface: the picture.
         board: what is shown.
         free: px, what it may cover.
         left: px, what else covers the top.
@@ -34,32 +55,48 @@ def draw_score(surface: pygame.Surface, board: Board, free: pygame.Rect, left: i
         left, right = free.left + margin, free.right - margin
     for letters in LETTERS:
         size = letters * scale
-        pad, gap = round(0.7 * size), round(1.1 * size)
-        room = right - left - 2 * pad
+        gap, room = round(1.1 * size), right - left - 2 * _pad(size)
         rows = _rows(board, room, size, gap)
         if len(rows) == 1:
             break
     end = wrapped(_told(board), size, room - 1.4 * size, 2, bold=True) if board.over is not None else ()
     wide = max(max(sum(cells) + gap * (len(cells) - 1) for _, cells in rows), *(_wide(line, size) for line in end), 0)
-    tall = round(2.75 * size)
-    rect = pygame.Rect(0, 0, wide + 2 * pad, tall * len(rows) + round(1.5 * size) * len(end) + round(0.9 * size))
+    high = _tall(size) * len(rows) + round(1.5 * size) * len(end) + round(0.9 * size)
+    rect = pygame.Rect(0, 0, wide + 2 * _pad(size), high)
     rect.midtop = (left + right) // 2, free.top + margin
     if not above:
         rect.bottomleft = left, free.bottom - margin
-    plate(surface, rect, 8 * scale)
+    return Laid(rect, above, rows, tuple(end), size, gap)
+
+
+def draw_score(surface: pygame.Surface, board: Board, free: pygame.Rect, left: int, unit: float) -> pygame.Rect:
+    """Draw it where it is laid, and return what it covers."""
+    rect, _, rows, end, size, gap = laid(board, free, left, unit)
+    plate(surface, rect, 0.57 * size)
     y = rect.top + round(0.45 * size)
     for cells, widths in rows:
-        _draw_cells(surface, cells, widths, (rect.left + pad, y), size, gap)
-        y += tall
+        _draw_cells(surface, cells, widths, (rect.left + _pad(size), y), size, gap)
+        y += _tall(size)
     for k, line in enumerate(end):
         middle = y + (k + 0.5) * 1.5 * size
         if k == 0:
-            draw_disc(surface, (rect.left + pad + 0.4 * size, middle), 0.3 * size, WARNING)
-        write(surface, line, (rect.left + pad + 1.2 * size, middle), size, INK, "midleft", bold=k == 0)
+            draw_disc(surface, (rect.left + _pad(size) + 0.4 * size, middle), 0.3 * size, WARNING)
+        write(surface, line, (rect.left + _pad(size) + 1.2 * size, middle), size, INK, "midleft", bold=k == 0)
     return rect
 
 
-Cell = tuple[str, str]
+def covered(board: Board, free: pygame.Rect, left: int, unit: float) -> tuple[int, int]:
+    """Return how many px at the top and at the bottom of what is free it takes."""
+    place = laid(board, free, left, unit)
+    return (place.rect.bottom - free.top, 0) if place.above else (0, free.bottom - place.rect.top)
+
+
+def _pad(size: float) -> int:
+    return round(0.7 * size)
+
+
+def _tall(size: float) -> int:
+    return round(2.75 * size)
 
 
 def _rows(board: Board, room: float, size: float, gap: int) -> list[tuple[list[Cell], list[int]]]:

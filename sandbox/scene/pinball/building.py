@@ -5,11 +5,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sandbox.scene.faults import Location
-from sandbox.scene.model import Ball, Drive, Paint, PlayPart, Polygon, Post, Wall, Zone
+from sandbox.scene.marking import Marking
+from sandbox.scene.model import Ball, Drive, PlayPart, Polygon, Post, Wall, Zone
 from sandbox.scene.part import Point
 from sandbox.scene.parts import Role
 from sandbox.scene.pinball.element import Corner, Scoring
 from sandbox.scene.pinball.rounding import rounded
+
+STATED = "score", "group", "step", "light", "colour"
+"""what a part has from its element"""
 
 
 @dataclass
@@ -33,7 +37,7 @@ class Building:
     polygons: list[Polygon] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)
     parts: list[PlayPart] = field(default_factory=list)
-    paints: list[Paint] = field(default_factory=list)
+    markings: list[Marking] = field(default_factory=list)
     origins: dict[str, Location] = field(default_factory=dict)
 
     def line(self, corners: Sequence[Corner], closed: bool = False) -> tuple[Point, ...]:
@@ -63,15 +67,15 @@ class Building:
 
     def part(self, name: str, role: Role, element: Scoring | None = None, **more: Any) -> None:
         """Say which part something plays; of an element that rules hear of, with what it states."""
-        stated = {} if element is None else {key: getattr(element, key) for key in ("score", "group", "step", "light")}
+        stated = {} if element is None else {key: getattr(element, key) for key in STATED}
         self.parts.append(PlayPart(name=name, role=role, **{**stated, **more}))
 
     def paint(self, colour: str | None, points: Sequence[Point]) -> None:
         """Paint an area, if it has a colour."""
         if colour is not None:
-            self.paints.append(Paint(points=tuple(points), colour=colour))
+            self.markings.append(Marking(points=tuple(points), colour=colour))
 
     def dot(self, colour: str | None, position: Point, radius: float) -> None:
         """Paint a disc, if it has a colour."""
         if colour is not None:
-            self.paints.append(Paint(position=position, radius=radius, colour=colour))
+            self.markings.append(Marking(position=position, radius=radius, colour=colour))

@@ -61,8 +61,8 @@ def expanded(scene: Scene) -> Scene:
         "solver": _stated(scene.solver, {"substeps": SUBSTEPS}),
         "materials": _added(scene.materials, MATERIALS),
         "pairs": _pairs(scene, pinball),
-        "play": _stated(scene.play, {"game": pinball.game}).model_copy(
-            update={"parts": _added(scene.play.parts, to.parts), "paints": (*to.paints, *scene.play.paints)}
+        "play": _stated(scene.play, {"game": pinball.game, "ground": "playfield"}).model_copy(
+            update={"parts": _added(scene.play.parts, to.parts), "markings": (*to.markings, *scene.play.markings)}
         ),
     }
     for key in ("walls", "posts", "zones", "balls", "polygons", "drives"):

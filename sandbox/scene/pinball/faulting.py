@@ -8,6 +8,7 @@ from sandbox.scene.model import Scene
 from sandbox.scene.pinball.described import Pinball
 from sandbox.scene.pinball.element import Corner, Element, Line
 from sandbox.scene.pinball.moving import Flipper, Plunger
+from sandbox.scene.pinball.painted import Art
 from sandbox.scene.pinball.rounding import RoundingError, length_of, rounded
 from sandbox.scene.pinball.sensed import LEAST_DEPTH, Drain, Ramp, Spinner
 from sandbox.scene.pinball.solids import DropTargets, Gate, Slingshot, Standup
@@ -47,6 +48,8 @@ def _wrong(element: Element, tolerance: float) -> Iterator[Found]:
             yield from _corners(("points",), element.points, element.closed, tolerance)
             if element.fill is not None and not element.closed:
                 yield ("fill",), "is of what a closed line encloses; set `closed`, or leave it out"
+        case Art() if element.points is not None:
+            yield from _corners(("points",), element.points, True, tolerance)
         case Ramp():
             yield from _ramp(element, tolerance)
         case Gate() | Spinner() | Drain() if math.dist(*element.points) < CLOSEST:

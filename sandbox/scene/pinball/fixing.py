@@ -70,7 +70,7 @@ def standup(to: Building, name: str, of: Standup) -> None:
     """Add a target."""
     out = unit(of.facing)
     to.wall(name, _plate(of.position, out, of.width, of.thickness), **_target(of))
-    to.part(name, "standup", of, light=of.light or _moved(of.position, out, AHEAD))
+    to.part(name, "standup", of, light=of.light or moved(of.position, out, AHEAD))
 
 
 def drops(to: Building, name: str, of: DropTargets) -> None:
@@ -78,9 +78,9 @@ def drops(to: Building, name: str, of: DropTargets) -> None:
     out = unit(of.facing)
     along = -out[1], out[0]  # to the ball's right, as the ball looks at the faces
     for k in range(of.count):
-        place = _moved(of.position, along, (k - 0.5 * (of.count - 1)) * (of.width + of.gap))
+        place = moved(of.position, along, (k - 0.5 * (of.count - 1)) * (of.width + of.gap))
         to.wall(f"{name} {k + 1}", _plate(place, out, of.width, of.thickness), **_target(of))
-        light = _moved(place, out, AHEAD)
+        light = moved(place, out, AHEAD)
         to.part(f"{name} {k + 1}", "drop", of, group=of.group or name, step=k, light=light)
 
 
@@ -105,10 +105,11 @@ def _target(of: Standup | DropTargets) -> dict[str, object]:
 def _plate(face: Point, out: Vector, width: float, thickness: float) -> tuple[Point, Point]:
     """Return the middle line of a plate with round ends, width and all, whose face is at a point."""
     half = 0.5 * (width - thickness)
-    middle = _moved(face, out, -0.5 * thickness)
+    middle = moved(face, out, -0.5 * thickness)
     along = -out[1], out[0]
-    return _moved(middle, along, -half), _moved(middle, along, half)
+    return moved(middle, along, -half), moved(middle, along, half)
 
 
-def _moved(point: Point, way: Vector, distance: float) -> Point:
+def moved(point: Point, way: Vector, distance: float) -> Point:
+    """Return a point moved so far, m, along a unit vector."""
     return point[0] + way[0] * distance, point[1] + way[1] * distance

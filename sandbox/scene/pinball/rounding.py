@@ -57,7 +57,7 @@ def rounded(corners: Sequence[Corner], closed: bool = False, tolerance: float = 
         tolerance: how far a chord may lie from its arc, m.
 
     Raises:
-        RoundingError: an edge is too short for the arcs at its ends, or a corner turns right back.
+        RoundingError: an edge is too short for the arcs at its ends, a corner turns right back, or all are one point.
     """
     arcs = [arc_at(corners, k, closed) for k in range(len(corners))]
     _fit(corners, arcs, closed)
@@ -68,6 +68,8 @@ def rounded(corners: Sequence[Corner], closed: bool = False, tolerance: float = 
                 points.append(point)
     if closed and math.dist(points[0], points[-1]) <= NEAREST:
         points.pop()
+    if len(points) < (3 if closed else 2):
+        raise RoundingError(len(corners) - 1, "lies on the corner next to it, and what is left is no line")
     return tuple(points)
 
 

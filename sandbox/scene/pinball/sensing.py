@@ -7,7 +7,7 @@ from typing import Any
 
 from sandbox.scene.part import Point, Vector
 from sandbox.scene.pinball.building import Building
-from sandbox.scene.pinball.fixing import DARK
+from sandbox.scene.pinball.fixing import DARK, moved, unit
 from sandbox.scene.pinball.rolling import ROLLING, G
 from sandbox.scene.pinball.rounding import beside, length_of, part_of
 from sandbox.scene.pinball.sensed import LEAST_DEPTH, Drain, Kicker, Ramp, Rollover, Spinner
@@ -15,6 +15,8 @@ from sandbox.scene.surfaced import GROUND
 
 PIECE = 0.03
 """m, of a bent climb, along which gravity has one direction"""
+BEFORE = 0.014
+"""m, from the rim of a hole to the middle of its lamp"""
 GAP = 0.006
 """m, between the strips at the mouth of a ramp of which one lifts the ball and the other lets it down"""
 
@@ -36,7 +38,8 @@ def kicker(to: Building, name: str, of: Kicker) -> None:
     to.zone(name, position=of.position, radius=of.radius, colour=of.colour, holds=True)
     to.dot(of.colour, of.position, 1.25 * of.radius)
     to.dot(DARK, of.position, of.radius)
-    to.part(name, "kicker", of, out=of.out, at=of.position)
+    light = of.light or (moved(of.position, unit(of.out), of.radius + BEFORE) if any(of.out) else None)
+    to.part(name, "kicker", of, out=of.out, at=of.position, light=light)
 
 
 def drain(to: Building, name: str, of: Drain) -> None:
@@ -85,7 +88,7 @@ def ramp(to: Building, name: str, of: Ramp) -> None:
     )
     group = of.group or name
     to.part(name, "ramp", group=group, step=0)
-    to.part(end, "ramp", group=group, step=1, score=of.score, light=of.light or line[0])
+    to.part(end, "ramp", group=group, step=1, score=of.score, light=of.light or line[0], colour=of.colour)
 
 
 def _pieces(line: Sequence[Point], begin: float, end: float) -> list[tuple[Point, ...]]:

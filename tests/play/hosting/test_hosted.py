@@ -15,6 +15,7 @@ from sandbox.games.registry import RULES, rules_of
 from sandbox.games.rules import Control
 from sandbox.measure.replay import rerun
 from sandbox.play.drawing.palette import WARNING
+from sandbox.play.framing import framing
 from sandbox.play.hosting.control_keys import KeyNameError, codes_of, told
 from sandbox.play.hosting.gamepad import LAYOUTS, PLAYSTATION, RUNGS, XBOX, Gamepads, layout_of
 from sandbox.play.hosting.host import Board, Host
@@ -193,6 +194,43 @@ def test_panel_is_drawn_and_tells_the_end(window: Window) -> None:
     red = (np.abs(over.astype(int) - WARNING).sum(axis=2) < 20) & (going != over).any(axis=2)
     assert red.any()  # the mark before the words
     assert presses_of(turned(window, key(UP))) == []  # nobody plays any more
+
+
+def lies_clear(window: Window) -> bool:
+    """Tell whether the whole scene is seen between what the score panel covers at the top and at the bottom."""
+    assert window.stage.show is not None
+    head, foot = window.desk.covered(window.stage)
+    rows = window.camera.to_screen(np.asarray(framing(window.stage.show.scene)))[:, 1]
+    return (
+        head + foot > 0 and rows.min() >= head and rows.max() <= window.surface.get_height() - window.desk.foot - foot
+    )
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1000, 300), (640, 480)])  # the last has the score at the bottom
+def test_scene_lies_clear_of_the_score_panel(window: Window, size: tuple[int, int]) -> None:
+    turned(window)
+    assert lies_clear(window)
+    window.resize(pygame.Surface(size))
+    assert lies_clear(window)
+    before = window.camera
+    window.make_room()
+    assert window.camera == before  # nothing has grown
+
+
+def test_scene_makes_room_as_the_panel_grows_unless_somebody_moved_it(window: Window) -> None:
+    turned(window)
+    rules, before = host_of(window).rules, window.camera
+    assert isinstance(rules, Toy)
+    rules.over = "enough, after a long time"
+    turned(window, elapsed=0.0)
+    assert window.camera != before
+    assert lies_clear(window)
+    rules.over = None
+    turned(window, elapsed=0.0)
+    window.at_home, window.camera = False, before
+    rules.over = "enough"
+    turned(window, elapsed=0.0)
+    assert window.camera == before
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (900, 300), (420, 300), (200, 150), (60, 40)])

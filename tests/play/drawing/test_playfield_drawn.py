@@ -1,4 +1,4 @@
-"""Painted scenes: paint below everything, lamps, shadows and caps; polygons cut to the picture."""
+"""Playfields: markings below everything, lamps, shadows and caps; polygons cut to the picture."""
 
 from typing import Any
 
@@ -21,19 +21,19 @@ SPOT: dict[str, Any] = {"position": [2, 0], "radius": 1, "colour": "#405060"}
 FAR = [ball(90, 90)]
 
 
-def painted(*paints: dict[str, Any], **tables: Any) -> np.ndarray[Any, Any]:
-    play = {"paint": list(paints), **tables.pop("play", {})}
+def painted(*markings: dict[str, Any], **tables: Any) -> np.ndarray[Any, Any]:
+    play = {"ground": "playfield", "marking": list(markings), **tables.pop("play", {})}
     return drawn(sight(scene(balls=tables.pop("balls", FAR), play=play, **tables)))
 
 
-def test_paint_is_laid_one_over_the_other_and_nothing_beside_it() -> None:
+def test_markings_are_laid_one_over_the_other_and_nothing_beside_it() -> None:
     picture = painted(BED, SPOT)
     assert at(picture, 0.0, 0.0) == (16, 32, 48)
     assert at(picture, 2.0, 0.0) == (64, 80, 96)
     assert at(picture, 4.5, 0.0) == BACKGROUND  # and no grid
 
 
-def test_paint_lies_below_bodies_and_what_is_fixed() -> None:
+def test_markings_lie_below_bodies_and_what_is_fixed() -> None:
     post = {"position": [-2, 0], "radius": 0.5, "colour": "#ff0000"}
     picture = painted(BED, balls=[ball(0, 0, 1.0, colour="#123456")], post=[post])
     assert at(picture, 0.0, 0.0) == (18, 52, 86)
@@ -50,7 +50,7 @@ def test_what_stands_casts_a_shadow_once_and_what_lets_pass_none() -> None:
         ("two", [{"points": [[-1, 0], [1, 0]], "thickness": 0.002}] * 2),
         ("passed", [{"points": [[-1, 0], [1, 0]], "thickness": 0.002, "solid": False}]),
     ):
-        which = sight(scene(balls=FAR, play={"paint": [bed]}, wall=walls))
+        which = sight(scene(balls=FAR, play={"ground": "playfield", "marking": [bed]}, wall=walls))
         surface = offscreen(SIZE)
         Picture().draw(surface, close, which)
         dark[name] = tuple(surface.get_at((100, 60 + 50)))[:3]  # 5 mm below the wall
@@ -62,7 +62,10 @@ def test_parts_with_a_light_have_a_lamp() -> None:
     part = {"name": "post-1", "role": "standup", "light": [0.0, 0.0]}
     post = {"position": [3, 1], "radius": 0.2}
     close = Camera((0.0, 0.0), 5_000.0, SIZE)
-    lit, dark = (sight(scene(balls=FAR, play={"paint": [BED], "part": parts}, post=[post])) for parts in ([part], []))
+    lit, dark = (
+        sight(scene(balls=FAR, play={"ground": "playfield", "marking": [BED], "part": parts}, post=[post]))
+        for parts in ([part], [])
+    )
     seen = []
     for which in (lit, dark):
         surface = offscreen(SIZE)
@@ -80,10 +83,10 @@ def test_posts_that_kick_wear_a_cap() -> None:
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e3, 1e9])
-def test_paint_is_drawn_at_any_scale(scale: float) -> None:
+def test_playfield_is_drawn_at_any_scale(scale: float) -> None:
     surface = offscreen(SIZE)
     wall, post = {"points": [[-1, 0], [1, 0]], "thickness": 0.5}, {"position": [0, 1], "radius": 0.3}
-    which = sight(scene(balls=FAR, play={"paint": [BED, SPOT]}, wall=[wall], post=[post]))
+    which = sight(scene(balls=FAR, play={"ground": "playfield", "marking": [BED, SPOT]}, wall=[wall], post=[post]))
     Picture().draw(surface, Camera((-3.0, -1.5), scale, SIZE), which)
     middle = tuple(surface.get_at((SIZE[0] // 2, SIZE[1] // 2)))[:3]
     assert (middle == (16, 32, 48)) == (scale > 1.0)

@@ -1,4 +1,4 @@
-"""Painted: a scene with paint on its ground, as a playfield has: paint, lamps, shadows of what is fixed, caps."""
+"""Playfield: a ground of markings alone, with lamps, shadows of what is fixed, and caps on posts that kick."""
 
 from itertools import pairwise
 
@@ -8,19 +8,16 @@ import pygame
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.decks import on_layer
 from sandbox.play.drawing.fixtures import draw_fixtures
-from sandbox.play.drawing.palette import BACKGROUND, INK, Colour, colour_of_fixed, hex_colour, mixed
-from sandbox.play.drawing.shade import Look, disc_distance, paint
-from sandbox.play.drawing.strokes import Pixel, clipped, cut, fill, stroke
+from sandbox.play.drawing.lamps import draw_lamps, draw_spot
+from sandbox.play.drawing.markings import draw_markings
+from sandbox.play.drawing.palette import INK, Colour, colour_of_fixed, mixed
+from sandbox.play.drawing.shade import Look
+from sandbox.play.drawing.strokes import Pixel, clipped, stroke
 from sandbox.play.drawing.zones import draw_zones
 from sandbox.scene.model import Post, Scene
-from sandbox.scene.paint import Paint
-from sandbox.scene.part import Point
 from sandbox.scene.surfaced import GROUND
 
 DARK: Colour = (5, 8, 14)
-AMBER: Colour = (255, 196, 84)
-LAMP = 0.0065
-"""m, radius of a lamp that nobody lit"""
 SHADOW = (0.003, -0.005)
 """m, from what is fixed to its shadow"""
 SHADE, NOTHING = 90, (255, 0, 255)
@@ -31,18 +28,13 @@ RAISED = 0.62
 """of the radius of a post that kicks: its cap"""
 
 
-def draw_painted(
+def draw_playfield(
     surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
 ) -> None:
-    """Draw the ground of a painted scene and what is fixed on it, as far as it is in sight."""
-    for area in scene.play.paints:
-        _area(surface, camera, area, antialias)
+    """Draw such a ground and what is fixed on it, as far as it is in sight."""
+    draw_markings(surface, camera, scene, unit, antialias)
     _shadows(surface, camera, scene)
-    for part in scene.play.parts:
-        if part.light is not None:
-            lit = AMBER if part.colour is None else hex_colour(part.colour)
-            look = Look(mixed(BACKGROUND, lit, 0.35), mixed(BACKGROUND, lit, 0.7), 1.2 * unit, 1.0, antialias)
-            _disc(surface, camera, part.light, LAMP, look)
+    draw_lamps(surface, camera, scene, unit, antialias)
     draw_zones(surface, camera, _coloured(scene), unit, antialias)
     draw_fixtures(surface, camera, on_layer(scene, 0), unit, antialias)
     for post in scene.posts:
@@ -55,16 +47,6 @@ def _coloured(scene: Scene) -> Scene:
     return scene.model_copy(update={"zones": tuple(zone for zone in scene.zones if zone.colour is not None)})
 
 
-def _area(surface: pygame.Surface, camera: Camera, area: Paint, antialias: bool) -> None:
-    colour = hex_colour(area.colour)
-    if area.points is not None:
-        corners = cut([(x, y) for x, y in camera.to_screen(np.asarray(area.points)).tolist()], surface.get_clip())
-        if corners:
-            fill(surface, corners, colour, antialias)
-    elif area.position is not None and area.radius is not None:
-        _disc(surface, camera, area.position, area.radius, Look(colour, colour, 0.0, 1.0, antialias))
-
-
 def _cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
     """Draw the cap of a bumper: a bright ring, a lid in its colour, a light on it."""
     colour = colour_of_fixed(post)
@@ -73,9 +55,9 @@ def _cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antia
         (RAISED + 0.12, INK, mixed(INK, colour, 0.3)),
         (RAISED, colour, mixed(colour, DARK, 0.35)),
     ):
-        _disc(surface, camera, post.position, share * post.radius, Look(inner, rim, 1.5 * unit, 1.0, antialias))
+        draw_spot(surface, camera, post.position, share * post.radius, Look(inner, rim, 1.5 * unit, 1.0, antialias))
     glint = post.position[0] - 0.2 * post.radius, post.position[1] + 0.22 * post.radius
-    _disc(surface, camera, glint, 0.2 * post.radius, Look(INK, INK, 0.0, 0.35, antialias))
+    draw_spot(surface, camera, glint, 0.2 * post.radius, Look(INK, INK, 0.0, 0.35, antialias))
 
 
 def _shadows(surface: pygame.Surface, camera: Camera, scene: Scene) -> None:
@@ -105,14 +87,3 @@ def _shadows(surface: pygame.Surface, camera: Camera, scene: Scene) -> None:
 def _dark(layer: pygame.Surface, at: Pixel, radius: float) -> None:
     if clipped(at, at, layer.get_rect(), radius) is not None:
         pygame.draw.circle(layer, DARK, at, radius)
-
-
-def _disc(surface: pygame.Surface, camera: Camera, at: Point, radius: float, look: Look) -> None:
-    ((x, y),), size = camera.to_screen(np.asarray([at])).tolist(), radius * camera.scale
-    if clipped((x, y), (x, y), surface.get_clip(), size + 4.0) is None:
-        return
-    reach = min(size, 1e6)
-    low, high = (min(max(v - reach, -1e6), 1e6) for v in (x, y)), (min(max(v + reach, -1e6), 1e6) for v in (x, y))
-    (left, top), (right, bottom) = low, high
-    within = pygame.Rect(int(left) - 3, int(top) - 3, int(right - left) + 7, int(bottom - top) + 7)
-    paint(surface, disc_distance(x, y, size), look, within)
