@@ -8,7 +8,21 @@ import drawing
 import peers
 import pooltool_shots
 from turning import turns
-from workloads import Timed, command, events, fanning, flying, rolling, running, scene, shooting, staged, stepping
+from workloads import (
+    Timed,
+    command,
+    events,
+    fanning,
+    flying,
+    playing,
+    rolling,
+    running,
+    scene,
+    shooting,
+    simulated,
+    staged,
+    stepping,
+)
 
 from sandbox.scene.file import load
 
@@ -277,6 +291,27 @@ BENCHES = (
             missing=pooltool_shots.missing,
         )
         for name in pooltool_shots.NAMES
+    ),
+    *(
+        Bench(
+            f"pinball-{name}",
+            "seconds of a game in one: 1 kHz, rules, random player, contacts, not audited / of the table bare, its "
+            "ball at rest",
+            lambda name=name: playing(scene(f"pinball/{name}")),
+            lambda name=name: simulated(scene(f"pinball/{name}"), 20.0),
+            60.0,
+            "s/s",
+            rate=True,
+        )
+        for name in ("classic", "full")
+    ),
+    Bench(
+        "pinball-frames",
+        "pictures a second of pinball/full in play / of the same with nothing kept from one to the next",
+        lambda: drawing.played(scene("pinball/full", "world.duration=8.0"), kept=True),
+        lambda: drawing.played(scene("pinball/full", "world.duration=8.0"), kept=False),
+        unit="frames/s",
+        rate=True,
     ),
     Bench(
         "shots-threads",

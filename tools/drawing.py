@@ -2,6 +2,7 @@
 
 import os
 import statistics
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -13,10 +14,12 @@ import pymunk
 import pymunk.pygame_util
 from workloads import timed
 
+import sandbox
 from sandbox.engines.registry import start
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import BACKGROUND, colour_of
 from sandbox.play.drawing.picture import Picture
+from sandbox.play.framing import framing
 from sandbox.play.sight import Sight
 from sandbox.scene.model import Scene
 
@@ -80,6 +83,31 @@ def debug_drawing(which: Scene, steps: int) -> Callable[[], float]:
         return _each(draw)
 
     return work
+
+
+def played(which: Scene, kept: bool) -> Callable[[], float]:
+    """Return how many pictures a second there are at the end of a game by a random player, 50 a second of the game.
+
+    Args:
+        which: the game, as long as it is played.
+        kept: the window's way: what does not change is drawn once.
+    """
+    pictures = PICTURES if kept else 1  # which takes a second
+    done = deque(sandbox.play_out(which, "random").recording.actions)
+    simulation, sights = sandbox.start(which), list[Sight]()
+    while simulation.time < which.world.duration - which.solver.dt:
+        while done and done[0].time <= simulation.time + which.solver.dt / 2.0:
+            simulation.apply(done.popleft())
+        simulation.step()
+        if round(simulation.time / which.solver.dt) % 2:
+            sights.append(Sight(simulation.scene, simulation.bodies, simulation.frame()))
+    camera, surface, picture = Camera.fitting(framing(which), SIZE), pygame.Surface(SIZE), Picture()
+
+    def draw() -> None:
+        for sight in sights[-pictures:]:
+            (picture if kept else Picture()).draw(surface, camera, sight, antialias=True)
+
+    return lambda: pictures / timed(draw)
 
 
 def particles(which: Scene, steps: int) -> Callable[[], float]:

@@ -109,6 +109,24 @@ def flying(count: int, substeps: int = 1, drag: float = 0.0) -> Callable[[], flo
     return work
 
 
+def playing(which: Scene) -> Timed:
+    """Return how many seconds of a game are played in one: rules, a random player, contacts; not audited."""
+
+    def work() -> float:
+        begun = time.perf_counter()
+        played = sandbox.play_out(which, "random", audit=False)
+        return float(played.trajectory.time[-1]) / (time.perf_counter() - begun)
+
+    return work
+
+
+def simulated(which: Scene, seconds: float) -> Timed:
+    """Return how many seconds are simulated in one where nobody looks: neither contacts nor frames, no rules."""
+    steps = round(seconds / which.solver.dt)
+    bare = stepping(which, steps, record=False, contacts=False)
+    return lambda: seconds / bare()
+
+
 def command(*arguments: str) -> Timed:
     """Time a Python process from start to end."""
     line = [sys.executable, *arguments]

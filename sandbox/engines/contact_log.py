@@ -81,7 +81,7 @@ class ContactLog:
             self._enter((impulse if self._order is None else impulse[self._order]) * self._sign)
 
     def _enter(self, given: ComplexArray) -> None:
-        if self.joints:
+        if self.joints and not self.steady:
             np.add.at(self._impulse, self._row, given)
         else:
             self._impulse[self._row] += given

@@ -9,9 +9,11 @@ from sandbox.games.rules import Control, Policy, Press, Rules, Seen, UnfitError
 from sandbox.scene.model import Scene
 
 RATES = 0.2, 2.0
-"""1/s, how often a random player presses a control: one rate for each, drawn evenly by factors between these"""
-HOLDS = 0.05, 0.8
-"""s, how long it holds a control on average: drawn likewise"""
+"""1/s, how often a random player presses a usual control: one rate for each, drawn evenly by factors between these"""
+HOLDS = 0.05, 1.6
+"""s, how long it holds a control: drawn likewise, for each press anew; what takes a second to draw is drawn at times"""
+FULL = 0.5
+"""of the presses of what can be pressed by halves, those all the way, as keys do; others are even from 0 to 1"""
 STREAM = 0x706C6179
 """Sets the player's chances apart from all else that the scene's seed decides: the letters of `play`."""
 
@@ -25,12 +27,12 @@ class Nobody:
 
 
 class Chance:
-    """Presses and lets go of each control at random times, exponentially distributed, at rates of its own."""
+    """Presses each control at random times, exponentially distributed at a rate of its own, and holds it a while."""
 
     def __init__(self, seed: int) -> None:
         self._chance = np.random.default_rng([STREAM, seed])
         self._turns: dict[str, tuple[float, bool]] = {}  # by control: when it changes next, and whether it is down
-        self._means: dict[str, tuple[float, float]] = {}  # s between presses, and of holding
+        self._pauses: dict[str, float] = {}  # s between presses, on average
 
     def decide(self, seen: Seen, rules: Rules) -> Sequence[tuple[str, float]]:
         """Return what changes now."""
@@ -42,18 +44,25 @@ class Chance:
             if due > seen.time:
                 continue
             down = not down
-            pause, hold = self._means[control.name]
             # No sooner than the next step: a control changes once a step.
-            self._turns[control.name] = seen.time + self._chance.exponential(hold if down else pause), down
-            level = float(self._chance.uniform()) if control.analogue else 1.0
-            found.append((control.name, level if down else 0.0))
+            lasts = self._drawn(HOLDS) if down else float(self._chance.exponential(self._pauses[control.name]))
+            self._turns[control.name] = seen.time + lasts, down
+            found.append((control.name, self._level(control) if down else 0.0))
         return found
 
     def _begin(self, controls: Sequence[Control], time: float) -> None:
         for control in controls:
-            rate, hold = (float(np.exp(self._chance.uniform(*np.log(each)))) for each in (RATES, HOLDS))
-            self._means[control.name] = 1.0 / rate, hold
-            self._turns[control.name] = time + self._chance.exponential(1.0 / rate), False
+            pause = self._pauses[control.name] = 1.0 / (self._drawn(RATES) * control.often)
+            self._turns[control.name] = time + self._chance.exponential(pause), False
+
+    def _drawn(self, bounds: tuple[float, float]) -> float:
+        return float(np.exp(self._chance.uniform(*np.log(bounds))))
+
+    def _level(self, control: Control) -> float:
+        """Return how far a control is pressed."""
+        if not control.analogue or self._chance.uniform() < FULL:
+            return 1.0
+        return float(self._chance.uniform())
 
 
 class Script:

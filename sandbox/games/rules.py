@@ -52,6 +52,8 @@ class Control(NamedTuple):
     are separated by blanks"""
     analogue: bool = False
     """its value is 0 to 1; else it is 0 or 1"""
+    often: float = 1.0
+    """of the presses of usual controls, those of this one by whoever presses at chance; more than 0"""
 
 
 class Rules(Protocol):

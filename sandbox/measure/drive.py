@@ -13,7 +13,7 @@ from sandbox.engines.contract import Divergence, Exhaustion, Simulation
 from sandbox.games.bout import Bout
 from sandbox.measure.recorder import Recorder
 from sandbox.measure.schedule import ROUNDING, Stretch
-from sandbox.trajectory import Contacts
+from sandbox.trajectory import Contacts, Frame
 
 Progress = Callable[[float], None]
 """Called now and then with the share of the run that is done, 0 to 1."""
@@ -45,6 +45,8 @@ class _Doing:
         """when there is something to be done again, s; of a game at every step"""
         self._done: list[Action] = []
         self._heard: list[Contacts] = []
+        self.frame: Frame | None = None
+        """of this moment, where it was just read; nobody has to read it again then"""
 
     def act(self, now: float, last: bool = False) -> bool:
         """Do all whose time has come by `now`, s; tell whether anything was done."""
@@ -74,7 +76,8 @@ class _Doing:
             self._heard.append(contacts)
             if len(self._heard) == HEARD:
                 self._heard = [Contacts.joined(self._heard).merged()]
-        return self._bout.turn(simulation.time, simulation.frame(), contacts, given, last)
+        frame = simulation.frame() if self.frame is None else self.frame
+        return self._bout.turn(simulation.time, frame, contacts, given, last)
 
     @property
     def done(self) -> tuple[Action, ...]:
@@ -124,8 +127,10 @@ def drive(
             simulation.step()
             step += 1
             last = step == every and part == 0.0
+            doing.frame = None
             if recorder.wants(step, last):
-                recorder.keep(simulation.frame(), duration if last else simulation.time)
+                doing.frame = simulation.frame()
+                recorder.keep(doing.frame, duration if last else simulation.time)
             if progress is not None and perf_counter() - told > REPORT_EVERY:
                 told = perf_counter()
                 progress(step / (every + part))
@@ -134,7 +139,8 @@ def drive(
         elif part > 0.0:
             doing.act(simulation.time + ROUNDING * stretches[-1].dt)
             simulation.finish(part)
-            recorder.keep(simulation.frame(), duration)
+            doing.frame = simulation.frame()
+            recorder.keep(doing.frame, duration)
             doing.look()
         elif doing.act(simulation.time + ROUNDING * stretches[-1].dt, last=True):
             recorder.amend(simulation.frame())

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import sandbox
@@ -38,11 +38,12 @@ def scene_of(*crowds: dict[str, Any], **more: Any) -> Scene:
 
 
 @given(seed=st.floats(-1.0, 1.0), jitter=st.integers(0, 1000))
+@example(seed=0.0, jitter=153)  # two of one layer graze by 0.5 % of their distance, and part, between two looks
 @settings(max_examples=15, deadline=None)
 def test_each_layer_runs_as_if_it_were_alone(seed: float, jitter: int) -> None:
     """The generators' chances hang on their place in the file, so those alone come first and are compared there."""
     world = {"duration": 0.6, "gravity": [0.0, -4.0], "seed": jitter}
-    alone = sandbox.run(scene_of(crowd("ground", seed), wall=[FRAME], world=world), audit=False)
+    alone = sandbox.run(scene_of(crowd("ground", seed), wall=[FRAME], world=world))
     post = {"position": [0.0, 0.0], "radius": 0.3, "layers": ["one", "two"]}
     others = (crowd("one", -seed), crowd("two", seed / 2.0))
     full = scene_of(crowd("ground", seed), *others, wall=[FRAME], post=[post], world=world)
@@ -51,9 +52,10 @@ def test_each_layer_runs_as_if_it_were_alone(seed: float, jitter: int) -> None:
     assert np.array_equal(mixed.position[:, :count], alone.position)
     assert np.array_equal(mixed.velocity[:, :count], alone.velocity)
     layer = full.bodies.layer
-    for a, b in mixed.contact_pair.tolist():
+    missed = mixed.missed_pair  # who passes over another misses nothing; at this dt those of one layer may
+    for a, b in (*mixed.contact_pair.tolist(), *missed.tolist()):
         assert layer[a] == layer[b] if b >= 0 else not (layer[a] == 0 and full.fixed_names[-1 - b] == "post-1")
-    assert mixed.missed_contacts == 0  # who passes over another misses nothing
+    assert np.array_equal(missed[missed[:, 0] < count], alone.missed_pair)
 
 
 @pytest.mark.parametrize("layers", [["ground"], ["ramp"], ["ground", "ramp"]])

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pymunk
+from pymunk._chipmunk_cffi import ffi, lib
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 
 from sandbox.engines.native.ids import IdTable
@@ -26,8 +27,13 @@ TOUCH = (
 
 WHO = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID | ArbiterFields.CONTACT_COUNT
 
-SECOND = ArbiterFields.POINT_A_2 | ArbiterFields.POINT_B_2
-"""What polygons have besides: they touch in two points."""
+SECOND = TOUCH | ArbiterFields.POINT_A_2 | ArbiterFields.POINT_B_2
+"""What polygons have: they touch in two points."""
+
+TOUCH_FLAGS, SECOND_FLAGS = TOUCH.value, SECOND.value
+
+LIST = ffi.addressof(lib, "pmSpaceArbiterIteratorFuncBatched")
+"""What writes an arbiter into a listing; `get_space_arbiters` looks it up at each call, which takes as long as it."""
 
 
 class Reader:
@@ -40,6 +46,8 @@ class Reader:
     def __init__(self, space: pymunk.Space) -> None:
         self._space = space
         self._bodies, self._arbiters, self._forces = Buffer(), Buffer(), Buffer()
+        self._listing = ffi.new("pmBatchedData *")  # of arbiters, as `get_space_arbiters` makes one at each call
+        self._listing.floatArray, self._listing.intArray = self._arbiters._float_arr, self._arbiters._int_arr
         self._number_of = IdTable({})
         self._moving: IntArray = np.empty(0, np.int64)
         self._words, self._width = b"", 4  # who touched at the last look, and how many vectors a contact has
@@ -125,7 +133,8 @@ class Reader:
         all that is new.
         """
         self._arbiters.clear()
-        get_space_arbiters(self._space, TOUCH | SECOND if polygons else TOUCH, self._arbiters)
+        self._listing.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
+        lib.cpSpaceEachCachedArbiter(self._space._space, LIST, self._listing)
         self._width = 6 if polygons else 4
         words = bytes(self._arbiters.int_buf())
         same = words == self._words

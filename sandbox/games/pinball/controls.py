@@ -10,11 +10,14 @@ FLIPPERS = {LEFT: "left", RIGHT: "right"}
 NUDGES = {"nudge": 1.0 + 0j, "nudge left": 1j, "nudge right": -1j}
 """control → where the balls go, as a turn from up the table"""
 
+SELDOM = 0.05
+"""of the presses of other controls, those of a nudge by whoever presses at chance: three of a ball are a tilt"""
+
 CONTROLS = (
     Control(LEFT, "raise the left flipper while held; lights of lanes move left", ("left shift", "z"), "lb lt"),
     Control(RIGHT, "raise the right flipper while held; lights of lanes move right", ("right shift", "/"), "rb rt"),
     Control(PLUNGER, "hold to pull the plunger, let go to shoot", ("enter",), "a +righty", True),
-    Control("nudge", "jolt the table: balls go up", ("space",), "y up", True),
-    Control("nudge left", "jolt the table: balls go left", ("left",), "left", True),
-    Control("nudge right", "jolt the table: balls go right", ("right",), "right", True),
+    Control("nudge", "jolt the table: balls go up", ("space",), "y up", True, SELDOM),
+    Control("nudge left", "jolt the table: balls go left", ("left",), "left", True, SELDOM),
+    Control("nudge right", "jolt the table: balls go right", ("right",), "right", True, SELDOM),
 )

@@ -56,7 +56,7 @@ class Nudge(Machine):
         struck = self._swung(now.time)
         self.jolts = [(began, a) for began, a in self.jolts if began + SECONDS > now.time + _AWAKE]
         yield from self._pushes(now)
-        if not struck or self.tilted or now.time < self.quiet:
+        if not struck or self.tilted or now.time < self.quiet or not now.loose:  # a ball that waits gains nothing
             return
         self.quiet = now.time + AGAIN
         self.warnings += 1

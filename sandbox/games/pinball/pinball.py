@@ -54,6 +54,7 @@ class Pinball:
             self.holes, Ramps(board), self.modes, self.multiball, self.nudge,
             Search(board, self.holes, self.banks),
         )  # fmt: skip
+        self._ticking = tuple(each for each in self.machines if type(each).tick is not Machine.tick)
         self.course = Course(board, self.holes, self.nudge)
         self.course.machines = self.machines
         self.up: set[str] = set()
@@ -85,7 +86,7 @@ class Pinball:
         return "all balls were played" if self.course.balls_left else "no ball is left on the table"
 
     def control(self, name: str, value: float) -> Sequence[Action]:
-        """Do what a player asks for; a tilted table obeys nobody, but lets go.
+        """Do what a player asks for; a tilted table obeys nobody, but lets go, and its plunger is only a rod.
 
         Raises:
             KeyError: there is no such control.
@@ -96,7 +97,7 @@ class Pinball:
         if name in FLIPPERS:
             return self._flipped(FLIPPERS[name], value > 0.0 and alive, now)
         if name == PLUNGER:
-            return self._settled(self._plunged(value if alive else 0.0, now), now)
+            return self._settled(self._plunged(value if self.course.phase == "play" else 0.0, now), now)
         direction = NUDGES[name] * complex(*self.board.up)
         return self._settled(self.nudge.jolt(direction, value, now), now) if alive and value > 0.0 else ()
 
@@ -108,7 +109,7 @@ class Pinball:
         actions += self._settled(self.course.missed(now), now)
         self._refresh(now)
         tilted = self.nudge.tilted
-        for machine in self.machines:
+        for machine in self._ticking:
             actions += self._settled(machine.tick(now), now)
         if self.nudge.tilted and not tilted:
             self.course.save(0.0)

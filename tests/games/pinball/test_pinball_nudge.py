@@ -182,3 +182,19 @@ def test_search_is_by_the_seed_alone() -> None:
 
     assert kick(5) == kick(5)
     assert kick(5) != kick(6)
+
+
+def test_tilt_is_of_a_ball_that_is_loose_and_the_plunger_is_only_a_rod() -> None:
+    game = Table(table())
+    game.wait(0.05)
+    for _ in range(5):  # the ball waits in the lane, where a jolt wins nothing
+        game.press("nudge")
+        game.wait(4.0)
+    assert not game.game.nudge.tilted
+    game.put(0, OPEN)
+    game.wait(0.1)
+    tilted(game)
+    game.put(0, SERVE)  # it was not shot far enough: without the plunger the game would never go on
+    game.wait(0.1)
+    assert drives(game.press("plunger", 0.8)) == [("plunger", 0.8)]
+    assert drives(game.press("left flipper")) == [("left bat", 0.0)]
