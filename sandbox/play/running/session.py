@@ -61,9 +61,7 @@ class Session(Course):
         super().__init__(scene, engine, settings, actions, game, until)
         self._calm = 0
         self._mark: Mark | None = None  # that the relay was taken up from, as long as all that followed was known
-        self._unsure: list[
-            int
-        ] = []  # steps first seen on a way from a checkpoint, and not yet confirmed by what follows
+        self._unsure: list[int] = []
         self._astray = False
         self._contacts: list[Contacts] = []
         self._everyone = self.bodies
@@ -75,6 +73,14 @@ class Session(Course):
     def _known(self) -> bool:
         seen = self.history.known(0) is not None and self._step <= self.history.furthest
         return seen or super()._known
+
+    @property
+    def unsure(self) -> tuple[int, ...]:
+        """Steps first seen on a way from a checkpoint, and not yet confirmed by what follows.
+
+        Where what follows differs, they are forgotten: on the way from the start their last digits may be others.
+        """
+        return tuple(self._unsure)
 
     def bodies_in(self, frame: Frame) -> Bodies:
         """Return the bodies by number, with those of a state that was seen; it may lie ahead and have more."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, SetParameter, Spawn, Strike, Switch
@@ -481,11 +481,12 @@ TWO = scene_of(
 
 @pytest.mark.parametrize("engine", ENGINES)
 @given(plan=st.lists(moves, max_size=12))
+@example(plan=[("on", 1), ("on", 29), ("to", 29), ("to", 111), ("to", 47), ("on", 15)])  # 62 tells that 47 was unsure
 @settings(max_examples=30)
 def test_in_any_order_of_moves_a_step_is_what_it_was(engine: str, plan: list[tuple[str, int]]) -> None:
     session = Session(TWO, engine)
     for kind, number in plan:
-        seen = hashes(session)
+        seen = {k: v for k, v in hashes(session).items() if k not in session.unsure}
         match kind:
             case "on":
                 try:
