@@ -44,6 +44,7 @@ class MeetingBodies:
             skin: the share of its radius by which each lone disc is larger in the space than it is.
         """
         self._scene, self._settings, self._skin = scene, settings, skin
+        self._h, self._dragged = settings.h, scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
         self._space = new_space(scene, settings)
         self._reader = Reader(self._space)
         self._setter = SurfaceSetter(self._space, settings.h)
@@ -240,6 +241,7 @@ class MeetingBodies:
         """Go on with a scene's changed air, gravity, coefficients or walls, or with more surfaces."""
         self._ground.reshape(self._scene, scene)
         self._scene = scene
+        self._dragged = scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
         self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
         self._touches, self._noted = meet.touches, meet.noted
         self._setter.renew(meet)
@@ -265,10 +267,10 @@ class MeetingBodies:
             self._setter.gates.tick += 1
         if self.drives:
             self.drives.before()
-            self._space.step(self._settings.h)
+            self._space.step(self._h)
             self.drives.after()
         else:
-            self._space.step(self._settings.h)
+            self._space.step(self._h)
         self._state = None
 
     def drive(self, velocity: FloatArray) -> None:
@@ -282,9 +284,8 @@ class MeetingBodies:
 
     def _apply_forces(self) -> None:
         """Set what pymunk forgets after each step: the drag on all bodies, the steady forces on some."""
-        world = self._scene.world
-        if world.linear_drag > 0 or world.quadratic_drag > 0:
-            self.steady.apply_with_drag(self._members, self._reader, self._read(), world, self._settings.h)
+        if self._dragged:
+            self.steady.apply_with_drag(self._members, self._reader, self._read(), self._scene.world, self._h)
         else:
             self.steady.apply(self._members)
 
@@ -315,7 +316,7 @@ class MeetingBodies:
         if not self._moving:
             return NOTHING
         same = self._reader.look(self._polygons)
-        remembered = self._remember()
+        remembered = self._remembered or self._remember()
         if same and steady and remembered.pairs and not remembered.found:
             return self._reader.impulses()
         remembered.pairs = True

@@ -136,7 +136,8 @@ class Reader:
         self._listing.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
         lib.cpSpaceEachCachedArbiter(self._space._space, LIST, self._listing)
         self._width = 6 if polygons else 4
-        words = bytes(self._arbiters.int_buf())
+        found = self._arbiters._int_arr  # what `int_buf` is made of: most often nothing touches
+        words = bytes(self._arbiters.int_buf()) if found.num else b""
         same = words == self._words
         if not same:
             self._words = words

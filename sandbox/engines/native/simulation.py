@@ -39,6 +39,7 @@ class NativeSimulation(Running):
     def __init__(self, scene: Scene, settings: Settings) -> None:
         super().__init__(settings)
         self._population = Population(scene, settings)
+        self._h = settings.h
         self._ledger: ContactLog | None = None
         self._observer: Observer | None = None
         self._books: Books | None = None
@@ -226,7 +227,7 @@ class NativeSimulation(Running):
 
         A share of it is booked: what lies beyond is cut off afterwards.
         """
-        population, h = self._population, self._settings.h
+        population, h = self._population, self._h
         start = self.time + k * h
         before = self._seen() if self._observer is not None else None
         opening = self._books.opening() if self._books is not None else None
@@ -239,7 +240,8 @@ class NativeSimulation(Running):
                 population.felt.told()  # who fell before contacts were asked for is nobody's concern
             population.felt.step(population.meeting, start, share)
             population.capture()
-        self._work["joint_iterations"] += population.meeting.joined * self._settings.iterations
+        if joined := population.meeting.joined:
+            self._work["joint_iterations"] += joined * self._settings.iterations
         population.changed()
         if self._books is not None:
             self._books.substep(opening, share)
@@ -289,8 +291,9 @@ class NativeSimulation(Running):
                 count = len(now)
             if came is not None:
                 self._ledger.steady = False  # a note does not last: next time others touch
-            self._work["contacts"] += count
-            self._work["contact_iterations"] += count * self._settings.iterations
+            if count:
+                self._work["contacts"] += count
+                self._work["contact_iterations"] += count * self._settings.iterations
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the present arrays in scene order; they belong to the population."""

@@ -77,7 +77,8 @@ class Steady:
             ]
         for record, force, torque in self._ready:  # pymunk's own setters take five times as long
             lib.cpBodySetForce(record, force)
-            lib.cpBodySetTorque(record, torque)
+            if torque:  # none is what pymunk leaves after each step
+                lib.cpBodySetTorque(record, torque)
 
     def apply_with_drag(
         self, members: Mapping[int, Member], reader: Reader, state: tuple[IntArray, FloatArray], world: World, h: float
