@@ -35,15 +35,20 @@ def print_scores(rows: Sequence[dict[str, Any]]) -> None:
     for row in rows:
         swept = "".join(f", {key} = {value}" for key, value in row["set"].items())
         click.echo(f"\nscores of {row['scene']}, {row['engine']}{swept}: {row['count']} games, player {row['player']}")
-        click.echo(f"  mean {row['mean']:.4g} ± {row['deviation']:.3g} a game")
+        click.echo(f"  mean {_score(row['mean'])} ± {_score(row['deviation'])} a game")
         names = {0.0: "least", 0.5: "median", 1.0: "most"}
-        told = (f"{names.get(share, f'{share:.0%}')} {row['quantiles'][f'{share:g}']:.4g}" for share in SHARES)
+        told = (f"{names.get(share, f'{share:.0%}')} {_score(row['quantiles'][f'{share:g}'])}" for share in SHARES)
         click.echo(f"  {' · '.join(told)}")
         _print_histogram(row["histogram"]["edges"], row["histogram"]["counts"])
 
 
+def _score(value: float) -> str:
+    """Write a score out, as games do: large ones whole, with thousands set apart."""
+    return f"{value:,.0f}" if abs(value) >= 1000.0 else f"{value:.4g}"
+
+
 def _print_histogram(edges: Sequence[float], counts: Sequence[int]) -> None:
-    bounds = [f"{edge:.4g}" for edge in edges]
+    bounds = [_score(edge) for edge in edges]
     wide, most = max(map(len, bounds)), max(counts)
     for low, high, count in zip(bounds, bounds[1:], counts, strict=False):
         click.echo(f"  {low:>{wide}} … {high:<{wide}} {_bar(count / most)} {count}")
