@@ -7,11 +7,11 @@ import pymunk
 
 from sandbox.engines.limits import BEYOND, FARTHEST
 from sandbox.engines.native.drives import Drives
+from sandbox.engines.native.encounters import Encounters
 from sandbox.engines.native.field import Field
 from sandbox.engines.native.ground import Ground, shuffled
 from sandbox.engines.native.member import Member
-from sandbox.engines.native.memory import RememberedImpulses, without
-from sandbox.engines.native.points import PointReader, Points
+from sandbox.engines.native.points import Points
 from sandbox.engines.native.probes import Probes
 from sandbox.engines.native.reader import Reader
 from sandbox.engines.native.space import (
@@ -62,8 +62,7 @@ class MeetingBodies:
         self._polygons = False
         self._named: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
-        self._remembered: RememberedImpulses | None = None
-        self._points: PointReader | None = None
+        self._encounters = Encounters(self._space, self._reader, self._setter.laws)
         self.field = Field(scene)
         self.drives = Drives(scene, self._space, settings.h)
         self.drives.weigh(scene.world.gravity, gravity_of(scene))
@@ -308,32 +307,12 @@ class MeetingBodies:
             self.drives.write(position, velocity, angle, angular_velocity)
 
     def touching(self, steady: bool = False) -> Touching | ComplexArray:
-        """Return who touches whom now, and how; from the first call on, all impulses add up.
-
-        Args:
-            steady: where it is who touched at the last call, in the same order, their impulses alone will do.
-        """
-        if not self._moving:
-            return NOTHING
-        same = self._reader.look(self._polygons)
-        remembered = self._remembered or self._remember()
-        if same and steady and remembered.pairs and not remembered.found:
-            return self._reader.impulses()
-        remembered.pairs = True
-        found = self._reader.touching()
-        ids, impulses = remembered.take()
-        return without(found, self._reader.numbers(ids), impulses) if len(ids) else found
-
-    def _remember(self) -> RememberedImpulses:
-        if self._remembered is None:
-            self._remembered = RememberedImpulses(self._space)
-        return self._remembered
+        """Return who touches whom now, and how, as `Encounters.touching` does."""
+        return self._encounters.touching(self._polygons, steady) if self._moving else NOTHING
 
     def points(self) -> Points:
         """Return the contact points of the last substep; from the first call on, their impulses add up."""
-        if self._points is None:
-            self._points = PointReader(self._space, self._remember(), self._setter.laws)
-        return self._points.read(self._reader.records)
+        return self._encounters.points()
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a body that is not finite or beyond all bounds, and what is the matter; else None."""

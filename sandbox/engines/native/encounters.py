@@ -1,0 +1,45 @@
+"""Encounters: who touches whom in a pymunk space, with impulses that add up."""
+
+import pymunk
+
+from sandbox.engines.native.laws import Laws
+from sandbox.engines.native.memory import RememberedImpulses, without
+from sandbox.engines.native.points import PointReader, Points
+from sandbox.engines.native.reader import Reader
+from sandbox.engines.touching import ComplexArray, Touching
+
+
+class Encounters:
+    """What a space tells of contacts. Until it is asked, nothing is looked at."""
+
+    def __init__(self, space: pymunk.Space, reader: Reader, laws: Laws) -> None:
+        self._space, self._reader, self._laws = space, reader, laws
+        self._remembered: RememberedImpulses | None = None
+        self._points: PointReader | None = None
+
+    def touching(self, polygons: bool, steady: bool) -> Touching | ComplexArray:
+        """Return who touches whom now, and how; from the first call on, all impulses add up.
+
+        Args:
+            polygons: whether there are some, which may touch in two points.
+            steady: where it is who touched at the last call, in the same order, their impulses alone will do.
+        """
+        same = self._reader.look(polygons)
+        remembered = self._remembered or self._remember()
+        if same and steady and remembered.pairs and not remembered.found:
+            return self._reader.impulses()
+        remembered.pairs = True
+        found = self._reader.touching()
+        ids, impulses = remembered.take()
+        return without(found, self._reader.numbers(ids), impulses) if len(ids) else found
+
+    def _remember(self) -> RememberedImpulses:
+        if self._remembered is None:
+            self._remembered = RememberedImpulses(self._space)
+        return self._remembered
+
+    def points(self) -> Points:
+        """Return the contact points of the last substep; from the first call on, their impulses add up."""
+        if self._points is None:
+            self._points = PointReader(self._space, self._remember(), self._laws)
+        return self._points.read(self._reader.records)
