@@ -1,6 +1,7 @@
 """Weaving: where the nodes of ropes and cloth start, and the joints between them."""
 
 import math
+import sys
 
 import numpy as np
 
@@ -45,7 +46,8 @@ def course(rope: Rope, gravity: Point) -> FloatArray:
     if half == 0.0:
         return start * (1.0 - share) + end * share
     down = np.asarray(gravity) if any(gravity) else np.asarray((0.0, -1.0))
-    along = way / distance if distance > 0.0 else np.asarray((-down[1], down[0])) / math.hypot(*down)
+    apart = distance >= sys.float_info.min  # what is less has too few digits to give a direction
+    along = way / distance if apart else np.asarray((-down[1], down[0])) / math.hypot(*down)
     across = np.asarray((along[1], -along[0]))  # to the right of the way, where the arc turns left
     if across @ down < 0.0:
         across = -across
