@@ -6,32 +6,33 @@ The model holds the file as it was written: generators are not expanded, mixing 
 
 from collections.abc import Collection, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, StringConstraints
 
 from sandbox.scene.artillery.described import Artillery, Terrain
 from sandbox.scene.billiards.described import Billiards
 from sandbox.scene.cue import Shot
-from sandbox.scene.curling import CurlingMatch
 from sandbox.scene.discs import Ball, Disc, Emitter, Generator, Grid, Scatter
 from sandbox.scene.drives import Drive
 from sandbox.scene.floor import ContactModels, Floor, Pocket
 from sandbox.scene.forces import Attraction, Thrust
 from sandbox.scene.joints import Joint
 from sandbox.scene.kick import Kick
-from sandbox.scene.marking import Marking
-from sandbox.scene.part import Acceleration, Falloff, Friction, Name, Part, Point, Radius, Restitution, Vector, Velocity
+from sandbox.scene.materials import Material, Pair
+from sandbox.scene.part import Part
 from sandbox.scene.parts import PlayPart
 from sandbox.scene.pinball.described import Pinball
+from sandbox.scene.play import Play
 from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule, Compound, Polygon
-from sandbox.scene.spots import Game, Spot
 from sandbox.scene.stacks import Stack
-from sandbox.scene.surfaced import GROUND, Collides, Mover, Single, Surfaced
+from sandbox.scene.standing import Course, Plane, Post, Wall
+from sandbox.scene.surfaced import Collides, Mover, Single, Surfaced
 from sandbox.scene.weaves import Cloth, Rope
-from sandbox.scene.zone import Layers, Zone
+from sandbox.scene.world import World
+from sandbox.scene.zone import Zone
 
 if TYPE_CHECKING:
     from sandbox.scene.bodies import Bodies
@@ -44,125 +45,6 @@ __all__ = [
     "Plane", "Play", "PlayPart", "Pocket", "Polygon", "Post", "Ragdoll", "Rope", "Scatter", "Scene", "Shot", "Single",
     "Stack", "Surfaced", "Thrust", "Wall", "World", "Zone", "default_name",
 ]  # fmt: skip
-
-Drag = Annotated[float, Field(ge=0, le=1e9)]
-Height = Annotated[float, Field(gt=0, le=1e9)]
-Course = Annotated[tuple[Point, ...], Field(min_length=2, max_length=100_000)]
-
-
-class World(Part):
-    """The surroundings: gravity, air, time, and the box outside which bodies are retired."""
-
-    gravity: tuple[Acceleration, Acceleration] = (0.0, 0.0)
-    """m/s²"""
-    duration: Annotated[float, Field(gt=0, le=1e9)] = 10.0
-    """s, of a headless run"""
-    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
-    """All randomness of a scene comes from it."""
-    linear_drag: Drag = 0.0
-    """k, 1/s: a = −k (v − wind)"""
-    quadratic_drag: Drag = 0.0
-    """c, 1/m: a = −c |v − wind| (v − wind)"""
-    wind: Velocity = (0.0, 0.0)
-    """m/s"""
-    bounds: tuple[Point, Point] | None = None
-    """Lower-left and upper-right corner, m. A body whose centre leaves the box is retired."""
-
-
-class Material(Part):
-    """Named coefficients."""
-
-    name: Name
-    restitution: Restitution | None = None
-    restitution_falloff: Falloff | None = None
-    """s/m"""
-    friction: Friction | None = None
-
-
-class Pair(Part):
-    """The coefficients of two materials in contact; outranks whatever they would mix to."""
-
-    between: tuple[Name, Name]
-    restitution: Restitution | None = None
-    restitution_falloff: Falloff | None = None
-    """s/m"""
-    friction: Friction | None = None
-
-
-class Plane(Surfaced):
-    """A half-plane, solid behind its normal."""
-
-    point: Point
-    """any point of the surface, m"""
-    normal: Vector
-    """out of the solid; any length"""
-    layers: Layers | None = None
-    """on which it is solid; without, on all"""
-
-
-class Wall(Surfaced):
-    """A polyline with round ends, solid on both sides."""
-
-    points: Course
-    thickness: Annotated[float, Field(ge=0, le=1e9)] = 0.0
-    """full thickness, m"""
-    closed: bool = False
-    """Join the last point to the first."""
-    layers: Layers = (GROUND,)
-    """on which it is solid"""
-    height: Height | None = None
-    """of the nose above a floor, m"""
-    kick: Kick | None = None
-    one_way: bool = False
-    """Solid only for what comes from the left of its direction, first to last point; from the right all pass."""
-    solid: bool = True
-    """whether anything meets it; an action can change that"""
-
-
-class Post(Surfaced):
-    """A fixed circle."""
-
-    position: Point
-    radius: Radius
-    layers: Layers = (GROUND,)
-    """on which it is solid"""
-    height: Height | None = None
-    """of the nose above a floor, m"""
-    kick: Kick | None = None
-    solid: bool = True
-    """whether anything meets it; an action can change that"""
-
-
-class Play(Part):
-    """How a scene is played. No engine reads it, and no run depends on it but by the game that is played."""
-
-    arrows: Name | None = None
-    """a body that the arrow keys move"""
-    arrow_step: Annotated[float, Field(gt=0, le=1e9)] = 0.5
-    """m, how far each time"""
-    relaunch: Name | None = None
-    """a generator whose bodies Space starts anew, with other chances"""
-    show: Literal["overlap"] | None = None
-    """Colour bodies by whether they overlap anything."""
-    game: Game | None = None
-    """whose rules are kept: of billiards, at a table in the window; of any other, also headless"""
-    area: tuple[Point, Point] | None = None
-    """lower left and upper right corner of a table's playing area, m"""
-    view: tuple[Point, Point] | None = None
-    """lower left and upper right corner of what the window shows at first, m; by default what the bodies may reach"""
-    inset: tuple[Point, Point] | None = None
-    """lower left and upper right corner of what is besides shown larger in a corner of the picture, m"""
-    spots: tuple[Spot, ...] = Field((), alias="spot")
-    curling: CurlingMatch | None = None
-    """of a match of curling"""
-    markings: tuple[Marking, ...] = Field((), alias="marking")
-    players: Annotated[int, Field(ge=1, le=4)] = 1
-    """of a game that they play in turn, such as pinball"""
-    parts: tuple[PlayPart, ...] = Field((), alias="part")
-    """which thing is what to the rules of the game"""
-    ground: Literal["grid", "playfield"] = "grid"
-    """what is drawn below everything: a grid; or a playfield of markings alone, on which what is fixed casts a shadow,
-    and zones are seen if they state a colour"""
 
 
 class Scene(Part):
