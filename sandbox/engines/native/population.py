@@ -11,7 +11,6 @@ import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.engines.acting import derived
-from sandbox.engines.native.crowds import check_crowd
 from sandbox.engines.native.felt import Felt, State
 from sandbox.engines.native.floors import of_floors, on_floor
 from sandbox.engines.native.free import FreeFlight
@@ -20,7 +19,7 @@ from sandbox.engines.native.overlaps import SKIN
 from sandbox.engines.native.visiting import Visiting
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings, meetings
-from sandbox.scene.model import Collides, Scene, Single
+from sandbox.scene.model import Scene, Single
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
@@ -55,7 +54,7 @@ class Population:
         """what zones do, where there are some"""
         self._renew(scene, meetings(scene, self.bodies))
         self._live()
-        self._place(np.arange(len(self.bodies)))
+        self.place(np.arange(len(self.bodies)))
         self.capture()
         if self.visiting is not None:
             self.visiting.begin(np.flatnonzero(self._meet.noted), anew=scene.began == 0.0)
@@ -145,7 +144,7 @@ class Population:
         self.refresh()
         return self.meeting.torn(self.position, self.velocity, self.angle, self.angular_velocity)
 
-    def _place(self, numbers: IntArray) -> None:
+    def place(self, numbers: IntArray) -> None:
         """Give each body to the half that it belongs to, and its surface, as things now stand."""
         meet, bodies = self._meet, self.bodies
         flying = meet.free[numbers] & ~self._driven[numbers]
@@ -195,102 +194,9 @@ class Population:
         self._renew(scene, meet)
         self._live()
 
-    def motion(self, number: int) -> tuple[FloatArray, float]:
-        """Return a body's velocity (2,), m/s, and angular velocity, rad/s."""
-        self.refresh()
-        return self.velocity[number] - self.ahead, float(self.angular_velocity[number])
-
-    def set_velocity(self, number: int, velocity: FloatArray) -> None:
-        """Give a body a velocity, m/s.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        if self._plays(number):
-            self.velocity[number] = velocity
-        else:
-            self._free(number)
-            self._home(number).set_velocity(number, velocity + self.ahead)
-
-    def set_spin(self, number: int, spin: float) -> None:
-        """Give a body an angular velocity, rad/s.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        if self._plays(number):
-            self.angular_velocity[number] = spin
-        else:
-            self._home(number).set_spin(number, spin)
-
-    def set_roll(self, number: int, roll: tuple[float, float]) -> None:
-        """Give a ball on a floor an angular velocity about x and y, rad/s; on one that asks for nothing it is none.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        if self._plays(number):
-            self.roll[number] = roll
-
-    def _free(self, number: int) -> None:
-        """Let a body go that a zone holds."""
-        if self.visiting is not None:
-            self.visiting.free(number)
-
-    def _plays(self, number: int) -> bool:
-        """Tell whether a body is a ball on a floor.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        if self.felt is None:
-            return False
-        if self._pocketed(number):
-            raise ActionError(f"{self.bodies.names[number]!r} lies in a pocket; move it back into play first")
-        return True
-
-    def _pocketed(self, number: int) -> bool:
+    def pocketed(self, number: int) -> bool:
+        """Tell whether a body lies in a pocket."""
         return self.felt is not None and bool(self.felt.pocket[number] >= 0)
-
-    def push(self, number: int, force: FloatArray, torque: float) -> None:
-        """Let a steady force (N) and torque (N·m) act on a body from now on.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        self._plays(number)
-        if force.any() or torque:
-            self._free(number)
-        half = self._home(number)
-        if torque and half is self.meeting and not math.isfinite(half.moment(number)):
-            half.give_moment(number, float(self.bodies.moment[number]))
-        half.push(number, force, torque)
-
-    def put(self, number: int, position: FloatArray) -> None:
-        """Put a body somewhere, m."""
-        self.refresh()
-        self.position[number] = position
-        if self.felt is not None and self._pocketed(number):
-            self.felt.free(number)
-            self._place(np.asarray([number]))
-            return
-        self._free(number)
-        half = self.half_of(number)
-        if half is not None:
-            half.set_position(number, position)
-        if self.visiting is not None:
-            self.visiting.put(number)
-
-    def _home(self, number: int) -> FreeFlight | MeetingBodies:
-        return self.free if self.free.holds(number) else self.meeting
-
-    def throttle(self, number: int, level: float) -> None:
-        """Open the scene's thrust of that number to a share of its force."""
-        self.meeting.field.level[number] = level
-
-    def drive(self, number: int, level: float) -> None:
-        """Ask the scene's drive of that number for a level."""
-        self.meeting.drives.set(number, level)
 
     def add(self, single: Single, name: str) -> int:
         """Add a body and return its number.
@@ -320,8 +226,8 @@ class Population:
         self._live()
         self.meeting.touched(bodies)
         out = [n for n in np.flatnonzero(self.present & ~meet.free).tolist() if not self.meeting.holds(n)]
-        self._promote(np.asarray([n for n in out if n != number and not self._pocketed(n)], np.int64))
-        self._place(np.asarray([number]))
+        self._promote(np.asarray([n for n in out if n != number and not self.pocketed(n)], np.int64))
+        self.place(np.asarray([number]))
         if self.visiting is not None:
             self.visiting.put(number)
         return number
@@ -333,7 +239,7 @@ class Population:
         flying = numbers[np.isin(numbers, self.free.numbers)]
         steady = {n: self.free.steady(n) for n in flying.tolist()}
         self.free.leave(numbers)
-        self._place(numbers)
+        self.place(numbers)
         for number, (force, torque) in steady.items():
             if torque:
                 self.meeting.give_moment(number, float(self.bodies.moment[number]))
@@ -351,15 +257,3 @@ class Population:
             self.felt.leave(numbers)
         if self.visiting is not None:
             self.visiting.gone(numbers)
-
-    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
-        """Refuse a place that pymunk cannot start from.
-
-        Raises:
-            ActionError: it lies out of reach, or in a crowd.
-        """
-        place = np.asarray(position)
-        self.refresh()
-        if not self.meeting.reaches(place):
-            raise ActionError(f"{position} m is out of reach: pymunk's half-planes end before it")
-        check_crowd(place, radius, collides, self.position, self.bodies, self.present)

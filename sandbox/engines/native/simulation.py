@@ -13,6 +13,7 @@ from sandbox.engines.contact_log import ContactLog
 from sandbox.engines.contract import Divergence, Observer
 from sandbox.engines.expiry import Expiry
 from sandbox.engines.native.books import Books
+from sandbox.engines.native.cast import NativeCast
 from sandbox.engines.native.population import Population
 from sandbox.engines.running import Running
 from sandbox.engines.touching import Touching, joined
@@ -145,7 +146,7 @@ class NativeSimulation(Running):
             self._check_running()
             self._still = None
             with booked(self._outside, Cause.ACTIONS, self):
-                leaving = perform(action, self._population)
+                leaving = perform(action, NativeCast(self._population))
                 self._population.changed()
                 self._still = None
             self._population.capture()
