@@ -10,7 +10,7 @@ from sandbox.engines.native.drives import Drives
 from sandbox.engines.native.encounters import Encounters
 from sandbox.engines.native.field import Field
 from sandbox.engines.native.ground import Ground, shuffled
-from sandbox.engines.native.member import Member
+from sandbox.engines.native.members import Member, Members
 from sandbox.engines.native.points import Points
 from sandbox.engines.native.probes import Probes
 from sandbox.engines.native.reader import Reader
@@ -32,7 +32,7 @@ from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 
-class MeetingBodies:
+class MeetingBodies(Members):
     """Bodies in a space, addressed by their numbers. The space is not made before a first body joins."""
 
     def __init__(self, scene: Scene, settings: Settings, skin: float = 0.0) -> None:
@@ -45,10 +45,9 @@ class MeetingBodies:
         """
         self._scene, self._settings, self._skin = scene, settings, skin
         self._h, self._dragged = settings.h, scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
-        self._space = new_space(scene, settings)
+        super().__init__(new_space(scene, settings))
         self._reader = Reader(self._space)
         self._setter = SurfaceSetter(self._space, settings.h)
-        self._members: dict[int, Member] = {}
         self._ground = Ground(self._space, self._setter)
         self._surface_of: IntArray = np.empty(0, np.int64)
         self._moments: FloatArray = np.empty(0)
@@ -57,7 +56,6 @@ class MeetingBodies:
         self.layer: IntArray = scene.bodies.layer
         """(N,) on which each body is"""
         self.probes = Probes(self._space, scene.zones)
-        self._resting: dict[int, tuple[float, float]] = {}  # mass and moment of those that zones hold
         self.tethers = Tethers(self._space)
         self._polygons = False
         self._named: dict[str, pymunk.Body] = {}
@@ -69,7 +67,6 @@ class MeetingBodies:
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.steady = Steady()
         self._moving = 0
-        self._state: tuple[IntArray, FloatArray] | None = None
 
     def __len__(self) -> int:
         return self._moving
@@ -157,25 +154,6 @@ class MeetingBodies:
         """Tell whether a body is here, and zones can note it."""
         return number in self._members and bool(self._noted[number])
 
-    def hold(self, number: int) -> None:
-        """Let a body stand still where it is, whatever it meets, until it is let go."""
-        if number in self._resting:  # it rests already: what pymunk tells then is no mass
-            return
-        body = self._members[number].body
-        self._resting[number] = body.mass, body.moment
-        body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
-        body.body_type = pymunk.Body.KINEMATIC
-        pymunk.Body.update_position(body, 0.0)  # forgets by how much overlaps would still have shifted it
-        self._state = None
-
-    def let_go(self, number: int) -> None:
-        """Let a body that was held move again."""
-        body = self._members[number].body
-        body.body_type = pymunk.Body.DYNAMIC
-        body.mass, body.moment = self._resting.pop(number)
-        body.force, body.torque = (0.0, 0.0), 0.0  # what thrusts have added up
-        self._state = None
-
     def touched(self, bodies: Bodies) -> None:
         """Give shapes to those that were only joined or driven, and have come to meet something."""
         for number, member in self._members.items():
@@ -216,20 +194,6 @@ class MeetingBodies:
     def joined(self) -> int:
         """How many joints there are that pymunk solves."""
         return len(self.tethers) if self._moving else 0
-
-    @property
-    def breakable(self) -> bool:
-        """Whether some joint may break."""
-        return self.tethers.breakable
-
-    def torn(
-        self, position: FloatArray, velocity: FloatArray, angle: FloatArray, angular_velocity: FloatArray
-    ) -> IntArray:
-        """Let go of joints that gave more than their strength in the last substep; return their numbers.
-
-        Of arrays in scene order: the present state.
-        """
-        return self.tethers.torn(position, velocity, angle, angular_velocity, self._settings.h)
 
     @property
     def joints(self) -> bool:
@@ -327,46 +291,10 @@ class MeetingBodies:
             return int(numbers[worst]), BEYOND
         return int(numbers[worst]), f"is more than {self._ground.reach:g} m out, where pymunk's half-planes end"
 
-    def holds(self, number: int) -> bool:
-        """Tell whether a body is in the space."""
-        return number in self._members
-
-    def movers(self) -> list[int]:
-        """Return the numbers of the bodies that are not fixed."""
-        return [number for number, member in self._members.items() if member.moves]
-
     def reaches(self, place: FloatArray) -> bool:
         """Tell whether planes are planes at a place; so they are until there are some."""
         return self._ground.reaches(place)
 
-    def moment(self, number: int) -> float:
-        """Return a body's moment of inertia, kg·m²; infinite where nothing in the scene can turn it."""
-        return self._resting[number][1] if number in self._resting else self._members[number].body.moment
-
-    def give_moment(self, number: int, moment: float) -> None:
-        """Let a body turn from now on."""
-        if number in self._resting:
-            self._resting[number] = self._resting[number][0], moment
-        else:
-            self._members[number].body.moment = moment
-
     def push(self, number: int, force: FloatArray, torque: float) -> None:
         """Let a steady force (N) and torque (N·m) act on a body from now on."""
         self.steady.push(number, force, torque)
-
-    def set_position(self, number: int, position: FloatArray) -> None:
-        """Put a body somewhere, m."""
-        body = self._members[number].body
-        body.position = float(position[0]), float(position[1])
-        self._space.reindex_shapes_for_body(body)
-        self._state = None
-
-    def set_velocity(self, number: int, velocity: FloatArray) -> None:
-        """Give a body a velocity, m/s."""
-        self._members[number].body.velocity = float(velocity[0]), float(velocity[1])
-        self._state = None
-
-    def set_spin(self, number: int, spin: float) -> None:
-        """Give a body an angular velocity, rad/s."""
-        self._members[number].body.angular_velocity = spin
-        self._state = None

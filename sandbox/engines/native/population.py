@@ -142,7 +142,7 @@ class Population:
     def torn(self) -> IntArray:
         """Let go of joints that gave more than their strength in the last substep; return their numbers."""
         self.refresh()
-        return self.meeting.torn(self.position, self.velocity, self.angle, self.angular_velocity)
+        return self.meeting.tethers.torn(self.position, self.velocity, self.angle, self.angular_velocity, self.h)
 
     def place(self, numbers: IntArray) -> None:
         """Give each body to the half that it belongs to, and its surface, as things now stand."""

@@ -246,7 +246,7 @@ class NativeSimulation(Running):
         population.changed()
         if self._books is not None:
             self._books.substep(opening, share)
-        if population.meeting.breakable and look:
+        if population.meeting.tethers.breakable and look:
             self._come_apart(population.torn(), self._after(k + 1))
         if population.stirred and look:
             self._settle()

@@ -7,7 +7,7 @@ import numpy as np
 from pymunk._chipmunk_cffi import ffi, lib
 
 from sandbox.engines.native.drag import acceleration
-from sandbox.engines.native.member import Member
+from sandbox.engines.native.members import Member
 from sandbox.engines.native.reader import Reader
 from sandbox.scene.model import World
 from sandbox.trajectory import FloatArray, IntArray
