@@ -9,14 +9,13 @@ from sandbox.action import Action
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.acting import perform
 from sandbox.engines.booked import booked
-from sandbox.engines.contact_log import ContactLog
 from sandbox.engines.contract import Divergence, Observer
 from sandbox.engines.expiry import Expiry
 from sandbox.engines.native.books import Books
 from sandbox.engines.native.cast import NativeCast
+from sandbox.engines.native.notes import Notes
 from sandbox.engines.native.population import Population
 from sandbox.engines.running import Running
-from sandbox.engines.touching import Touching, joined
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -41,12 +40,12 @@ class NativeSimulation(Running):
         super().__init__(settings)
         self._population = Population(scene, settings)
         self._h = settings.h
-        self._ledger: ContactLog | None = None
+        self._notes: Notes | None = None
         self._observer: Observer | None = None
         self._books: Books | None = None
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
-        self._work = {"contacts": 0, "contact_iterations": 0, "joint_iterations": 0}
+        self._joint_iterations = 0
         self._expiry = Expiry(scene.bodies, scene.began, settings.h)
         self._still: tuple[FloatArray, FloatArray] | None = None  # angles and spins, which frames share if they can
 
@@ -77,7 +76,13 @@ class NativeSimulation(Running):
         Its contacts, and with them `contact_iterations`, count only from the first call of `contacts` or `watch` on:
         until then nobody asks pymunk for them.
         """
-        return {"substeps": self.substeps, **self._work}
+        contacts = 0 if self._notes is None else self._notes.contacts
+        return {
+            "substeps": self.substeps,
+            "contacts": contacts,
+            "contact_iterations": contacts * self._settings.iterations,
+            "joint_iterations": self._joint_iterations,
+        }
 
     @property
     def flying(self) -> int:
@@ -150,8 +155,8 @@ class NativeSimulation(Running):
                 self._population.changed()
                 self._still = None
             self._population.capture()
-            if self._ledger is not None:
-                self._ledger.joints = self._population.meeting.joints  # a spawned body may have several pieces
+            if self._notes is not None:
+                self._notes.changed()
             if leaving is not None:
                 self._take_out(np.asarray([leaving]))
 
@@ -174,12 +179,9 @@ class NativeSimulation(Running):
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
-        if self._ledger is None:
-            meeting = self._population.meeting
-            scene = self._population.scene
-            self._ledger = ContactLog(len(scene.fixed_names), meeting.joints)
-            self._record(self.time, opening=True)
-        return self._ledger.take()
+        if self._notes is None:
+            self._notes = Notes(self._population, self.time)
+        return self._notes.take()
 
     def account(self) -> Mapping[Cause, float]:
         """Return the energy that each cause has brought since the first call, J; that call opens the account."""
@@ -200,7 +202,7 @@ class NativeSimulation(Running):
 
     def watch(self, observer: Observer) -> None:
         """Have an observer called after every substep; this records contacts too."""
-        if self._ledger is None:
+        if self._notes is None:
             self.contacts()
         self._observer = observer
 
@@ -219,7 +221,7 @@ class NativeSimulation(Running):
         together = self._observer is not None or self._books is not None
         if not together:
             self._population.free.step(substeps)
-        if together or self._ledger is not None or len(self._population.meeting):
+        if together or self._notes is not None or len(self._population.meeting):
             for k in range(substeps):
                 self._substep(k, fly=together)
 
@@ -237,12 +239,12 @@ class NativeSimulation(Running):
         if population.felt is None:
             population.meeting.step(start)
         else:
-            if self._ledger is None:
+            if self._notes is None:
                 population.felt.told()  # who fell before contacts were asked for is nobody's concern
             population.felt.step(population.meeting, start, share)
             population.capture()
         if joined := population.meeting.joined:
-            self._work["joint_iterations"] += joined * self._settings.iterations
+            self._joint_iterations += joined * self._settings.iterations
         population.changed()
         if self._books is not None:
             self._books.substep(opening, share)
@@ -250,17 +252,17 @@ class NativeSimulation(Running):
             self._come_apart(population.torn(), self._after(k + 1))
         if population.stirred and look:
             self._settle()
-        if self._ledger is not None and look:
-            self._record(start + h * share)
+        if self._notes is not None and look:
+            self._notes.record(start + h * share)
             if self._observer is not None and before is not None:
-                self._observer(start, before, self._seen(), self._ledger.pairs())
+                self._observer(start, before, self._seen(), self._notes.pairs())
 
     def _settle(self) -> None:
         """Let zones note who came in, and do what they do."""
         with booked(self._outside, Cause.DRIVES, self):
             self._population.settle()
         visiting = self._population.visiting
-        if self._ledger is None and visiting is not None:
+        if self._notes is None and visiting is not None:
             visiting.told()  # who came in before contacts were asked for is nobody's concern
 
     def _seen(self) -> FloatArray:
@@ -275,26 +277,6 @@ class NativeSimulation(Running):
         self._broken |= dict.fromkeys(numbers.tolist(), time)
         if self._books is not None and len(numbers):
             self._books.parted(numbers)
-
-    def _record(self, time: float, opening: bool = False) -> None:
-        """Enter what touches at a time, s, and who has come into zones; who did at the opening lasts till the next."""
-        if self._ledger is not None:
-            felt = self._population.felt
-            visiting = self._population.visiting
-            came = None if visiting is None else visiting.told(again=opening)
-            steady = self._ledger.steady and came is None
-            now = self._population.meeting.touching(steady) if felt is None else felt.told()
-            if isinstance(now, Touching):
-                self._ledger.record(time, now if came is None else joined(now, came))
-                count = len(now.a)
-            else:
-                self._ledger.go_on(now)
-                count = len(now)
-            if came is not None:
-                self._ledger.steady = False  # a note does not last: next time others touch
-            if count:
-                self._work["contacts"] += count
-                self._work["contact_iterations"] += count * self._settings.iterations
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the present arrays in scene order; they belong to the population."""
