@@ -49,9 +49,10 @@ from sandbox.engines.exact.arena import (
 from sandbox.engines.exact.books import Books
 from sandbox.engines.exact.driven import EventDriven
 from sandbox.engines.exact.excess import too_many
+from sandbox.engines.exact.hold import freed
 from sandbox.engines.exact.log import log_rests, open_rest, taken, with_room
 from sandbox.engines.exact.predict import predict
-from sandbox.engines.exact.support import freed, knocked
+from sandbox.engines.exact.support import knocked
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, Frame, IntArray

@@ -1,4 +1,4 @@
-"""Support: a ball at rest on a flat, or in the corner of two. It slides, rolls or stands, each in closed form.
+"""Support: a ball at rest on a flat. It slides, rolls or stands, each in closed form; on two it is in a corner.
 
 Slip of the contact point u = v·t − ω R, with t the normal turned left. While it slips friction is μ N against it; the
 slip changes at a constant rate and its end is an event. Then the ball rolls (a = ⅔ g·t for a disc) while that takes
@@ -51,7 +51,9 @@ from sandbox.engines.exact.arena import (
     X,
     Y,
 )
-from sandbox.engines.exact.booking import book_spin, book_velocity
+from sandbox.engines.exact.booking import book_spin
+from sandbox.engines.exact.corner import corner
+from sandbox.engines.exact.hold import REST_TIME, keep, release
 from sandbox.engines.exact.impact import note, strike
 from sandbox.engines.exact.log import add_impulse, open_rest, open_row
 from sandbox.engines.exact.predict import parallel
@@ -60,11 +62,8 @@ from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.rebound import compiled_kicked, compiled_rebound
 from sandbox.trajectory import FloatArray
 
-REST_TIME = 1e-13
-"""s: when what is left of a series of bounces takes less, the ball rests; it is as if they had all been made."""
-
 TICKS = 8.0 * 2.0**-52
-"""The same for a single bounce, as a share of the time: what is shorter cannot be told from nothing."""
+"""As `REST_TIME`, for a single bounce and as a share of the time: what is shorter cannot be told from nothing."""
 
 ABSORBED = 1e-3
 """m/s: a ball at rest that is knocked into its support more slowly than this stays at rest."""
@@ -111,15 +110,6 @@ def flat_kick(flats: FloatArray, f: int, x: float, y: float, closing: float) -> 
     share = ((x - flats[f, PX]) * flats[f, UX] + (y - flats[f, PY]) * flats[f, UY]) / flats[f, WHOLE]
     share = flats[f, BEGIN] + flats[f, SPAN] * min(max(share, 0.0), 1.0)
     return compiled_kicked(flats[f, KICK], flats[f, THRESHOLD], flats[f, MIDDLE] != 0.0, share, closing)
-
-
-@kernel
-def release(arena: Arena, i: int, which: int) -> None:
-    """End a support; the second of two becomes the first."""
-    if which == 0:
-        arena.tags[i, SUPPORT], arena.tags[i, ROW] = arena.tags[i, SUPPORT + 1], arena.tags[i, ROW + 1]
-    arena.tags[i, SUPPORT + 1], arena.tags[i, ROW + 1] = -1, -1
-    arena.state[i, FORCE + 2], arena.state[i, FORCE + 3] = 0.0, 0.0
 
 
 @kernel
@@ -210,73 +200,6 @@ def single(arena: Arena, i: int, f: int, press: float) -> None:
 
 
 @kernel
-def keep(arena: Arena, i: int, which: int, vx: float, vy: float) -> None:
-    """Set a ball's velocity to what its supports leave of it, and log the little that this changes."""
-    state, im = arena.state, arena.state[i, LIGHTNESS]
-    add_impulse(arena, arena.tags[i, ROW + which], (state[i, VX] - vx) / im, (state[i, VY] - vy) / im)
-    book_velocity(arena, i, vx, vy)
-    state[i, VX], state[i, VY] = vx, vy
-
-
-@kernel
-def pushes(arena: Arena, i: int, turning: float) -> tuple[float, float, float, float]:
-    """Return what holds a ball in a corner: normal force and friction of each support, by mass, m/s².
-
-    Args:
-        arena: everything.
-        i: ball.
-        turning: the sign of its spin; 0 leaves friction out, which a ball that stands does not need.
-    """
-    f, g = arena.tags[i, SUPPORT], arena.tags[i, SUPPORT + 1]
-    mine = arena.tags[i, SURFACE]
-    mu = turning * arena.surfaces[FRICTION, mine, arena.flat_tags[f, COAT]]
-    nu = turning * arena.surfaces[FRICTION, mine, arena.flat_tags[g, COAT]]
-    flats = arena.flats
-    # A ball that turns left slips to the right of each normal's left: friction acts along + t there.
-    ax, ay = flats[f, NX] - mu * flats[f, NY], flats[f, NY] + mu * flats[f, NX]
-    bx, by = flats[g, NX] - nu * flats[g, NY], flats[g, NY] + nu * flats[g, NX]
-    determinant = ax * by - ay * bx
-    if determinant == 0.0:
-        return -1.0, -1.0, 0.0, 0.0
-    gx, gy = -arena.world[GX], -arena.world[GY]
-    first, second = (gx * by - gy * bx) / determinant, (ax * gy - ay * gx) / determinant
-    return first, second, mu * first, nu * second
-
-
-@kernel
-def corner(arena: Arena, i: int) -> None:
-    """Let a ball stand in a corner, its spin fading; or end the support that does not press."""
-    state, r = arena.state, arena.state[i, RADIUS]
-    im, ii = arena.state[i, LIGHTNESS], arena.state[i, READINESS]
-    if abs(state[i, SPIN]) * r <= REST_TIME * (abs(arena.world[GX]) + abs(arena.world[GY])) and ii > 0.0:
-        book_spin(arena, i, 0.0)
-        state[i, SPIN] = 0.0
-    turning = 0.0
-    if state[i, SPIN] != 0.0 and ii > 0.0:
-        turning = 1.0 if state[i, SPIN] > 0.0 else -1.0
-    first, second, mu, nu = pushes(arena, i, turning)
-    if first < 0.0 or second < 0.0:
-        calm, other, _, _ = pushes(arena, i, 0.0)
-        if turning == 0.0 or calm < 0.0 or other < 0.0 or (first < 0.0) != (second < 0.0):
-            release(arena, i, 0 if first < 0.0 else 1)
-            return
-        book_spin(arena, i, 0.0)
-        state[i, SPIN], turning = 0.0, 0.0  # it jams: no two forces within friction let it turn on
-        first, second, mu, nu = calm, other, 0.0, 0.0
-    keep(arena, i, 1, 0.0, 0.0)
-    state[i, AX], state[i, AY] = 0.0, 0.0
-    state[i, ALPHA] = -r * (mu + nu) * ii / im
-    state[i, SLIDES] = math.inf
-    if state[i, ALPHA] != 0.0:
-        state[i, SLIDES] = state[i, T] + (state[i, LATE] - state[i, SPIN] / state[i, ALPHA])
-    for which in range(2):
-        f = arena.tags[i, SUPPORT + which]
-        push, rub = (first, mu) if which == 0 else (second, nu)
-        arena.state[i, FORCE + 2 * which] = (push * arena.flats[f, NX] - rub * arena.flats[f, NY]) / im
-        arena.state[i, FORCE + 2 * which + 1] = (push * arena.flats[f, NY] + rub * arena.flats[f, NX]) / im
-
-
-@kernel
 def slip_ends(arena: Arena, i: int) -> None:
     """Let a ball's slip be zero, or in a corner its spin, as it is at the end of sliding but for rounding."""
     state, f = arena.state, arena.tags[i, SUPPORT]
@@ -314,10 +237,3 @@ def pass_edge(arena: Arena, i: int) -> None:
             return
     release(arena, i, 0)
     note(state, arena.tags, i, EDGE, f)
-
-
-@kernel
-def freed(arena: Arena, i: int) -> None:
-    """End all of a ball's supports, whose impulses are logged."""
-    release(arena, i, 0)
-    release(arena, i, 0)

@@ -9,7 +9,6 @@ Only `resolve` and `impact` change the present state.
 
 import math
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 
@@ -27,19 +26,11 @@ from sandbox.engines.reference.motion import Inputs, State, transition
 from sandbox.engines.reference.parting import Bounce, Parting
 from sandbox.engines.reference.penalty import Penalty
 from sandbox.engines.reference.piece_finder import PieceFinder
+from sandbox.engines.reference.witness import Witness
 from sandbox.engines.roster import Roster
 from sandbox.scene.links import LinkKind
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import FloatArray, IntArray
-
-
-class Witness(Protocol):
-    """Who is told of every piece of a substep that is done."""
-
-    def __call__(
-        self, start: float, end: float, before: State, after: State, contacts: Manifolds, impulse: FloatArray
-    ) -> None:
-        """See the times, s, the states, and the contacts with their impulses (K, 2), normal and tangential, N·s."""
 
 
 class Stage:
