@@ -3,6 +3,7 @@
 A session is a scene and its actions; so it can be stored, replayed, and replayed on another engine.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
@@ -14,6 +15,8 @@ from sandbox.scene.part import MAX_SPEED, Name, Part, Point, Velocity
 Amount = Annotated[float, Field(ge=-1e42, le=1e42)]
 """Of an impulse or force: no more than the greatest mass at the greatest speed takes."""
 
+Level = Annotated[float, Field(ge=0, le=1)]
+"""How far a thrust is opened, or what a drive is asked for."""
 
 Value = float | int | bool | str | None
 """Of a setting."""
@@ -139,7 +142,7 @@ class Throttle(Timed):
 
     kind: Literal["throttle"] = "throttle"
     thrust: Name
-    level: Annotated[float, Field(ge=0, le=1)]
+    level: Level
     """share of its force, from now on"""
 
 
@@ -158,7 +161,7 @@ class Drive(Timed):
 
     kind: Literal["drive"] = "drive"
     drive: Name
-    level: Annotated[float, Field(ge=0, le=1)]
+    level: Level
     """0 is at rest; of a torque the part of it, of a pull how far, of a stroke anything above 0 all the way"""
 
 
@@ -207,20 +210,22 @@ Action = Annotated[
 
 _ACTIONS: TypeAdapter[tuple[Action, ...]] = TypeAdapter(tuple[Action, ...])
 
-SETTABLE = (
-    "world.gravity, world.wind, world.linear_drag, world.quadratic_drag, surface.sliding_friction, surface.curl, "
-    "and any restitution or friction"
+_SETTABLE = (
+    "world.gravity",
+    "world.wind",
+    "world.linear_drag",
+    "world.quadratic_drag",
+    "surface.sliding_friction",
+    "surface.curl",
 )
+
+SETTABLE = f"{', '.join(_SETTABLE)}, and any restitution or friction"
+"""What of a running scene may be changed, in words."""
 
 
 def is_settable(path: str) -> bool:
     """Tell whether a running scene's value may be changed."""
-    world = {f"world.{key}" for key in ("gravity", "wind", "linear_drag", "quadratic_drag")}
-    swept = {"surface.sliding_friction", "surface.curl"}
-    return path in world | swept or path.rpartition(".")[2] in (
-        "restitution",
-        "friction",
-    )
+    return path in _SETTABLE or path.rpartition(".")[2] in ("restitution", "friction")
 
 
 def actions_from_json(text: str) -> tuple[Action, ...]:
@@ -244,6 +249,17 @@ def actions_to_json(actions: tuple[Action, ...]) -> Any:
 def in_order(actions: tuple[Action, ...]) -> tuple[Action, ...]:
     """Return actions by time; those of one time stay in the order in which they were given."""
     return tuple(sorted(actions, key=lambda action: action.time))
+
+
+def number_among(names: Sequence[str], name: str, kind: str) -> int:
+    """Return the place of a name among those of a kind.
+
+    Raises:
+        ActionError: it is none of them.
+    """
+    if name not in names:
+        raise ActionError(f"no {kind} is named {name!r}; there are {', '.join(names) or 'none'}")
+    return names.index(name)
 
 
 def speed_limit(speed: float, what: str) -> None:

@@ -21,6 +21,7 @@ from sandbox.action import (
     Switch,
     Throttle,
     Toggle,
+    number_among,
     speed_limit,
 )
 from sandbox.engines.cast import Cast
@@ -54,11 +55,12 @@ def perform(action: Action, cast: Cast) -> int | None:
         case SetParameter():
             set_parameter(action, cast)
         case Throttle():
-            cast.throttle(_thrust_number(action.thrust, cast.scene), action.level)
+            thrusts = [thrust.name or default_name("thrust", k) for k, thrust in enumerate(cast.scene.thrusts)]
+            cast.throttle(number_among(thrusts, action.thrust, "thrust"), action.level)
         case Reshape():
             reshape(action, cast)
         case Drive():
-            cast.drive(_drive_number(action.drive, cast.scene), action.level)
+            cast.drive(number_among(names_of(cast.scene), action.drive, "drive"), action.level)
         case Toggle():
             toggle(action, cast)
         case Strike():
@@ -165,20 +167,6 @@ def _strike(action: Strike, cast: Cast) -> None:
     cast.set_velocity(number, np.asarray(velocity))
     cast.set_spin(number, spin[2])
     cast.set_roll(number, spin[:2])
-
-
-def _thrust_number(name: str, scene: Scene) -> int:
-    names = [thrust.name or default_name("thrust", k) for k, thrust in enumerate(scene.thrusts)]
-    if name not in names:
-        raise ActionError(f"no thrust is named {name!r}; there are {', '.join(names) or 'none'}")
-    return names.index(name)
-
-
-def _drive_number(name: str, scene: Scene) -> int:
-    names = names_of(scene)
-    if name not in names:
-        raise ActionError(f"no drive is named {name!r}; there are {', '.join(names) or 'none'}")
-    return names.index(name)
 
 
 def _spawn(action: Spawn, cast: Cast) -> None:

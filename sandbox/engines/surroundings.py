@@ -5,7 +5,7 @@ Everything is checked before anything changes.
 
 from dataclasses import replace
 
-from sandbox.action import SETTABLE, ActionError, Reshape, SetParameter, Toggle, is_settable
+from sandbox.action import SETTABLE, ActionError, Reshape, SetParameter, Toggle, is_settable, number_among
 from sandbox.engines.cast import Cast
 from sandbox.scene.address import AddressError, assign
 from sandbox.scene.crosscheck import course
@@ -50,11 +50,9 @@ def toggle(action: Toggle, cast: Cast) -> None:
     scene = cast.scene
     begin = len(scene.planes)
     names = scene.fixed_names[begin : len(scene.fixed)]
-    if action.thing not in names:
-        raise ActionError(f"no wall or post is named {action.thing!r}; there are {', '.join(names) or 'none'}")
+    number = number_among(names, action.thing, "wall or post")
     if scene.surface is not None or scene.pockets:
         raise ActionError("cushions of a table on a floor are solid; none can be toggled")
-    number = names.index(action.thing)
     things: list[Wall | Post] = [*scene.walls, *scene.posts]
     if things[number].solid == action.solid:
         return

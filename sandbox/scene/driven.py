@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.scene.bodies import Bodies, centre_of
-from sandbox.scene.drives import Driven, PlungerDrive, StrokeDrive, TorqueDrive
+from sandbox.scene.drives import Drive, Driven, PlungerDrive, TorqueDrive
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene, Single, default_name
 from sandbox.scene.near import BoolArray, FloatArray
@@ -23,7 +23,7 @@ class Mount(NamedTuple):
 
     number: int
     """of the drive"""
-    drive: TorqueDrive | StrokeDrive | PlungerDrive
+    drive: Drive
     home: Point
     """where the body's centre of mass starts, m"""
     hinge: Point
@@ -43,8 +43,7 @@ def mounts(scene: Scene) -> dict[str, Mount]:
     for k, drive in enumerate(scene.drives):
         if drive.body in singles:
             single = singles[drive.body]
-            home = centre_of(single)
-            found[drive.body] = Mount(k, drive, home, _hinge(drive, single, home))
+            found[drive.body] = _mount(k, drive, single)
     return found
 
 
@@ -56,14 +55,12 @@ def driven_in(scene: Scene, bodies: Bodies, *, turning: bool = False) -> BoolArr
 
 def weighed(scene: Scene, bodies: Bodies) -> Bodies:
     """Return bodies with the moments of inertia that drives state for them: I about the hinge less m d²."""
-    stated = {name: mount for name, mount in mounts(scene).items() if _moment(mount) is not None}
-    if not stated:
-        return bodies
     moment = bodies.moment.copy()
-    for name, mount in stated.items():
-        number = bodies.names.index(name)
-        least = _least(mount, float(bodies.mass[number]))
-        moment[number] = max(float(_moment(mount) or 0.0) - least, 0.0)
+    for name, mount in mounts(scene).items():
+        if isinstance(mount.drive, TorqueDrive) and mount.drive.moment is not None:
+            number = bodies.names.index(name)
+            least = _least(mount, float(bodies.mass[number]))
+            moment[number] = max(mount.drive.moment - least, 0.0)
     return replace(bodies, moment=moment)
 
 
@@ -78,8 +75,8 @@ def driven(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
             yield ("drive", k, "body"), f"{drive.body!r} is one of many; a drive holds a body with a table of its own"
         else:
             single = singles[drive.body]
-            yield from (((*("drive", k), key), why) for key, why in _of_body(drive, single, scene, drive.body in seen))
-            yield from ((("drive", k, key), why) for key, why in _of_figures(drive, single, bodies))
+            faults = *_of_body(drive, single, scene, drive.body in seen), *_of_figures(drive, single, bodies)
+            yield from ((("drive", k, key), why) for key, why in faults)
             seen.add(drive.body)
 
 
@@ -94,9 +91,7 @@ def _of_body(drive: Driven, single: Single, scene: Scene, twice: bool) -> Iterat
         yield "body", f"{drive.body!r} carries a thrust; a driven body is moved by its drive alone"
 
 
-def _of_figures(
-    drive: TorqueDrive | StrokeDrive | PlungerDrive, single: Single, bodies: Bodies
-) -> Iterator[tuple[str, str]]:
+def _of_figures(drive: Drive, single: Single, bodies: Bodies) -> Iterator[tuple[str, str]]:
     if isinstance(drive, PlungerDrive):
         if not math.hypot(*drive.direction) > 0.0:
             yield "direction", f"{list(drive.direction)} has no direction; such as [0, 1] for upwards"
@@ -107,14 +102,9 @@ def _of_figures(
     elif not low - ROUNDED <= single.angle <= high + ROUNDED:
         yield "stops", f"{drive.body!r} starts at an angle of {single.angle:g}, not between {low:g} and {high:g} rad"
     if isinstance(drive, TorqueDrive) and drive.moment is not None:
-        home = centre_of(single)
-        mount = Mount(0, drive, home, _hinge(drive, single, home))
-        least = _least(mount, float(bodies.mass[bodies.names.index(drive.body)]))
+        least = _least(_mount(0, drive, single), float(bodies.mass[bodies.names.index(drive.body)]))
         if drive.moment <= least:
-            yield (
-                "moment",
-                f"its mass alone makes {least:.3g} kg·m² about that pivot; state more, or less mass",
-            )
+            yield "moment", f"its mass alone makes {least:.3g} kg·m² about that pivot; state more, or less mass"
 
 
 def _singles(scene: Scene) -> dict[str, Single]:
@@ -126,7 +116,7 @@ def _singles(scene: Scene) -> dict[str, Single]:
     }
 
 
-def _hinge(drive: TorqueDrive | StrokeDrive | PlungerDrive, single: Single, home: Point) -> Point:
+def _hinge(drive: Drive, single: Single, home: Point) -> Point:
     if isinstance(drive, PlungerDrive):
         return 0.0, 0.0
     x, y = drive.pivot[0] - home[0], drive.pivot[1] - home[1]
@@ -134,8 +124,9 @@ def _hinge(drive: TorqueDrive | StrokeDrive | PlungerDrive, single: Single, home
     return cos * x + sin * y, cos * y - sin * x
 
 
-def _moment(mount: Mount) -> float | None:
-    return mount.drive.moment if isinstance(mount.drive, TorqueDrive) else None
+def _mount(number: int, drive: Drive, single: Single) -> Mount:
+    home = centre_of(single)
+    return Mount(number, drive, home, _hinge(drive, single, home))
 
 
 def _least(mount: Mount, mass: float) -> float:

@@ -8,6 +8,7 @@ from sandbox.scene.artillery.described import Artillery, Terrain
 from sandbox.scene.artillery.landscape import heights_of, levelled
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene, Wall
+from sandbox.scene.outranking import stated
 from sandbox.scene.part import Point
 from sandbox.scene.solids import Box
 
@@ -85,9 +86,7 @@ def expanded(scene: Scene) -> Scene:
             _tank(artillery, k, ground) for k, player in enumerate(artillery.players) if player.name not in taken
         )
         changes["boxes"] = (*scene.boxes, *tanks)
-        play = {"game": "artillery", "view": _view(ground)}
-        stated = scene.play.model_fields_set
-        changes["play"] = scene.play.model_copy(update={k: v for k, v in play.items() if k not in stated})
+        changes["play"] = stated(scene.play, {"game": "artillery", "view": _view(ground)})
     return scene.model_copy(update=changes)
 
 

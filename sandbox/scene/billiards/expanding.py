@@ -1,8 +1,8 @@
 """Expanding: `[billiards]` to surface, walls, posts, pockets, balls and spots, of which everything else is made."""
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterator
+from typing import Any
 
 from sandbox.scene.billiards.balls import BALLS, BallSet
 from sandbox.scene.billiards.cushions import MATERIAL, fixtures_of
@@ -13,7 +13,8 @@ from sandbox.scene.discs import Ball
 from sandbox.scene.faults import Location
 from sandbox.scene.floor import Floor
 from sandbox.scene.model import Material, Pair, Scene
-from sandbox.scene.part import Part, Point
+from sandbox.scene.outranking import added, paired, stated
+from sandbox.scene.part import Point
 from sandbox.scene.spots import Spot, TableGame
 
 BALL = "phenolic"
@@ -28,8 +29,6 @@ RACKS: dict[TableGame, RackName] = {
     "free": "none",
 }
 """What each game is racked as."""
-
-Stated = TypeVar("Stated", bound=Part)
 
 DURATION = 20.0
 """s: a hard break rolls out in 10 to 15"""
@@ -74,25 +73,25 @@ def expanded(scene: Scene) -> Scene:
     }
     changes: dict[str, Any] = {
         "billiards": None,
-        "surface": _stated(scene.surface or Floor(), floor),
-        "contact_models": _stated(scene.contact_models, {"ball_ball": "frictional", "cushion": "han2005"}),
-        "world": _stated(scene.world, {"duration": DURATION}),
-        "solver": _stated(scene.solver, {"substeps": SUBSTEPS}),
-        "materials": _added(scene.materials, (Material(name=BALL), Material(name=MATERIAL))),
-        "pairs": _pairs(scene, billiards),
-        "balls": _added(scene.balls, _balls(billiards, balls, rack, spots, radius, scene.world.seed)),
+        "surface": stated(scene.surface or Floor(), floor),
+        "contact_models": stated(scene.contact_models, {"ball_ball": "frictional", "cushion": "han2005"}),
+        "world": stated(scene.world, {"duration": DURATION}),
+        "solver": stated(scene.solver, {"substeps": SUBSTEPS}),
+        "materials": added(scene.materials, (Material(name=BALL), Material(name=MATERIAL))),
+        "pairs": paired(scene.pairs, _pairs(billiards)),
+        "balls": added(scene.balls, _balls(billiards, balls, rack, spots, radius, scene.world.seed)),
     }
     play: dict[str, Any] = {"game": billiards.game}
     if billiards.table is not None:
         table = TABLES[billiards.table]
         nose = next(each for each in (billiards.nose, balls.nose, 2.0 * NOSE * radius) if each is not None)
         fixtures = fixtures_of(table, nose)
-        changes["walls"] = _added(scene.walls, fixtures.walls)
-        changes["posts"] = _added(scene.posts, fixtures.posts)
-        changes["pockets"] = _added(scene.pockets, fixtures.pockets)
+        changes["walls"] = added(scene.walls, fixtures.walls)
+        changes["posts"] = added(scene.posts, fixtures.posts)
+        changes["pockets"] = added(scene.pockets, fixtures.pockets)
         play["area"] = ((0.0, 0.0), (table.width, table.length))
     named = tuple(Spot(name=name, position=at) for name, at in spots.items())
-    changes["play"] = _stated(scene.play, play).model_copy(update={"spots": named})
+    changes["play"] = stated(scene.play, play).model_copy(update={"spots": named})
     return scene.model_copy(update=changes)
 
 
@@ -128,24 +127,11 @@ def _spots(scene: Scene, billiards: Billiards) -> dict[str, Point]:
     return own | {name: at for name, at in more.items() if name not in own}
 
 
-def _pairs(scene: Scene, billiards: Billiards) -> tuple[Pair, ...]:
-    pairs = (
+def _pairs(billiards: Billiards) -> tuple[Pair, ...]:
+    return (
         Pair(between=(BALL, BALL), restitution=billiards.ball_restitution),
         Pair(between=(BALL, MATERIAL), restitution=billiards.cushion_restitution, friction=billiards.cushion_friction),
     )
-    stated = {frozenset(pair.between) for pair in scene.pairs}
-    return (*scene.pairs, *(pair for pair in pairs if frozenset(pair.between) not in stated))
-
-
-def _stated(part: Stated, values: dict[str, Any]) -> Stated:
-    """Return a part with values for what it does not state itself."""
-    return part.model_copy(update={key: value for key, value in values.items() if key not in part.model_fields_set})
-
-
-def _added(own: Sequence[Any], more: Sequence[Any]) -> tuple[Any, ...]:
-    """Return a scene's own things, and more that have other names."""
-    taken = {each.name for each in own}
-    return (*own, *(each for each in more if each.name not in taken))
 
 
 def _and(names: list[str]) -> str:

@@ -1,6 +1,7 @@
 """Driving: the bodies and drives of a table's balls, flippers and plunger."""
 
 import math
+from typing import Any
 
 from sandbox.scene.discs import Ball
 from sandbox.scene.drives import PlungerDrive, StrokeDrive, TorqueDrive
@@ -44,7 +45,7 @@ def flipper(to: Building, name: str, of: Flipper) -> None:
             colour=of.colour,
         )
     )
-    to.drives.append(_coil(name, of) if of.drive == "torque" else _stroke(name, of))
+    to.drives.append(_drive(name, of))
     to.part(name, "flipper", group=of.side or ("left" if of.pivot[0] < to.axis else "right"))
 
 
@@ -62,14 +63,13 @@ def plunger(to: Building, name: str, of: Plunger) -> None:
     to.part(name, "plunger", of, at=served)
 
 
-def _coil(name: str, of: Flipper) -> TorqueDrive:
-    """Return the drive of a bat that is as heavy to turn as a rod of its mass and length."""
+def _drive(name: str, of: Flipper) -> TorqueDrive | StrokeDrive:
+    """Return the drive of a bat: a stroke, or a coil to which it is as heavy as a rod of its mass and length."""
+    held: dict[str, Any] = {"name": name, "body": name, "pivot": of.pivot, "stops": of.stops}
+    if of.drive == "stroke":
+        return StrokeDrive(kind="stroke", rate=of.rate, return_rate=of.return_rate, **held)
     return TorqueDrive(
         kind="torque",
-        name=name,
-        body=name,
-        pivot=of.pivot,
-        stops=of.stops,
         torque=of.torque,
         ramp=RAMP,
         return_ratio=RETURN,
@@ -77,16 +77,5 @@ def _coil(name: str, of: Flipper) -> TorqueDrive:
         hold_within=WITHIN,
         bounce=BOUNCE,
         moment=of.mass * of.length**2 / 3.0,
-    )
-
-
-def _stroke(name: str, of: Flipper) -> StrokeDrive:
-    return StrokeDrive(
-        kind="stroke",
-        name=name,
-        body=name,
-        pivot=of.pivot,
-        stops=of.stops,
-        rate=of.rate,
-        return_rate=of.return_rate,
+        **held,
     )

@@ -1,22 +1,18 @@
 """Expanding: `[pinball]` to walls, posts, zones, bodies, drives and the parts they play."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Callable
+from typing import Any
 
 from sandbox.scene.faults import Location
 from sandbox.scene.model import Scene
-from sandbox.scene.part import Part
+from sandbox.scene.outranking import added, paired, stated
 from sandbox.scene.pinball import driving, fixing, sensing
 from sandbox.scene.pinball.building import Building
 from sandbox.scene.pinball.described import Pinball
-from sandbox.scene.pinball.faulting import elements_of, faults_of
+from sandbox.scene.pinball.faulting import elements_of
 from sandbox.scene.pinball.materials import MATERIALS, pairs
 from sandbox.scene.pinball.mirroring import both
 from sandbox.scene.pinball.rolling import rolling_gravity
-
-__all__ = ["expanded", "faults_of", "origins"]
-
-Stated = TypeVar("Stated", bound=Part)
 
 SUBSTEPS = 10
 """for engines that step: at 1 kHz a ball at 8 m/s covers less than its radius in one"""
@@ -57,16 +53,16 @@ def expanded(scene: Scene) -> Scene:
     to = _built(pinball, gravity)
     changes: dict[str, Any] = {
         "pinball": None,
-        "world": _stated(scene.world, {"gravity": gravity, "duration": DURATION}),
-        "solver": _stated(scene.solver, {"substeps": SUBSTEPS}),
-        "materials": _added(scene.materials, MATERIALS),
-        "pairs": _pairs(scene, pinball),
-        "play": _stated(scene.play, {"game": pinball.game, "ground": "playfield"}).model_copy(
-            update={"parts": _added(scene.play.parts, to.parts), "markings": (*to.markings, *scene.play.markings)}
+        "world": stated(scene.world, {"gravity": gravity, "duration": DURATION}),
+        "solver": stated(scene.solver, {"substeps": SUBSTEPS}),
+        "materials": added(scene.materials, MATERIALS),
+        "pairs": paired(scene.pairs, pairs(pinball.ball_restitution)),
+        "play": stated(scene.play, {"game": pinball.game, "ground": "playfield"}).model_copy(
+            update={"parts": added(scene.play.parts, to.parts), "markings": (*to.markings, *scene.play.markings)}
         ),
     }
     for key in ("walls", "posts", "zones", "balls", "polygons", "drives"):
-        changes[key] = _added(getattr(scene, key), getattr(to, key))
+        changes[key] = added(getattr(scene, key), getattr(to, key))
     return scene.model_copy(update=changes)
 
 
@@ -85,22 +81,3 @@ def _built(pinball: Pinball, gravity: tuple[float, float]) -> Building:
             for name, one in both(element, kind, k, pinball.axis):
                 BUILD[kind](to, name, one)
     return to
-
-
-def _pairs(scene: Scene, pinball: Pinball) -> tuple[Any, ...]:
-    stated = {frozenset(pair.between) for pair in scene.pairs}
-    return (
-        *scene.pairs,
-        *(pair for pair in pairs(pinball.ball_restitution) if frozenset(pair.between) not in stated),
-    )
-
-
-def _stated(part: Stated, values: dict[str, Any]) -> Stated:
-    """Return a part with values for what it does not state itself."""
-    return part.model_copy(update={key: value for key, value in values.items() if key not in part.model_fields_set})
-
-
-def _added(own: Sequence[Any], more: Sequence[Any]) -> tuple[Any, ...]:
-    """Return a scene's own things, and more that have other names."""
-    taken = {each.name for each in own}
-    return (*own, *(each for each in more if each.name not in taken))

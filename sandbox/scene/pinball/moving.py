@@ -5,8 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from sandbox.scene.part import Mass, Point, Radius, Vector
-from sandbox.scene.pinball.element import Element, Length, Scoring, Size
-from sandbox.scene.pinball.solids import Speed
+from sandbox.scene.pinball.element import Element, Length, Scoring
 
 Angle = Annotated[float, Field(ge=-10, le=10)]
 """rad"""
@@ -60,7 +59,7 @@ class Plunger(Scoring):
     """of the shot; any length"""
     width: Length = 0.02
     """of the tip, m"""
-    travel: Size = 0.043
+    travel: Length = 0.043
     """of a full pull, m: 80 units"""
-    speed: Speed = 1.03
+    speed: Annotated[float, Field(gt=0, le=1e3)] = 1.03
     """that a full pull gives the ball, m/s"""
