@@ -25,8 +25,7 @@ from sandbox.action import Action, ActionError
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.relay import Relay, start
 from sandbox.games.referee import Referee
-from sandbox.games.registry import rules_of
-from sandbox.games.rules import UnfitError
+from sandbox.games.registry import required_rules
 from sandbox.measure.seeds import seeded
 from sandbox.recording import Recording
 from sandbox.scene.file import load
@@ -89,15 +88,12 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         """
         self.scene = scene if isinstance(scene, Scene) else load(find(str(scene)))
         self.engine, self.every, self.render_mode = engine, every, render_mode
-        rules = rules_of(self.scene)
-        if rules is None:
-            raise UnfitError(f"the scene {self.scene.title!r} has no game with rules: state [play] game")
+        self.controls = required_rules(self.scene).controls
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"there is no render mode {render_mode!r}; there is rgb_array")
         if every < 1:
             raise ValueError(f"an action lasts 1 or more steps, not {every}")
         self._numbers = _numbers(self.scene, bodies)
-        self.controls = rules.controls
         count = len(self.controls)
         self.analogue = any(control.analogue for control in self.controls)
         self.action_space = (
@@ -131,8 +127,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         number = seed if seed is not None else self.scene.world.seed if first else int(self.np_random.integers(SEEDS))
         self.close()
         self._played = seeded(self.scene, number)
-        rules = rules_of(self._played)
-        assert rules is not None
+        rules = required_rules(self._played)
         self._relay, self._game = start(self._played, self.engine), Referee(rules)
         self._relay.contacts()
         self._done, self._levels = [], [0.0] * len(self.controls)

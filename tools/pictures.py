@@ -16,7 +16,7 @@ from PIL import Image
 
 from sandbox.cli.main import call
 from sandbox.games.billiards.bot.bot import Bot
-from sandbox.games.pinball.hand import Hand
+from sandbox.games.pinball.hand import PinballHand
 from sandbox.games.rules import Seen
 from sandbox.play.messages import Messages
 from sandbox.play.stage import Stage
@@ -119,7 +119,7 @@ def pinball(file: str) -> None:
     assert live is not None
     assert host is not None
     live.company.show_trust(False)
-    player = Hand(live.scene.world.seed, SKILL)
+    player = PinballHand(live.scene.world.seed, SKILL)
     while live.frame.time < LIT:
         for control, value in player.decide(Seen(live.frame.time, live.frame, live.contacts, ()), host.rules):
             host.hold("player", control, value)

@@ -2,7 +2,7 @@
 
 import math
 import sys
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,6 +11,9 @@ from sandbox.cli.table import WIDE
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
+
+if TYPE_CHECKING:
+    from sandbox.games.artillery.miss import Table as MissTable
 
 STEP = click.FloatRange(min=1e-6, max=1.0)
 SPEED = click.FloatRange(0.0, 1e6, min_open=True)
@@ -45,7 +48,7 @@ def command(
     return 0
 
 
-def _print(name: str, scene: Scene, found: Any, shot: str) -> None:
+def _print(name: str, scene: Scene, found: "MissTable", shot: str) -> None:
     """Print a row an engine and integrator, and a column a step."""
     from rich.console import Console
     from rich.table import Table

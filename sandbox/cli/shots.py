@@ -1,5 +1,6 @@
 """`sandbox shots`: how likely a shot is, what it hangs on, and until when anybody could tell."""
 
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from sandbox.cli.shots_table import print_study
 from sandbox.cli.telling import telling
 from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.measure.shots.attempt import Attempt, NoSuchShotError, attempt_of
-from sandbox.measure.shots.horizon import NUDGE, TOLERANCE
+from sandbox.measure.shots.horizon import NUDGE, TOLERANCE, By
 from sandbox.measure.shots.odds import COUNT
 from sandbox.measure.shots.spread import Spread
 from sandbox.measure.shots.study import Study, pot_of, study
@@ -65,7 +66,7 @@ def command(
     pots: tuple[str, ...],
     foretold: bool,
     nudge: float,
-    by: Any,
+    by: By,
     tolerance: float,
     out: Path | None,
     as_json: bool,
@@ -80,7 +81,7 @@ def command(
     with gathering(faults, "--aim-error, --speed-error, --side-error, --height-error", (ValueError,)):
         spread = Spread(aim_error, speed_error, side_error, height_error)
     for flag, figure in (("--nudge", nudge), ("--tolerance", tolerance)):
-        if figure != figure:
+        if math.isnan(figure):
             faults.append(Fault(flag, None, "", "is no number; it is positive and finite"))
     attempt: Attempt | None = None
     wanted: list[tuple[str, str]] = []

@@ -149,7 +149,7 @@ def _window(found: Windows) -> Iterator[str]:
     if nearest is None:
         yield f"{who}: never, for aim within {found.reach:g} rad of {found.aim:.6g}"
         return
-    near = sorted(found.found, key=lambda each: max(each.low - found.aim, found.aim - each.high, 0.0))[:MOST_WINDOWS]
+    near = sorted(found.found, key=lambda each: each.off(found.aim))[:MOST_WINDOWS]
     for each in sorted(near, key=lambda each: each.low):
         ends = f"[{each.low:.9f}, {each.high:.9f}] rad, ± {1e3 * each.half:.4g} mrad about {each.centre:.9f}"
         yield f"{who}: for aim in {ends}"

@@ -83,7 +83,7 @@ class Bout:
             "player": self.player,
             "score": self.score,
             "over": self.over,
-            "lines": [list(line) for line in self._referee.rules.lines()],
+            "lines": [list(line) for line in rules.lines()],
             "presses": [list(press) for press in self.presses],
             "otherwise": self.otherwise,
             **log,

@@ -140,7 +140,7 @@ def table_of(scene: Scene) -> str:
 
 
 def initials_of(text: str) -> str:
-    """Return up to three capital letters, digits, blanks, dots or dashes of a text; `???`, so to speak, is `---`."""
+    """Return up to three capital letters, digits, blanks, dots or dashes of a text; one without any is `---`."""
     return re.sub(r"[^A-Z0-9 .\-]", "", text.upper())[:LETTERS].strip() or "-" * LETTERS
 
 

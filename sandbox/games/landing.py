@@ -8,7 +8,6 @@ all, leaves the scene's bounds, or falls over on the pad.
 
 import math
 from collections.abc import Sequence
-from itertools import chain
 
 import numpy as np
 
@@ -193,7 +192,7 @@ def _control(name: str, thrust: Thrust) -> Control:
 
 def _place(scene: Scene) -> Point:
     """Return the middle of the pad's top, m."""
-    pad = dict(zip(scene.fixed_names, chain(scene.planes, scene.walls, scene.posts), strict=False)).get(PAD)
+    pad = dict(zip(scene.fixed_names, scene.fixed, strict=False)).get(PAD)  # pockets and zones come after
     match pad:
         case Wall():
             across, up = zip(*pad.points, strict=True)

@@ -13,6 +13,7 @@ from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.model import Scene
 
 RECORDED = "as recorded"
+"""What the player of a session is called that is seen again."""
 
 
 @dataclass(frozen=True)

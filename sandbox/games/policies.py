@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from sandbox.games.pinball.hand import Hand
+from sandbox.games.pinball.hand import PinballHand
 from sandbox.games.rules import Control, Policy, Press, Rules, Seen, UnfitError
 from sandbox.scene.model import Scene
 
@@ -87,12 +87,12 @@ def _skilled(scene: Scene) -> Policy:
         UnfitError: it is a game that none knows.
     """
     if scene.play.game == "artillery":
-        from sandbox.games.artillery.hand import Hand as Gunner  # an engine's integrators, which others do without
+        from sandbox.games.artillery.hand import ArtilleryHand  # an engine's integrators, which others do without
 
-        return Gunner(scene.world.seed)
+        return ArtilleryHand(scene.world.seed)
     if scene.play.game != "pinball":
         raise UnfitError(f"skilled plays pinball and artillery, not {scene.play.game}; random plays everything")
-    return Hand(scene.world.seed)
+    return PinballHand(scene.world.seed)
 
 
 POLICIES: dict[str, Callable[[Scene], Policy]] = {

@@ -41,6 +41,18 @@ def rules_of(scene: Scene, bodies: Bodies | None = None) -> Rules | None:
     return None if begin is None else begin(scene, scene.bodies if bodies is None else bodies)
 
 
+def required_rules(scene: Scene) -> Rules:
+    """Begin the game that a scene names.
+
+    Raises:
+        UnfitError: it names none that has rules here, or lacks what the game needs.
+    """
+    rules = rules_of(scene)
+    if rules is None:
+        raise UnfitError(f"the scene {scene.title!r} has no game with rules: state [play] game")
+    return rules
+
+
 def fitting_rules(scene: Scene, file: str) -> Rules | None:
     """Begin the game that the scene of a file names; none where it names none that has rules here.
 

@@ -7,8 +7,8 @@ from typing import Any
 from sandbox.action import actions_from_json
 from sandbox.games.bout import Bout
 from sandbox.games.player import Player
-from sandbox.games.registry import rules_of
-from sandbox.games.rules import Policy, Press, UnfitError
+from sandbox.games.registry import required_rules
+from sandbox.games.rules import Policy, Press
 from sandbox.measure.run import Progress, run
 from sandbox.recording import Recording
 from sandbox.scene.model import Scene
@@ -53,9 +53,7 @@ def play_out(
         UnknownEngineError: no engine has that name.
         TooLargeError: the frames would not fit into memory.
     """
-    rules = rules_of(scene)
-    if rules is None:
-        raise UnfitError(f"the scene {scene.title!r} has no game with rules: state [play] game")
+    rules = required_rules(scene)
     bout = Player.named(player).bout(scene) if isinstance(player, str) else Bout(rules, player, type(player).__name__)
     assert bout is not None
     trajectory = run(scene, engine, audit=audit, progress=progress, bout=bout, **settings)

@@ -1,6 +1,7 @@
 """Replaying: a recorded session run again without a window, on its own engine or another."""
 
 from sandbox.games.bout import Bout
+from sandbox.games.player import RECORDED
 from sandbox.games.registry import rules_of
 from sandbox.measure.run import Progress, run
 from sandbox.recording import Recording
@@ -37,6 +38,6 @@ def rerun(
         actions=chosen.actions,
         audit=audit,
         progress=progress,
-        bout=None if rules is None else Bout(rules, None, "as recorded", chosen.presses),
+        bout=None if rules is None else Bout(rules, None, RECORDED, chosen.presses),
         **chosen.settings.model_dump(),
     )

@@ -9,7 +9,7 @@ import pytest
 from toy_game import TOY, Toy, toy_scene
 
 from sandbox.action import Impulse
-from sandbox.engines.registry import ENGINES
+from sandbox.engines.registry import ENGINES, start
 from sandbox.games import registry
 from sandbox.games.bout import Bout
 from sandbox.games.policies import POLICIES, Chance, Script
@@ -129,12 +129,12 @@ def test_script_presses_before_the_step_of_its_time() -> None:
 def test_random_player_presses_at_its_rates() -> None:
     """Each control goes down and up in turn, with values of its kind; over seeds as often as the rates say."""
     scene, counts = toy_scene(), []
-    frame = run(scene, audit=False).at(0)
+    frame = start(scene, "pymunk").frame()
     for seed in range(60):
         rules, policy = Toy(scene, scene.bodies), Chance(seed)
         pressed: dict[str, list[float]] = {"kick": [], "aim": []}
         for step in range(2000):
-            for name, value in policy.decide(Seen(0.01 * step, frame, Contacts.none(), ()), rules):  # type: ignore[arg-type]
+            for name, value in policy.decide(Seen(0.01 * step, frame, Contacts.none(), ()), rules):
                 pressed[name].append(value)
         for values in pressed.values():
             assert all(value == 0.0 for value in values[1::2])
@@ -148,11 +148,11 @@ def test_random_player_presses_at_its_rates() -> None:
 
 def test_copied_policies_go_on_alike() -> None:
     scene = toy_scene()
-    frame = run(scene, audit=False).at(0)
+    frame = start(scene, "pymunk").frame()
     rules, policy = Toy(scene, scene.bodies), Chance(1)
 
     def decide(which: Chance, begin: int) -> list[Any]:
-        seen = (Seen(0.01 * step, frame, Contacts.none(), ()) for step in range(begin, begin + 500))  # type: ignore[arg-type]
+        seen = (Seen(0.01 * step, frame, Contacts.none(), ()) for step in range(begin, begin + 500))
         return [which.decide(each, rules) for each in seen]
 
     decide(policy, 0)

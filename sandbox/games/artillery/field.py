@@ -73,7 +73,7 @@ class Field:
         self.blasts.append(Blast(time, place, weapon.radius, dirt))
         actions = self._changed(time, change)
         hurt = self.tanks.blast(shooter, place, weapon)
-        return actions + self._out(time, [tank for tank, _ in hurt if not tank.alive])
+        return actions + self._out(time, [tank for tank in hurt if not tank.alive])
 
     def _out(self, time: float, dead: Sequence[Tank]) -> list[Action]:
         """Take tanks out that have no health left; each goes off itself, and may take others with it."""

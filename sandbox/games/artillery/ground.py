@@ -55,7 +55,7 @@ class Ground:
 
     def surface(self, x: FloatArray | float) -> FloatArray:
         """Return the heights of the surface at places, m; beside the ground there is none, −inf."""
-        return np.interp(x, self.middles, self.heights, left=None, right=None) + np.where(
+        return np.interp(x, self.middles, self.heights) + np.where(
             (np.asarray(x) < 0.0) | (np.asarray(x) > self.width), -np.inf, 0.0
         )
 

@@ -11,6 +11,7 @@ from sandbox.games.artillery.gunner import PER_SECOND, POWER, TURN
 from sandbox.games.artillery.rules import ArtilleryRules
 from sandbox.games.artillery.tanks import Tank
 from sandbox.games.rules import Rules, Seen, UnfitError
+from sandbox.games.skill import checked_skill
 
 STREAM = 0x61696D73
 """Sets these chances apart from all else that the seed decides: the letters of `aims`."""
@@ -18,7 +19,7 @@ NEAR = 12.0
 """Taps, from which on a key is no longer held but tapped."""
 
 
-class Hand:
+class ArtilleryHand:
     """Plays for whoever's turn it is and who is no bot. Other games than artillery it cannot play."""
 
     def __init__(self, seed: int, skill: float = 0.8) -> None:
@@ -27,9 +28,7 @@ class Hand:
         Raises:
             ValueError: the skill is not from 0 to 1.
         """
-        if not 0.0 <= skill <= 1.0:
-            raise ValueError(f"a skill of {skill:g} is none; it is 0 to 1")
-        self.skill = skill
+        self.skill = checked_skill(skill)
         self._seed, self._turn, self._time = seed, 0, 0.0
         self._thought: Thought | None = None
         self._down: set[str] = set()
@@ -70,9 +69,7 @@ class Hand:
         lacks = self._lacks(rules, tank, aim)
         for (lack, tap, rate), (more, less) in zip(lacks, (("left", "right"), ("up", "down")), strict=True):
             key = more if lack > 0.0 else less
-            if abs(lack) > max(0.5 * (tap + rate * step), 0.5 * tap) and (
-                key not in self._down or abs(lack) > NEAR * tap
-            ):
+            if abs(lack) > 0.5 * (tap + rate * step) and (key not in self._down or abs(lack) > NEAR * tap):
                 found.add(key)
         if not found and not self._down:
             found.add("fire")

@@ -76,7 +76,7 @@ def miss_table(world: World, speed: float, angle: float, dts: Sequence[float] = 
     refused: list[tuple[str, str]] = []
     for engine, integrator in _ways():
         for dt in dts:
-            settings = Settings(dt=dt, integrator=integrator)  # type: ignore[arg-type]  # of the table of integrators
+            settings = Settings().replace(dt=dt, integrator=integrator)
             try:
                 down = flown(world, velocity, engine, settings)
             except Refusal as refusal:

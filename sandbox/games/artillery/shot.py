@@ -30,11 +30,10 @@ class Shot(NamedTuple):
         """In words."""
         if self.place is None:
             return "gone" if self.exact is None else f"gone; exactly at {self.exact[0]:.2f} m"
-        if self.off is None:
+        if self.exact is None:
             return f"at {self.place[0]:.2f} m; exactly, gone"
-        return (
-            f"at {self.place[0]:.2f} m, exactly {self.exact[0]:.2f} m: off by {length(self.off)}" if self.exact else ""
-        )
+        off = length(math.dist(self.place, self.exact))
+        return f"at {self.place[0]:.2f} m, exactly {self.exact[0]:.2f} m: off by {off}"
 
 
 def length(metres: float) -> str:

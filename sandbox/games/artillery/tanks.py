@@ -2,10 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.games.artillery.weapons import Weapon
 from sandbox.scene.artillery.described import Artillery, Player
 from sandbox.scene.part import Point
 from sandbox.trajectory import FloatArray, Frame
@@ -20,18 +21,6 @@ BARREL = 0.75
 """of a tank's width, from its middle to the muzzle"""
 SAFE_FALL, PER_METRE = 1.0, 3.0
 """m that a tank falls unharmed, and health that each more costs"""
-
-
-class Struck(Protocol):
-    """What a weapon does to tanks."""
-
-    @property
-    def radius(self) -> float:
-        """Of the crater, m."""
-
-    @property
-    def damage(self) -> float:
-        """To a tank that is struck."""
 
 
 class Muzzle(NamedTuple):
@@ -121,22 +110,21 @@ class Tanks:
         """Return where a tank's shells leave."""
         return Muzzle(tank.place, BARREL * self.size[0])
 
-    def blast(self, shooter: Tank, place: Point, weapon: Struck) -> list[tuple[Tank, float]]:
-        """Hurt who stands near a blast, and reward the shooter; return who lost how much."""
+    def blast(self, shooter: Tank, place: Point, weapon: Weapon) -> list[Tank]:
+        """Hurt who stands near a blast, and reward the shooter; return who was hurt."""
         hurt = []
         for tank in self.alive:
             far = max(math.dist(tank.place, place) - self.radius, 0.0)
             share = 1.0 - far / (2.0 * weapon.radius)
             if share > 0.0 and weapon.damage > 0.0:
-                hurt.append((tank, self.hurt(tank, weapon.damage * share, shooter)))
+                self.hurt(tank, weapon.damage * share, shooter)
+                hurt.append(tank)
         return hurt
 
-    def hurt(self, tank: Tank, damage: float, shooter: Tank | None) -> float:
-        """Take health from a tank; return how much. Who shoots at himself loses the points that others bring."""
+    def hurt(self, tank: Tank, damage: float, shooter: Tank) -> None:
+        """Take health from a tank. Who shoots at himself loses the points that others bring."""
         taken = min(damage, tank.health)
         tank.health -= taken
-        if shooter is not None:
-            points = round(taken) + (0 if tank.alive else PER_KILL)
-            shooter.points += points if tank is not shooter else -points
-            shooter.money += PER_POINT * round(taken) if tank is not shooter else 0
-        return taken
+        points = round(taken) + (0 if tank.alive else PER_KILL)
+        shooter.points += points if tank is not shooter else -points
+        shooter.money += PER_POINT * round(taken) if tank is not shooter else 0

@@ -256,14 +256,7 @@ class Match:
         if after.over:
             return replace(after, verdict=verdict)
         settled = after.rules.settle(after.state, after._lie())
-        told = replace(
-            verdict,
-            state=settled.state,
-            fouls=(*verdict.fouls, *settled.fouls),
-            points=_summed(verdict.points, settled.points),
-            messages=(*verdict.messages, *settled.messages),
-        )
-        return replace(after, state=settled.state, verdict=told)
+        return replace(after, state=settled.state, verdict=verdict.followed_by(settled))
 
     def _in_hand(self) -> Self:
         """Return the match with a cue ball in hand at the legal place nearest to where it is, or to the head spot."""
@@ -295,9 +288,3 @@ def _points(plain: Any, layout: Layout) -> tuple[Point, ...]:
     if len(points) != len(layout.names):
         raise ValueError(f"{len(points)} positions of {len(layout.names)} bodies")
     return points
-
-
-def _summed(one: tuple[int, ...], other: tuple[int, ...]) -> tuple[int, ...]:
-    if not one or not other:
-        return one or other
-    return tuple(a + b for a, b in zip(one, other, strict=True))

@@ -33,11 +33,13 @@ def stone(team: int, number: int) -> str:
 
 def waiting(team: int, number: int) -> Point:
     """Return where a stone lies until it is thrown, beside the sheet, m: red to the left of the way."""
-    side = 1.0 if team == 0 else -1.0
-    return RELEASE + (STONES - number) * _PITCH, side * (0.5 * WIDTH + 0.45)
+    return RELEASE + (STONES - number) * _PITCH, _aside(team)
 
 
 def gone(team: int, number: int) -> Point:
     """Return where a stone lies that is out of play, m."""
-    side = 1.0 if team == 0 else -1.0
-    return BACK + 3.2 - (STONES - number) * _PITCH, side * (0.5 * WIDTH + 0.45)
+    return BACK + 3.2 - (STONES - number) * _PITCH, _aside(team)
+
+
+def _aside(team: int) -> float:
+    return (1.0 if team == 0 else -1.0) * (0.5 * WIDTH + 0.45)

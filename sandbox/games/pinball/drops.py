@@ -85,9 +85,7 @@ class Drops(Machine):
         x, y = now.frame.position[ball].tolist()
         target = self.members[place]
         room = self.board.radius + target.reach
-        return any(
-            _distance((x, y), a, b) < room for a, b in pairwise(target.outline)
-        )  # fmt: skip
+        return any(_distance((x, y), a, b) < room for a, b in pairwise(target.outline))
 
 
 def _distance(point: Point, a: Point, b: Point) -> float:

@@ -8,7 +8,9 @@ import numpy as np
 from sandbox.games.pinball.board import Element
 from sandbox.games.pinball.controls import FLIPPERS, PLUNGER
 from sandbox.games.pinball.pinball import Pinball
+from sandbox.games.pinball.trough import SLOW
 from sandbox.games.rules import Rules, Seen, UnfitError
+from sandbox.games.skill import checked_skill
 
 LEAD = 0.03
 """s, that a flipper takes to get up, and so ahead of which a player looks. Source: Visual Pinball's stroke of 34 ms"""
@@ -35,7 +37,7 @@ STREAM = 0x68616E64
 """Sets these chances apart from all else that the seed decides: the letters of `hand`."""
 
 
-class Hand:
+class PinballHand:
     """Flips when a ball is about to be within reach, plunges when one waits.
 
     Skill is the part of the balls that are seen in time; it also takes away from how far the timing is off, and from
@@ -48,9 +50,7 @@ class Hand:
         Raises:
             ValueError: the skill is not from 0 to 1.
         """
-        if not 0.0 <= skill <= 1.0:
-            raise ValueError(f"a skill of {skill:g} is none; it is 0 to 1")
-        self.skill = skill
+        self.skill = checked_skill(skill)
         self._chance = np.random.default_rng([STREAM, seed])
         self._due: dict[str, float] = {}  # by control: when it is pressed, s
         self._until: dict[str, float] = {}  # by control: when it is let go, s
@@ -92,7 +92,7 @@ class Hand:
 
     def _plunge(self, seen: Seen, rules: Pinball) -> None:
         waits = any(
-            rules.trough.in_lane(ball, seen.frame) and math.hypot(*seen.frame.velocity[ball].tolist()) < 0.05
+            rules.trough.in_lane(ball, seen.frame) and math.hypot(*seen.frame.velocity[ball].tolist()) < SLOW
             for ball in rules.trough.live
         )
         if waits and PLUNGER not in self._until:

@@ -1,17 +1,17 @@
 """Lamps: sets of lights, each lit by its own switch; a set that is full scores and goes dark."""
 
 from collections.abc import Iterator
-from typing import Literal
 
 from sandbox.games.pinball.board import Board, Element
 from sandbox.games.pinball.effects import Again, Award, Cue, Effect, Light, Machine, Now, Say
 from sandbox.games.pinball.sheet import MOST
 from sandbox.games.pinball.switches import Hit
+from sandbox.scene.parts import Role
 
-FULL = {"rollover": 10_000, "standup": 20_000}
+FULL: dict[Role, int] = {"rollover": 10_000, "standup": 20_000}
 """points of a set"""
 
-NEWS = {"rollover": "lanes", "standup": "standups"}
+NEWS: dict[Role, str] = {"rollover": "lanes", "standup": "standups"}
 """what a full set is called"""
 
 BONUS = 2_000
@@ -19,8 +19,7 @@ BONUS = 2_000
 AGAIN = 4
 """times that the bonus counts, with which an extra ball comes"""
 
-
-LEAST = {"rollover": 3, "standup": 2}
+LEAST: dict[Role, int] = {"rollover": 3, "standup": 2}
 """of a set: a pair of rollovers is of inlanes or outlanes, which have no lamps"""
 
 
@@ -33,7 +32,7 @@ class Lamps(Machine):
 
     def __init__(self, group: str, members: tuple[Element, ...]) -> None:
         self.group = group
-        self.role: Literal["rollover", "standup"] = "rollover" if members[0].role == "rollover" else "standup"
+        self.role = members[0].role
         self.names = tuple(each.name for each in members)
         self.lit = [False] * len(members)
 
@@ -75,10 +74,9 @@ class Lamps(Machine):
 
 def lamps_of(board: Board) -> tuple[Lamps, ...]:
     """Return the sets of a table; what stands alone has no lamp."""
-    roles: tuple[Literal["rollover", "standup"], ...] = ("rollover", "standup")
     return tuple(
         Lamps(name, members)
-        for role in roles
+        for role, least in LEAST.items()
         for name, members in board.groups(role).items()
-        if len(members) >= LEAST[role]
+        if len(members) >= least
     )

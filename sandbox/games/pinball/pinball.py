@@ -24,11 +24,9 @@ from sandbox.games.pinball.trough import Trough
 from sandbox.games.rules import Control, Seen
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
-from sandbox.trajectory import Frame
 
 SAID = 3.0
 """s, that a message stays"""
-
 
 BLINK = 0.4
 """s, from one blink to the next"""
@@ -103,7 +101,8 @@ class Pinball:
 
     def look(self, seen: Seen) -> Sequence[Action]:
         """See what happened in a step."""
-        now = self._now = self._how(seen.time, seen.frame)
+        now = self._now = Now(seen.time, seen.frame, self.sheet)
+        self._refresh(now)
         hits = [hit for hit in self.switches.read(seen) if hit.ball in now.live]
         actions = [action for hit in hits for action in self._settled(self._hit(hit, now), now)]
         actions += self._settled(self.course.missed(now), now)
@@ -143,11 +142,6 @@ class Pinball:
         cues, self._cues = self._cues, []
         return cues
 
-    def _how(self, time: float, frame: Frame) -> Now:
-        now = Now(time, frame, self.sheet)
-        self._refresh(now)
-        return now
-
     def _refresh(self, now: Now) -> None:
         """Bring up to date what others than the engine change."""
         trough = self.trough
@@ -175,9 +169,7 @@ class Pinball:
                 lamps.rotate(side)
         (self.up.add if up else self.up.discard)(side)
         self._refresh(now)
-        return [
-            Drive(time=now.time, drive=each.name, level=float(up)) for each in self.board.flippers(side)
-        ]  # fmt: skip
+        return [Drive(time=now.time, drive=each.name, level=float(up)) for each in self.board.flippers(side)]
 
     def _plunged(self, value: float, now: Now) -> Iterator[Effect]:
         """Pull the plunger, or let it go; a table without one launches the ball when it is let go."""

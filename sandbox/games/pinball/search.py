@@ -11,15 +11,13 @@ from sandbox.games.pinball.drops import Drops
 from sandbox.games.pinball.effects import Cue, Effect, Machine, Now, Save, Say, Serve, Take
 from sandbox.games.pinball.holes import Holes
 from sandbox.games.pinball.switches import Hit
+from sandbox.games.pinball.trough import SLOW
 
 PATIENCE = 10.0
 """s without a switch, the balls slow"""
 
 LONGEST = 30.0
 """s without a switch, however fast they are"""
-
-SLOW = 0.05
-"""m/s"""
 
 PULSE, BETWEEN = 0.12, 0.25
 """s, that a coil is on, and from one to the next"""

@@ -10,7 +10,6 @@ ROLES = ("bumper", "slingshot", "standup", "rollover", "gate")
 BONUS = {"standup": 100, "rollover": 100}
 """points of the bonus, each time"""
 
-
 FLASH = 0.15
 """s, that a lamp flashes after a hit"""
 

@@ -19,7 +19,7 @@ LANE_UP, LANE_DOWN, LANE_SIDE = 0.10, 0.10, 0.03
 """m, about where balls are served, what counts as the lane: a plunger draws a ball down by some 43 mm"""
 
 SLOW = 0.05
-"""m/s"""
+"""m/s, below which a ball lies"""
 
 
 class Trough:
@@ -52,9 +52,7 @@ class Trough:
 
     def park(self, ball: int, now: Now) -> Iterator[Effect]:
         """Take a ball out of play, to a free place; where there is none left, it goes to the plunger."""
-        self.live.remove(ball)
-        self.flown.discard(ball)
-        self.lying.pop(ball, None)
+        self.lose(ball)
         taken = set(self.home.values())
         place = next((k for k in range(len(self.board.homes)) if k not in taken), None)
         if place is None:
@@ -66,7 +64,7 @@ class Trough:
         yield Move(time=now.time, body=self.board.names[ball], position=where, velocity=(0.0, 0.0))
 
     def lose(self, ball: int) -> None:
-        """Give up a ball that no longer exists."""
+        """Take a ball out of play, to nowhere: by itself that is for one that no longer exists."""
         self.live.remove(ball)
         self.flown.discard(ball)
         self.lying.pop(ball, None)

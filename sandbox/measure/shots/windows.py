@@ -41,6 +41,10 @@ class Window:
         """How far off it the aim may be, rad."""
         return 0.5 * (self.high - self.low)
 
+    def off(self, aim: float) -> float:
+        """Return how far an aim is beside it, rad; 0 of one that is in it."""
+        return max(self.low - aim, aim - self.high, 0.0)
+
     def __contains__(self, aim: float) -> bool:
         return self.low <= aim <= self.high
 
@@ -62,8 +66,7 @@ class Windows:
     @property
     def nearest(self) -> Window | None:
         """The window that the aim is in, or the nearest one."""
-        off = {one: max(one.low - self.aim, self.aim - one.high, 0.0) for one in self.found}
-        return min(off, key=lambda one: off[one], default=None)
+        return min(self.found, key=lambda one: one.off(self.aim), default=None)
 
     def document(self) -> dict[str, Any]:
         """Return it as one JSON object."""

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from sandbox.games.artillery.hand import Hand
+from sandbox.games.artillery.hand import ArtilleryHand
 from sandbox.games.artillery.rules import ArtilleryRules
 from sandbox.games.artillery.weapons import WEAPONS
 from sandbox.games.bout import Bout
@@ -47,7 +47,7 @@ def played(policy: Policy) -> tuple[ArtilleryRules, Bout, str]:
 
 
 def test_full_skill_hits_by_keys_alone() -> None:
-    rules, bout, state = played(Hand(1, skill=1.0))
+    rules, bout, state = played(ArtilleryHand(1, skill=1.0))
     own = [shot for shot in rules.shots if shot.shooter == "Red"]
     assert own
     first, blue = own[0], loads(FIELD).bodies.position[1].tolist()
@@ -60,7 +60,7 @@ def test_full_skill_hits_by_keys_alone() -> None:
 
 def test_skill_is_a_share_and_the_game_has_to_be_artillery() -> None:
     with pytest.raises(ValueError, match="0 to 1"):
-        Hand(1, skill=1.5)
-    assert isinstance(POLICIES["skilled"](loads(FIELD)), Hand)
+        ArtilleryHand(1, skill=1.5)
+    assert isinstance(POLICIES["skilled"](loads(FIELD)), ArtilleryHand)
     with pytest.raises(UnfitError, match="pinball and artillery"):
         POLICIES["skilled"](load(find("landing")))

@@ -3,6 +3,7 @@
 import copy
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,16 +49,16 @@ name = "Blue"
 position = 190.0
 """
 BOTS = TEXT.replace("position = 50.0", "position = 50.0\nbot = 1.0").replace("190.0", "190.0\nbot = 0.9")
-RK4 = {"integrator": "rk4"}
+RK4: dict[str, Any] = {"integrator": "rk4"}
 
 
 def played(
-    scene: Scene, presses: tuple[Press, ...] = (), engine: str = "pymunk", **settings: object
+    scene: Scene, presses: tuple[Press, ...] = (), engine: str = "pymunk", **settings: Any
 ) -> tuple[ArtilleryRules, Trajectory, Bout]:
     rules = rules_of(scene)
     assert isinstance(rules, ArtilleryRules)
     bout = Bout(rules, Script(presses) if presses else Nobody(), "script")
-    trajectory = run(scene, engine, bout=bout, **settings)  # type: ignore[arg-type]
+    trajectory = run(scene, engine, bout=bout, **settings)
     assert trajectory.status == "ok", trajectory.reason
     return rules, trajectory, bout
 
@@ -135,7 +136,7 @@ def test_shells_at_the_sides_go_the_exact_way(edges: str) -> None:
     assert isinstance(rules, ArtilleryRules)
     for tank, angle in zip(rules.field.tanks.every, (120.0, 60.0), strict=True):  # both outwards
         tank.angle, tank.power = math.radians(angle), 0.8
-    run(scene, "reference", bout=Bout(rules, Script(presses), "script"), **RK4)  # type: ignore[arg-type]
+    run(scene, "reference", bout=Bout(rules, Script(presses), "script"), **RK4)
     assert len(rules.shots) == 2
     for shot in rules.shots:
         assert (shot.place is None) == (shot.exact is None) == (edges == "open")

@@ -7,7 +7,7 @@ import pytest
 
 from sandbox.action import actions_from_json
 from sandbox.engines.relay import start
-from sandbox.games.pinball.hand import Hand
+from sandbox.games.pinball.hand import PinballHand
 from sandbox.games.player import Player
 from sandbox.games.registry import rules_of
 from sandbox.games.rules import Seen, UnfitError
@@ -172,6 +172,6 @@ def test_hand_plays_pinball_alone() -> None:
     scene = plain()
     frame = start(scene, "pymunk").frame()
     with pytest.raises(UnfitError, match="pinball alone"):
-        Hand(1).decide(Seen(0.0, frame, Contacts.none(), ()), object())  # type: ignore[arg-type]
+        PinballHand(1).decide(Seen(0.0, frame, Contacts.none(), ()), object())  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="0 to 1"):
-        Hand(1, 1.5)
+        PinballHand(1, 1.5)

@@ -10,7 +10,7 @@ import pytest
 from sandbox.action import Move
 from sandbox.engines.relay import start
 from sandbox.games.pinball.board import MARGIN
-from sandbox.games.pinball.hand import Hand
+from sandbox.games.pinball.hand import PinballHand
 from sandbox.games.pinball.pinball import Pinball
 from sandbox.games.pinball.search import PATIENCE
 from sandbox.games.policies import Chance
@@ -24,7 +24,11 @@ from sandbox.trajectory import Frame, IntArray
 
 TABLES = sorted((Path(__file__).parents[3] / "scenes" / "pinball").glob("*.toml"))
 
-PLAYERS = {"skilled": lambda seed: Hand(seed, 0.8), "clumsy": lambda seed: Hand(seed, 0.2), "random": Chance}
+PLAYERS = {
+    "skilled": lambda seed: PinballHand(seed, 0.8),
+    "clumsy": lambda seed: PinballHand(seed, 0.2),
+    "random": Chance,
+}
 
 
 PARTS = [*(("random", 1 + 100 * k) for k in range(6)), ("clumsy", 1), ("skilled", 1), ("skilled", 101)]
@@ -118,7 +122,7 @@ def test_no_ball_is_stuck_lost_or_through_anything_in_an_hour_of_play(path: Path
 
 @pytest.mark.parametrize("path", TABLES, ids=lambda path: path.stem)
 def test_game_is_played_and_scored(path: Path) -> None:
-    game = play(seeded(path, 1), Hand(1), 15.0)
+    game = play(seeded(path, 1), PinballHand(1), 15.0)
     assert game.rules.score > 0
     assert "ball search" not in [text for _, text in game.said]
 
@@ -128,7 +132,7 @@ def test_multiball_of_the_full_table_puts_all_balls_into_play() -> None:
     simulation = start(scene, "pymunk")
     simulation.contacts()
     rules = Pinball(scene, simulation.bodies)
-    referee, hand = Referee(rules), Hand(1, 0.8)
+    referee, hand = Referee(rules), PinballHand(1, 0.8)
     store = simulation.frame().position[rules.board.balls[1]].copy()
     most = 0
     while simulation.time < 12.0:

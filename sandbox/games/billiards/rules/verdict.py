@@ -1,7 +1,7 @@
 """Verdict: what came of a shot."""
 
-from dataclasses import dataclass
-from typing import Generic
+from dataclasses import dataclass, replace
+from typing import Generic, Self
 
 from sandbox.games.billiards.rules.state import S
 
@@ -35,6 +35,16 @@ class Verdict(Generic[S]):
     messages: tuple[str, ...] = ()
     """lines for the players"""
 
+    def followed_by(self, settled: Self) -> Self:
+        """Return it with what the lie of the balls, looked at after it, has brought besides."""
+        return replace(
+            self,
+            state=settled.state,
+            fouls=(*self.fouls, *settled.fouls),
+            points=_summed(self.points, settled.points),
+            messages=(*self.messages, *settled.messages),
+        )
+
 
 @dataclass(frozen=True)
 class Lie:
@@ -46,6 +56,12 @@ class Lie:
     """whether no legal target touches or can be hit straight at both its edges, for balls that are no targets"""
     by: tuple[str, ...] = ()
     """the nearest of the balls in the way, if it is one for all targets"""
+
+
+def _summed(one: tuple[int, ...], other: tuple[int, ...]) -> tuple[int, ...]:
+    if not one or not other:
+        return one or other
+    return tuple(a + b for a, b in zip(one, other, strict=True))
 
 
 def player(number: int) -> str:
