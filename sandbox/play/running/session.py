@@ -151,10 +151,6 @@ class Session(Course):
         if calm and self.ended is None and self.history.wants_mark(self._step):
             self.history.mark(self._mark_here())
 
-    def _mark_here(self) -> Mark:
-        game = None if self.game is None else self.game.copy()
-        return Mark(self._step, self._script.done, self.relay.checkpoint(), game)
-
     def _check(self, frame: Frame | None) -> None:
         """Hold the present state against what was seen before."""
         known = self.history.known(self._step)
