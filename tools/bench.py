@@ -3,7 +3,7 @@
     python tools/bench.py [NAME…] [--json] [--repeats N]
 
 Ours and the peer take turns, after a warm-up, so that a noisy machine meets both; the ratio is that of the medians.
-The rows are those of benches.py. Times are seconds unless the unit says otherwise.
+The rows are those of benches.py and game_benches.py. Times are seconds unless the unit says otherwise.
 """
 
 import argparse
@@ -15,7 +15,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from benches import BENCHES, Bench
+from bench_row import Bench
+from benches import BENCHES
 
 from sandbox.measure.versions import machine, versions
 

@@ -1,49 +1,12 @@
-"""The rows of the benchmarks: what is timed of ours, against what, and what is claimed."""
-
-from collections.abc import Callable
-from typing import NamedTuple
+"""The rows of the benchmarks: engines, pictures and commands; those of games come last."""
 
 import connected
 import drawing
 import peers
-import pooltool_shots
+from bench_row import Bench
+from game_benches import GAMES
 from turning import turns
-from workloads import (
-    Timed,
-    command,
-    events,
-    fanning,
-    flying,
-    playing,
-    rolling,
-    running,
-    scene,
-    shooting,
-    simulated,
-    staged,
-    stepping,
-)
-
-from sandbox.scene.file import load
-
-
-class Bench(NamedTuple):
-    """A row: ours, the peer, and what is claimed."""
-
-    name: str
-    about: str
-    ours: Callable[[], Timed]
-    peer: Callable[[], Timed]
-    target: float | None = None
-    """the ratio, or for `above` the seconds, that may not be exceeded; for a rate, what ours must reach"""
-    unit: str = "s"
-    above: bool = False
-    """Ours is what exceeds the peer, not its whole."""
-    rate: bool = False
-    """Ours and the peer return how much they did in a second; the target is what ours must reach."""
-    missing: Callable[[], str | None] | None = None
-    """Says why the peer is not to be had, where it may not be; the row is then left out, and that is told."""
-
+from workloads import command, events, flying, rolling, running, scene, staged, stepping
 
 SPARKS = ("world.duration=1.0", "solver.record_every=1")
 PILE = scene("benchmark/pile")
@@ -271,54 +234,5 @@ BENCHES = (
         "frames/s",
         rate=True,
     ),
-    *(
-        Bench(
-            f"shot-{name.replace('_', '-')}",
-            "a full shot to rest, events kept, exact engine / the same shot by pooltool as it is installed",
-            lambda name=name: shooting(load(pooltool_shots.path(name))),
-            lambda name=name: pooltool_shots.peer(name),
-            1.0 / (100.0 if name == "three_cushions" else 300.0),
-            missing=pooltool_shots.missing,
-        )
-        for name in pooltool_shots.NAMES
-    ),
-    *(
-        Bench(
-            f"shot-{name.replace('_', '-')}-corrected",
-            "the same / by pooltool with touching balls and degenerate quartics corrected",
-            lambda name=name: shooting(load(pooltool_shots.path(name))),
-            lambda name=name: pooltool_shots.peer(name, corrected=True),
-            missing=pooltool_shots.missing,
-        )
-        for name in pooltool_shots.NAMES
-    ),
-    *(
-        Bench(
-            f"pinball-{name}",
-            "seconds of a game in one: 1 kHz, rules, random player, contacts, not audited / of the table bare, its "
-            "ball at rest",
-            lambda name=name: playing(scene(f"pinball/{name}")),
-            lambda name=name: simulated(scene(f"pinball/{name}"), 20.0),
-            60.0,
-            "s/s",
-            rate=True,
-        )
-        for name in ("classic", "full")
-    ),
-    Bench(
-        "pinball-frames",
-        "pictures a second of pinball/full in play / of the same with nothing kept from one to the next",
-        lambda: drawing.played(scene("pinball/full", "world.duration=8.0"), kept=True),
-        lambda: drawing.played(scene("pinball/full", "world.duration=8.0"), kept=False),
-        unit="frames/s",
-        rate=True,
-    ),
-    Bench(
-        "shots-threads",
-        "9-ball breaks a second, a fan of them on two threads / on one",
-        lambda: fanning(load(pooltool_shots.path("nine_ball_break")), 2000, 2),
-        lambda: fanning(load(pooltool_shots.path("nine_ball_break")), 2000, 1),
-        unit="shots/s",
-        rate=True,
-    ),
+    *GAMES,
 )

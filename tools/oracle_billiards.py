@@ -27,9 +27,10 @@ os.environ["HOME"] = os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="po
 import numpy as np
 import pooltool as pt
 import pooltool_world as world
-from billiard_shots import TO_COMPARE, Document, Shot, full
+from billiard_shots import TO_COMPARE, full
 from oracle_audit import Event, Rules, Verdict, audit
 from scene_text import text
+from shot_parts import Document, Shot
 
 CASES = Path(__file__).resolve().parents[1] / "tests" / "engines" / "exact" / "rolling" / "cases"
 SHOTS = Path(__file__).resolve().parent / "shots"

@@ -1,4 +1,6 @@
-"""Breaks: which joints have broken by a time, and what is to be said of it."""
+"""Breaks: when joints broke, which have by a time, and what is to be said of it."""
+
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -12,6 +14,26 @@ TELL_EVERY = 1.0
 def broken_by(breaks: FloatArray, time: float) -> list[int]:
     """Return the numbers of the joints that have broken by a time, s; `breaks` (J,) says when each does."""
     return np.flatnonzero(parted(breaks, np.asarray([time]))[0]).tolist() if len(breaks) else []
+
+
+class BreakTimes:
+    """When each joint broke, as far as it has been seen."""
+
+    def __init__(self, joints: int) -> None:
+        """None of so many has."""
+        self.times: FloatArray = np.full(joints, np.inf)
+        """(J,) s, inf where it never did; what was handed out does not change"""
+
+    def note(self, broken: Mapping[int, float]) -> None:
+        """Learn when joints broke, s. Those that broke later than now are kept: the same way leads there again."""
+        numbers = list(broken)
+        if numbers and not np.isfinite(self.times[numbers]).all():
+            self.times = self.times.copy()
+            self.times[numbers] = list(broken.values())
+
+    def forget(self) -> None:
+        """Forget all of them."""
+        self.times = np.full(len(self.times), np.inf)
 
 
 class BreakNotes:

@@ -19,6 +19,12 @@ class Messages:
         self._messages = [each for each in self._messages if each[1:] != (level, text)]
         self._messages = [*self._messages, (until, level, text)][-MOST:]
 
+    def take(self, notes: list[tuple[str, str]]) -> None:
+        """Say what is noted, (level, text), and empty the list."""
+        for level, text in notes:
+            self.tell(text, level)
+        notes.clear()
+
     def shown(self) -> tuple[tuple[str, str], ...]:
         """Return (level, text) of those whose time is not over."""
         now = perf_counter()

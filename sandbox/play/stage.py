@@ -5,7 +5,6 @@ Whatever fails is told as a message, and what was on goes on.
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.registry import ENGINES, USUAL, engine_named, usual
@@ -21,9 +20,9 @@ from sandbox.play.running.beginning import begun
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 from sandbox.play.shelf import neighbour
-from sandbox.scene.document import to_document
+from sandbox.play.wishes import Wishes
 from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import Override, from_document, load
+from sandbox.scene.file import Override, load
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -55,12 +54,9 @@ class Stage:
         self.faults: tuple[str, ...] = ()
         self.on_new: Callable[[bool], object] = bool
         """Called when something else is on; with whether it is the same scene, for the camera to stay."""
-        self._engine, self._overrides = engine, tuple(overrides)  # the wish; what plays may be another
+        self._wishes = Wishes(engine, tuple(overrides))
         self._again: Callable[[], Live | Stored] | None = None
         self._tried: Path | None = None  # the file that was not opened after the present one, for its faults
-        self._turned: dict[str, Any] = {}  # values of the scene by path, for a restart to keep
-        self._ghosted = False
-        self._trusting: bool | None = None  # nobody has said
 
     @property
     def live(self) -> Live | None:
@@ -80,7 +76,7 @@ class Stage:
     @property
     def engine(self) -> str:
         """The present engine's name."""
-        return self.show.engine if self.show is not None else self._engine or USUAL
+        return self.show.engine if self.show is not None else self._wishes.engine or USUAL
 
     @property
     def paused(self) -> bool:
@@ -119,10 +115,8 @@ class Stage:
         self.hands.forget()
         self.faults = ()
         if isinstance(show, Live):
-            few = len(show.bodies) <= FEW and self.host is None  # what rules and hands do next, no twin can tell
-            show.company.show_trust(few if self._trusting is None else self._trusting)
-            if self._ghosted and not show.company.ghosted:
-                show.company.show_ghost(True)
+            # What rules and hands do next, no twin can tell.
+            self._wishes.begin(show.company, trusting=len(show.bodies) <= FEW and self.host is None)
             self._seats.take(show, file, self.messages.tell)
         self.on_new(same)
 
@@ -134,12 +128,12 @@ class Stage:
     def open(self, path: Path, same: bool = False, engine: str | None = None) -> bool:
         """Open a scene file; one with faults is told, and what was on goes on. Return whether it was opened."""
         try:
-            scene = load(path, self._overrides)
+            scene = load(path, self._wishes.overrides)
         except SceneError as error:
             # By the file's own name: its folders would take the place of what is wrong.
             self.faults = tuple(str(Fault(path.name, f.line, f.path, f.message)) for f in error.faults)
             return False
-        return self._start(scene, path, scene, engine or self._engine or usual(scene), None, same)
+        return self._start(scene, path, scene, engine or self._wishes.engine or usual(scene), None, same)
 
     def _start(
         self, scene: Scene, path: Path | None, file: Scene, engine: str, settings: Settings | None, same: bool
@@ -157,7 +151,7 @@ class Stage:
             self.put_on(self._again(), self.path, self.file, same=True, again=self._again)
         elif self.show is not None and self.file is not None:
             try:
-                scene = from_document(to_document(self.file), "<scene>", self._turned.items())
+                scene = self._wishes.as_turned(self.file)
             except SceneError as error:
                 self.messages.tell(str(error), "error")
                 return
@@ -169,7 +163,7 @@ class Stage:
             self.messages.tell("there is no scene file to reload", "warning")
             return
         if self.open(self.path, same=True, engine=self.show.engine):
-            self._turned.clear()
+            self._wishes.turned.clear()
             self.messages.tell(f"{self.path.name} reloaded")
 
     def walk(self, by: int) -> None:
@@ -185,7 +179,7 @@ class Stage:
     def take(self, path: Path) -> None:
         """Open another scene file."""
         if self.open(path):
-            self._turned.clear()
+            self._wishes.turned.clear()
         else:
             self._tried = path
 
@@ -194,16 +188,14 @@ class Stage:
         if self.live is None:
             self._tell_why_not("has no ghost; replay it with --engine")
             return
-        self._ghosted = not self.live.company.ghosted
-        self.live.company.show_ghost(self._ghosted)
+        self._wishes.toggle_ghost(self.live.company)
 
     def toggle_trust(self) -> None:
         """Begin to watch a twin from here, or end it."""
         if self.live is None:
             self._tell_why_not("has no twin; `sandbox play` plays its scene")
             return
-        self._trusting = self.live.company.trust is None
-        self.live.company.show_trust(self._trusting)
+        self._wishes.toggle_trust(self.live.company)
 
     def next_engine(self) -> None:
         """Go on with the next engine that can, from the same state; who cannot says why."""
@@ -225,7 +217,7 @@ class Stage:
         except ActionError as error:
             self.messages.tell(str(error), "warning")
             return False
-        self._engine = engine
+        self._wishes.engine = engine
         self.messages.tell(f"{engine}: {engine_named(engine).about}" + (f" ({note})" if note else ""))
         return True
 
@@ -246,8 +238,7 @@ class Stage:
             for action in turned(live, key, value, self.hands.picked_of(live)):
                 live.act(action)
                 if isinstance(action, SetParameter):
-                    self._turned.pop(action.path, None)  # what is turned last is set last
-                    self._turned[action.path] = action.value
+                    self._wishes.turn(action)
 
         self.act(turn)
 
@@ -276,21 +267,14 @@ class Stage:
         self.show.go_on(elapsed, self.paused or still)
         if game is not None:
             self.act(lambda _: game.go_on(elapsed))
-            for level, text in game.notes:
-                self.messages.tell(text, level)
-            game.notes.clear()
-        doubt = self.host.doubt() if self.host is not None else None
-        if doubt is not None:
-            self.messages.tell(doubt, "warning")
-        for text in self.host.news() if self.host is not None else ():
-            self.messages.tell(text)
+            self.messages.take(game.notes)
+        if self.host is not None:
+            self.messages.take(self.host.notes())
         if isinstance(self.show, Live) and self.show.wants_pause:
             self.paused, self.show.wants_pause = True, False
         elif isinstance(self.show, Stored) and self.show.at_end:
             self.paused = True
-        for level, text in self.show.notes:
-            self.messages.tell(text, level)
-        self.show.notes.clear()
+        self.messages.take(self.show.notes)
 
     def step(self) -> None:
         """Make one step; a running scene pauses."""

@@ -93,15 +93,19 @@ class Host:
         last = {press.control: press.value for press in game.presses} if game is not None else {}
         return [name for name, value in last.items() if value > 0.0]
 
-    def doubt(self) -> str | None:
+    def notes(self) -> list[tuple[str, str]]:
+        """Return (level, text) of what is to be said since the last call."""
+        return [*(("warning", text) for text in self._doubts()), *(("info", text) for text in self._news())]
+
+    def _doubts(self) -> list[str]:
         """Return what is to be said, once, where a recorded game goes otherwise than the rules would have it."""
         game = self.live.session.game
         if self._told or game is None or game.otherwise is None:
-            return None
+            return []
         self._told = True
-        return f"from {game.otherwise:g} s on the rules would have done something else than was recorded"
+        return [f"from {game.otherwise:g} s on the rules would have done something else than was recorded"]
 
-    def news(self) -> list[str]:
+    def _news(self) -> list[str]:
         """Return what a game with a log has told since the last call; of what is taken back it may tell again."""
         if not isinstance(self.rules, Logged):
             return []

@@ -160,6 +160,11 @@ class Course:
         parts, self._redone = self._redone, []
         return parts
 
+    def _mark_here(self) -> Mark:
+        """Make a checkpoint of the present state."""
+        game = None if self.game is None else self.game.copy()
+        return Mark(self._step, self._script.done, self.relay.checkpoint(), game)
+
     def _take_up(self, mark: Mark | None) -> bool:
         """Go back to a checkpoint, or to the start; tell whether the checkpoint could be taken up."""
         relay = None

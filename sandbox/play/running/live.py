@@ -5,10 +5,8 @@ from time import perf_counter
 
 from sandbox.action import Action, ActionError, Launch
 from sandbox.engines.compiling import COMPILING
-from sandbox.engines.energy import energy_of
 from sandbox.play.breaks import BreakNotes, broken_by
 from sandbox.play.footage.film import Film
-from sandbox.play.footage.scenery import Scenery
 from sandbox.play.picking import overlapping
 from sandbox.play.running.between import between
 from sandbox.play.running.burning import burning
@@ -16,20 +14,18 @@ from sandbox.play.running.company import Company
 from sandbox.play.running.journey import Journey
 from sandbox.play.running.pace import Pace
 from sandbox.play.running.session import Session, WrongWayError
+from sandbox.play.running.showing import Showing
 from sandbox.play.running.switching import switch
 from sandbox.play.sight import Sight
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
 from sandbox.scene.zone import notes
-from sandbox.trajectory import Contacts, Frame
+from sandbox.trajectory import Contacts
 
 LEAST, MOST = 0.012, 0.03
 """s of each picture that steps may take: as much as all else takes, within these bounds. Where they need more, the
 scene is slower than asked."""
 
 
-class Live:
+class Live(Showing):
     """A session that is being watched."""
 
     def __init__(self, session: Session, ghost: Film | None = None, until: float | None = None) -> None:
@@ -40,7 +36,7 @@ class Live:
             ghost: a stored run to be seen beside it, instead of another engine.
             until: when what was recorded ends, s; it pauses there, once.
         """
-        self.session = session
+        super().__init__(session)
         self.pace = Pace()
         self.company = Company(session, ghost)
         self._journey, self._worked = Journey(), 0.0
@@ -54,53 +50,7 @@ class Live:
         self._until = until
         self.wants_pause = False
         """It has come to the end of what was recorded; whoever pauses it takes this back."""
-        self._peek: tuple[int, Frame] | None = None
-        self._scenery: Scenery | None = None  # as long as another state than the present one is looked at
         self._anew = False  # what runs beside it has seen what was taken back
-
-    @property
-    def scene(self) -> Scene:
-        """What runs, with all that was set since."""
-        return self.session.scene
-
-    @property
-    def shown(self) -> Scene:
-        """The scene of the state that is shown: with its walls as they were then."""
-        if self._peek is None:
-            self._scenery = None
-            return self.scene
-        self._scenery = self._scenery or self.session.scenery()
-        return self._scenery.at(self._peek[1].time)
-
-    @property
-    def peeking(self) -> bool:
-        """Whether another state than the present one is shown."""
-        return self._peek is not None
-
-    @property
-    def bodies(self) -> Bodies:
-        """The bodies by number; of the state that is shown."""
-        return self.session.bodies if self._peek is None else self.session.bodies_in(self._peek[1])
-
-    @property
-    def engine(self) -> str:
-        """The present engine's name."""
-        return self.session.engine
-
-    @property
-    def settings(self) -> Settings:
-        """The present settings, with every choice filled in."""
-        return self.session.settings
-
-    @property
-    def step_number(self) -> int:
-        """Steps made since the start; of the state that is shown."""
-        return self.session.step_number if self._peek is None else self._peek[0]
-
-    @property
-    def frame(self) -> Frame:
-        """The state that is shown, or that the picture is just short of."""
-        return self.session.frame if self._peek is None else self._peek[1]
 
     @property
     def busy(self) -> str | None:
@@ -251,31 +201,12 @@ class Live:
         if present > 0:
             self.seek(present - 1)
 
-    def scrub(self, time: float) -> None:
-        """Look at the state seen nearest to a time, s; the session stays where it is until `settle`."""
-        self._peek = self.session.history.nearest(time)
-
     def settle(self) -> None:
         """Set out for the state that is being looked at."""
         if self._peek is not None:
             step, self._peek = self._peek[0], None
             if step != self.session.step_number:
                 self.seek(step)
-
-    @property
-    def begin(self) -> float:
-        """The first time that can be gone to, s."""
-        return 0.0
-
-    @property
-    def end(self) -> float:
-        """The last time that was seen, s."""
-        return self.session.history.end
-
-    @property
-    def marks(self) -> tuple[float, ...]:
-        """Times of the checkpoints, s."""
-        return self.session.history.mark_times
 
     def _go_there(self) -> None:
         if self._journey.go():
@@ -298,10 +229,6 @@ class Live:
     def notes(self) -> list[tuple[str, str]]:
         """(level, text) of what happened; whoever tells it empties the list."""
         return self.company.notes
-
-    def energy(self) -> tuple[float, float, float]:
-        """Return the kinetic, potential and total energy, J."""
-        return energy_of(self.frame, self.bodies, self.scene.world.gravity, self.scene, self.session.breaks)
 
     def sight(
         self,

@@ -13,22 +13,18 @@ from collections.abc import Iterator
 from dataclasses import replace
 from time import perf_counter
 
-import numpy as np
-
 from sandbox.action import Action, ActionError
 from sandbox.games.referee import Referee
+from sandbox.play.breaks import BreakTimes
+from sandbox.play.running.calm import Calm
 from sandbox.play.running.course import Course
 from sandbox.play.running.history import History, Mark
-from sandbox.play.running.rest import at_rest
 from sandbox.play.running.script import handed_over
 from sandbox.recording import Recording
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, FloatArray, Frame
-
-CALM = 8
-"""Substeps without contact before a checkpoint is made; engines remember parted contacts for 3 by default."""
 
 PACE = 16
 """Steps made at a time on the way to another one."""
@@ -59,13 +55,13 @@ class Session(Course):
         """Start; as `Course`."""
         self.history = History()
         super().__init__(scene, engine, settings, actions, game, until)
-        self._calm = 0
+        self._calm = Calm()
         self._mark: Mark | None = None  # that the relay was taken up from, as long as all that followed was known
         self._unsure: list[int] = []
         self._astray = False
         self._contacts: list[Contacts] = []
         self._everyone = self.bodies
-        self._breaks = np.full(len(self.scene.links), np.inf)
+        self._breaks = BreakTimes(len(self.scene.links))
         self._previous = self._frame = self.relay.frame()
         self.history.keep(0, self._frame)
 
@@ -89,7 +85,7 @@ class Session(Course):
     @property
     def breaks(self) -> FloatArray:
         """When each of the scene's joints broke, (J,) s, inf where it never did; also in states that lie ahead."""
-        return self._breaks
+        return self._breaks.times
 
     @property
     def time(self) -> float:
@@ -141,36 +137,19 @@ class Session(Course):
         self._frame = self.relay.frame()
         if len(self.bodies) >= len(self._everyone):
             self._everyone = self.bodies
-        self._note_breaks()
+        self._breaks.note(self.relay.broken)
         self._contacts.append(self._contacts_since())
         del self._contacts[:-64]  # nobody asks
-        if len(self._contacts[-1]):
-            self._calm = 0
-        else:
-            self._calm += self.relay.settings.substeps
+        self._calm.look(self._contacts[-1], self.relay.settings)
         if self._exhausted:  # within the step after this one: that state is none of the session's
             return
         self._check(self._frame)
         if self._mark is not None and self.history.known(self._step) is None:
             self._unsure.append(self._step)
         self.history.keep(self._step, self._frame)
-        calm = self._calm >= max(CALM, 2 * (self.relay.settings.persistence or 1))
-        if self.scene.surface is not None and not at_rest(self._frame):
-            calm = False  # a state in mid-roll does not tell when the roll began: the way on differs by roundings
+        calm = self._calm.lasts(self.relay, self._frame)
         if calm and self.ended is None and self.history.wants_mark(self._step):
             self.history.mark(self._mark_here())
-
-    def _mark_here(self) -> Mark:
-        game = None if self.game is None else self.game.copy()
-        return Mark(self._step, self._script.done, self.relay.checkpoint(), game)
-
-    def _note_breaks(self) -> None:
-        """Learn when joints broke. Those that broke later than now are kept: the same way leads there again."""
-        broken = self.relay.broken
-        if len(broken) and not np.isfinite(self._breaks[list(broken)]).all():
-            breaks = self._breaks.copy()
-            breaks[list(broken)] = list(broken.values())
-            self._breaks = breaks
 
     def _check(self, frame: Frame | None) -> None:
         """Hold the present state against what was seen before."""
@@ -256,13 +235,17 @@ class Session(Course):
         self._own_up()
         self._script.add(action, self.relay)
         self._until = min(self._until, self.relay.time)
-        self.history.cut(self._step - 1)
-        self._everyone = self.bodies
-        self._breaks = np.full(len(self._breaks), np.inf)
-        self._note_breaks()
+        self._forget_from(self._step)
+        self._breaks.note(self.relay.broken)
         self._frame = self._previous = self.relay.frame()
         self.history.keep(self._step, self._frame)
-        self._calm = 0
+        self._calm = Calm()
+
+    def _forget_from(self, step: int) -> None:
+        """Forget what was seen of a step and of all after it."""
+        self.history.cut(step - 1)
+        self._everyone = self.bodies
+        self._breaks.forget()
 
     def retract(self, place: int) -> int:
         """Take back what was done from the place-th action on, and forget what came of it.
@@ -275,9 +258,7 @@ class Session(Course):
         """
         step = self.history.nearest(self.actions[place].time)[0]
         self._script.cut(place)
-        self.history.cut(step - 1)
-        self._everyone = self.bodies
-        self._breaks = np.full(len(self._breaks), np.inf)
+        self._forget_from(step)
         self._astray = True  # what is seen was never done
         return step
 
@@ -312,7 +293,7 @@ class Session(Course):
         self._mark = mark if taken else None
         self._unsure.clear()
         self._astray = False
-        self._calm = 0
+        self._calm = Calm()
         self._contacts.clear()
         self._previous = self._frame = self.relay.frame()
         self.history.keep(self._step, self._frame)

@@ -1,0 +1,61 @@
+"""The rows of the benchmarks that are games: shots at billiards against pooltool, and pinball in play."""
+
+import drawing
+import pooltool_shots
+from bench_row import Bench
+from workloads import fanning, playing, scene, shooting, simulated
+
+from sandbox.scene.file import load
+
+GAMES = (
+    *(
+        Bench(
+            f"shot-{name.replace('_', '-')}",
+            "a full shot to rest, events kept, exact engine / the same shot by pooltool as it is installed",
+            lambda name=name: shooting(load(pooltool_shots.path(name))),
+            lambda name=name: pooltool_shots.peer(name),
+            1.0 / (100.0 if name == "three_cushions" else 300.0),
+            missing=pooltool_shots.missing,
+        )
+        for name in pooltool_shots.NAMES
+    ),
+    *(
+        Bench(
+            f"shot-{name.replace('_', '-')}-corrected",
+            "the same / by pooltool with touching balls and degenerate quartics corrected",
+            lambda name=name: shooting(load(pooltool_shots.path(name))),
+            lambda name=name: pooltool_shots.peer(name, corrected=True),
+            missing=pooltool_shots.missing,
+        )
+        for name in pooltool_shots.NAMES
+    ),
+    *(
+        Bench(
+            f"pinball-{name}",
+            "seconds of a game in one: 1 kHz, rules, random player, contacts, not audited / of the table bare, its "
+            "ball at rest",
+            lambda name=name: playing(scene(f"pinball/{name}")),
+            lambda name=name: simulated(scene(f"pinball/{name}"), 20.0),
+            60.0,
+            "s/s",
+            rate=True,
+        )
+        for name in ("classic", "full")
+    ),
+    Bench(
+        "pinball-frames",
+        "pictures a second of pinball/full in play / of the same with nothing kept from one to the next",
+        lambda: drawing.played(scene("pinball/full", "world.duration=8.0"), kept=True),
+        lambda: drawing.played(scene("pinball/full", "world.duration=8.0"), kept=False),
+        unit="frames/s",
+        rate=True,
+    ),
+    Bench(
+        "shots-threads",
+        "9-ball breaks a second, a fan of them on two threads / on one",
+        lambda: fanning(load(pooltool_shots.path("nine_ball_break")), 2000, 2),
+        lambda: fanning(load(pooltool_shots.path("nine_ball_break")), 2000, 1),
+        unit="shots/s",
+        rate=True,
+    ),
+)
