@@ -16,7 +16,8 @@ from sandbox.engines.native.floors import of_floors, on_floor
 from sandbox.engines.native.free import FreeFlight
 from sandbox.engines.native.meeting import MeetingBodies
 from sandbox.engines.native.overlaps import SKIN
-from sandbox.engines.native.visiting import Visiting
+from sandbox.engines.native.premises import NativePremises
+from sandbox.engines.visiting import Visiting
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Scene, Single
@@ -50,7 +51,8 @@ class Population:
         floored = settings.replace(slop=UNCORRECTED), SKIN
         self.meeting = MeetingBodies(scene, *(floored if self.felt is not None else (settings,)))
         self.free = FreeFlight(scene.world, settings.h, self.meeting.field)
-        self.visiting = Visiting(scene, self.meeting) if scene.zones else None
+        self._premises = NativePremises(self.meeting)
+        self.visiting = Visiting(scene, self._premises) if scene.zones else None
         """what zones do, where there are some"""
         self._renew(scene, meetings(scene, self.bodies))
         self._live()
@@ -68,7 +70,8 @@ class Population:
             meet = replace(meet, surfaces=replace(meet.surfaces, restitution=nothing, friction=nothing))
         self.meeting.renew(scene, meet)
         if self.visiting is not None:
-            self.visiting.renew(scene, self.bodies, meet)
+            self._premises.renew(scene, self.bodies)
+            self.visiting.renew(meet)
 
     def _live(self) -> None:
         """Let the felt and zones, if there are some, go on with the present arrays."""

@@ -1,24 +1,60 @@
-"""Visiting: what zones do to those whose centres come in."""
+"""Visiting: what zones do to those whose centres come in, by rules that are the same on every engine."""
 
 import math
+from typing import Protocol
 
 import numpy as np
 
-from sandbox.engines.native.meeting import MeetingBodies
 from sandbox.engines.touching import Touching
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene
+from sandbox.scene.part import Point
 from sandbox.scene.precinct import middle_of
 from sandbox.scene.zone import AWAY, HELD, INSIDE, LET_GO, mask_of
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 
-class Visiting:
-    """The zones of a running scene, and who is in them. It writes to rows of the population's arrays."""
+class Premises(Protocol):
+    """What an engine finds, and does, for zones. Bodies and zones go by their numbers."""
 
-    def __init__(self, scene: Scene, meeting: MeetingBodies) -> None:
-        self._zones, self._meeting = scene.zones, meeting
+    stirred: set[int]
+    """who has come into a zone, or left one, or is to be looked at"""
+
+    def at(self, place: FloatArray) -> list[int]:
+        """Return the zones that a place, m, is in, in their order."""
+
+    def inside(self, number: int) -> list[int]:
+        """Return the zones that a body's centre was in at the end of the last substep, in their order."""
+
+    def noted(self, number: int) -> bool:
+        """Tell whether a body is here, and zones can note it."""
+
+    @property
+    def lifted(self) -> list[int]:
+        """Who has the gravity of a zone."""
+
+    def set_layer(self, number: int) -> None:
+        """Let a body meet what is on its layer from now on; what it touched elsewhere it touches no more."""
+
+    def set_position(self, number: int, position: FloatArray) -> None:
+        """Put a body somewhere, m."""
+
+    def hold(self, number: int) -> None:
+        """Let a body stand still where it is, whatever it meets, until it is let go."""
+
+    def let_go(self, number: int) -> None:
+        """Let a body that was held move again."""
+
+    def lift(self, number: int, gravity: Point | None) -> None:
+        """Let a gravity, m/s², act on a body in the place of the world's from now on; None is the world's."""
+
+
+class Visiting:
+    """The zones of a running scene, and who is in them. It writes to rows of the arrays that an engine lives in."""
+
+    def __init__(self, scene: Scene, premises: Premises) -> None:
+        self._zones, self._premises = scene.zones, premises
         self._masks = [mask_of(zone.layers, scene.layers) for zone in scene.zones]
         self._to = [None if zone.to_layer is None else scene.layers.index(zone.to_layer) for zone in scene.zones]
         self._first = len(scene.fixed) + len(scene.pockets)
@@ -31,12 +67,11 @@ class Visiting:
         self._position, self._velocity, self._spin = position, velocity, spin
         self.layer, self.visits = layer, visits
 
-    def renew(self, scene: Scene, bodies: Bodies, meet: Meetings) -> None:
+    def renew(self, meet: Meetings) -> None:
         """Go on with a scene's changed gravity, or with more bodies."""
-        self._gravity, self._bodies = np.asarray(scene.world.gravity), bodies
         self._joined: BoolArray = meet.held
-        for number in self._meeting.steady.lifted:
-            self._lift(number, self._meeting.probes.at(self._position[number]))
+        for number in self._premises.lifted:
+            self._lift(number, self._premises.at(self._position[number]))
 
     @property
     def held(self) -> BoolArray:
@@ -46,29 +81,29 @@ class Visiting:
     def begin(self, numbers: IntArray, anew: bool) -> None:
         """Take note of where bodies that zones can note are; anew, as if they had come this moment."""
         for number in numbers.tolist():
-            inside = self._meeting.probes.at(self._position[number])
+            inside = self._premises.at(self._position[number])
             if anew:
                 self._come(number, inside, np.zeros(2))
             if (self.visits[number] == HELD).any():
-                self._meeting.hold(number)
+                self._premises.hold(number)
             self._lift(number, inside)
-            self._meeting.probes.stirred.add(number)  # by the end of the first substep it may have left again
+            self._premises.stirred.add(number)  # by the end of the first substep it may have left again
 
     def put(self, number: int) -> None:
         """Take note that a body was put where it is; what it comes into there it comes into within the next substep."""
-        if not self._meeting.noted(number):
+        if not self._premises.noted(number):
             return
-        inside = self._meeting.probes.at(self._position[number])
+        inside = self._premises.at(self._position[number])
         self._leave(number, inside)
         self._lift(number, inside)
-        self._meeting.probes.stirred.add(number)
+        self._premises.stirred.add(number)
 
     def free(self, number: int) -> None:
         """Let a body go, if it is held."""
         where = self.visits[number] == HELD
         if where.any():
             self.visits[number, where] = LET_GO
-            self._meeting.let_go(number)
+            self._premises.let_go(number)
 
     def gone(self, numbers: IntArray) -> None:
         """Take note that bodies are no longer there."""
@@ -80,10 +115,10 @@ class Visiting:
         Args:
             ahead: (2,) m/s by which velocities run ahead.
         """
-        probes = self._meeting.probes
-        stirred, probes.stirred = sorted(probes.stirred), set()
+        premises = self._premises
+        stirred, premises.stirred = sorted(premises.stirred), set()
         for number in stirred:
-            inside = probes.inside(number)
+            inside = premises.inside(number)
             self._come(number, inside, ahead)
             self._lift(number, inside)
 
@@ -103,7 +138,7 @@ class Visiting:
             to = self._to[zone]
             if to is not None and to != self.layer[number]:
                 self.layer[number] = to
-                self._meeting.set_layer(number, self._bodies)
+                self._premises.set_layer(number)
             if self._zones[zone].holds and self._can_hold(number, zone):
                 self._hold(number, zone)
                 return
@@ -126,9 +161,9 @@ class Visiting:
         self.visits[number, zone] = HELD
         self._position[number] = middle_of(self._zones[zone])
         self._velocity[number], self._spin[number] = 0.0, 0.0
-        self._meeting.set_position(number, self._position[number])
-        self._meeting.hold(number)
-        self._meeting.probes.stirred.add(number)  # at the centre it may be in other zones
+        self._premises.set_position(number, self._position[number])
+        self._premises.hold(number)
+        self._premises.stirred.add(number)  # at the centre it may be in other zones
 
     def _lift(self, number: int, inside: list[int]) -> None:
         """Let the gravity of the last zone that a body is in take the place of the world's."""
@@ -136,8 +171,7 @@ class Visiting:
         for zone in inside:
             if self._masks[zone] >> self.layer[number] & 1 and self._zones[zone].gravity is not None:
                 gravity = self._zones[zone].gravity
-        more = None if gravity is None else (np.asarray(gravity) - self._gravity) * self._bodies.mass[number]
-        self._meeting.steady.lift(number, more)
+        self._premises.lift(number, gravity)
 
     def told(self, again: bool = False) -> Touching | None:
         """Return who has come in since this was last asked, or none; with `again`, the next call tells of it too."""
