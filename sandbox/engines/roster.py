@@ -45,6 +45,12 @@ class Roster:
         """(N,) N·m, steady, by actions"""
         self.throttles: FloatArray = np.asarray([0.0 if t.key else 1.0 for t in scene.thrusts], dtype=np.float64)
         """how far each thrust of the scene is open, 0 to 1"""
+        self.layer: IntArray = bodies.layer.copy()
+        """(N,) on which each is, by its number in the scene's `layers`"""
+        self.visits: IntArray = bodies.visits.copy()
+        """(N, Z) how each is with each zone"""
+        self.held: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
+        """(N,) who stands still, as zones hold it"""
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
         self._expiry = Expiry(bodies, scene.began, h)
@@ -95,9 +101,19 @@ class Roster:
         raise ActionError(f"there is no drive {number} here to ask for a level of {level:g}")
 
     @property
-    def moving(self) -> BoolArray:
+    def mobile(self) -> BoolArray:
         """(N,) which bodies are there and not fixed."""
         return self.present & ~self.bodies.fixed
+
+    @property
+    def moving(self) -> BoolArray:
+        """(N,) which bodies are there, not fixed, and held by no zone."""
+        return self.mobile & ~self.held
+
+    @property
+    def gravity(self) -> FloatArray:
+        """Of all bodies alike, (2,), or of each, (N, 2), m/s²."""
+        return np.asarray(self.scene.world.gravity, dtype=np.float64)
 
     @property
     def retired(self) -> Mapping[int, float]:
@@ -171,7 +187,9 @@ class Roster:
         self.angular_velocity = np.append(self.angular_velocity, bodies.angular_velocity[-1])
         self.present = np.append(self.present, True)
         self.force, self.torque = np.vstack((self.force, np.zeros((1, 2)))), np.append(self.torque, 0.0)
-        self._twisted = np.append(self._twisted, False)
+        self._twisted, self.held = np.append(self._twisted, False), np.append(self.held, False)
+        self.layer = np.append(self.layer, bodies.layer[-1])
+        self.visits = np.vstack((self.visits, bodies.visits[-1:]))
         self._assume(self.scene, bodies, meet)
         return len(bodies) - 1
 
@@ -180,6 +198,7 @@ class Roster:
         self.present[numbers] = False
         self.velocity[numbers], self.angular_velocity[numbers], self.roll[numbers] = 0.0, 0.0, 0.0
         self.force[numbers], self.torque[numbers] = 0.0, 0.0
+        self.held[numbers] = False
         self._retired |= dict.fromkeys(numbers.tolist(), time)
         self._assume(self.scene, self.bodies, self.meet)
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from sandbox.engines.reference.finder import Candidates, Finder
+from sandbox.engines.reference.candidates import Candidates
+from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.manifolds import KIND, Manifolds, meet_balls, meet_planes, meet_segments
 from sandbox.engines.reference.piece_contacts import drop
 from sandbox.engines.reference.pieces import apart_keys
@@ -18,13 +19,13 @@ class BallFinder(Finder):
         """Work out anew who can meet what."""
         super().population_changed()
         self._apart: IntArray = apart_keys(self._roster.links)
-        self._own: IntArray = np.arange(len(self._roster.position))  # each ball is its own body
+        self._owner = np.arange(len(self._roster.position))  # each ball is its own body
 
-    def candidates(self, position: FloatArray, margin: float = 0.0) -> Candidates:
-        """Return the pairs worth a look at (N, ≥ 2) positions, m: none nearer than the margin, m, is left out."""
+    def _near(self, position: FloatArray, margin: float, walls_alone: bool = False) -> Candidates:
+        """Return the pairs that may be near at (N, ≥ 2) positions, m: none nearer than the margin, m, is left out."""
         roster, boxes = self._roster, self._boxes
-        none = self._ball_keys[:0]
-        if roster.meet.ball_ball:
+        balls = segments = self._ball_keys[:0]
+        if roster.meet.ball_ball and not walls_alone:
             self._ball_keys, balls = self._filled(
                 self._ball_keys,
                 lambda room: self._broad_phase(
@@ -32,7 +33,7 @@ class BallFinder(Finder):
                 ),
             )
             if len(self._apart):
-                balls = balls[: drop(balls, self._own, self._apart, roster.bodies.group)]
+                balls = balls[: drop(balls, self._owner, self._apart, roster.bodies.group)]
         if len(boxes):
             self._segment_keys, segments = self._filled(
                 self._segment_keys,
@@ -40,7 +41,7 @@ class BallFinder(Finder):
                     position, roster.radius, self.able, boxes.box, boxes.index, boxes.widest, margin, room
                 ),
             )
-        return Candidates(balls if roster.meet.ball_ball else none, segments if len(boxes) else none)
+        return Candidates(balls, segments)
 
     def _looked(self, position: FloatArray, near: Candidates, reach: float) -> int:
         """Write the contacts as far as there is room; return how many there are."""
@@ -69,6 +70,8 @@ class BallFinder(Finder):
         Pairs whose keys are in `rest`, ascending, are left out.
         """
         roster = self._roster
+        if self.sieve is not None:
+            rest = self.sieve.with_planes_apart(rest, self.able)
         near = self.candidates(start, 2.0 * self.farthest(start, end))
         self.work["pair_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
         planes, segments = roster.fixtures.planes, roster.fixtures.segments

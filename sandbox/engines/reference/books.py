@@ -89,14 +89,15 @@ class Bookkeeper(Idle):
         """Take note of who is there, and what acts on them; `penalty` is one of the books' own."""
         roster = self._roster
         self._u, self._joints, self._penalty = u, joints, penalty
-        moving = roster.moving
+        moving = roster.mobile  # who is held has no motion, but height
         self._inertia: FloatArray = np.where(moving, (roster.bodies.mass,) * 2 + (roster.bodies.moment,), 0.0).T
         self._weight: FloatArray = self._inertia[:, :1] * roster.scene.world.gravity
+        self._lifted: FloatArray = self._inertia[:, :1] * (roster.gravity - np.asarray(roster.scene.world.gravity))
         breaks = np.full(len(roster.scene.links), np.inf)
         breaks[list(roster.broken)] = -np.inf
         self._potential = Potential(roster.scene, roster.bodies, breaks=breaks)
         self._no_spin: FloatArray = np.zeros(len(moving))
-        steady = bool(roster.force.any() or roster.torque.any())
+        steady = bool(roster.force.any() or roster.torque.any() or self._lifted.any())
         self._worked = u.dragged or u.rubbing or steady or self._field.thrusting or penalty is not None
         self._compliant = joints is not None and joints.how == "xpbd"
 
@@ -200,6 +201,8 @@ class Bookkeeper(Idle):
         if roster.force.any() or roster.torque.any():
             yield Cause.DRIVES, float((roster.force * rate[:, :2]).sum())
             yield Cause.DRIVES, float(roster.torque @ rate[:, 2]) if rate.shape[1] == 3 else 0.0
+        if self._lifted.any():  # what zones give beyond the world's gravity
+            yield Cause.DRIVES, float((self._lifted * rate[:, :2]).sum())
         if self._field.thrusting:
             yield Cause.DRIVES, self._product(self._field.thrusts(time, x), rate)
         if self._penalty is not None:

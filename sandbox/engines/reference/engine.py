@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.overlap import BIAS, slop_of
-from sandbox.scene.demands import BALLS, Demand, demands, unmodelled
+from sandbox.scene.demands import BALLS, SURFACES, Demand, demands, unmodelled
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -40,10 +40,9 @@ class ReferenceEngine:
 
     name: str = "reference"
     about: str = "by hand, fixed step: integrators, broad phases, times of impact, impulses or penalty springs"
-    capabilities: frozenset[Demand] = BALLS | {
-        Demand.FALLOFF,
-        Demand.KICKS,
-        Demand.PASSABLE,
+    capabilities: frozenset[Demand] = BALLS | SURFACES | {
+        Demand.LAYERS,
+        Demand.ZONES,
         Demand.POLYGONS,
         Demand.RODS,
         Demand.PIVOTS,

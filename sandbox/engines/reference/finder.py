@@ -3,13 +3,14 @@
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from sandbox.engines.reference.broad_phase import BROAD_PHASES
+from sandbox.engines.reference.candidates import Candidates
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.segments import SegmentBoxes
+from sandbox.engines.reference.sieve import Sieve
 from sandbox.engines.roster import NOTHING, Roster
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
@@ -17,17 +18,13 @@ WORK = "broad_tests", "pair_tests", "contacts", "contact_iterations", "joint_ite
 """What is counted; the solvers count their passes in with what is found."""
 
 
-class Candidates(NamedTuple):
-    """The pairs that the broad phases handed on, by ascending key. Every body is a candidate for every plane."""
-
-    balls: IntArray
-    """(B,) keys of two balls, or two pieces"""
-    segments: IntArray
-    """(S,) keys of a ball, or a piece, and a segment"""
-
-
 class Finder(ABC):
     """Finds contacts, in the order of their keys, whichever broad phase; counts the work. Of what, its kinds say."""
+
+    sieve: Sieve | None = None
+    """what keeps apart those near each other that do not meet, where something does"""
+    _owner: IntArray
+    """body of each ball, or piece"""
 
     def __init__(self, roster: Roster, broad_phase: str) -> None:
         self._roster, self._broad_phase = roster, BROAD_PHASES[broad_phase]
@@ -41,7 +38,7 @@ class Finder(ABC):
         """Work out anew who can meet what."""
         roster = self._roster
         self.able: BoolArray = roster.moving & (roster.meets > NOTHING)
-        self._moves: BoolArray = roster.moving
+        self._moves: BoolArray = roster.mobile
         self._order: IntArray = np.arange(len(roster.position))
         self._boxes = SegmentBoxes(roster.fixtures)
         self._planes = len(roster.fixtures.planes) if self.able.any() else 0
@@ -58,9 +55,14 @@ class Finder(ABC):
         """Enter figures of one's own (S, S) into the manifolds, in the place of restitution."""
         self._tables = restitution, self._roster.friction
 
-    @abstractmethod
     def candidates(self, position: FloatArray, margin: float = 0.0) -> Candidates:
         """Return the pairs worth a look at (N, ≥ 2) poses, m: none nearer than the margin, m, is left out."""
+        near = self._near(position, margin)
+        return near if self.sieve is None else self.sieve.some(near, self._owner)
+
+    @abstractmethod
+    def _near(self, position: FloatArray, margin: float, walls_alone: bool = False) -> Candidates:
+        """Return the pairs that may be near, whether or not they meet; of walls and posts alone where that is asked."""
 
     def _filled(self, room: IntArray, search: Callable[[IntArray], tuple[int, int]]) -> tuple[IntArray, IntArray]:
         """Return what a search finds, sorted, and the room that it took: more where there was too little."""
@@ -76,13 +78,29 @@ class Finder(ABC):
 
         They are good until the next look.
         """
+        found = self._found(position, near, reach)
+        self.work["contacts"] += found.size
+        return found
+
+    def _found(self, position: FloatArray, near: Candidates, reach: float) -> Manifolds:
         size = self._looked(position, near, reach)
         if size > len(self._out.key):
             self._out = _room_for(2 * size)
             self._looked(position, near, reach)
         self.work["pair_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
-        self.work["contacts"] += size
-        return self._out.of(slice(0, size)) if size else self._none
+        if not size:
+            return self._none
+        found = self._out.of(slice(0, size))
+        return found if self.sieve is None else self.sieve.on_planes(found)
+
+    def at_gates(self, position: FloatArray) -> Manifolds:
+        """Return where bodies overlap one-way walls, whether these stop them or not; good until the next look."""
+        assert self.sieve is not None
+        near = self.sieve.at_gates(self._near(position, 0.0, walls_alone=True), self._owner)
+        if not len(near.segments):
+            return self._none
+        found = self._found(position, near, 0.0)
+        return found.of(self.sieve.gate(found.second))
 
     @abstractmethod
     def _looked(self, position: FloatArray, near: Candidates, reach: float) -> int:

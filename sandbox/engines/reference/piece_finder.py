@@ -6,7 +6,8 @@ long, as a disc around them holds mostly nothing.
 
 import numpy as np
 
-from sandbox.engines.reference.finder import Candidates, Finder
+from sandbox.engines.reference.candidates import Candidates
+from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.piece_contacts import (
     Look,
     drop,
@@ -34,6 +35,7 @@ class PieceFinder(Finder):
         super().population_changed()
         roster = self._roster
         self._pieces = Pieces(roster)
+        self._owner = self._pieces.body
         self._order: IntArray = np.arange(self._pieces.count)
         self._plane_tests = self._planes * int(np.count_nonzero(self._pieces.able))
         self._box = np.empty((len(self._pieces.radius), 6))
@@ -46,12 +48,12 @@ class PieceFinder(Finder):
         angle = position[:, 2] if position.shape[1] == 3 else self._roster.angle
         self._pieces.lay_out(position, angle)
 
-    def candidates(self, position: FloatArray, margin: float = 0.0) -> Candidates:
-        """Return the pairs of pieces, and of pieces and segments, worth a look at (N, ≥ 2) positions, m."""
+    def _near(self, position: FloatArray, margin: float, walls_alone: bool = False) -> Candidates:
+        """Return the pairs of pieces, and of pieces and segments, that may be near at (N, ≥ 2) positions, m."""
         self._lay_out(position)
         roster, boxes, pieces = self._roster, self._boxes, self._pieces
         bodies = segments = self._ball_keys[:0]
-        if roster.meet.mutual:
+        if roster.meet.mutual and not walls_alone:
             self._ball_keys, bodies = self._filled(
                 self._ball_keys,
                 lambda room: self._broad_phase(

@@ -45,8 +45,8 @@ class Pieces:
         self.middle: FloatArray = np.empty((self.count, 2))
         """(S, 2) m, likewise"""
         self.meets: IntArray = roster.meets[self.body]
-        self.moves: BoolArray = roster.moving[self.body]
-        self.able: BoolArray = self.moves & (self.meets > NOTHING)
+        self.moves: BoolArray = roster.mobile[self.body]
+        self.able: BoolArray = roster.moving[self.body] & (self.meets > NOTHING)
         self.apart: IntArray = apart_keys(roster.links)
         self.group: IntArray = roster.bodies.group
         """(N,) of each body"""

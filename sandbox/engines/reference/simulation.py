@@ -16,9 +16,10 @@ from sandbox.engines.reference.engine import BALLS_ALONE
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.motion import State
 from sandbox.engines.reference.stage import Stage
+from sandbox.engines.reference.zoned_roster import ZonedRoster
 from sandbox.engines.roster import Roster
 from sandbox.engines.running import Running
-from sandbox.engines.touching import NOTHING, Touching
+from sandbox.engines.touching import NOTHING, Touching, joined
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Disc, Scene, Single
 from sandbox.scene.settings import Settings
@@ -35,11 +36,13 @@ class ReferenceSimulation(Running):
     def __init__(self, scene: Scene, settings: Settings) -> None:
         assert settings.detection is not None
         super().__init__(settings)
-        self._roster = Roster(scene, settings.h)
+        self._roster = ZonedRoster(scene, settings.h) if scene.zones else Roster(scene, settings.h)
         self._stage = Stage(self._roster, settings)
         self._advance = DETECTIONS[settings.detection]
         self._ledger: ContactLog | None = None
         self._observer: Observer | None = None
+        self._now = NOTHING  # what touched when last recorded
+        self._came: Touching | None = None  # who was in zones when the recording began
         tell_if_slow(len(scene.bodies))
 
     @property
@@ -77,8 +80,10 @@ class ReferenceSimulation(Running):
         with self._turn, np.errstate(all="ignore"):
             self._check_running()
             for k in range(self._settings.substeps):
-                self._substep(self._steps * self._settings.dt + k * self._settings.h, self._settings.h)
+                begin = self._steps * self._settings.dt + k * self._settings.h
+                self._substep(begin, self._settings.h)
                 self._stage.tear(self._settings.h, self._after(k + 1))
+                self._visit(begin + self._settings.h)
             self._steps += 1
             self._settle()
 
@@ -97,11 +102,13 @@ class ReferenceSimulation(Running):
             for k in range(int(whole)):
                 self._substep(begin + k * h, h)
                 self._stage.tear(h, self._after(k + 1))
+                self._visit(begin + k * h + h)
             if rest > 0.0:
                 self._substep(begin + whole * h, rest * h)
             self._part = part
             if rest > 0.0:
                 self._stage.tear(rest * h, self.time)
+                self._visit(self.time)
             self._settle()
             self._ended = True
 
@@ -116,6 +123,17 @@ class ReferenceSimulation(Running):
         except Exhaustion:
             self._ended = True
             raise
+
+    def _visit(self, time: float) -> None:
+        """Let zones do what they do, and note at a time, s, who came in."""
+        if not isinstance(self._roster, ZonedRoster):
+            return
+        self._stage.visit()
+        came = self._roster.visiting.told()
+        if self._ledger is not None and came is not None:  # else it is nobody's concern
+            # What touches has been entered with its impulses: it goes on, beside the notes.
+            lasting = self._now._replace(impulse=np.zeros_like(self._now.impulse))
+            self._ledger.record(time, joined(lasting, came))
 
     def _settle(self) -> None:
         """Write the state down, stop what is no longer finite and bounded, retire whose time is up."""
@@ -164,15 +182,20 @@ class ReferenceSimulation(Running):
         """Return the present state."""
         r = self._roster
         position, velocity, angle, spin = (a.copy() for a in (r.position, r.velocity, r.angle, r.angular_velocity))
-        return Frame(self.time, position, velocity, angle, spin, r.present.copy())
+        layer = r.layer.copy() if len(r.scene.layers) > 1 else None
+        visits = r.visits.copy() if r.scene.zones else None
+        return Frame(self.time, position, velocity, angle, spin, r.present.copy(), layer=layer, visits=visits)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
-            self._ledger = ContactLog(len(self._roster.scene.fixed), joints=True)
+            self._ledger = ContactLog(len(self._roster.scene.fixed_names), joints=True)
             self._stage.witness = self._witness
-            now = self._stage.overlaps(self._stage.x)
-            self._ledger.record(self.time, _touching(now, np.zeros((now.size, 2))))
+            overlaps = self._stage.overlaps(self._stage.x)
+            now = _touching(overlaps, np.zeros((overlaps.size, 2)))
+            if isinstance(self._roster, ZonedRoster):  # who is in a zone is told now, and with the first substep
+                self._came = self._roster.visiting.told()
+            self._ledger.record(self.time, now if self._came is None else joined(now, self._came))
         return self._ledger.take()
 
     def account(self) -> Mapping[Cause, float]:
@@ -189,7 +212,9 @@ class ReferenceSimulation(Running):
         self, start: float, end: float, before: State, after: State, contacts: Manifolds, impulse: FloatArray
     ) -> None:
         assert self._ledger is not None
-        self._ledger.record(end, _touching(*_real(contacts, impulse, after[1], self._roster.inverse_mass)))
+        self._now = now = _touching(*_real(contacts, impulse, after[1], self._roster.inverse_mass))
+        came, self._came = self._came, None
+        self._ledger.record(end, now if came is None else joined(now, came))
         if self._observer is not None:
             # The observer may keep what it is given: these arrays are never written to again.
             self._observer(start, before[0, :, :2], after[0, :, :2], self._ledger.pairs())

@@ -26,7 +26,9 @@ from sandbox.engines.reference.motion import Inputs, State, transition
 from sandbox.engines.reference.parting import Bounce, Parting
 from sandbox.engines.reference.penalty import Penalty
 from sandbox.engines.reference.piece_finder import PieceFinder
+from sandbox.engines.reference.sieve import Sieve
 from sandbox.engines.reference.witness import Witness
+from sandbox.engines.reference.zoned_roster import ZonedRoster
 from sandbox.engines.roster import Roster
 from sandbox.scene.links import LinkKind
 from sandbox.scene.settings import Settings
@@ -47,6 +49,7 @@ class Stage:
         self._breakable: IntArray = np.flatnonzero(np.isfinite(self._links.strength))
         self._given: FloatArray = np.zeros((len(self._links), 2))  # N·s or N·m·s by each link, in this substep
         self._field = Field(roster)
+        self._sieve = Sieve(roster) if Sieve.needed(roster.scene) else None
         self.finder = self._new_finder()
         self._fixtures = roster.fixtures
         self._parting: Parting | None = None
@@ -73,7 +76,9 @@ class Stage:
     def _new_finder(self) -> Finder:
         assert self._settings.broad_phase
         kind = PieceFinder if self._roster.meet.solids else BallFinder
-        return kind(self._roster, self._settings.broad_phase)
+        finder = kind(self._roster, self._settings.broad_phase)
+        finder.sieve = self._sieve
+        return finder
 
     def _joint_solver(self) -> JointSolver | None:
         """Return what holds the scene's links, if it has any."""
@@ -113,6 +118,7 @@ class Stage:
             self._fixtures = roster.fixtures
             self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
         self.finder.population_changed()
+        self._sift()
         self._parting = None
         if Parting.needed(roster):
             self._parting = Parting(roster)
@@ -122,6 +128,26 @@ class Stage:
         if self._joints is not None:
             self._joints.use(roster.inverse_mass, roster.inverse_moment, roster.linked())
         self.apply_forces()
+
+    def _sift(self) -> None:
+        """Let the sieve, where there is one, know who is there, and who touches one-way walls."""
+        if self._sieve is None:
+            return
+        self._sieve.population_changed()
+        gates = self._sieve.gates
+        if gates is not None:
+            gates.start = self.x[0]
+            overlaps = self.finder.at_gates(self.x[0])
+            gates.begin(overlaps, self.closing(overlaps, self.x))
+
+    def visit(self) -> None:
+        """Let zones note who came in during the substep that has ended, and do what they do."""
+        roster = self._roster
+        if isinstance(roster, ZonedRoster) and roster.look(self.x[0]):
+            self.leave()
+            with self.books.doing(Cause.DRIVES):
+                if roster.settle():
+                    self.enter()
 
     def tear(self, h: float, time: float) -> None:
         """Break what gave more than its strength, on average over a substep of h, s, that ended at a time, s.
@@ -152,7 +178,7 @@ class Stage:
         roster, world = self._roster, self._roster.scene.world
         moving = roster.moving[:, None]
         steady = np.zeros_like(self.x[1])
-        steady[:, :2] = np.where(moving, world.gravity, 0.0) + roster.force * roster.inverse_mass[:, None]
+        steady[:, :2] = np.where(moving, roster.gravity, 0.0) + roster.force * roster.inverse_mass[:, None]
         if steady.shape[1] == 3:
             steady[:, 2] = roster.torque * roster.inverse_moment
         forces: list[Callable[[float, State], FloatArray]] = [] if self._field.empty else [self._field]
@@ -300,6 +326,9 @@ class Stage:
             self._given += h * self._joints.load(after)
         if self.witness is not None:
             self.witness(start, self.time, before, after, contacts, impulse)
+        if self._sieve is not None and self._sieve.gates is not None:
+            self._sieve.gates.settle(self.finder.at_gates(after[0]))
+            self._sieve.gates.start = after[0]
 
 
 Detection = Callable[[Stage, float], None]
