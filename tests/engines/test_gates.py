@@ -12,6 +12,9 @@ from sandbox.engines.relay import Relay, start
 from sandbox.measure.run import run
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
 
 R = 0.1
 
@@ -29,6 +32,10 @@ def gate(ball: dict[str, Any], points: list[list[float]] | None = None, **more: 
     )
 
 
+def start_on(engine: str, scene: Scene, settings: Settings | None = None) -> Relay:
+    return start(scene, engine, settings)
+
+
 def gone(simulation: Relay, steps: int) -> np.ndarray[Any, Any]:
     """Return the velocities (steps, 2) while a simulation goes on."""
     found = []
@@ -38,16 +45,18 @@ def gone(simulation: Relay, steps: int) -> np.ndarray[Any, Any]:
     return np.asarray(found)
 
 
+@both
 @pytest.mark.parametrize("speed", [0.01, 1.0, 15.0])
-def test_what_comes_from_the_left_rebounds(speed: float) -> None:
+def test_what_comes_from_the_left_rebounds(engine: str, speed: float) -> None:
     scene = gate({"position": [-R - 0.01 - 0.05 * speed, 0.0], "velocity": [speed, 0.0]})
-    velocity = gone(start(scene), 40)
+    velocity = gone(start_on(engine, scene), 40)
     assert velocity[-1, 0] == pytest.approx(-speed, rel=1e-12)  # rounding
 
 
+@both
 @pytest.mark.parametrize("speed", [0.1, 1.0, 10.0, 30.0])
-def test_what_comes_from_the_right_passes_without_a_trace(speed: float) -> None:
-    simulation = start(gate({"position": [R + 0.01 + 0.05 * speed, 0.0], "velocity": [-speed, 0.0]}))
+def test_what_comes_from_the_right_passes_without_a_trace(engine: str, speed: float) -> None:
+    simulation = start_on(engine, gate({"position": [R + 0.01 + 0.05 * speed, 0.0], "velocity": [-speed, 0.0]}))
     simulation.contacts()
     velocity = gone(simulation, 1000 if speed < 1.0 else 200)
     assert (velocity == [-speed, 0.0]).all()
@@ -55,9 +64,10 @@ def test_what_comes_from_the_right_passes_without_a_trace(speed: float) -> None:
     assert not len(simulation.contacts().time)
 
 
-def test_it_rebounds_from_the_left_once_it_has_passed() -> None:
+@both
+def test_it_rebounds_from_the_left_once_it_has_passed(engine: str) -> None:
     # Thrown through against a pull to the right: it turns round beyond the gate and comes back to it.
-    simulation = start(gate({"position": [0.5, 0.0], "velocity": [-3.0, 0.0]}, gravity=[4.0, 0.0]))
+    simulation = start_on(engine, gate({"position": [0.5, 0.0], "velocity": [-3.0, 0.0]}, gravity=[4.0, 0.0]))
     x = []
     for _ in range(400):
         simulation.step()
@@ -67,56 +77,61 @@ def test_it_rebounds_from_the_left_once_it_has_passed() -> None:
     assert min(x) == pytest.approx(0.5 - 9.0 / 8.0, abs=0.02)  # v²/2a: it lost nothing on the way through
 
 
-def test_what_turns_round_within_goes_back_unhindered() -> None:
+@both
+def test_what_turns_round_within_goes_back_unhindered(engine: str) -> None:
     # It turns round while it overlaps, its centre beyond the line: nothing snaps it to either side.
     start_x = 0.5
     pull = 2.0
     speed = float(np.sqrt(2.0 * pull * (start_x + 0.04)))  # it reaches x = −0.04
-    simulation = start(gate({"position": [start_x, 0.0], "velocity": [-speed, 0.0]}, gravity=[pull, 0.0]))
+    simulation = start_on(engine, gate({"position": [start_x, 0.0], "velocity": [-speed, 0.0]}, gravity=[pull, 0.0]))
     velocity = gone(simulation, 300)
     assert np.diff(velocity[:, 0]) == pytest.approx(np.full(299, pull * 0.005), rel=1e-9)  # free fall throughout
     assert simulation.frame().position[0, 0] > 0.5
 
 
-def test_what_rests_on_it_stays_there_and_what_hangs_below_falls_up_through() -> None:
+@both
+def test_what_rests_on_it_stays_there_and_what_hangs_below_falls_up_through(engine: str) -> None:
     # Its left is above: first point to the right, last to the left, would be below.
     points = [[-1.0, 0.0], [1.0, 0.0]]
-    lying = start(gate({"position": [0.0, R + 0.01]}, points, gravity=[0.0, -9.81]))
+    lying = start_on(engine, gate({"position": [0.0, R + 0.01]}, points, gravity=[0.0, -9.81]))
     for _ in range(200):
         lying.step()
     assert lying.frame().position[0, 1] == pytest.approx(R + 0.01, abs=2e-3)  # pymunk's slop
-    turned = start(gate({"position": [0.0, R + 0.01]}, points[::-1], gravity=[0.0, -9.81]))
+    turned = start_on(engine, gate({"position": [0.0, R + 0.01]}, points[::-1], gravity=[0.0, -9.81]))
     for _ in range(200):
         turned.step()
     assert turned.frame().position[0, 1] < -4.0
 
 
-def test_polyline_lets_pass_where_its_segments_join() -> None:
+@both
+def test_polyline_lets_pass_where_its_segments_join(engine: str) -> None:
     for points in ([[0.0, -1.0], [0.0, 0.0], [0.0, 1.0]], [[-0.3, -1.0], [0.0, 0.0], [-0.3, 1.0]]):
-        simulation = start(gate({"position": [0.5, 0.0], "velocity": [-1.0, 0.0]}, points))
+        simulation = start_on(engine, gate({"position": [0.5, 0.0], "velocity": [-1.0, 0.0]}, points))
         assert (gone(simulation, 200) == [-1.0, 0.0]).all()
-        back = start(gate({"position": [-0.8, 0.0], "velocity": [1.0, 0.0]}, points))
+        back = start_on(engine, gate({"position": [-0.8, 0.0], "velocity": [1.0, 0.0]}, points))
         assert gone(back, 200)[-1, 0] == pytest.approx(-1.0, rel=0.02)  # two at once in a corner: ten passes
 
 
-def test_box_passes_too() -> None:
+@both
+def test_box_passes_too(engine: str) -> None:
     document = {
         "solver": {"dt": 0.005},
         "box": [{"position": [0.5, 0.3], "velocity": [-1.0, 0.0], "angular_velocity": 2.0, "size": [0.3, 0.1]}],
         "wall": [{"points": [[0.0, -1.0], [0.0, 1.0]], "one_way": True, "friction": 1.0}],
     }
-    simulation = start(from_document(document))
+    simulation = start_on(engine, from_document(document))
     assert (gone(simulation, 200) == [-1.0, 0.0]).all()
     assert simulation.frame().angular_velocity[0] == 2.0
 
 
+@both
 @settings(max_examples=25, deadline=None)
 @given(st.floats(-1.2, 1.2), st.floats(-0.5, 0.5), st.floats(0.2, 20.0))
-def test_nothing_gets_from_left_to_right_nor_loses_energy(y: float, up: float, speed: float) -> None:
+def test_nothing_gets_from_left_to_right_nor_loses_energy(engine: str, y: float, up: float, speed: float) -> None:
     # Elastic and without friction: whatever it meets, sides or ends, its speed stays.
     for side in (-1.0, 1.0):
         scene = gate({"position": [side * 0.6, y], "velocity": [-side * speed, up * speed]})
-        simulation = start(scene, settings=scene.solver.replace(dt=0.5 * R / (20.0 * 1.2)))
+        simulation = start_on(engine, scene, settings=scene.solver.replace(dt=0.5 * R / (20.0 * 1.2)))
         for _ in range(200):
             simulation.step()
             velocity = simulation.frame().velocity[0]
@@ -128,8 +143,9 @@ def test_nothing_gets_from_left_to_right_nor_loses_energy(y: float, up: float, s
             assert simulation.frame().position[0, 0] < 0.0 or velocity[0] == speed
 
 
-def test_checkpoint_within_the_gate_goes_on_through() -> None:
-    simulation = start(gate({"position": [0.5, 0.0], "velocity": [-1.0, 0.0]}))
+@both
+def test_checkpoint_within_the_gate_goes_on_through(engine: str) -> None:
+    simulation = start_on(engine, gate({"position": [0.5, 0.0], "velocity": [-1.0, 0.0]}))
     for _ in range(110):  # its centre is beyond the line by now, and it still overlaps
         simulation.step()
     assert -R < simulation.frame().position[0, 0] < 0.0
@@ -139,22 +155,23 @@ def test_checkpoint_within_the_gate_goes_on_through() -> None:
     assert taken_up.state_hash() == simulation.state_hash()
 
 
-def test_audit_misses_nothing_at_a_gate() -> None:
+@both
+def test_audit_misses_nothing_at_a_gate(engine: str) -> None:
     scene = gate({"position": [0.5, 0.0], "velocity": [-60.0, 0.0]})
-    assert run(scene).missed_contacts == 0
+    assert run(scene, engine).missed_contacts == 0
 
 
-@pytest.mark.parametrize("engine", ["exact", "reference"])
-def test_engines_without_gates_refuse(engine: str) -> None:
-    with pytest.raises(Refusal, match=r"does not model one-way walls; these could: pymunk"):
-        start(gate({"position": [0.5, 0.0]}), engine)
+def test_exact_engine_refuses_gates() -> None:
+    with pytest.raises(Refusal, match=r"does not model one-way walls; these could: pymunk, reference"):
+        start(gate({"position": [0.5, 0.0]}), "exact")
 
 
-def test_surfaces_numbered_anew_leave_the_gate_what_it_is() -> None:
+@both
+def test_surfaces_numbered_anew_leave_the_gate_what_it_is(engine: str) -> None:
     from sandbox.action import Spawn
     from sandbox.scene.discs import Ball
 
-    simulation = start(gate({"position": [0.5, 0.0], "velocity": [-1.0, 0.0]}))
+    simulation = start_on(engine, gate({"position": [0.5, 0.0], "velocity": [-1.0, 0.0]}))
     for k in range(3):
         simulation.apply(Spawn(time=0.0, ball=Ball(position=(3.0 + k, 0.5), radius=R, restitution=0.1 * k + 0.05)))
     ball = Ball(position=(-0.5, 0.5), velocity=(1.0, 0.0), radius=R, restitution=0.9)

@@ -10,13 +10,25 @@ from hypothesis import strategies as st
 import sandbox
 from sandbox.action import ActionError, Launch, Spawn, Switch
 from sandbox.engines.contract import Refusal
+from sandbox.engines.relay import Relay
 from sandbox.scene.discs import Ball
 from sandbox.scene.file import from_document
 from sandbox.scene.meetings import meetings, reach
 from sandbox.scene.model import Scene
+from sandbox.trajectory import Trajectory
+
+both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
 
 LAYERS = ("ground", "one", "two")
 FRAME = {"points": [[-1, -1], [1, -1], [1, 1], [-1, 1]], "closed": True, "restitution": 0.9, "layers": list(LAYERS)}
+
+
+def run_on(engine: str, scene: Scene) -> Trajectory:
+    return sandbox.run(scene, engine)
+
+
+def start_on(engine: str, scene: Scene) -> Relay:
+    return sandbox.start(scene, engine)
 
 
 def crowd(layer: str, seed: float, count: int = 5) -> dict[str, Any]:
@@ -37,17 +49,18 @@ def scene_of(*crowds: dict[str, Any], **more: Any) -> Scene:
     return from_document({"world": {"duration": 0.6, "gravity": [0.0, -4.0]}, "scatter": list(crowds), **more})
 
 
+@both
 @given(seed=st.floats(-1.0, 1.0), jitter=st.integers(0, 1000))
 @example(seed=0.0, jitter=153)  # two of one layer graze by 0.5 % of their distance, and part, between two looks
 @settings(max_examples=15, deadline=None)
-def test_each_layer_runs_as_if_it_were_alone(seed: float, jitter: int) -> None:
+def test_each_layer_runs_as_if_it_were_alone(engine: str, seed: float, jitter: int) -> None:
     """The generators' chances hang on their place in the file, so those alone come first and are compared there."""
     world = {"duration": 0.6, "gravity": [0.0, -4.0], "seed": jitter}
-    alone = sandbox.run(scene_of(crowd("ground", seed), wall=[FRAME], world=world))
+    alone = run_on(engine, scene_of(crowd("ground", seed), wall=[FRAME], world=world))
     post = {"position": [0.0, 0.0], "radius": 0.3, "layers": ["one", "two"]}
     others = (crowd("one", -seed), crowd("two", seed / 2.0))
     full = scene_of(crowd("ground", seed), *others, wall=[FRAME], post=[post], world=world)
-    mixed = sandbox.run(full)
+    mixed = run_on(engine, full)
     count = alone.position.shape[1]
     assert np.array_equal(mixed.position[:, :count], alone.position)
     assert np.array_equal(mixed.velocity[:, :count], alone.velocity)
@@ -58,42 +71,46 @@ def test_each_layer_runs_as_if_it_were_alone(seed: float, jitter: int) -> None:
     assert np.array_equal(missed[missed[:, 0] < count], alone.missed_pair)
 
 
+@both
 @pytest.mark.parametrize("layers", [["ground"], ["ramp"], ["ground", "ramp"]])
 @pytest.mark.parametrize("layer", ["ground", "ramp"])
-def test_wall_stops_who_shares_a_layer(layers: list[str], layer: str) -> None:
+def test_wall_stops_who_shares_a_layer(engine: str, layers: list[str], layer: str) -> None:
     ball = {"position": [0.0, 0.0], "velocity": [2.0, 0.0], "radius": 0.1, "restitution": 1.0, "layer": layer}
     wall = {"points": [[0.5, -1], [0.5, 1]], "layers": layers}
-    run = sandbox.run(from_document({"world": {"duration": 1.0}, "ball": [ball], "wall": [wall]}))
+    run = run_on(engine, from_document({"world": {"duration": 1.0}, "ball": [ball], "wall": [wall]}))
     assert run.velocity[-1, 0, 0] == pytest.approx(-2.0 if layer in layers else 2.0, rel=1e-12)  # rounding of a solve
 
 
-def test_planes_are_on_all_layers_but_those_that_say_otherwise() -> None:
+@both
+def test_planes_are_on_all_layers_but_those_that_say_otherwise(engine: str) -> None:
     balls = [{"position": [x, 1.0], "radius": 0.1, "layer": name} for x, name in ((0.0, "ground"), (5.0, "up"))]
     world = {"duration": 1.0, "gravity": [0.0, -10.0]}
     for layers, falls in ((None, [False, False]), (["up"], [True, False])):
         plane: dict[str, Any] = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
         plane |= {} if layers is None else {"layers": layers}
-        run = sandbox.run(from_document({"world": world, "ball": balls, "plane": [plane]}))
+        run = run_on(engine, from_document({"world": world, "ball": balls, "plane": [plane]}))
         assert (run.position[-1, :, 1] < -1.0).tolist() == falls
 
 
-def test_fixed_bodies_are_on_layers_too() -> None:
+@both
+def test_fixed_bodies_are_on_layers_too(engine: str) -> None:
     fixed = {"position": [0.5, 0.0], "size": [0.1, 1.0], "fixed": True, "layer": "up"}
     balls = [
         {"position": [0.0, y], "velocity": [1.0, 0.0], "radius": 0.1, "layer": name}
         for y, name in ((-0.2, "up"), (0.2, "ground"))
     ]
-    run = sandbox.run(from_document({"world": {"duration": 1.0}, "ball": balls, "box": [fixed]}))
+    run = run_on(engine, from_document({"world": {"duration": 1.0}, "ball": balls, "box": [fixed]}))
     assert run.velocity[-1, :2, 0].tolist() == [0.0, 1.0]
 
 
-def test_contacts_of_a_layer_end_when_a_body_leaves_it() -> None:
+@both
+def test_contacts_of_a_layer_end_when_a_body_leaves_it(engine: str) -> None:
     """A ball lies on a shelf in a zone; rolled into the mouth it is on another layer, and falls through."""
     shelf = {"points": [[-1, 0], [1, 0]]}
     ball = {"name": "ball", "position": [-0.5, 0.1], "velocity": [1.0, 0.0], "radius": 0.1}
     mouth = {"position": [0.0, 0.1], "radius": 0.1, "to_layer": "below"}
     world = {"duration": 1.5, "gravity": [0.0, -10.0]}
-    run = sandbox.run(from_document({"world": world, "ball": [ball], "wall": [shelf], "zone": [mouth]}))
+    run = run_on(engine, from_document({"world": world, "ball": [ball], "wall": [shelf], "zone": [mouth]}))
     through = float(run.time[np.flatnonzero(run.layer[:, 0])[0]])
     assert through == pytest.approx(0.4, abs=0.02)
     fallen = 0.1 - 5.0 * (1.5 - through) ** 2
@@ -125,10 +142,11 @@ def test_meetings_count_every_layer_that_can_be_got_to() -> None:
     assert meet.free.tolist() == [False, False, False, True, True]
 
 
-def test_spawned_body_is_on_its_layer_and_an_unknown_one_is_refused() -> None:
+@both
+def test_spawned_body_is_on_its_layer_and_an_unknown_one_is_refused(engine: str) -> None:
     ball = {"position": [0.0, 0.0], "radius": 0.1}
     wall = {"points": [[0.5, -1], [0.5, 1]], "layers": ["up"]}
-    relay = sandbox.start(from_document({"ball": [ball], "wall": [wall]}))
+    relay = start_on(engine, from_document({"ball": [ball], "wall": [wall]}))
     for name, y in (("up", 0.5), ("ground", -0.5)):
         spawned = Ball(name=name, position=(0.0, y), velocity=(2.0, 0.0), radius=0.1, layer=name)
         relay.apply(Spawn(time=0, ball=spawned))
@@ -143,11 +161,12 @@ def test_spawned_body_is_on_its_layer_and_an_unknown_one_is_refused() -> None:
     assert relay.frame().velocity[:, 0].tolist() == pytest.approx([0.0, 0.0, 2.0], abs=1e-12)  # rounding of a solve
 
 
-def test_launched_bodies_are_back_on_their_layer() -> None:
+@both
+def test_launched_bodies_are_back_on_their_layer(engine: str) -> None:
     emitter = {"name": "jet", "position": [0, 0], "count": 3, "velocity_min": [1, 0], "velocity_max": [2, 0]}
     emitter |= {"collides": "fixed", "radius": 0.01}
     zone = {"points": [[0.2, -1], [0.2, 1]], "thickness": 0.1, "to_layer": "up"}
-    relay = sandbox.start(from_document({"emitter": [emitter], "zone": [zone]}))
+    relay = start_on(engine, from_document({"emitter": [emitter], "zone": [zone]}))
     for _ in range(60):
         relay.step()
     assert relay.frame().layer.tolist() == [1, 1, 1]
@@ -156,19 +175,19 @@ def test_launched_bodies_are_back_on_their_layer() -> None:
     assert not relay.frame().visits.any()
 
 
-def test_layers_are_stored_with_a_run(tmp_path) -> None:
+@both
+def test_layers_are_stored_with_a_run(engine: str, tmp_path) -> None:
     ball = {"position": [0.0, 0.0], "velocity": [1.0, 0.0], "radius": 0.1}
     zone = {"position": [0.5, 0.0], "radius": 0.2, "to_layer": "up"}
-    run = sandbox.run(from_document({"world": {"duration": 1.0}, "ball": [ball], "zone": [zone]}))
+    run = run_on(engine, from_document({"world": {"duration": 1.0}, "ball": [ball], "zone": [zone]}))
     again = type(run).load(run.save(tmp_path / "run.npz"))
     assert np.array_equal(again.layer, run.layer)
     assert sorted(np.unique(run.layer).tolist()) == [0, 1]
-    plain = sandbox.run(from_document({"world": {"duration": 0.1}, "ball": [ball]}))
+    plain = run_on(engine, from_document({"world": {"duration": 0.1}, "ball": [ball]}))
     assert plain.layer.size == 0
 
 
-@pytest.mark.parametrize("engine", ["exact", "reference"])
-def test_engines_that_know_no_layers_refuse_them(engine: str) -> None:
+def test_exact_engine_refuses_layers() -> None:
     scene = from_document({"ball": [{"position": [0, 0], "radius": 0.1, "layer": "up"}]})
     with pytest.raises(Refusal, match="layers"):
-        sandbox.start(scene, engine)
+        sandbox.start(scene, "exact")
