@@ -6,7 +6,6 @@ from typing import Protocol
 import numpy as np
 
 from sandbox.engines.touching import Touching
-from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.part import Point

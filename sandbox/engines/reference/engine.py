@@ -40,19 +40,23 @@ class ReferenceEngine:
 
     name: str = "reference"
     about: str = "by hand, fixed step: integrators, broad phases, times of impact, impulses or penalty springs"
-    capabilities: frozenset[Demand] = BALLS | SURFACES | {
-        Demand.LAYERS,
-        Demand.ZONES,
-        Demand.POLYGONS,
-        Demand.RODS,
-        Demand.PIVOTS,
-        Demand.SLIDES,
-        Demand.ROTARY_LIMITS,
-        Demand.SPRINGS,
-        Demand.ROTARY_SPRINGS,
-        Demand.ATTRACTION,
-        Demand.THRUST,
-    }
+    capabilities: frozenset[Demand] = (
+        BALLS
+        | SURFACES
+        | {
+            Demand.LAYERS,
+            Demand.ZONES,
+            Demand.POLYGONS,
+            Demand.RODS,
+            Demand.PIVOTS,
+            Demand.SLIDES,
+            Demand.ROTARY_LIMITS,
+            Demand.SPRINGS,
+            Demand.ROTARY_SPRINGS,
+            Demand.ATTRACTION,
+            Demand.THRUST,
+        }
+    )
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that the reference lacks."""

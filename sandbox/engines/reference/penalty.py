@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from sandbox.engines.reference.finder import Candidates, Finder
+from sandbox.engines.reference.candidates import Candidates
+from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.integrators import Step
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.motion import Inputs, State, transition

@@ -31,9 +31,7 @@ class Sieve:
     @staticmethod
     def needed(scene: Scene) -> bool:
         """Tell whether a scene has layers, one-way walls, or zones that hold."""
-        return (
-            len(scene.layers) > 1 or any(wall.one_way for wall in scene.walls) or any(z.holds for z in scene.zones)
-        )
+        return len(scene.layers) > 1 or any(wall.one_way for wall in scene.walls) or any(z.holds for z in scene.zones)
 
     def population_changed(self) -> None:
         """Take note of who is on which layer, who is held, and where walls run."""
