@@ -21,8 +21,8 @@ class BallFinder(Finder):
         self._apart: IntArray = apart_keys(self._roster.links)
         self._owner = np.arange(len(self._roster.position))  # each ball is its own body
 
-    def _near(self, position: FloatArray, margin: float, walls_alone: bool = False) -> Candidates:
-        """Return the pairs that may be near at (N, ≥ 2) positions, m: none nearer than the margin, m, is left out."""
+    def candidates(self, position: FloatArray, margin: float = 0.0, walls_alone: bool = False) -> Candidates:
+        """Return the pairs worth a look at (N, ≥ 2) positions, m: none nearer than the margin, m, is left out."""
         roster, boxes = self._roster, self._boxes
         balls = segments = self._ball_keys[:0]
         if roster.meet.ball_ball and not walls_alone:
@@ -41,7 +41,8 @@ class BallFinder(Finder):
                     position, roster.radius, self.able, boxes.box, boxes.index, boxes.widest, margin, room
                 ),
             )
-        return Candidates(balls, segments)
+        near = Candidates(balls, segments)
+        return near if self.sieve is None or walls_alone else self.sieve.some(near, self._owner)
 
     def _looked(self, position: FloatArray, near: Candidates, reach: float) -> int:
         """Write the contacts as far as there is room; return how many there are."""

@@ -55,14 +55,12 @@ class Finder(ABC):
         """Enter figures of one's own (S, S) into the manifolds, in the place of restitution."""
         self._tables = restitution, self._roster.friction
 
-    def candidates(self, position: FloatArray, margin: float = 0.0) -> Candidates:
-        """Return the pairs worth a look at (N, ≥ 2) poses, m: none nearer than the margin, m, is left out."""
-        near = self._near(position, margin)
-        return near if self.sieve is None else self.sieve.some(near, self._owner)
-
     @abstractmethod
-    def _near(self, position: FloatArray, margin: float, walls_alone: bool = False) -> Candidates:
-        """Return the pairs that may be near, whether or not they meet; of walls and posts alone where that is asked."""
+    def candidates(self, position: FloatArray, margin: float = 0.0, walls_alone: bool = False) -> Candidates:
+        """Return the pairs worth a look at (N, ≥ 2) poses, m: none nearer than the margin, m, is left out.
+
+        Where walls and posts alone are asked for, the sieve leaves them all in.
+        """
 
     def _filled(self, room: IntArray, search: Callable[[IntArray], tuple[int, int]]) -> tuple[IntArray, IntArray]:
         """Return what a search finds, sorted, and the room that it took: more where there was too little."""
@@ -78,16 +76,12 @@ class Finder(ABC):
 
         They are good until the next look.
         """
-        found = self._found(position, near, reach)
-        self.work["contacts"] += found.size
-        return found
-
-    def _found(self, position: FloatArray, near: Candidates, reach: float) -> Manifolds:
         size = self._looked(position, near, reach)
         if size > len(self._out.key):
             self._out = _room_for(2 * size)
             self._looked(position, near, reach)
         self.work["pair_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
+        self.work["contacts"] += size
         if not size:
             return self._none
         found = self._out.of(slice(0, size))
@@ -96,10 +90,10 @@ class Finder(ABC):
     def at_gates(self, position: FloatArray) -> Manifolds:
         """Return where bodies overlap one-way walls, whether these stop them or not; good until the next look."""
         assert self.sieve is not None
-        near = self.sieve.at_gates(self._near(position, 0.0, walls_alone=True), self._owner)
+        near = self.sieve.at_gates(self.candidates(position, walls_alone=True), self._owner)
         if not len(near.segments):
             return self._none
-        found = self._found(position, near, 0.0)
+        found = self.manifolds(position, near)
         return found.of(self.sieve.gate(found.second))
 
     @abstractmethod

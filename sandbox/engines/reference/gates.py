@@ -29,12 +29,10 @@ class Gates:
         """(F,) which fixed things are some"""
         self._passing: set[Pair] = set()
         self._stopped: set[Pair] = set()
-        self.start: FloatArray = roster.position
-        """(N, ≥ 2) m, where centres are at the beginning of the present piece of a substep"""
 
-    def renew(self) -> None:
-        """Go on with walls that may have other courses, or be solid now."""
-        fixtures = self._roster.fixtures
+    def renew(self, start: FloatArray) -> None:
+        """Go on from centres (N, ≥ 2), m, with walls that may have other courses, or be solid now."""
+        fixtures, self._start = self._roster.fixtures, start
         self._segments = {
             thing: fixtures.segments[fixtures.segment_thing == thing, :4]
             for thing in np.flatnonzero(self.of_thing).tolist()
@@ -47,11 +45,11 @@ class Gates:
             found[k] = self._stops((int(bodies[k]), int(things[k])))
         return found
 
-    def settle(self, overlaps: Manifolds) -> None:
-        """Take note of who touches at the end of a piece of a substep, which decides of who comes to touch."""
+    def settle(self, overlaps: Manifolds, end: FloatArray) -> None:
+        """Take note of who touches at the end of a piece of a substep, where centres are (N, ≥ 2), m."""
         touching = _pairs(overlaps)
         self._passing = {pair for pair in touching if not self._stops(pair)}
-        self._stopped = touching - self._passing
+        self._stopped, self._start = touching - self._passing, end
 
     def begin(self, overlaps: Manifolds, closing: FloatArray) -> None:
         """Take note of who touches at the beginning: new is stopped who is on the left and does not leave, (K,) m/s."""
@@ -70,7 +68,7 @@ class Gates:
         """Tell whether a body is on the left of a wall, or on its line."""
         body, thing = pair
         segments = self._segments[thing]
-        a, b, place = segments[:, :2], segments[:, 2:], self.start[body, :2]
+        a, b, place = segments[:, :2], segments[:, 2:], self._start[body, :2]
         along = b - a
         length = np.sqrt((along * along).sum(axis=1))
         unit = along / length[:, None]

@@ -48,8 +48,8 @@ class PieceFinder(Finder):
         angle = position[:, 2] if position.shape[1] == 3 else self._roster.angle
         self._pieces.lay_out(position, angle)
 
-    def _near(self, position: FloatArray, margin: float, walls_alone: bool = False) -> Candidates:
-        """Return the pairs of pieces, and of pieces and segments, that may be near at (N, ≥ 2) positions, m."""
+    def candidates(self, position: FloatArray, margin: float = 0.0, walls_alone: bool = False) -> Candidates:
+        """Return the pairs of pieces, and of pieces and segments, worth a look at (N, ≥ 2) positions, m."""
         self._lay_out(position)
         roster, boxes, pieces = self._roster, self._boxes, self._pieces
         bodies = segments = self._ball_keys[:0]
@@ -74,7 +74,8 @@ class PieceFinder(Finder):
             self.work["broad_tests"] += len(bodies) + len(segments)
             bodies = bodies[: drop_apart(bodies, 0, box, margin)]
             segments = segments[: drop_apart(segments, pieces.count, box, margin)]
-        return Candidates(bodies, segments)
+        near = Candidates(bodies, segments)
+        return near if self.sieve is None or walls_alone else self.sieve.some(near, self._owner)
 
     def _looked(self, position: FloatArray, near: Candidates, reach: float) -> int:
         """Write the contacts as far as there is room; return how many there are."""

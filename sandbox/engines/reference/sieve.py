@@ -13,7 +13,7 @@ from sandbox.engines.reference.meeting import FIRST, SECOND
 from sandbox.engines.roster import Roster
 from sandbox.scene.model import Scene
 from sandbox.scene.zone import mask_of
-from sandbox.trajectory import BoolArray, IntArray
+from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 
 class Sieve:
@@ -26,20 +26,20 @@ class Sieve:
         self._planes_apart = bool((self._of_fixed[: len(scene.planes)] != every).any())
         self.gates = Gates(roster) if any(wall.one_way for wall in scene.walls) else None
         """the one-way walls, where there are some"""
-        self.population_changed()
+        self.population_changed(roster.position)
 
     @staticmethod
     def needed(scene: Scene) -> bool:
         """Tell whether a scene has layers, one-way walls, or zones that hold."""
         return len(scene.layers) > 1 or any(wall.one_way for wall in scene.walls) or any(z.holds for z in scene.zones)
 
-    def population_changed(self) -> None:
-        """Take note of who is on which layer, who is held, and where walls run."""
+    def population_changed(self, position: FloatArray) -> None:
+        """Take note of who is on which layer, who is held, where they are, (N, ≥ 2) m, and where walls run."""
         self._bits: IntArray = 1 << self._roster.layer
         self._moving: BoolArray = self._roster.moving
         self._thing = self._roster.fixtures.segment_thing
         if self.gates is not None:
-            self.gates.renew()
+            self.gates.renew(position)
 
     def some(self, near: Candidates, owner: IntArray) -> Candidates:
         """Return the candidates that meet; `owner` is the body of each ball, or piece."""

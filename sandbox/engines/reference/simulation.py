@@ -36,7 +36,8 @@ class ReferenceSimulation(Running):
     def __init__(self, scene: Scene, settings: Settings) -> None:
         assert settings.detection is not None
         super().__init__(settings)
-        self._roster = ZonedRoster(scene, settings.h) if scene.zones else Roster(scene, settings.h)
+        self._zoned = ZonedRoster(scene, settings.h) if scene.zones else None
+        self._roster = self._zoned or Roster(scene, settings.h)
         self._stage = Stage(self._roster, settings)
         self._advance = DETECTIONS[settings.detection]
         self._ledger: ContactLog | None = None
@@ -83,7 +84,8 @@ class ReferenceSimulation(Running):
                 begin = self._steps * self._settings.dt + k * self._settings.h
                 self._substep(begin, self._settings.h)
                 self._stage.tear(self._settings.h, self._after(k + 1))
-                self._visit(begin + self._settings.h)
+                if self._zoned is not None:
+                    self._visit(begin + self._settings.h, self._zoned)
             self._steps += 1
             self._settle()
 
@@ -102,13 +104,15 @@ class ReferenceSimulation(Running):
             for k in range(int(whole)):
                 self._substep(begin + k * h, h)
                 self._stage.tear(h, self._after(k + 1))
-                self._visit(begin + k * h + h)
+                if self._zoned is not None:
+                    self._visit(begin + k * h + h, self._zoned)
             if rest > 0.0:
                 self._substep(begin + whole * h, rest * h)
             self._part = part
             if rest > 0.0:
                 self._stage.tear(rest * h, self.time)
-                self._visit(self.time)
+                if self._zoned is not None:
+                    self._visit(self.time, self._zoned)
             self._settle()
             self._ended = True
 
@@ -124,12 +128,10 @@ class ReferenceSimulation(Running):
             self._ended = True
             raise
 
-    def _visit(self, time: float) -> None:
+    def _visit(self, time: float, roster: ZonedRoster) -> None:
         """Let zones do what they do, and note at a time, s, who came in."""
-        if not isinstance(self._roster, ZonedRoster):
-            return
-        self._stage.visit()
-        came = self._roster.visiting.told()
+        self._stage.visit(roster)
+        came = roster.visiting.told()
         if self._ledger is not None and came is not None:  # else it is nobody's concern
             # What touches has been entered with its impulses: it goes on, beside the notes.
             lasting = self._now._replace(impulse=np.zeros_like(self._now.impulse))
@@ -193,8 +195,8 @@ class ReferenceSimulation(Running):
             self._stage.witness = self._witness
             overlaps = self._stage.overlaps(self._stage.x)
             now = _touching(overlaps, np.zeros((overlaps.size, 2)))
-            if isinstance(self._roster, ZonedRoster):  # who is in a zone is told now, and with the first substep
-                self._came = self._roster.visiting.told()
+            if self._zoned is not None:  # who is in a zone is told now, and with the first substep
+                self._came = self._zoned.visiting.told()
             self._ledger.record(self.time, now if self._came is None else joined(now, self._came))
         return self._ledger.take()
 

@@ -102,6 +102,8 @@ class Stage:
                 for p in ((roster.position, roster.angle), (roster.velocity, roster.angular_velocity))
             ]
         self.x: State = np.stack(parts)
+        if self._sieve is not None:
+            self._sieve.population_changed(self.x[0])
         # Overlap goes on being corrected, except for who is gone.
         kept = np.zeros((len(roster.position), 3))
         kept[: len(self.push)] = self.push
@@ -118,7 +120,9 @@ class Stage:
             self._fixtures = roster.fixtures
             self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
         self.finder.population_changed()
-        self._sift()
+        if self._sieve is not None and self._sieve.gates is not None:
+            overlaps = self.finder.at_gates(self.x[0])
+            self._sieve.gates.begin(overlaps, self.closing(overlaps, self.x))
         self._parting = None
         if Parting.needed(roster):
             self._parting = Parting(roster)
@@ -129,21 +133,9 @@ class Stage:
             self._joints.use(roster.inverse_mass, roster.inverse_moment, roster.linked())
         self.apply_forces()
 
-    def _sift(self) -> None:
-        """Let the sieve, where there is one, know who is there, and who touches one-way walls."""
-        if self._sieve is None:
-            return
-        self._sieve.population_changed()
-        gates = self._sieve.gates
-        if gates is not None:
-            gates.start = self.x[0]
-            overlaps = self.finder.at_gates(self.x[0])
-            gates.begin(overlaps, self.closing(overlaps, self.x))
-
-    def visit(self) -> None:
-        """Let zones note who came in during the substep that has ended, and do what they do."""
-        roster = self._roster
-        if isinstance(roster, ZonedRoster) and roster.look(self.x[0]):
+    def visit(self, roster: ZonedRoster) -> None:
+        """Let the zones of the roster note who came in during the substep that has ended, and do what they do."""
+        if roster.look(self.x[0]):
             self.leave()
             with self.books.doing(Cause.DRIVES):
                 if roster.settle():
@@ -327,8 +319,7 @@ class Stage:
         if self.witness is not None:
             self.witness(start, self.time, before, after, contacts, impulse)
         if self._sieve is not None and self._sieve.gates is not None:
-            self._sieve.gates.settle(self.finder.at_gates(after[0]))
-            self._sieve.gates.start = after[0]
+            self._sieve.gates.settle(self.finder.at_gates(after[0]), after[0])
 
 
 Detection = Callable[[Stage, float], None]
