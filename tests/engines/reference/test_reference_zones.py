@@ -16,6 +16,7 @@ from sandbox.scene.discs import Ball
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene, Zone
 from sandbox.scene.precinct import contains
+from sandbox.scene.solids import Box
 from sandbox.scene.zone import HELD
 
 H = 0.001
@@ -223,6 +224,20 @@ def test_gate_that_closes_about_somebody_stops_or_lets_through_by_where_it_is() 
     relay.apply(Reshape(time=0.0, thing="gate", points=((-2.0, 1.0), (-2.0, -1.0))))  # its left is to the right now
     advance(relay, 3.0)
     assert relay.frame().position[1, 0] > -2.0
+
+
+@pytest.mark.parametrize("response", ["impulse", "penalty"])
+def test_first_box_among_balls_comes_where_there_are_layers_and_gates(response: str) -> None:
+    """From then on contacts are looked for in another way, and go by other keys."""
+    scene = course()
+    relay = start(scene, "reference", scene.solver.replace(response=response))
+    advance(relay, 1.95)  # as it comes into the gate
+    box = Box(name="box", position=(0.7, 0.5), velocity=(1.0, 0.0), size=(0.1, 0.1))
+    relay.apply(Spawn(time=0.0, box=box))
+    advance(relay, 2.2)
+    assert relay.frame().velocity[0].tolist() == [1.0, 0.0]  # it has passed
+    advance(relay, 3.0)
+    assert relay.frame().position[1, 0] < 1.0  # on the ground the fence is in its way
 
 
 def test_zone_is_noted_in_a_last_part_of_a_step() -> None:

@@ -7,6 +7,8 @@ import pytest
 import sandbox
 from sandbox.scene.file import from_document
 
+both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
+
 WALL = {"points": [[0.5, -1], [0.5, 1]], "layers": ["up"]}
 POST = {"position": [0.5, 0.0], "radius": 0.01, "layers": ["up"]}
 PLANE = {"point": [0.5, 0.0], "normal": [-1.0, 0.0], "layers": ["up"]}
@@ -14,24 +16,29 @@ TARGET = {"position": [0.5, 0.0], "radius": 0.01, "layer": "up"}
 BULLET: dict[str, Any] = {"position": [0.0, 0.0], "velocity": [70.0, 0.0], "radius": 0.01}
 
 
+@both
 @pytest.mark.parametrize("thing", ["wall", "post", "ball"])
 @pytest.mark.parametrize(("layer", "missed"), [("ground", 0), ("up", 1)])
-def test_bullet_misses_what_is_on_its_own_layer(thing: str, layer: str, missed: int) -> None:
+def test_bullet_misses_what_is_on_its_own_layer(engine: str, thing: str, layer: str, missed: int) -> None:
     more: dict[str, Any] = {"wall": {"wall": [WALL]}, "post": {"post": [POST]}, "ball": {}}[thing]
     balls = [{**BULLET, "layer": layer}, *([TARGET] if thing == "ball" else [])]
-    run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": balls, **more}))
+    run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": balls, **more}), engine)
     assert run.missed_contacts == missed
 
 
-def test_who_has_just_come_to_a_layer_is_audited_there() -> None:
+@both
+def test_who_has_just_come_to_a_layer_is_audited_there(engine: str) -> None:
     mouth = {"position": [0.0, 0.0], "radius": 0.05, "to_layer": "up"}
-    run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": [BULLET], "wall": [WALL], "zone": [mouth]}))
+    run = sandbox.run(
+        from_document({"world": {"duration": 0.05}, "ball": [BULLET], "wall": [WALL], "zone": [mouth]}), engine
+    )
     assert run.missed_contacts == 1
 
 
-def test_plane_of_another_layer_is_not_missed() -> None:
+@both
+def test_plane_of_another_layer_is_not_missed(engine: str) -> None:
     for layer in ("ground", "up"):
         ball = {**BULLET, "layer": layer}
-        run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": [ball], "plane": [PLANE]}))
+        run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": [ball], "plane": [PLANE]}), engine)
         assert run.missed_contacts == 0
         assert len(run.contact_time) == (layer == "up")
