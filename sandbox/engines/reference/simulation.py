@@ -31,7 +31,10 @@ ROUNDING = 1e-12
 
 
 class ReferenceSimulation(Running):
-    """A running scene. A substep reads as the tutorial's: apply forces, advance, detect and resolve."""
+    """A running scene. A substep reads as the tutorial's: apply forces, advance, detect and resolve.
+
+    Zones look where centres are at its end: how late one notes who comes in depends on the substep, whatever is chosen.
+    """
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
         assert settings.detection is not None
