@@ -93,6 +93,20 @@ class MeetingBodies(Members):
             self._add(number, bodies, state)
         self._register()
         self.drives.watch(self._kinds)
+        if self._scene.began and self._setter.gates.walls:
+            walls = {number: each for each, number in self._ground.ids.items()}
+            pairs = [(n, walls[wall]) for n, wall in self._scene.passing if n in self._members]
+            self._setter.gates.go_on([(self._members[n].body.id, wall) for n, wall in pairs])
+
+    def passing(self) -> IntArray | None:
+        """Return who is being let through a one-way wall, and which, −1 − k, (P, 2); none where nobody is."""
+        who = self._setter.gates.passing()
+        if not who:
+            return None
+        numbers = {member.body.id: n for n, member in self._members.items()}
+        walls = self._ground.ids
+        pairs = sorted((numbers[body], walls[wall]) for body, wall in who if body in numbers)
+        return np.asarray(pairs, np.int64) if pairs else None
 
     def _kinds(self, number: int) -> set[int]:
         """Return the collision types of a body's shapes."""

@@ -175,7 +175,10 @@ class NativeSimulation(Running):
         layer = population.layer.copy() if len(scene.layers) > 1 else None
         visits = population.visits.copy() if scene.zones else None
         drives = population.meeting.drives.told() if scene.drives else None
-        return Frame(self.time, position, velocity, angle, angular_velocity, present, roll, layer, visits, drives)
+        passing = population.meeting.passing()
+        return Frame(
+            self.time, position, velocity, angle, angular_velocity, present, roll, layer, visits, drives, passing
+        )
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
