@@ -2,15 +2,20 @@
 
 `solver.dt` · `world.gravity` · `ball.cue.velocity` · `ball.0.radius` · `ball."8 ball".mass` · `ball.*.restitution`.
 An element of a list is named by its `name`, or by its number from 0; `*` means every one, where none is called so.
+Numbers may stand in brackets, as faults write them: `drive[0].rate`, `ball.cue.velocity[1]`. A name that ends so itself
+is quoted.
 """
 
 import copy
+import re
 import tomllib
 from typing import Any
 
 from sandbox.scene.faults import Location
 
 EVERY = "*"
+
+_NUMBERED = re.compile(r"(.*?)((?:\[[0-9]+\])+)", re.DOTALL)
 
 
 class AddressError(ValueError):
@@ -52,7 +57,7 @@ def parse_value(text: str) -> Any:
 
 
 def parse_path(path: str) -> tuple[str, ...]:
-    """Split a dotted path; quotes hold names together, as in TOML.
+    """Split a dotted path; quotes hold names together, as in TOML, and a number in brackets is a part of its own.
 
     Raises:
         AddressError: the path is malformed.
@@ -64,13 +69,15 @@ def parse_path(path: str) -> tuple[str, ...]:
             end = rest.find(rest[0], 1)
             if end < 0:
                 raise AddressError(f"{path!r}: a quote is not closed")
-            part, rest = rest[1:end], rest[end + 1 :]
+            part, numbers, rest = rest[1:end], "", rest[end + 1 :]
         else:
             part, dot, after = rest.partition(".")
+            numbered = _NUMBERED.fullmatch(part)
+            part, numbers = numbered.groups() if numbered else (part, "")
             rest = dot + after
         if not part:
             raise AddressError(f"{path!r} is not a path, such as solver.dt or ball.cue.velocity")
-        parts.append(part)
+        parts += [part, *numbers[1:-1].split("][")] if numbers else [part]
         if not rest:
             return tuple(parts)
         if rest[0] != ".":

@@ -9,6 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sandbox.scene.address import AddressError, assign, parse_assignment, parse_path, parse_value
+from sandbox.scene.faults import path_of
 
 DOCUMENT: dict[str, Any] = {
     "title": "t",
@@ -48,13 +49,16 @@ def test_value_is_toml_and_any_other_word_a_string(text: str, value: object) -> 
         ("ball.8 ball.mass", ("ball", "8 ball", "mass")), ("ball.'a.b'.mass", ("ball", "a.b", "mass")),
         ("""ball.'say "hi"'""", ("ball", 'say "hi"')), ("ball.0.velocity.1", ("ball", "0", "velocity", "1")),
         ("ball.it's.mass", ("ball", "it's", "mass")), ('"a"', ("a",)),
+        ("drive[0].rate", ("drive", "0", "rate")), ("ball.cue.velocity[1]", ("ball", "cue", "velocity", "1")),
+        ("wall[0].points[1][0]", ("wall", "0", "points", "1", "0")), ("ball.'a[0]'.mass", ("ball", "a[0]", "mass")),
+        ("ball.[x]", ("ball", "[x]")), ("a[0]b", ("a[0]b",)),
     ],
 )  # fmt: skip
 def test_path_is_split_at_dots_outside_quotes(path: str, parts: tuple[str, ...]) -> None:
     assert parse_path(path) == parts
 
 
-@pytest.mark.parametrize("path", ["", ".", "a.", ".a", "a..b", '"a', "'a.b", '"a"b', 'a."".b', "''", "a.'b'c"])
+@pytest.mark.parametrize("path", ["", ".", "a.", ".a", "a..b", '"a', "'a.b", '"a"b', 'a."".b', "''", "a.'b'c", "[0]", "a.[0].b"])
 def test_path_malformed_is_refused(path: str) -> None:
     with pytest.raises(AddressError):
         parse_path(path)
@@ -121,6 +125,14 @@ def test_path_that_leads_nowhere_is_refused_with_what_there_is(path: str, words:
 def test_path_into_an_empty_list_is_refused() -> None:
     with pytest.raises(AddressError, match="numbers: none"):
         assign({"ball": []}, "ball.0.mass", 1)
+
+
+@pytest.mark.parametrize(
+    "location",
+    [("ball", 0, "mass"), ("ball", 2, "mass"), ("wall", 0, "points", 1, 0), ("world", "gravity", 1), ("ball", 1)],
+)
+def test_path_that_a_fault_writes_leads_to_what_it_is_about(location: tuple[str | int, ...]) -> None:
+    assert assign(DOCUMENT, path_of(location, DOCUMENT), 7)[1] == location
 
 
 @given(st.text(max_size=40), st.integers())
