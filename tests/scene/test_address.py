@@ -58,7 +58,9 @@ def test_path_is_split_at_dots_outside_quotes(path: str, parts: tuple[str, ...])
     assert parse_path(path) == parts
 
 
-@pytest.mark.parametrize("path", ["", ".", "a.", ".a", "a..b", '"a', "'a.b", '"a"b', 'a."".b', "''", "a.'b'c", "[0]", "a.[0].b"])
+@pytest.mark.parametrize(
+    "path", ["", ".", "a.", ".a", "a..b", '"a', "'a.b", '"a"b', 'a."".b', "''", "a.'b'c", "[0]", "a.[0].b"]
+)
 def test_path_malformed_is_refused(path: str) -> None:
     with pytest.raises(AddressError):
         parse_path(path)

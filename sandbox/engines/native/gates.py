@@ -18,7 +18,6 @@ from sandbox.engines.native.approach import closing_speed
 from sandbox.scene.surfaces import Surfaces
 from sandbox.trajectory import BoolArray
 
-
 Who: TypeAlias = tuple[int, int]
 """The ids of a body and a wall."""
 
