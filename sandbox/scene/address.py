@@ -1,6 +1,7 @@
 """Addresses: any value of a scene by its path, as `--set` and sweeps name it.
 
-`solver.dt` · `world.gravity` · `ball.cue.velocity` · `ball.0.radius` · `ball."8 ball".mass` · `ball.*.restitution`.
+`solver.dt` · `world.gravity` · `ball.cue.velocity` · `ball.0.radius` · `ball."8 ball".mass` · `ball.*.restitution` ·
+`pinball.bumper.*.speed`.
 An element of a list is named by its `name`, or by its number from 0; `*` means every one, where none is called so.
 Numbers may stand in brackets, as faults write them: `drive[0].rate`, `ball.cue.velocity[1]`. A name that ends so itself
 is quoted.
@@ -98,14 +99,38 @@ def assign(document: dict[str, Any], path: str, value: Any) -> tuple[dict[str, A
         result = copy.deepcopy(document)
     except RecursionError:
         raise AddressError(f"{path}: the scene's values are nested too deeply") from None
-    elements = result.get(parts[0]) if len(parts) > 2 and parts[1] == EVERY else None
+    return result, _assign_all(result, parts, path, value)
+
+
+def _assign_all(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Location:
+    """Set a value in place wherever a path leads, and return the location."""
+    if EVERY not in parts[1:-1]:
+        return _assign(result, parts, path, value)
+    place = parts.index(EVERY, 1)
+    elements, location = _followed(result, parts[:place])
     if not isinstance(elements, list) or EVERY in _names(elements):
-        return result, _assign(result, parts, path, value)
+        return _assign(result, parts, path, value)
     if not elements:
-        raise AddressError(f"{path}: the scene has no [[{parts[0]}]]")
-    for index in range(len(elements)):
-        _assign(elements[index], parts[2:], path, value)
-    return result, (parts[0],)
+        raise AddressError(f"{path}: the scene has no [[{'.'.join(parts[:place])}]]")
+    for element in elements:
+        _assign_all(element, parts[place + 1 :], path, value)
+    return location
+
+
+def _followed(here: Any, parts: tuple[str, ...]) -> tuple[Any, Location]:
+    """Return what a path leads to, with its location; None where it leads nowhere."""
+    location: Location = ()
+    for part in parts:
+        key: str | int = part
+        if isinstance(here, list):
+            try:
+                key = _index(here, part, "")
+            except AddressError:
+                return None, ()
+        elif not isinstance(here, dict) or part not in here:
+            return None, ()
+        here, location = here[key], (*location, key)
+    return here, location
 
 
 def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Location:

@@ -176,6 +176,14 @@ def test_star_reaches_into_values() -> None:
     assert assign(document, 'ball."*".mass', 9)[0]["ball"][1] == {"position": [2.0, 3.0], "mass": 9}
 
 
+def test_star_stands_for_every_element_of_a_list_anywhere() -> None:
+    document = {"pinball": {"bumper": [{"name": "a"}, {}], "wall": [{"points": [[0, 0], [1, 2]]}]}}
+    changed, where = assign(document, "pinball.bumper.*.speed", 2)
+    assert where == ("pinball", "bumper")
+    assert changed["pinball"]["bumper"] == [{"name": "a", "speed": 2}, {"speed": 2}]
+    assert assign(document, "pinball.wall.*.points.*[1]", 7)[0]["pinball"]["wall"] == [{"points": [[0, 7], [1, 7]]}]
+
+
 def test_element_called_star_is_the_one_that_is_meant() -> None:
     document = {"ball": [{"name": "a"}, {"name": "*"}]}
     changed, where = assign(document, "ball.*.mass", 2)
@@ -193,6 +201,9 @@ def test_element_called_star_is_the_one_that_is_meant() -> None:
         ({"ball": [{"mass": 1}]}, "ball.*", "no element"),
         ({"world": {"gravity": [0, 0]}}, "world.*.x", "no world"),
         ({"ball": [3]}, "ball.*.mass", r"\w"),
+        ({"pinball": {"bumper": []}}, "pinball.bumper.*.speed", r"no \[\[pinball.bumper\]\]"),
+        ({"pinball": {"wall": []}}, "pinball.bumper.*.speed", "no pinball.bumper"),
+        ({"ball": [{}]}, "ball.b.shapes.*.x", "no element 'b'"),
     ],
 )  # fmt: skip
 def test_star_that_leads_nowhere_is_refused(document: dict[str, Any], path: str, words: str) -> None:

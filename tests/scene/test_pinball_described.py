@@ -197,6 +197,21 @@ def test_overrides_reach_elements_and_what_they_stand_for() -> None:
 
 
 @pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("pinball.bumper[9].speed=1", "no element '9'; names: pop; numbers: 0 to"),
+        ("pinball.bumper.pup.speed=1", "no element 'pup'; names: pop"),
+        ("pinball.bumpr.pop.speed=1", "the scene has no pinball.bumpr"),
+    ],
+)
+def test_override_of_an_element_that_there_is_not_tells_which_there_are(override: str, words: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        loads(TEXT, overrides=[override])
+    assert words in str(caught.value)
+    assert len(caught.value.faults) == 1
+
+
+@pytest.mark.parametrize(
     ("changes", "path", "words"),
     [
         ({"bumper": [{"position": [0, 0], "radios": 1.0}]}, "pinball.bumper[0].radios", "did you mean 'radius'?"),
