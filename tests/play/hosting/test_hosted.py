@@ -98,6 +98,11 @@ def test_help_lists_controls_and_scene_keys_are_theirs(window: Window) -> None:
     assert {UP, LEFT, pygame.K_LSHIFT} <= window.desk.claimed(window.stage)
 
 
+def test_help_tells_the_cross_of_a_gamepad_from_its_stick() -> None:
+    ((_, what),) = told((Control("go", "go", ("left",), "y left +leftx up"),))
+    assert what == "go; gamepad: Y, D-pad left, stick right, D-pad up"
+
+
 def test_restart_is_a_new_game(window: Window) -> None:
     turned(window, key(UP), elapsed=0.3)
     old = host_of(window)
