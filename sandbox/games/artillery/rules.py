@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import Literal
 
+import numpy as np
+
 from sandbox.action import Action, SetParameter
 from sandbox.games.artillery.aim import Aim
 from sandbox.games.artillery.barrage import Barrage
@@ -16,6 +18,9 @@ from sandbox.games.artillery.weapons import WEAPONS
 from sandbox.games.rules import Control, Seen
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
+
+HEIGHTS = 33
+"""of the ground, evenly from side to side, that gauges tell"""
 
 Phase = Literal["begin", "aim", "fly", "settle"]
 """Of a turn: the next player gets the gun, aims it; shells are in the air; ground and tanks come to rest."""
@@ -136,6 +141,20 @@ class ArtilleryRules:
         if self.shots:
             told.append(("last shot", self.shots[-1].told))
         return told
+
+    def gauges(self) -> Sequence[tuple[str, float]]:
+        """Return whose turn it is, the wind, every gun and what its tank has, the last shot, and the ground's course."""
+        field, last = self.field, next((shot.place for shot in reversed(self.shots) if shot.place is not None), None)
+        person = self.phase == "aim" and self.shooter.player.bot is None
+        found = [("turn", float(self.turn)), ("shooter", self._number), ("may fire", person)]
+        found += [("wind", self.world.wind[0]), ("shells", len(self.barrage.shells))]
+        for tank in field.tanks.every:
+            own = {"health": tank.health, "money": tank.money, "points": tank.points}
+            gun = {"angle": tank.angle, "power": tank.power, "weapon": tank.weapon}
+            found += [(f"{tank.name} {name}", value) for name, value in (own | gun).items()]
+        found += [("landed x", -1.0 if last is None else last[0])]
+        heights = field.ground.surface(np.linspace(0.0, field.ground.width, HEIGHTS))
+        return [*found, *((f"height {k}", height) for k, height in enumerate(heights.tolist()))]
 
     def cues(self) -> Sequence[str]:
         """Return the sounds since the last call."""
