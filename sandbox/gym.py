@@ -262,12 +262,12 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         """Return a picture, (height, width, 3) of 0 to 255, or None without a render mode."""
         if self.render_mode is None:
             return None
-        relay, _ = self._going()
+        relay, game = self._going()
         if self._canvas is None:
             from sandbox.play.canvas import Canvas  # pygame is for who wants to see something
 
             self._canvas = Canvas(SIZE)
-        return self._canvas.picture(relay.scene, relay.bodies, relay.frame())
+        return self._canvas.picture(relay.scene, relay.bodies, relay.frame(), game.rules, relay.throttles)
 
     def close(self) -> None:
         """Release the engine, and what pictures are drawn on."""

@@ -110,7 +110,7 @@ def test_script_plays(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[s
     assert row["score"] % 1.0 == 0.5
     bad = written(tmp_path, "0.1, jump, 1\n", "bad.txt")
     status, _, err = json_of(capfd, "run", scene, "--player", bad)
-    assert (status, err) == (2, [f"{bad}: there is no control 'jump'; the game has 'kick', 'aim'"])
+    assert (status, err) == (2, [f"{bad}:1: there is no control 'jump'; the game has 'kick', 'aim'"])
 
 
 def test_player_where_nobody_plays_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -143,14 +143,14 @@ class ArtilleryRules:
         return told
 
     def gauges(self) -> Sequence[tuple[str, float]]:
-        """Return whose turn it is, the wind, every gun and what its tank has, the last shot, and the ground's course."""
+        """Return whose turn it is, the wind, every gun and what its tank has, the last shot, and the ground."""
         field, last = self.field, next((shot.place for shot in reversed(self.shots) if shot.place is not None), None)
         person = self.phase == "aim" and self.shooter.player.bot is None
         found = [("turn", float(self.turn)), ("shooter", self._number), ("may fire", person)]
         found += [("wind", self.world.wind[0]), ("shells", len(self.barrage.shells))]
         for tank in field.tanks.every:
             own = {"health": tank.health, "money": tank.money, "points": tank.points}
-            gun = {"angle": tank.angle, "power": tank.power, "weapon": tank.weapon}
+            gun = {"barrel": tank.angle, "power": tank.power, "weapon": tank.weapon}
             found += [(f"{tank.name} {name}", value) for name, value in (own | gun).items()]
         found += [("landed x", -1.0 if last is None else last[0])]
         heights = field.ground.surface(np.linspace(0.0, field.ground.width, HEIGHTS))

@@ -259,7 +259,7 @@ class Curling:
         return [*shown, ("", self._told)] if self._told else shown
 
     def gauges(self) -> Sequence[tuple[str, float]]:
-        """Return how the stone is aimed, m, whether a person is to let it go, who has what, and how far the match is."""
+        """Return how the stone is aimed, m, whether a person is to let it go, and how the match stands."""
         score = self._score
         return (
             ("broom", self._broom),
