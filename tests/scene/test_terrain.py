@@ -130,7 +130,7 @@ def test_stated_heights_are_the_ground() -> None:
         (
             ("position = 170.0", "position = 32.9"),
             "artillery.player.Blue.position",
-            "where 'Red' stands; tanks stand 3 m",
+            "is where 'Red' stands",
         ),
         (("width = 200.0", "width = 200.0\nheights = [1.0, 2.0]"), "terrain.heights", "leave out `columns`"),
         (('name = "Blue"', 'name = "Red"'), "artillery.player.Red.name", "names are unique"),

@@ -61,6 +61,11 @@ class Barrage:
         for k, shell in enumerate(new):  # what the rules spawn stands before what a hand does
             shell.number = first + k
 
+    def disturb(self) -> None:
+        """Note that what flies now does so in another air than it was fired in."""
+        for shell in self.shells:
+            shell.exact, shell.disturbed = None, True
+
     def follow(self, seen: Seen, passed: float) -> list[Action]:
         """Look where all shells have gone since the last frame, a time before, s."""
         actions: list[Action] = []
@@ -167,7 +172,8 @@ class Barrage:
         """Note what a shot came to, if it is one that was fired and came down by itself."""
         if shell.whole and shell.rolling is None:
             exact = None if shell.exact is None else shell.exact.place
-            self.shots.append(Shot(shell.shooter.name, shell.weapon.name, place, exact, time - shell.fired, time))
+            flown = time - shell.fired
+            self.shots.append(Shot(shell.shooter.name, shell.weapon.name, place, exact, flown, time, shell.disturbed))
 
     def _shell(
         self, time: float, tank: Tank, weapon: Weapon, place: FloatArray, velocity: FloatArray, rolls: bool = False

@@ -22,6 +22,9 @@ from sandbox.scene.model import Scene
 HEIGHTS = 33
 """of the ground, evenly from side to side, that gauges tell"""
 
+AIR = frozenset({"gravity", "wind", "linear_drag", "quadratic_drag"})
+"""Of the world, what decides how shells fly."""
+
 Phase = Literal["begin", "aim", "fly", "settle"]
 """Of a turn: the next player gets the gun, aims it; shells are in the air; ground and tanks come to rest."""
 
@@ -105,6 +108,7 @@ class ArtilleryRules:
     def look(self, seen: Seen) -> Sequence[Action]:
         """Go on with the turn: aim as long as keys are held, follow what flies, wait until all is still."""
         passed, self._time = seen.time - self._time, seen.time
+        self._breathe(seen.actions)
         self.barrage.know(seen)
         self.field.tanks.see(seen.frame)
         match self.phase:
@@ -160,6 +164,17 @@ class ArtilleryRules:
         """Return the sounds since the last call."""
         cues, self.field.cues = self.field.cues, []
         return cues
+
+    def _breathe(self, actions: Sequence[Action]) -> None:
+        """Go on in the air that a hand has made another; what flies through both has no exact flight."""
+        for action in actions:
+            key = action.path.removeprefix("world.") if isinstance(action, SetParameter) else ""
+            if not isinstance(action, SetParameter) or key not in AIR:
+                continue
+            value = tuple(action.value) if isinstance(action.value, list) else action.value
+            self.world = self.world.model_copy(update={key: value})
+            self.field.pull = math.hypot(*self.world.gravity)
+            self.barrage.disturb()
 
     def _begin_turn(self) -> list[Action]:
         """Let the next who is alive have the gun, in a wind of the turn's own; or end the game."""
