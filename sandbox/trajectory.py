@@ -50,7 +50,7 @@ class Frame:
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""
         for array in self._arrays():
-            array.flags.writeable = False
+            array.setflags(write=False)
 
     @property
     def spin(self) -> FloatArray | None:
@@ -64,10 +64,10 @@ class Frame:
             digest.update(array.tobytes())
         return digest.hexdigest()
 
-    def _arrays(self) -> tuple[npt.NDArray[Any], ...]:
-        arrays = (self.position, self.velocity, self.angle, self.angular_velocity, self.present)
-        more = (self.roll, self.layer, self.visits, self.drives)
-        return (*arrays, *(array for array in more if array is not None))
+    def _arrays(self) -> list[npt.NDArray[Any]]:
+        arrays = [self.position, self.velocity, self.angle, self.angular_velocity, self.present]
+        arrays += [array for array in (self.roll, self.layer, self.visits, self.drives) if array is not None]
+        return arrays
 
 
 class ContactEvent(NamedTuple):
@@ -138,6 +138,8 @@ class Contacts:
         return len(self.time)
 
     def __iter__(self) -> Iterator[ContactEvent]:
+        if not len(self):  # of most steps; five empty lists take longer than all else that asks
+            return
         columns = (self.time, self.pair, self.point, self.normal, self.impulse)
         for time, *vectors in zip(*(column.tolist() for column in columns), strict=True):
             yield ContactEvent(time, *map(tuple, vectors))

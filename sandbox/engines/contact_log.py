@@ -38,6 +38,7 @@ class ContactLog:
         self._impulse: ComplexArray = np.empty(256, np.complex128)
         self._row: IntArray = np.empty(0, np.int64)  # of what touches now
         self._sign: npt.NDArray[np.floating[Any]] = np.empty(0)  # likewise, of the impulses that go on
+        self._given: ComplexArray | None = None  # likewise, the impulses so far, where they are not in their rows
         self._order: IntArray | None = None  # likewise, in which they are entered
         self.steady = False
         """Each of what touches has a row of its own: while it is the same that touch, `go_on` will do. Of two that
@@ -45,6 +46,7 @@ class ContactLog:
 
     def record(self, time: float, now: Touching) -> None:
         """Enter what touches at a time, s."""
+        self._settle()
         self._order, self.steady = None, True
         if self.joints and len(now.a) > 1:
             self._order = _order(now)
@@ -77,8 +79,21 @@ class ContactLog:
 
     def go_on(self, impulse: ComplexArray) -> None:
         """Enter that the same touch as when last recorded, with these impulses, (K,) N·s, in the order of then."""
-        if len(impulse):
-            self._enter((impulse if self._order is None else impulse[self._order]) * self._sign)
+        if not len(impulse):
+            return
+        given = (impulse if self._order is None else impulse[self._order]) * self._sign
+        if not self.steady:
+            self._settle()
+            self._enter(given)
+        elif self._given is None:  # from now on beside the rows, which are found only once
+            self._given = self._impulse[self._row] + given
+        else:
+            self._given += given
+
+    def _settle(self) -> None:
+        """Write what was given into its rows."""
+        if self._given is not None:
+            self._impulse[self._row], self._given = self._given, None
 
     def _enter(self, given: ComplexArray) -> None:
         if self.joints and not self.steady:
@@ -106,12 +121,13 @@ class ContactLog:
 
     def take(self) -> Contacts:
         """Return the contacts that were open since the last call, and forget those that have ended."""
+        self._settle()
         n = self._count
         if not n:
             return Contacts.none()
         vectors = (self._place[:n, 0], self._place[:n, 1], self._impulse[:n])
         taken = Contacts(self._time[:n].copy(), self._pair[:n].copy(), *(_plain(vector) for vector in vectors))
-        lasting = np.unique(self._row)
+        lasting = self._row if len(self._row) < 2 else np.unique(self._row)
         self._row = np.searchsorted(lasting, self._row)
         self._rows.keep(self._row)
         self._count = count = len(lasting)

@@ -1,5 +1,6 @@
 """Policies: who plays where nobody sits at the window. But for the skilled they look at nothing: they press keys."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
@@ -33,9 +34,12 @@ class Chance:
         self._chance = np.random.default_rng([STREAM, seed])
         self._turns: dict[str, tuple[float, bool]] = {}  # by control: when it changes next, and whether it is down
         self._pauses: dict[str, float] = {}  # s between presses, on average
+        self._next = -math.inf  # when anything changes, s
 
     def decide(self, seen: Seen, rules: Rules) -> Sequence[tuple[str, float]]:
         """Return what changes now."""
+        if seen.time < self._next:
+            return ()
         if not self._turns:
             self._begin(rules.controls, seen.time)
         found = []
@@ -48,6 +52,7 @@ class Chance:
             lasts = self._drawn(HOLDS) if down else float(self._chance.exponential(self._pauses[control.name]))
             self._turns[control.name] = seen.time + lasts, down
             found.append((control.name, self._level(control) if down else 0.0))
+        self._next = min((due for due, _ in self._turns.values()), default=math.inf)
         return found
 
     def _begin(self, controls: Sequence[Control], time: float) -> None:

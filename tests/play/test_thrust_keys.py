@@ -6,10 +6,10 @@ from pathlib import Path
 import pygame
 import pytest
 from pressing import FOCUS_LOST, key, key_up
+from windowed import turned, window_on
 
 from sandbox.action import Throttle
 from sandbox.play.running.live import Live
-from sandbox.play.stage import Stage
 from sandbox.play.window import Window
 
 SHIP = """
@@ -38,23 +38,8 @@ UP, RIGHT = pygame.K_UP, pygame.K_RIGHT
 
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[Window]:
-    file = tmp_path / "ship.toml"
-    file.write_text(SHIP)
-    stage = Stage()
-    stage.take(file)
-    opened = Window(stage, size=(640, 480), folder=tmp_path, say=lambda _: None)
-    try:
+    with window_on(SHIP, tmp_path) as opened:
         yield opened
-    finally:
-        opened.close()
-
-
-def turned(window: Window, *events: pygame.event.Event, elapsed: float = 0.05) -> Live:
-    for event in events:
-        pygame.event.post(event)
-    window.turn(elapsed)
-    assert isinstance(window.stage.show, Live)
-    return window.stage.show
 
 
 def rising(live: Live) -> float:

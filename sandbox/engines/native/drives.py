@@ -6,7 +6,6 @@ driven body is put where it arrives at its place. After it: what it met has chan
 
 from collections.abc import Callable
 
-import numpy as np
 import pymunk
 
 from sandbox.engines.native.axle import Axle, Start, on_axle
@@ -77,7 +76,7 @@ class Drives:
         """Let go of a body, by its number, that leaves the space."""
         for k, axle in list(self._axles.items()):
             if axle.number == number:
-                self._note(k, axle)
+                self.state[k] = axle.state
                 del self._axles[k]
                 if isinstance(axle, Hinge):
                     del self._hinges[axle.body.id]
@@ -124,12 +123,11 @@ class Drives:
         self, position: FloatArray, velocity: FloatArray, angle: FloatArray, angular_velocity: FloatArray
     ) -> None:
         """Write the present state of driven bodies into arrays in scene order."""
-        for k, axle in self._axles.items():
+        for axle in self._axles.values():
             axle.settle()
             n = axle.number
             position[n], velocity[n] = axle.place, axle.velocity
             angle[n], angular_velocity[n] = axle.angle, axle.spin
-            self._note(k, axle)
 
     def seat(self, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray) -> None:
         """Put the centres of what turns about a hinge where their angles have them: between two states, on the arc.
@@ -140,9 +138,6 @@ class Drives:
             n = axle.number
             if not isinstance(axle, Plunger):
                 position[n], velocity[n] = axle.seated(float(angle[n]), float(spin[n]))
-
-    def _note(self, number: int, axle: Axle) -> None:
-        self.state[number] = axle.state
 
     @property
     def axles(self) -> list[Axle]:
@@ -162,6 +157,6 @@ class Drives:
         """Return the drives as they are, (D, 3), as a frame tells them."""
         if self._last is not None:
             return self._last
-        for k, axle in self._axles.items():
-            self._note(k, axle)
-        return np.array(self.state)
+        if self._axles:
+            self.state[list(self._axles)] = [axle.state for axle in self._axles.values()]
+        return self.state.copy()

@@ -193,7 +193,7 @@ class MeetingBodies(Members):
     @property
     def joined(self) -> int:
         """How many joints there are that pymunk solves."""
-        return len(self.tethers) if self._moving else 0
+        return self.tethers.count if self._moving else 0
 
     @property
     def joints(self) -> bool:

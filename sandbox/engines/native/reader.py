@@ -32,6 +32,9 @@ SECOND = TOUCH | ArbiterFields.POINT_A_2 | ArbiterFields.POINT_B_2
 
 TOUCH_FLAGS, SECOND_FLAGS = TOUCH.value, SECOND.value
 
+WORD = ffi.sizeof("uintptr_t")
+"""bytes, of a whole number in a buffer"""
+
 LIST = ffi.addressof(lib, "pmSpaceArbiterIteratorFuncBatched")
 """What writes an arbiter into a listing; `get_space_arbiters` looks it up at each call, which takes as long as it."""
 
@@ -52,6 +55,7 @@ class Reader:
         self._moving: IntArray = np.empty(0, np.int64)
         self._words, self._width = b"", 4  # who touched at the last look, and how many vectors a contact has
         self._live: IntArray = np.empty(0, np.int64)
+        self._firsts = self._live  # where the vectors of each of these begin
         self._moved, self._first, self._all = True, True, 0
         self._rows: IntArray = np.empty(0, np.int64)
         self._numbers: IntArray = np.empty(0, np.int64)
@@ -136,13 +140,14 @@ class Reader:
         self._listing.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
         lib.cpSpaceEachCachedArbiter(self._space._space, LIST, self._listing)
         self._width = 6 if polygons else 4
-        found = self._arbiters._int_arr  # what `int_buf` is made of: most often nothing touches
-        words = bytes(self._arbiters.int_buf()) if found.num else b""
+        found = self._arbiters._int_arr  # what `int_buf` would be made of
+        words = ffi.buffer(found.arr, found.num * WORD)[:] if found.num else b""
         same = words == self._words
         if not same:
             self._words = words
             # A parted contact is remembered for a while, with no points.
             self._live = np.flatnonzero(np.frombuffer(words, np.int64)[2::3])
+            self._firsts = self._live * self._width
         return same
 
     def impulses(self) -> ComplexArray:
@@ -150,7 +155,7 @@ class Reader:
         if not len(self._live):
             return NOTHING.impulse
         vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128)
-        return vectors.take(self._live * self._width)
+        return vectors.take(self._firsts)
 
     def touching(self) -> Touching:
         """Return what touched at the last look, as arrays of their own."""

@@ -243,8 +243,8 @@ class NativeSimulation(Running):
                 population.felt.told()  # who fell before contacts were asked for is nobody's concern
             population.felt.step(population.meeting, start, share)
             population.capture()
-        if joined := population.meeting.joined:
-            self._joint_iterations += joined * self._settings.iterations
+        if population.meeting.tethers.count:
+            self._joint_iterations += population.meeting.joined * self._settings.iterations
         population.changed()
         if self._books is not None:
             self._books.substep(opening, share)

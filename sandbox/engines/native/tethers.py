@@ -36,10 +36,9 @@ class Tethers:
         self._links: Links | None = None
         self._constraints: dict[int, pymunk.Constraint] = {}
         self._sorted: Held | None = None
+        self.count = 0
+        """how many constraints there are"""
         self._watch(Links.none())
-
-    def __len__(self) -> int:
-        return len(self._constraints)
 
     def tie(self, links: Links, body: Callable[[int], pymunk.Body], bias: float) -> None:
         """Join bodies as a scene says, once.
@@ -125,6 +124,7 @@ class Tethers:
 
     def _watch(self, links: Links) -> None:
         """Sort out which of the links that are there may break."""
+        self.count = len(self._constraints)
         self._there: Links = links
         self._sorted = None
         some = links.some(np.isfinite(links.strength))

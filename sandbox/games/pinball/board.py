@@ -24,6 +24,9 @@ LAUNCH = 3.0
 EJECT = 1.2
 """m/s, towards the middle of the table, of a hole that states nothing"""
 
+LANE_UP, LANE_DOWN, LANE_SIDE = 0.10, 0.10, 0.03
+"""m, about where balls are served, what counts as the lane: a plunger draws a ball down by some 43 mm"""
+
 MARGIN = 0.05
 """m: what is so far outside everything fixed has left the table"""
 
@@ -145,6 +148,11 @@ class Board:
     def height(self, x: float, y: float) -> float:
         """Return how far up from where balls are served a point is, m."""
         return (x - self.serve[0]) * self.up[0] + (y - self.serve[1]) * self.up[1]
+
+    def in_lane(self, x: float, y: float) -> bool:
+        """Tell whether a point, m, is where balls are served, or where a plunger draws them."""
+        along, dx, dy = self.height(x, y), x - self.serve[0], y - self.serve[1]
+        return -LANE_DOWN <= along <= LANE_UP and abs(dx * self.up[1] - dy * self.up[0]) <= LANE_SIDE
 
     def inside(self, x: float, y: float) -> bool:
         """Tell whether a point, m, is on the table; what is not a number is not."""

@@ -97,6 +97,8 @@ class Now:
     """the balls in play, in the lane too"""
     loose: tuple[int, ...] = ()
     """of these, the ones that neither wait in the lane nor are held in a hole"""
+    lane: dict[int, bool] = field(default_factory=dict)
+    """whether a ball lies where the plunger is, of those that were asked about"""
     waiting: int = 0
     """balls that are about to be served"""
     up: frozenset[str] = field(default_factory=frozenset)

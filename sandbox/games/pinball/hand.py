@@ -91,8 +91,9 @@ class PinballHand:
             self._due.setdefault(control, seen.time)
 
     def _plunge(self, seen: Seen, rules: Pinball) -> None:
+        position, velocity = seen.frame.position, seen.frame.velocity
         waits = any(
-            rules.trough.in_lane(ball, seen.frame) and math.hypot(*seen.frame.velocity[ball].tolist()) < SLOW
+            rules.board.in_lane(*position[ball].tolist()) and math.hypot(*velocity[ball].tolist()) < SLOW
             for ball in rules.trough.live
         )
         if waits and PLUNGER not in self._until:

@@ -102,19 +102,7 @@ class Pinball:
     def look(self, seen: Seen) -> Sequence[Action]:
         """See what happened in a step."""
         now = self._now = Now(seen.time, seen.frame, self.sheet)
-        self._refresh(now)
-        hits = [hit for hit in self.switches.read(seen) if hit.ball in now.live]
-        actions = [action for hit in hits for action in self._settled(self._hit(hit, now), now)]
-        actions += self._settled(self.course.missed(now), now)
-        self._refresh(now)
-        tilted = self.nudge.tilted
-        for machine in self._ticking:
-            actions += self._settled(machine.tick(now), now)
-        if self.nudge.tilted and not tilted:
-            self.course.save(0.0)
-            actions += [action for side in sorted(self.up) for action in self._flipped(side, False, now)]
-        actions += self._settled(self.trough.tick(now), now)
-        actions += self._settled(self.course.went_on(now), now)
+        actions = self._settled(self._happens(seen, now), now)
         self._refresh(now)
         return actions
 
@@ -146,10 +134,26 @@ class Pinball:
         """Bring up to date what others than the engine change."""
         trough = self.trough
         now.sheet, now.live, now.waiting = self.sheet, tuple(trough.live), len(trough.queue)
-        now.loose = tuple(
-            ball for ball in trough.live if ball not in self.holes.held and not trough.in_lane(ball, now.frame)
-        )
+        now.loose = tuple(ball for ball in trough.live if ball not in self.holes.held and not trough.in_lane(ball, now))
         now.up = frozenset(self.up)
+
+    def _happens(self, seen: Seen, now: Now) -> Iterator[Effect]:
+        """Yield what a step has brought, each effect after those before it were carried out."""
+        self._refresh(now)
+        for hit in self.switches.read(seen):
+            if hit.ball in now.live:
+                yield from self._hit(hit, now)
+        yield from self.course.missed(now)
+        self._refresh(now)
+        tilted = self.nudge.tilted
+        for machine in self._ticking:
+            yield from machine.tick(now)
+        if self.nudge.tilted and not tilted:
+            self.course.save(0.0)
+            for side in sorted(self.up):
+                yield from self._flipped(side, False, now)
+        yield from self.trough.tick(now)
+        yield from self.course.went_on(now)
 
     def _hit(self, hit: Hit, now: Now) -> Iterator[Effect]:
         if hit.ball not in self.trough.live:  # an earlier hit of this step has taken it
@@ -178,7 +182,7 @@ class Pinball:
             yield from (Drive(time=now.time, drive=each.name, level=value) for each in plungers)
         elif not value:
             for ball in now.live:
-                if self.trough.in_lane(ball, now.frame):
+                if self.trough.in_lane(ball, now):
                     yield from self.trough.launched(ball, now)
 
     def _settled(self, effects: Iterable[Effect], now: Now) -> list[Action]:

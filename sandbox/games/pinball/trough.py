@@ -15,9 +15,6 @@ GAP = 0.7
 STUCK = 2.0
 """s, that a ball which was to fly by itself may lie in the lane"""
 
-LANE_UP, LANE_DOWN, LANE_SIDE = 0.10, 0.10, 0.03
-"""m, about where balls are served, what counts as the lane: a plunger draws a ball down by some 43 mm"""
-
 SLOW = 0.05
 """m/s, below which a ball lies"""
 
@@ -42,13 +39,12 @@ class Trough:
         self.next = 0.0
         """when the next ball may be served, s"""
 
-    def in_lane(self, ball: int, frame: Frame) -> bool:
+    def in_lane(self, ball: int, now: Now) -> bool:
         """Tell whether a ball lies where the plunger is."""
-        x, y = frame.position[ball].tolist()
-        along = self.board.height(x, y)
-        dx, dy = x - self.board.serve[0], y - self.board.serve[1]
-        aside = abs(dx * self.board.up[1] - dy * self.board.up[0])
-        return -LANE_DOWN <= along <= LANE_UP and aside <= LANE_SIDE
+        found = now.lane.get(ball)
+        if found is None:
+            found = now.lane[ball] = self.board.in_lane(*now.frame.position[ball].tolist())
+        return found
 
     def park(self, ball: int, now: Now) -> Iterator[Effect]:
         """Take a ball out of play, to a free place; where there is none left, it goes to the plunger."""
@@ -76,7 +72,7 @@ class Trough:
     def tick(self, now: Now) -> Iterator[Effect]:
         """Serve, and launch what should fly by itself but does not; note what has left the lane."""
         for ball in self.live:
-            if self.in_lane(ball, now.frame):
+            if self.in_lane(ball, now):
                 self.flown.discard(ball)
             else:
                 self.flown.add(ball)
@@ -108,7 +104,7 @@ class Trough:
         """Launch a ball that has fallen back, if it was to fly by itself or others are in play meanwhile."""
         for ball in self.live:
             slow = math.hypot(*now.frame.velocity[ball].tolist()) < SLOW
-            if ball in self.flown or not slow or not self.in_lane(ball, now.frame):
+            if ball in self.flown or not slow or not self.in_lane(ball, now):
                 continue
             since = self.lying.get(ball)
             if since is not None and now.time - since > STUCK:

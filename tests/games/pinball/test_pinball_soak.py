@@ -66,7 +66,8 @@ class Keeper:
         assert (places >= self.low).all(), (frame.time, places)
         assert (places <= self.high).all(), (frame.time, places)
         for ball in balls:
-            waits = ball not in rules.trough.live or ball in rules.holes.held or rules.trough.in_lane(ball, frame)
+            in_lane = rules.board.in_lane(*frame.position[ball].tolist())
+            waits = ball not in rules.trough.live or ball in rules.holes.held or in_lane
             rests = not waits and not rules.up and math.hypot(*frame.velocity[ball].tolist()) < 0.005
             self.rest[ball] = self.rest[ball] + self.dt if rests else 0.0
             assert self.rest[ball] <= PATIENCE + PATIENCE / 2.0, (frame.time, frame.position[ball])  # a round of search

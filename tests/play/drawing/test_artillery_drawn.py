@@ -7,6 +7,7 @@ import numpy as np
 import pygame
 import pytest
 from pressing import key, key_up
+from windowed import turned, window_on
 
 from sandbox.action import Reshape
 from sandbox.games.artillery.rules import ArtilleryRules
@@ -22,7 +23,6 @@ from sandbox.play.footage.film import Film
 from sandbox.play.footage.still import offscreen
 from sandbox.play.running.live import Live
 from sandbox.play.sight import Sight
-from sandbox.play.stage import Stage
 from sandbox.play.window import Window
 from sandbox.recording import Recording
 from sandbox.scene.artillery.columns import course_of
@@ -170,21 +170,12 @@ def test_films_show_the_ground_as_it_was() -> None:
 
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[Window]:
-    file = tmp_path / "duel.toml"
-    file.write_text(TEXT.format(edges="open"))
-    stage = Stage()
-    stage.take(file)
-    opened = Window(stage, size=(640, 400), folder=tmp_path, say=lambda _: None)
-    try:
+    with window_on(TEXT.format(edges="open"), tmp_path, (640, 400)) as opened:
         yield opened
-    finally:
-        opened.close()
 
 
 def turn(window: Window, *events: pygame.event.Event) -> ArtilleryRules:
-    for event in events:
-        pygame.event.post(event)
-    window.turn(0.05)
+    turned(window, *events)
     assert window.stage.host is not None
     rules = window.stage.host.rules
     assert isinstance(rules, ArtilleryRules)

@@ -9,6 +9,7 @@ import pygame
 import pytest
 from pressing import FOCUS_LOST, key, key_up
 from toy_game import TOY, Toy
+from windowed import turned, window_on
 
 from sandbox.games import registry
 from sandbox.games.registry import RULES, rules_of
@@ -48,23 +49,8 @@ def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[Window]:
-    file = tmp_path / "toy.toml"
-    file.write_text(TOY)
-    stage = Stage()
-    stage.take(file)
-    opened = Window(stage, size=(1000, 640), folder=tmp_path, say=lambda _: None)
-    try:
+    with window_on(TOY, tmp_path, (1000, 640)) as opened:
         yield opened
-    finally:
-        opened.close()
-
-
-def turned(window: Window, *events: pygame.event.Event, elapsed: float = 0.05) -> Live:
-    for event in events:
-        pygame.event.post(event)
-    window.turn(elapsed)
-    assert isinstance(window.stage.show, Live)
-    return window.stage.show
 
 
 def presses_of(live: Live) -> list[tuple[str, float]]:
