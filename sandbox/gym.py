@@ -89,6 +89,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
 
         Raises:
             SceneError: the file has faults.
+            UnknownSceneError: there is no such file, nor a shipped scene of that name.
             UnfitError: the scene has no game with rules, or lacks what its game needs.
             Refusal: the engine lacks something that the scene needs.
             ValueError: there is no such engine, body or mode, or `every` is no whole number from 1 on.
