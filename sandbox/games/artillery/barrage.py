@@ -140,7 +140,22 @@ class Barrage:
         if near.any() or still or time - shell.rolling > ROLLS:
             x, y = shell.place.tolist()
             return self._go_off(shell, (x, y - ROLLER), time)
-        return [] if 0.0 <= shell.place[0] <= self._field.ground.width else self._left(shell, time)
+        if 0.0 <= shell.place[0] <= self._field.ground.width:
+            return []
+        return self._left(shell, time) if self._edges == "open" else self._roll_past(shell, time)
+
+    def _roll_past(self, shell: Shell, time: float) -> list[Action]:
+        """Let what has rolled past a side roll on within; it goes off where the ground there stands higher."""
+        ground = self._field.ground
+        beyond = returned(shell.place, shell.velocity, ground, self._edges)
+        assert beyond is not None
+        (x, y), (vx, vy) = (each.tolist() for each in beyond)
+        surface = float(ground.surface(x))
+        if y < surface:
+            return self._go_off(shell, (x, y), time)
+        place = x, max(y, surface + ROLLER)
+        shell.place, shell.velocity = np.array(place), beyond[1]
+        return [Move(time=time, body=shell.name, position=place, velocity=(vx, vy))]
 
     def _split(self, shell: Shell, time: float) -> list[Action]:
         """Let a cluster come apart: its momentum stays, the fragments fly on beside each other."""

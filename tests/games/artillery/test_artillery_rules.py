@@ -275,6 +275,32 @@ def test_a_roller_rolls_before_it_goes_off() -> None:
     assert (made.contact_pair == [roller, -1]).all(axis=1).any()
 
 
+SLOPE = [40.0 - 0.2 * k for k in range(100)]
+HILL = [*SLOPE[:49:-1], *SLOPE[50:]]
+
+
+@pytest.mark.parametrize(
+    ("edges", "heights", "where"),
+    [("open", SLOPE, None), ("rubber", SLOPE, (60.0, 98.0)), ("wrap", SLOPE, (0.0, 1.0)), ("wrap", HILL, (5.0, 40.0))],
+)
+def test_what_rolls_meets_the_sides_as_what_flies_does(
+    edges: str, heights: list[float], where: tuple[float, float] | None
+) -> None:
+    """Down to the right side: it leaves, is thrown back, strikes the cliff on the far side, or rolls on there."""
+    text = TEXT.replace("width = 240.0\ncolumns = 240\nheight = 20.0", f"width = 100.0\nheights = {heights}")
+    text = text.replace("position = 50.0", "position = 30.0").replace("position = 190.0", "position = 45.0")
+    scene = loads(text.replace("speed = 60.0", f'edges = "{edges}"\nspeed = 30.0'))
+    rules, made, _ = played(scene, taps("weapon", "weapon", "weapon", "fire"))
+    assert rules.shots[0].weapon == "roller"
+    way = made.position[:, made.number("shell 2"), 0]
+    assert 100.0 < np.nanmax(way) < 100.5  # a step of 20 ms beyond the side
+    if where is None:
+        assert not rules.field.blasts
+    else:
+        (blast,) = rules.field.blasts
+        assert where[0] < blast.place[0] < where[1]
+
+
 def test_keys_set_the_gun_and_only_in_turn() -> None:
     rules = rules_of(loads(TEXT))
     assert isinstance(rules, ArtilleryRules)
