@@ -28,6 +28,7 @@ from sandbox.play.instruments.score_panel import covered, draw_score
 from sandbox.play.instruments.timeline import HEIGHT, Timeline
 from sandbox.play.instruments.tools import Tools
 from sandbox.play.knobs import Knobs
+from sandbox.play.messages import MOST
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 from sandbox.play.shelf import to_pick
@@ -283,8 +284,11 @@ class Desk:
             told = self.claims(stage).told
             if stage.game is not None:
                 stage.messages.tell("aim with the mouse; Space shoots, H lists all keys")
-            for keys, what in told if stage.game is None else ():
-                stage.messages.tell(f"{keys}: {what}")
+            elif len(told) > MOST:  # more than are seen at once
+                stage.messages.tell(f"{', '.join(keys for keys, _ in told)}: F1 tells what each does")
+            else:
+                for keys, what in told:
+                    stage.messages.tell(f"{keys}: {what}")
         return account(stage, self.claims(stage).told, rate, recording)
 
     def close(self) -> None:

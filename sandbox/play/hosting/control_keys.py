@@ -69,6 +69,8 @@ def told(controls: tuple[Control, ...]) -> tuple[tuple[str, str], ...]:
         keys = " or ".join(" ".join(word.capitalize() for word in key.split()) for key in control.keys)
         pad = f"; gamepad: {_buttons(control.pad)}" if control.pad else ""
         rows.append((keys or "Gamepad", f"{control.about}{pad}"))
+    if any(control.pad for control in controls):
+        rows.append(("Gamepad Start", "pause, go on"))
     return tuple(rows)
 
 

@@ -29,7 +29,7 @@ from sandbox.play.stage import Stage
 from sandbox.play.window import Window
 from sandbox.recording import Recording
 from sandbox.scene.file import load
-from sandbox.scene.shipped import shipped
+from sandbox.scene.shipped import find, shipped
 
 UP, LEFT, R, P = pygame.K_UP, pygame.K_LEFT, pygame.K_r, pygame.K_p
 
@@ -94,6 +94,7 @@ def test_help_lists_controls_and_scene_keys_are_theirs(window: Window) -> None:
     assert claims.told == (
         ("Up or Left Shift", "kick it; gamepad: A, stick up"),
         ("Left", "how far; gamepad: LT"),
+        ("Gamepad Start", "pause, go on"),
     )
     assert {UP, LEFT, pygame.K_LSHIFT} <= window.desk.claimed(window.stage)
 
@@ -439,3 +440,12 @@ def test_scene_that_its_game_does_not_fit_is_shown_without(tmp_path: Path, monke
     level, text = stage.messages.shown()[-1]
     assert (level, text.partition(",")[0]) == ("warning", "landing needs a body 'ship'")
     stage.close()
+
+
+def test_a_game_of_many_keys_says_where_they_are_told() -> None:
+    opened = Window(Stage(), size=(900, 600), say=lambda _: None)
+    opened.stage.open(find("duel"))
+    opened.turn(0.02)
+    said = [text for _, text in opened.stage.messages.shown()]
+    assert said == ["Left, Right, Up, Down, W, Space, Gamepad Start: F1 tells what each does"]
+    opened.close()
