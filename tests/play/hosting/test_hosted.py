@@ -100,7 +100,7 @@ def test_help_lists_controls_and_scene_keys_are_theirs(window: Window) -> None:
 
 
 def test_help_tells_the_cross_of_a_gamepad_from_its_stick() -> None:
-    ((_, what),) = told((Control("go", "go", ("left",), "y left +leftx up"),))
+    (_, what), *_ = told((Control("go", "go", ("left",), "y left +leftx up"),))
     assert what == "go; gamepad: Y, D-pad left, stick right, D-pad up"
 
 
