@@ -239,7 +239,10 @@ class MeetingBodies(Members):
         if not self._moving:
             return
         self.field.time = time
-        self._apply_forces()
+        if self._dragged:
+            self.steady.apply_with_drag(self._members, self._reader, self._read(), self._scene.world, self._h)
+        else:
+            self.steady.apply(self._members)
         if self._setter.gates.walls:
             self._setter.gates.tick += 1
         if self.drives:
@@ -258,13 +261,6 @@ class MeetingBodies(Members):
     def pairs(self) -> IntArray:
         """Return who is in contact, (K, 2) numbers, fixed things being −1 − k; a pair may be listed twice."""
         return self._reader.pairs() if self._moving else np.empty((0, 2), np.int64)
-
-    def _apply_forces(self) -> None:
-        """Set what pymunk forgets after each step: the drag on all bodies, the steady forces on some."""
-        if self._dragged:
-            self.steady.apply_with_drag(self._members, self._reader, self._read(), self._scene.world, self._h)
-        else:
-            self.steady.apply(self._members)
 
     def _read(self) -> tuple[IntArray, FloatArray]:
         if self._state is None:

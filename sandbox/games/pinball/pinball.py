@@ -53,6 +53,7 @@ class Pinball:
             Search(board, self.holes, self.banks),
         )  # fmt: skip
         self._ticking = tuple(each for each in self.machines if type(each).tick is not Machine.tick)
+        self._lamped = tuple(each for each in self.machines if type(each).lights is not Machine.lights)
         self.course = Course(board, self.holes, self.nudge)
         self.course.machines = self.machines
         self.up: set[str] = set()
@@ -120,7 +121,9 @@ class Pinball:
         now = self._now
         if now is None or self.nudge.tilted:
             return frozenset()
-        lights = [light for machine in self.machines for light in machine.lights(now)]
+        lights = [light for machine in self._lamped for light in machine.lights(now)]
+        if not lights:
+            return frozenset()
         blinking = {light.name for light in lights if light.blinks}
         on = blinking if now.time % BLINK < 0.5 * BLINK else set[str]()
         return frozenset(on | {light.name for light in lights} - blinking)
