@@ -132,6 +132,38 @@ def test_engines_hand_over_on_the_ramp_in_the_gate_and_in_the_hole(first: str) -
     assert frame.position.tolist() == [[2.7, 0.49]]
 
 
+@pytest.mark.parametrize("first", ["pymunk", "reference"])
+def test_who_passes_a_gate_is_handed_over_and_who_lies_on_one_stays(first: str) -> None:
+    """One has turned round within, its centre on the left already; the other rests on the left, at no speed."""
+    second = {"pymunk": "reference", "reference": "pymunk"}[first]
+    balls = [
+        {"position": [-0.5, 0.1], "velocity": [0.0, 0.0], "radius": 0.1},
+        {"position": [0.5, -0.5], "velocity": [0.0, 2.0 * np.sqrt(0.54)], "radius": 0.1},  # it comes to y = 0.04
+    ]
+    gate = {"points": [[-1, 0], [1, 0]], "one_way": True, "thickness": 0.0001}
+    document = {
+        "world": {"gravity": [0.0, -2.0]},
+        "solver": {"dt": 5 * H, "substeps": 5},
+        "ball": balls,
+        "wall": [gate],
+    }
+    relay = sandbox.start(from_document(document), first)
+    while relay.frame().velocity[1, 1] >= 0.0:
+        relay.step()
+    before = relay.frame()
+    assert before.position[1, 1] > 0.0
+    assert before.passing is not None and before.passing.tolist() == [[1, -1]]
+    relay.apply(Switch(time=0.0, engine=second))
+    after = relay.frame()
+    assert after.passing is not None and after.passing.tolist() == [[1, -1]]
+    for _ in range(60):
+        relay.step()
+    y = relay.frame().position[:, 1]
+    assert y[0] == pytest.approx(0.1, abs=2e-3)  # pymunk's slop
+    assert y[1] == pytest.approx(before.position[1, 1] - 0.5 * 2.0 * 0.6**2, abs=0.02)  # free fall, from near rest
+    assert relay.frame().passing is None
+
+
 def test_recording_of_the_reference_goes_again_to_the_same_hash() -> None:
     scene = course()
     free = Impulse(time=6.0, body="ball", impulse=(-0.8, 0.1))

@@ -27,8 +27,9 @@ class Gates:
         self._roster = roster
         self.of_thing: BoolArray = np.asarray([isinstance(t, Wall) and t.one_way for t in roster.scene.fixed], np.bool_)
         """(F,) which fixed things are some"""
-        self._passing: set[Pair] = set()
+        self._passing: set[Pair] = {(body, -1 - wall) for body, wall in roster.scene.passing}
         self._stopped: set[Pair] = set()
+        self._goes_on = roster.scene.began > 0.0  # from a state that tells who passes: others on the left are stopped
 
     def renew(self, start: FloatArray) -> None:
         """Go on from centres (N, ≥ 2), m, with walls that may have other courses, or be solid now."""
@@ -53,11 +54,18 @@ class Gates:
 
     def begin(self, overlaps: Manifolds, closing: FloatArray) -> None:
         """Take note of who touches at the beginning: new is stopped who is on the left and does not leave, (K,) m/s."""
-        coming = _pairs(overlaps.of(closing >= 0.0))
+        coming = _pairs(overlaps if self._goes_on else overlaps.of(closing >= 0.0))
+        self._goes_on = False
         touching, known = _pairs(overlaps), self._passing | self._stopped
         passing = {pair for pair in touching - known if pair not in coming or not self._on_left(pair)}
         self._passing = passing | (self._passing & touching)
         self._stopped = touching - self._passing
+
+    @property
+    def passing(self) -> IntArray | None:
+        """Who is being let through, and which wall, −1 − k, (P, 2); none where nobody is."""
+        pairs = sorted((body, -1 - thing) for body, thing in self._passing)
+        return np.asarray(pairs, np.int64) if pairs else None
 
     def _stops(self, pair: Pair) -> bool:
         if pair in self._passing:

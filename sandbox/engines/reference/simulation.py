@@ -189,7 +189,8 @@ class ReferenceSimulation(Running):
         position, velocity, angle, spin = (a.copy() for a in (r.position, r.velocity, r.angle, r.angular_velocity))
         layer = r.layer.copy() if len(r.scene.layers) > 1 else None
         visits = r.visits.copy() if r.scene.zones else None
-        return Frame(self.time, position, velocity, angle, spin, r.present.copy(), layer=layer, visits=visits)
+        present, passing = r.present.copy(), self._stage.passing
+        return Frame(self.time, position, velocity, angle, spin, present, None, layer, visits, None, passing)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""

@@ -133,6 +133,11 @@ class Stage:
             self._joints.use(roster.inverse_mass, roster.inverse_moment, roster.linked())
         self.apply_forces()
 
+    @property
+    def passing(self) -> IntArray | None:
+        """Who is being let through a one-way wall, and which, −1 − k, (P, 2); none where nobody is."""
+        return None if self._sieve is None or self._sieve.gates is None else self._sieve.gates.passing
+
     def visit(self, roster: ZonedRoster) -> None:
         """Let the zones of the roster note who came in during the substep that has ended, and do what they do."""
         if roster.look(self.x[0]):
