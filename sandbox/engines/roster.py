@@ -49,7 +49,7 @@ class Roster:
         """(N,) on which each is, by its number in the scene's `layers`"""
         self.visits: IntArray = bodies.visits.copy()
         """(N, Z) how each is with each zone"""
-        self.held: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
+        self.caught: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
         """(N,) who stands still, as zones hold it"""
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
@@ -108,7 +108,7 @@ class Roster:
     @property
     def moving(self) -> BoolArray:
         """(N,) which bodies are there, not fixed, and held by no zone."""
-        return self.mobile & ~self.held
+        return self.mobile & ~self.caught
 
     @property
     def gravity(self) -> FloatArray:
@@ -187,7 +187,7 @@ class Roster:
         self.angular_velocity = np.append(self.angular_velocity, bodies.angular_velocity[-1])
         self.present = np.append(self.present, True)
         self.force, self.torque = np.vstack((self.force, np.zeros((1, 2)))), np.append(self.torque, 0.0)
-        self._twisted, self.held = np.append(self._twisted, False), np.append(self.held, False)
+        self._twisted, self.caught = np.append(self._twisted, False), np.append(self.caught, False)
         self.layer = np.append(self.layer, bodies.layer[-1])
         self.visits = np.vstack((self.visits, bodies.visits[-1:]))
         self._assume(self.scene, bodies, meet)
@@ -198,7 +198,7 @@ class Roster:
         self.present[numbers] = False
         self.velocity[numbers], self.angular_velocity[numbers], self.roll[numbers] = 0.0, 0.0, 0.0
         self.force[numbers], self.torque[numbers] = 0.0, 0.0
-        self.held[numbers] = False
+        self.caught[numbers] = False
         self._retired |= dict.fromkeys(numbers.tolist(), time)
         self._assume(self.scene, self.bodies, self.meet)
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.overlap import BIAS, slop_of
-from sandbox.scene.demands import BALLS, SURFACES, Demand, demands, unmodelled
+from sandbox.scene.demands import BALLS, Demand, demands, unmodelled
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -40,23 +40,23 @@ class ReferenceEngine:
 
     name: str = "reference"
     about: str = "by hand, fixed step: integrators, broad phases, times of impact, impulses or penalty springs"
-    capabilities: frozenset[Demand] = (
-        BALLS
-        | SURFACES
-        | {
-            Demand.LAYERS,
-            Demand.ZONES,
-            Demand.POLYGONS,
-            Demand.RODS,
-            Demand.PIVOTS,
-            Demand.SLIDES,
-            Demand.ROTARY_LIMITS,
-            Demand.SPRINGS,
-            Demand.ROTARY_SPRINGS,
-            Demand.ATTRACTION,
-            Demand.THRUST,
-        }
-    )
+    capabilities: frozenset[Demand] = BALLS | {
+        Demand.FALLOFF,
+        Demand.KICKS,
+        Demand.ONE_WAY,
+        Demand.PASSABLE,
+        Demand.POLYGONS,
+        Demand.RODS,
+        Demand.PIVOTS,
+        Demand.SLIDES,
+        Demand.ROTARY_LIMITS,
+        Demand.SPRINGS,
+        Demand.ROTARY_SPRINGS,
+        Demand.ATTRACTION,
+        Demand.THRUST,
+        Demand.LAYERS,
+        Demand.ZONES,
+    }
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that the reference lacks."""

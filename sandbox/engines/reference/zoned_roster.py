@@ -96,7 +96,7 @@ class ZonedRoster(Roster):
 
     def _stands(self, number: int, held: bool) -> None:
         self.velocity[number], self.angular_velocity[number] = 0.0, 0.0
-        self.held[number], self._changed = held, True
+        self.caught[number], self._changed = held, True
         self._assume(self.scene, self.bodies, self.meet)
 
     def lift(self, number: int, gravity: Point | None) -> None:
