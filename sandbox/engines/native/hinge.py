@@ -1,9 +1,9 @@
 """Hinge: a drive by torque in a pymunk space.
 
-A substep: the torque ramps and the body glides between its stops (`driving/torque.py`); pymunk finds what it meets there, kicks it to its new speed, and solves contacts. A body that is pressed
-onto a stop is held there by a one-sided limit which pymunk solves together with the contacts. Where all that it meets
-presses it onto its stop as well, it is immovable for that substep: contact and limit in turn would not get there in 10
-iterations.
+A substep: the torque ramps and the body glides between its stops (`driving/torque.py`); pymunk finds what it meets
+there, kicks it to its new speed, and solves contacts. A body that is pressed onto a stop is held there by a one-sided
+limit which pymunk solves together with the contacts. Where all that it meets presses it onto its stop as well, it is
+immovable for that substep: contact and limit in turn would not get there in 10 iterations.
 """
 
 import math

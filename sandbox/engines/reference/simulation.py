@@ -164,7 +164,8 @@ class ReferenceSimulation(Running):
         """Return the present state."""
         r = self._roster
         position, velocity, angle, spin = (a.copy() for a in (r.position, r.velocity, r.angle, r.angular_velocity))
-        return Frame(self.time, position, velocity, angle, spin, r.present.copy())
+        drives = r.drives.copy() if len(r.drives) else None
+        return Frame(self.time, position, velocity, angle, spin, r.present.copy(), drives=drives)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
@@ -192,7 +193,8 @@ class ReferenceSimulation(Running):
         self._ledger.record(end, _touching(*_real(contacts, impulse, after[1], self._roster.inverse_mass)))
         if self._observer is not None:
             # The observer may keep what it is given: these arrays are never written to again.
-            self._observer(start, before[0, :, :2], after[0, :, :2], self._ledger.pairs())
+            centres = self._stage.centres
+            self._observer(start, centres(before), centres(after), self._ledger.pairs())
 
 
 def _falls_off(single: Single, scene: Scene) -> bool:

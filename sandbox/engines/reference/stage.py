@@ -15,6 +15,7 @@ import numpy as np
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.reference.ball_finder import BallFinder
 from sandbox.engines.reference.books import Bookkeeper, Idle
+from sandbox.engines.reference.driven.drives import Drives
 from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.impulses import approach, remembered, solve_overlaps, solve_velocities
 from sandbox.engines.reference.integrators import INTEGRATORS
@@ -47,6 +48,7 @@ class Stage:
         self._breakable: IntArray = np.flatnonzero(np.isfinite(self._links.strength))
         self._given: FloatArray = np.zeros((len(self._links), 2))  # N·s or N·m·s by each link, in this substep
         self._field = Field(roster)
+        self.drives: Drives | None = None
         self.finder = self._new_finder()
         self._fixtures = roster.fixtures
         self._parting: Parting | None = None
@@ -68,12 +70,17 @@ class Stage:
     def _tell_books(self) -> None:
         """Let the books know who is there. What looks for contacts on their behalf is no work of the stage's."""
         own = None if self.penalty is None else Penalty(self._roster, self._settings, self._new_finder())
-        self.books.population_changed(self.u, self._joints, own)
+        self.books.population_changed(self.u, self._joints, own, self.drives)
 
     def _new_finder(self) -> Finder:
         assert self._settings.broad_phase
-        kind = PieceFinder if self._roster.meet.solids else BallFinder
+        kind = PieceFinder if self._pieced else BallFinder
         return kind(self._roster, self._settings.broad_phase)
+
+    @property
+    def _pieced(self) -> bool:
+        """Bodies are looked at piece by piece, wherever those lie: not all are discs about their own centres."""
+        return self._roster.meet.solids or len(self._roster.drives) > 0
 
     def _joint_solver(self) -> JointSolver | None:
         """Return what holds the scene's links, if it has any."""
@@ -88,7 +95,7 @@ class Stage:
     def enter(self) -> None:
         """Take the state from the roster, whose bodies may have been changed."""
         roster = self._roster
-        posed = len(self._links) > 0 or not self._field.empty  # these work on poses, whether anything turns or not
+        posed = len(self._links) > 0 or not self._field.empty or bool(roster.held)
         turns = posed or bool(roster.inverse_moment.any() or roster.angular_velocity.any())
         parts = [roster.position, roster.velocity]
         if turns:
@@ -97,13 +104,16 @@ class Stage:
                 for p in ((roster.position, roster.angle), (roster.velocity, roster.angular_velocity))
             ]
         self.x: State = np.stack(parts)
+        self.drives = Drives.of(roster)
+        if self.drives is not None:
+            self.drives.enter(self.x)
         # Overlap goes on being corrected, except for who is gone.
         kept = np.zeros((len(roster.position), 3))
         kept[: len(self.push)] = self.push
         self.push = np.where(roster.moving[:, None], kept, 0.0)
         self._pushes = bool(self.push.any())
         self._no_spin: FloatArray = np.zeros((len(roster.position), 3))
-        if roster.meet.solids != isinstance(self.finder, PieceFinder):  # keys mean other pairs from now on
+        if self._pieced != isinstance(self.finder, PieceFinder):  # keys mean other pairs from now on
             work, self.finder = self.finder.work, self._new_finder()
             self.finder.work = work
             self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
@@ -146,11 +156,20 @@ class Stage:
         roster.position[:], roster.velocity[:] = self.x[0, :, :2], self.x[1, :, :2]
         if self.x.shape[2] == 3:
             roster.angle[:], roster.angular_velocity[:] = self.x[0, :, 2], self.x[1, :, 2]
+        if self.drives is not None:
+            self.drives.leave(self.x)
+
+    def centres(self, x: State) -> FloatArray:
+        """Return where the centres of all bodies are in a state, (N, 2) m."""
+        return x[0, :, :2] if self.drives is None else self.drives.centred(x)
 
     def apply_forces(self) -> None:
         """Gather what acts: gravity, steady forces, air."""
         roster, world = self._roster, self._roster.scene.world
         moving = roster.moving[:, None]
+        if roster.held:  # what acts on them is their drives' concern
+            moving = moving.copy()
+            moving[list(roster.held)] = False
         steady = np.zeros_like(self.x[1])
         steady[:, :2] = np.where(moving, world.gravity, 0.0) + roster.force * roster.inverse_mass[:, None]
         if steady.shape[1] == 3:
@@ -174,12 +193,15 @@ class Stage:
 
     def moved(self, h: float) -> State:
         """Return the state a time h, s, ahead, as if nothing were hit on the way. Nothing is changed."""
+        x = self.x if self.drives is None else self.drives.begin(self.x, h)
         if self.penalty is not None:
-            moved = self.penalty.moved(self._integrator.step, self.time, self.x, self.u, h)
+            moved = self.penalty.moved(self._integrator.step, self.time, x, self.u, h)
         else:
-            moved = self._integrator.step(transition, self.time, self.x, self.u, h)
+            moved = self._integrator.step(transition, self.time, x, self.u, h)
+        if self.drives is not None:
+            self.drives.place(moved)
         shift = h * self.push[:, : moved.shape[2]] if self._pushes else None
-        self.books.flown(self.x, moved, shift)
+        self.books.flown(x, moved, shift)
         if shift is not None:
             moved[0] += shift
         if self._joints is not None and self._joints.how != "impulses":
@@ -211,7 +233,8 @@ class Stage:
             self._pushes = bool(target.any())
             if self._pushes:
                 self.finder.work["contact_iterations"] += contacts.size * self._settings.iterations
-                inverse = self._roster.inverse_mass, self._roster.inverse_moment
+                turning = self._roster.inverse_moment if self.drives is None else self.drives.firm
+                inverse = self._roster.inverse_mass, turning
                 solve_overlaps(contacts, target, self.push, *inverse, np.zeros_like(target), self._settings.iterations)
         self._memory = contacts.key.copy(), impulse, h
         self._done(moved, contacts, impulse, h)
@@ -236,12 +259,12 @@ class Stage:
         self.books.met(moved)
         impulse = np.zeros((contacts.size, 2))
         joined = self._joints is not None and self._joints.how == "impulses"
-        if not (contacts.size or joined):
+        if not (contacts.size or joined or self.drives is not None):
             return impulse
         share = self._integrator.share
         if self._joints is not None and joined:
             self._joints.prepare(kick_pose(moved, share, h), h)
-        bounce = self._bounce(contacts, self.x[1])
+        bounce = self._bounce(contacts, self.x[1] if self.drives is None else self.drives.start[1])
         key, old, old_h = self._memory
         remembered(contacts.key, key, old, impulse)
         # What rests takes impulses in proportion to the time. Never more: a blow does not grow with it.
@@ -250,7 +273,7 @@ class Stage:
         self._solve(contacts, bounce.speed, moved[1], impulse, joined)
         self.books.held(moved, contacts, impulse, bounce.worth)
         if share:
-            change = moved[1] - kicked
+            change = moved[1] - (kicked if self.drives is None else self.drives.released(kicked))
             moved[0] += (share * h) * change
             contacts.separation[:] += (share * h) * self._approach(contacts, change)
         return impulse
@@ -280,6 +303,13 @@ class Stage:
     ) -> None:
         inverse = self._roster.inverse_mass, self._roster.inverse_moment
         self.finder.work["contact_iterations"] += contacts.size * self._settings.iterations
+        if self.drives is not None:
+            rows = None
+            if self._joints is not None and joined:
+                self.finder.work["joint_iterations"] += self._joints.visits
+                rows = self._joints.rows
+            self.drives.solve(contacts, bounce, rows, velocity, impulse, self._settings.iterations)
+            return
         if self._joints is not None and joined:
             self.finder.work["joint_iterations"] += self._joints.visits
             rows, times = self._joints.rows, self._settings.iterations
@@ -295,6 +325,9 @@ class Stage:
     def _done(self, after: State, contacts: Manifolds, impulse: FloatArray, h: float) -> None:
         before, self.x = self.x, after
         start, self.time = self.time, self.time + h
+        if self.drives is not None:
+            self.drives.done(after)
+            self.books.led(before, after, h)
         self.books.done(start, after, h)
         if self._joints is not None and len(self._breakable):
             self._given += h * self._joints.load(after)
