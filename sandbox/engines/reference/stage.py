@@ -104,7 +104,7 @@ class Stage:
                 for p in ((roster.position, roster.angle), (roster.velocity, roster.angular_velocity))
             ]
         self.x: State = np.stack(parts)
-        self.drives = Drives.of(roster)
+        self.drives = Drives.of(roster, self.drives)
         if self.drives is not None:
             self.drives.enter(self.x)
         # Overlap goes on being corrected, except for who is gone.

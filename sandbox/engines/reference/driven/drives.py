@@ -45,9 +45,16 @@ class Drives:
         self._no_rows: Rows = rows_of(ties_of(roster.scene.links, among=np.empty(0, np.int64)))
 
     @classmethod
-    def of(cls, roster: Roster) -> Self | None:
-        """Return those of a roster; none where none is driven."""
-        return cls(roster) if roster.held else None
+    def of(cls, roster: Roster, old: Self | None) -> Self | None:
+        """Return those of a roster, who go on from old ones; none where none is driven."""
+        if not roster.held:
+            return None
+        new = cls(roster)
+        stopped = {} if old is None else {hinge.number: hinge for hinge in old._hinges}
+        for hinge in new._hinges:
+            if hinge.number in stopped:
+                hinge.follow(stopped[hinge.number])
+        return new
 
     def enter(self, x: State) -> None:
         """Write hinges into a state (2, N, 3) in the place of centres."""
@@ -98,24 +105,23 @@ class Drives:
         iterations: int,
     ) -> None:
         """Give contacts, joints and stops their impulses; the arguments are those of `solve_with_stops`."""
-        inverse_moment, stopped = self._roster.inverse_moment, []
+        inverse_moment, stopped = self._roster.inverse_moment.copy(), list[Hinge]()
         for hinge in self._hinges:
-            way, n = hinge.way, hinge.number
-            if not way:
-                continue
-            if _presses(contacts, n, way):
-                inverse_moment = inverse_moment.copy()
-                inverse_moment[n] = velocity[n, 2] = 0.0
-            else:
-                stopped.append((n, way))
+            if hinge.way and _presses(contacts, hinge.number, hinge.way):
+                inverse_moment[hinge.number] = velocity[hinge.number, 2] = 0.0
+            elif hinge.way:
+                stopped.append(hinge)
         stops = Stops(
-            np.asarray([n for n, _ in stopped], np.int64),
-            np.asarray([way for _, way in stopped], np.float64),
-            np.zeros(len(stopped)),
+            np.asarray([hinge.number for hinge in stopped], np.int64),
+            np.asarray([hinge.way for hinge in stopped]),
+            np.asarray([hinge.given for hinge in stopped]),
         )
         rows = self._no_rows if rows is None else rows
         inverse = self._roster.inverse_mass, inverse_moment
         solve_with_stops(contacts, bounce, rows, stops, velocity, *inverse, impulse, iterations)
+        given = dict(zip(stops.body.tolist(), stops.given.tolist(), strict=True))
+        for hinge in self._hinges:
+            hinge.hold(given.get(hinge.number, 0.0))
 
     def done(self, after: State) -> None:
         """Take the planned substep as done."""

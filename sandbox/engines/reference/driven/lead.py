@@ -83,12 +83,27 @@ class Hinge(Lead):
         assert isinstance(mount.drive, TorqueDrive)
         self._law = Torque(mount.drive, self.moment)
         self._torque, self._h = 0.0, 0.0
+        self._held = 0, 0.0, 0.0  # by a stop: at which, N·m·s, in which time
         self._low, self._high = sorted(mount.drive.stops)
 
     @property
     def way(self) -> float:
         """In which sense the planned substep presses it onto a stop: 1, −1, or 0 for none."""
         return self.turned.at * self._law.sense
+
+    @property
+    def given(self) -> float:
+        """What the stop gives to begin with, N·m·s: what it gave before, never more by time than then."""
+        at, impulse, h = self._held
+        return impulse * min(self._h / h, 1.0) if at and at == self.turned.at else 0.0
+
+    def hold(self, given: float) -> None:
+        """Remember what the stop gave."""
+        self._held = self.turned.at, given, self._h
+
+    def follow(self, old: "Hinge") -> None:
+        """Go on where another left off, with what its stop gave."""
+        self._held = old._held
 
     def plan(self, x: State, h: float) -> None:
         """Let the torque ramp, and the body glide."""

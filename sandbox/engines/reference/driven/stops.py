@@ -18,7 +18,7 @@ class Stops(NamedTuple):
     way: FloatArray
     """(S,) 1 or −1: the sense in which the stop lets it turn no further"""
     given: FloatArray
-    """(S,) N·m·s, against that sense, so far; 0 at first"""
+    """(S,) N·m·s, against that sense; that to start with, and then the sum"""
 
 
 @bare_kernel
@@ -49,6 +49,8 @@ def solve_with_stops(
     spin = velocity[:, 2]
     start_with(now, velocity, spin, inverse_mass, inverse_moment, impulse)
     warm_start(rows, velocity, inverse_mass, inverse_moment)
+    for k in range(len(stops.body)):
+        spin[stops.body[k]] -= stops.way[k] * stops.given[k] * inverse_moment[stops.body[k]]
     for _ in range(iterations):
         solve_once(now, bounce, velocity, spin, inverse_mass, inverse_moment, impulse)
         one_pass(rows, velocity, inverse_mass, inverse_moment)
