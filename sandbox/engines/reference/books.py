@@ -64,8 +64,8 @@ class Idle:
     def struck(self, moved: State, contacts: Manifolds, impulse: FloatArray, worth: FloatArray | None) -> None:
         """Book what impulses (K, 2), N·s, of impacts at the end of a step did to velocities; `worth` as above."""
 
-    def led(self, before: State, after: State, h: float) -> None:
-        """Book what drives did in a step of h, s, between two states."""
+    def led(self, before: State, after: State, h: float, contacts: Manifolds, impulse: FloatArray) -> None:
+        """Book what drives did in a step of h, s, between two states, and with what impulses (K, 2) of contacts."""
 
     def done(self, time: float, after: State, h: float) -> None:
         """Book the rest of a step of h, s, that began at a time, s, and led to a state."""
@@ -137,10 +137,13 @@ class Bookkeeper(Idle):
         if self._joints is not None and self._joints.how == "impulses":
             self.account.enter(Cause.JOINTS, self._joints.work(mean))
 
-    def led(self, before: State, after: State, h: float) -> None:
+    def led(self, before: State, after: State, h: float, contacts: Manifolds, impulse: FloatArray) -> None:
         """Book drives: what the driven gained, less what contacts and weight gave them."""
         assert self._drives is not None
         work = self._drives.work(before, after, h)
+        if self._penalty is not None:  # whose forces are booked whole, and against what moves freely alone
+            self._taken = self._drives.taken(contacts, impulse, 0.5 * (self._start[1] + self._end))
+            self.account.enter(Cause.INTEGRATOR, self._taken)
         self.account.enter(Cause.DRIVES, work.gained - self._taken - work.weight)
         self.account.enter(Cause.INTEGRATOR, work.weight + work.lifted)
 

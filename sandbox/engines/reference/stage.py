@@ -70,6 +70,8 @@ class Stage:
     def _tell_books(self) -> None:
         """Let the books know who is there. What looks for contacts on their behalf is no work of the stage's."""
         own = None if self.penalty is None else Penalty(self._roster, self._settings, self._new_finder())
+        if own is not None:
+            own.drives = self.drives
         self.books.population_changed(self.u, self._joints, own, self.drives)
 
     def _new_finder(self) -> Finder:
@@ -128,6 +130,7 @@ class Stage:
             self._parting = Parting(roster)
             self.finder.use(self._parting.codes)
         if self.penalty is not None:
+            self.penalty.drives = self.drives
             self.penalty.population_changed()
         if self._joints is not None:
             self._joints.use(roster.inverse_mass, roster.inverse_moment, roster.linked())
@@ -193,13 +196,13 @@ class Stage:
 
     def moved(self, h: float) -> State:
         """Return the state a time h, s, ahead, as if nothing were hit on the way. Nothing is changed."""
-        x = self.x if self.drives is None else self.drives.begin(self.x, h)
-        if self.penalty is not None:
+        x = self.x
+        if self.drives is not None:
+            x, moved = self._driven(self.drives, h)
+        elif self.penalty is not None:
             moved = self.penalty.moved(self._integrator.step, self.time, x, self.u, h)
         else:
             moved = self._integrator.step(transition, self.time, x, self.u, h)
-        if self.drives is not None:
-            self.drives.place(moved)
         shift = h * self.push[:, : moved.shape[2]] if self._pushes else None
         self.books.flown(x, moved, shift)
         if shift is not None:
@@ -208,6 +211,16 @@ class Stage:
             self._joints.project(self.x, moved, h)
             self.finder.work["joint_iterations"] += self._joints.visits
         return moved
+
+    def _driven(self, drives: Drives, h: float) -> tuple[State, State]:
+        """Return from where on and to where the state goes in h, s, where some of it is led by drives."""
+        penalty, step = self.penalty, self._integrator.step
+        if penalty is None:
+            moved = step(transition, self.time, drives.begin(self.x, h), self.u, h)
+        else:
+            moved = drives.spring(self.x, h, lambda x: (penalty.moved(step, self.time, x, self.u, h), *penalty.given()))
+        drives.place(moved)
+        return drives.start, moved
 
     def overlaps(self, x: State) -> Manifolds:
         """Return the contacts in a state; they are good until the next look. Springs have looked while they moved."""
@@ -327,7 +340,7 @@ class Stage:
         start, self.time = self.time, self.time + h
         if self.drives is not None:
             self.drives.done(after)
-            self.books.led(before, after, h)
+            self.books.led(before, after, h, contacts, impulse)
         self.books.done(start, after, h)
         if self._joints is not None and len(self._breakable):
             self._given += h * self._joints.load(after)

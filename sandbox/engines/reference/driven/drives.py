@@ -5,6 +5,7 @@ presses it onto its stop as well, it is immovable for that substep: contact and 
 10 iterations. What a stroke or a plunger leads is moved by nothing, and has its velocity all through a substep.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -42,6 +43,8 @@ class Drives:
         self.firm: FloatArray = roster.inverse_moment.copy()
         """(N,) 1/(kg·m²), with which overlaps are undone: driven bodies stay where they have to be"""
         self.firm[self._numbers] = 0.0
+        self.yielding: FloatArray = roster.inverse_moment
+        """(N,) 1/(kg·m²), as forces find them in the planned substep: what stands on a stop does not give way"""
         self._no_rows: Rows = rows_of(ties_of(roster.scene.links, among=np.empty(0, np.int64)))
 
     @classmethod
@@ -82,6 +85,49 @@ class Drives:
             lead.plan(x, h)
             lead.begin(self.start)
         return self.start
+
+    def spring(self, x: State, h: float, spring: Callable[[State], tuple[State, Manifolds, FloatArray]]) -> State:
+        """Return the state h, s, ahead, under contacts that are forces all the way.
+
+        What stands on a stop stands still as long as they, too, press it there, or less off than its drive presses.
+        Whatever else is on a hinge goes evenly, and they turn it besides; how far, with stops, is its drive's matter.
+
+        Args:
+            x: (2, N, 3) the state.
+            h: s.
+            spring: the way of all bodies from a state, with the contacts and what each gave, (K, 2) N·s.
+        """
+        self.begin(x, h)
+        for lead in self.leads:
+            lead.glide(self.start, h)
+        self.yielding = self._roster.inverse_moment.copy()
+        standing = [hinge for hinge in self._hinges if hinge.stands]
+        self.yielding[[hinge.number for hinge in standing]] = 0.0
+        while True:  # at most once for each of them
+            moved, contacts, given = spring(self.start)
+            loose = [each for each in standing if not each.sprung(self._turn(each, contacts, given))]
+            if not loose:
+                break
+            for hinge in loose:
+                hinge.plan(x, h)
+                self.yielding[hinge.number] = 1.0 / hinge.moment
+            standing = [hinge for hinge in standing if hinge not in loose]
+            for hinge in standing:
+                hinge.plan(x, h)
+        for hinge in self._hinges:
+            if hinge not in standing:
+                n = hinge.number
+                hinge.sprung(float(moved[1, n, 2] - self.start[1, n, 2]))
+        return moved
+
+    def _turn(self, hinge: Hinge, contacts: Manifolds, impulse: FloatArray) -> float:
+        """Return by how much impulses (K, 2), N·s, would change the spin of a body on a hinge, rad/s."""
+        turn = 0.0
+        for who, side, sign in ((contacts.first, 0, -1.0), (contacts.second, 1, 1.0)):
+            which = who == hinge.number
+            turn -= float(contacts.arm[which, side] @ impulse[which, 1])
+            turn -= sign * float(contacts.offset[which, side] @ impulse[which, 0])
+        return turn / hinge.moment
 
     def place(self, moved: State) -> None:
         """Write the end of the planned substep into a state."""

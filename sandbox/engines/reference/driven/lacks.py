@@ -14,8 +14,6 @@ def drives_lack(scene: Scene, wanted: frozenset[Demand], settings: Settings) -> 
             f"detection {settings.detection!r} resolves impacts one by one, apart from the stops of drives, "
             "and takes no arcs for ways; 'discrete' and 'shrink' do"
         )
-    if settings.response == "penalty":
-        lacks.append("response 'penalty' has springs push a body on a hinge into its stops; 'impulse' does not")
     if Demand.ATTRACTION in wanted:
         lacks.append("attraction in a scene with drives: it acts on centres, and drives hold bodies by their hinges")
     held = _joined(scene)

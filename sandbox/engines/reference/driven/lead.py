@@ -43,6 +43,13 @@ class Lead:
     def begin(self, x: State) -> None:
         """Write the velocity into a state that the body has through the planned substep."""
 
+    def glide(self, x: State, h: float) -> None:
+        """Write the velocity into a state with which it gets to the end of the planned substep of h, s, evenly."""
+        n = self.number
+        end = np.zeros_like(x)
+        self.place(end)
+        x[1, n] = (end[0, n] - x[0, n]) / h
+
     def place(self, moved: State) -> None:
         """Write the end of the planned substep into a state."""
         raise NotImplementedError
@@ -83,6 +90,7 @@ class Hinge(Lead):
         assert isinstance(mount.drive, TorqueDrive)
         self._law = Torque(mount.drive, self.moment)
         self._torque, self._h = 0.0, 0.0
+        self._planned = 0.0, 0.0, 0.0, 0.0  # angle, spin, mean torque, how long
         self._held = 0, 0.0, 0.0  # by a stop: at which, N·m·s, in which time
         self._low, self._high = sorted(mount.drive.stops)
 
@@ -111,7 +119,8 @@ class Hinge(Lead):
         angle, spin = float(x[0, self.number, 2]), float(x[1, self.number, 2])
         self._torque, mean, _ = self._law.ramped(torque, level, h)
         self.fall = heaviness(self.mount.hinge, angle, self.mass, self.gravity)
-        self.turned, self._h = self._law.turned(angle, spin, mean, self.fall, h), h
+        self._planned = angle, spin, mean, h
+        self.turned, self._h = self._law.turned(*self._planned[:3], self.fall, h), h
 
     def place(self, moved: State) -> None:
         """Write the end of the planned substep; what presses onto a stop is a spin for that to take away."""
@@ -119,6 +128,21 @@ class Hinge(Lead):
         self.enter(moved)
         moved[0, n, 2] = turned.angle
         moved[1, n, 2] = turned.spin + turned.press * self._h / self.moment
+
+    @property
+    def stands(self) -> bool:
+        """It is pressed onto a stop from beginning to end of the planned substep."""
+        return self.turned.at != 0 and not self._planned[1] and self._planned[0] == self.turned.angle
+
+    def sprung(self, spun: float) -> bool:
+        """Take what springs did to the spin in the planned substep, rad/s, as a torque among the others.
+
+        Return whether that leaves it pressed onto a stop on which it stands.
+        """
+        angle, spin, mean, h = self._planned
+        stood = self.stands
+        self.turned = self._law.turned(angle, spin, mean, self.fall + self.moment * spun / h, h)._replace(press=0.0)
+        return stood and self.stands
 
     def done(self, after: State) -> None:
         """Stay between the stops, where a contact had a part in the way, and at rest on one."""
