@@ -9,6 +9,7 @@ or `SandboxEnv(scene)` for any scene whose `[play] game` has rules. What an agen
 gets is what the score gained. An episode is a session: `recording()` returns it, to be replayed and seen in the window.
 """
 
+import operator
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,10 +23,12 @@ except ImportError:
     raise ImportError("sandbox.gym needs gymnasium: pip install 'sandbox2d[gym]'") from None
 
 from sandbox.action import Action, ActionError
-from sandbox.engines.contract import Divergence, Exhaustion
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal
+from sandbox.engines.registry import able, engine_named
 from sandbox.engines.relay import Relay, start
 from sandbox.games.referee import Referee
 from sandbox.games.registry import required_rules
+from sandbox.games.rules import Gauged, Rules
 from sandbox.measure.seeds import seeded
 from sandbox.recording import Recording
 from sandbox.scene.file import load
@@ -44,8 +47,8 @@ GAMES = {
 """By the name in an id, the shipped scene, and how many steps an action lasts."""
 LIMIT = 1e6
 """of every number that is observed, which is cut off there: spaces without bounds are ill-suited to learning"""
-STATE = 7
-"""Numbers a body: x, y in m, vx, vy in m/s, angle in rad, ω in rad/s, and whether it is there."""
+STATES = "x", "y", "vx", "vy", "angle", "ω", "present"
+"""Of a body, in m, m/s, rad and rad/s, and whether it is there: 1 or 0."""
 SIZE = 640, 480
 """px of a picture"""
 SEEDS = 2**31
@@ -56,10 +59,13 @@ Observation = np.ndarray[tuple[int], np.dtype[np.float32]]
 class SandboxEnv(gymnasium.Env[Observation, Any]):
     """A game.
 
-    Observed are the chosen bodies, `STATE` numbers each, then the time in s and the score. An action sets every
-    control, where one is analogue by a `Box` of 0 to 1 (of the others more than a half is on), else by a
+    Observed are the chosen bodies, `STATES` each, then what the rules show besides (fuel, wind, how a gun is set), the
+    time in s and the score; `observed` names each number. An action sets every control, where one is analogue by a
+    `Box` of 0 to 1 (of the others more than a half is on; what lies beyond is taken for 0 or 1), else by a
     `MultiDiscrete` of 0 and 1. The reward is what the score gained. An episode is terminated as the game is over, and
     truncated at the scene's duration, or where the physics cannot go on, which `info["failed"]` says.
+
+    It can be pickled, and copied, as long as no episode has begun.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012, as the base has it
@@ -83,29 +89,37 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
 
         Raises:
             SceneError: the file has faults.
+            UnknownSceneError: there is no such file, nor a shipped scene of that name.
             UnfitError: the scene has no game with rules, or lacks what its game needs.
-            ValueError: there is no such body, no such mode, or `every` is not positive.
+            Refusal: the engine lacks something that the scene needs.
+            ValueError: there is no such engine, body or mode, or `every` is no whole number from 1 on.
         """
         self.scene = scene if isinstance(scene, Scene) else load(find(str(scene)))
-        self.engine, self.every, self.render_mode = engine, every, render_mode
-        self.controls = required_rules(self.scene).controls
+        self.engine, self.every, self.render_mode = engine, _steps(every), render_mode
+        rules = required_rules(self.scene)
+        self.controls = rules.controls
+        missing = engine_named(engine).missing(self.scene, self.scene.solver)
+        if missing:
+            raise Refusal(engine, missing, able(self.scene))
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"there is no render mode {render_mode!r}; there is rgb_array")
-        if every < 1:
-            raise ValueError(f"an action lasts 1 or more steps, not {every}")
         self._numbers = _numbers(self.scene, bodies)
+        states = [f"{self.scene.bodies.names[number]} {state}" for number in self._numbers for state in STATES]
+        self.observed: tuple[str, ...] = (*states, *(name for name, _ in _gauges(rules)), "time", "score")
+        """what each number of an observation is"""
         count = len(self.controls)
         self.analogue = any(control.analogue for control in self.controls)
         self.action_space = (
             spaces.Box(0.0, 1.0, (count,), np.float32) if self.analogue else spaces.MultiDiscrete([2] * count)
         )
-        self.observation_space = spaces.Box(-LIMIT, LIMIT, (STATE * len(self._numbers) + 2,), np.float32)
+        self.observation_space = spaces.Box(-LIMIT, LIMIT, (len(self.observed),), np.float32)
         self.metadata = self.metadata | {"render_fps": max(round(1.0 / (self.scene.solver.dt * every)), 1)}
         self._relay: Relay | None = None
         self._game: Referee | None = None
         self._played = self.scene
         self._done: list[Action] = []
         self._levels: list[float] = []
+        self._ended = False
         self._canvas: Any = None
 
     def reset(
@@ -125,21 +139,29 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         first = self._np_random is None
         super().reset(seed=self.scene.world.seed if seed is None and first else seed)
         number = seed if seed is not None else self.scene.world.seed if first else int(self.np_random.integers(SEEDS))
-        self.close()
+        self._release()
         self._played = seeded(self.scene, number)
         rules = required_rules(self._played)
         self._relay, self._game = start(self._played, self.engine), Referee(rules)
         self._relay.contacts()
-        self._done, self._levels = [], [0.0] * len(self.controls)
+        self._done, self._levels, self._ended = [], [0.0] * len(self.controls), False
         self._look(Contacts.none())
         return self._observation(), self._info()
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Set the controls, and make steps until the next decision, or to the end of the episode."""
+        """Set the controls, and make steps until the next decision, or to the end of the episode.
+
+        Raises:
+            ValueError: the action is not one number for each control, finite, or 0 or 1; nothing has happened then.
+            ResetNeeded: no episode has begun, or it is over.
+        """
         relay, game = self._going()
+        if self._ended:
+            raise gymnasium.error.ResetNeeded("the episode is over; call reset before the next step")
+        levels = self._levels_of(action)
         before, failed = game.rules.score, None
         try:
-            self._press(np.asarray(action, dtype=np.float64).tolist())
+            self._press(levels)
             for _ in range(self.every):
                 relay.step()
                 self._look(relay.contacts())
@@ -149,8 +171,9 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             failed = str(error)
         info = self._info() | ({} if failed is None else {"failed": failed})
         over = game.rules.over is not None
-        reward = float(game.rules.score - before)
-        return self._observation(), reward, over, not over and (self._late or failed is not None), info
+        late = not over and (self._late or failed is not None)
+        self._ended = over or late
+        return self._observation(), float(game.rules.score - before), over, late, info
 
     def _going(self) -> tuple[Relay, Referee]:
         if self._relay is None or self._game is None:
@@ -161,6 +184,23 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
     def _late(self) -> bool:
         assert self._relay is not None
         return self._relay.time >= self.scene.world.duration - 0.5 * self.scene.solver.dt
+
+    def _levels_of(self, action: Any) -> list[float]:
+        """Return how far an action presses each control.
+
+        Raises:
+            ValueError: it is none.
+        """
+        try:
+            levels = np.asarray(action, dtype=np.float64)
+        except (TypeError, ValueError):
+            levels = np.empty(0)
+        sound = levels.shape == (len(self.controls),) and np.isfinite(levels).all()
+        if not sound or not (self.analogue or np.isin(levels, (0.0, 1.0)).all()):
+            names, each = ", ".join(control.name for control in self.controls), "0 to 1" if self.analogue else "0 or 1"
+            raise ValueError(f"an action is {len(self.controls)} numbers, {each}, for {names}; not {action!r}")
+        found: list[float] = np.clip(levels, 0.0, 1.0).tolist()
+        return found
 
     def _press(self, levels: list[float]) -> None:
         """Set the controls that an action changes."""
@@ -189,7 +229,8 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         frame, some = relay.frame(), self._numbers
         columns: list[FloatArray] = [frame.position[some], frame.velocity[some]]
         columns += [each[some, None] for each in (frame.angle, frame.angular_velocity, frame.present.astype(float))]
-        state = np.concatenate((np.hstack(columns).ravel(), [relay.time, float(game.rules.score)]))
+        others = [*(value for _, value in _gauges(game.rules)), relay.time, float(game.rules.score)]
+        state = np.concatenate((np.hstack(columns).ravel(), others))
         bounded = np.clip(np.nan_to_num(state, posinf=LIMIT, neginf=-LIMIT), -LIMIT, LIMIT)
         return np.asarray(bounded, np.float32)
 
@@ -222,22 +263,45 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         """Return a picture, (height, width, 3) of 0 to 255, or None without a render mode."""
         if self.render_mode is None:
             return None
-        relay, _ = self._going()
+        relay, game = self._going()
         if self._canvas is None:
             from sandbox.play.canvas import Canvas  # pygame is for who wants to see something
 
             self._canvas = Canvas(SIZE)
-        return self._canvas.picture(relay.scene, relay.bodies, relay.frame())
+        return self._canvas.picture(relay.scene, relay.bodies, relay.frame(), game.rules, relay.throttles)
 
     def close(self) -> None:
-        """Release the engine."""
+        """Release the engine, and what pictures are drawn on."""
+        self._release()
+        self._canvas = None
+
+    def _release(self) -> None:
         if self._relay is not None:
             self._relay.close()
         self._relay = self._game = None
 
 
+def _steps(every: int) -> int:
+    """Return how many steps an action lasts.
+
+    Raises:
+        ValueError: it is no whole number from 1 on.
+    """
+    try:
+        steps = operator.index(every)
+    except TypeError:
+        steps = 0
+    if steps < 1:
+        raise ValueError(f"an action lasts 1 or more steps, a whole number, not {every!r}")
+    return steps
+
+
+def _gauges(rules: Rules) -> Sequence[tuple[str, float]]:
+    return rules.gauges() if isinstance(rules, Gauged) else ()
+
+
 def _numbers(scene: Scene, names: Sequence[str] | None) -> list[int]:
-    """Return the numbers of the bodies that are observed.
+    """Return the numbers of the bodies that are observed; one name is a list of one.
 
     Raises:
         ValueError: there is no such body.
@@ -245,6 +309,7 @@ def _numbers(scene: Scene, names: Sequence[str] | None) -> list[int]:
     bodies = scene.bodies
     if names is None:
         return [int(number) for number in np.flatnonzero(~bodies.fixed)]
+    names = (names,) if isinstance(names, str) else names
     unknown = [name for name in names if name not in bodies.names]
     if unknown:
         raise ValueError(f"no body is named {', '.join(map(repr, unknown))}; there are {', '.join(bodies.names[:9])}")

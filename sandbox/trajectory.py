@@ -46,6 +46,8 @@ class Frame:
     """(N, Z) how each is with each zone, by the words of `scene.zone`; none where there are none"""
     drives: FloatArray | None = None
     """(D, 3) of the scene's drives: level; torque, N·m, of a plunger its pull, m, and how fast that grows, m/s"""
+    passing: IntArray | None = None
+    """(P, 2) who is being let through a one-way wall, and which, −1 − k; none where nobody is"""
 
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""
@@ -66,8 +68,8 @@ class Frame:
 
     def _arrays(self) -> list[npt.NDArray[Any]]:
         arrays = [self.position, self.velocity, self.angle, self.angular_velocity, self.present]
-        arrays += [array for array in (self.roll, self.layer, self.visits, self.drives) if array is not None]
-        return arrays
+        more = (self.roll, self.layer, self.visits, self.drives, self.passing)
+        return arrays + [array for array in more if array is not None]
 
 
 class ContactEvent(NamedTuple):

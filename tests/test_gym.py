@@ -1,5 +1,7 @@
 """Environments to learn in: they keep the interface of gymnasium, and are the same games as everywhere else."""
 
+import copy
+import pickle
 import subprocess
 import sys
 
@@ -9,10 +11,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from toy_game import TOY, Toy
 
+from sandbox.engines.contract import Refusal
 from sandbox.games import registry
 from sandbox.games.registry import RULES
 from sandbox.games.rules import Control, UnfitError
-from sandbox.gym import GAMES, STATE, SandboxEnv
+from sandbox.gym import GAMES, STATES, SandboxEnv
 from sandbox.measure.replay import rerun
 from sandbox.scene.file import load, loads
 from sandbox.scene.shipped import shipped
@@ -32,6 +35,20 @@ def played(env: SandboxEnv, seed: int | None, chances: int = 1) -> list[tuple[by
 def test_shipped_games_keep_the_interface(name: str) -> None:
     # pytest turns warnings into errors, those of the checker among them
     check_env(gymnasium.make(f"sandbox/{name}-v0").unwrapped)
+
+
+@pytest.mark.parametrize("name", GAMES)
+def test_each_number_that_is_observed_has_a_name_of_its_own(name: str) -> None:
+    env = gymnasium.make(f"sandbox/{name}-v0").unwrapped
+    assert isinstance(env, SandboxEnv)
+    assert len(set(env.observed)) == len(env.observed)
+    env.action_space.seed(2)
+    for seed in (1, 2):
+        observation, _ = env.reset(seed=seed)
+        for _ in range(30):
+            assert env.observation_space.contains(observation)
+            assert np.isfinite(observation).all()
+            observation, *_ = env.step(env.action_space.sample())
 
 
 def test_every_shipped_game_has_an_id() -> None:
@@ -67,7 +84,8 @@ def test_agent_sees_the_bodies_the_time_and_the_score() -> None:
     env = SandboxEnv("landing", every=2)
     first, _ = env.reset()
     observation, _, _, _, info = env.step([0.0, 0.0, 0.0])
-    assert observation.shape == (STATE + 2,)
+    assert env.observed == (*(f"ship {state}" for state in STATES), "fuel", "time", "score")
+    assert observation.shape == (len(env.observed),)
     dt, gravity = env.scene.solver.dt, env.scene.world.gravity[1]
     assert observation[-2] == pytest.approx(2 * dt)  # s
     assert observation[-1] == info["score"] == 0
@@ -122,6 +140,121 @@ def test_pictures_are_of_the_scene() -> None:
     assert (env.render() != picture).any()
 
 
+def test_pictures_show_what_the_rules_alone_know() -> None:
+    """The barrel, and the flame of an engine: no body is there, and still they are seen."""
+    duel = SandboxEnv("duel", every=60, render_mode="rgb_array")
+    duel.reset()
+    before = duel.render()
+    duel.step([0, 1, 0, 0, 0, 0])
+    assert duel.render().shape == before.shape
+    assert (duel.render() != before).any()
+    ship = SandboxEnv("landing", render_mode="rgb_array")
+    off, on = (drawn_after(ship, level) for level in (0.0, 1.0))
+    changed = (off != on).any(axis=2)
+    assert 10 < changed.sum() < 2000  # the flame, not the ship, which one step moves by 0.2 mm
+
+
+def drawn_after(env: SandboxEnv, engine: float) -> np.ndarray:
+    env.reset(seed=1)
+    env.step([engine, 0.0, 0.0])
+    return np.asarray(env.render())
+
+
+@pytest.mark.parametrize(
+    "action",
+    [[np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0], [0.0, 0.0], [0.0] * 4, [[0.0] * 3], 0.5, "up", None, [0.0, 0.0, "up"]],
+)
+def test_an_action_that_is_none_is_told_and_nothing_happens(action: object) -> None:
+    env = SandboxEnv("landing")
+    env.reset(seed=1)
+    with pytest.raises(ValueError, match="3 numbers, 0 to 1, for engine, turn left, turn right; not"):
+        env.step(action)
+    assert (env.recording().presses, env.recording().duration) == ((), 0.0)
+
+
+def test_actions_beyond_their_bounds_are_cut_off_there() -> None:
+    env = SandboxEnv("landing", every=5)
+    env.reset(seed=1)
+    env.step([7.0, -3.0, 0.5])
+    assert [(press.control, press.value) for press in env.recording().presses] == [("engine", 1.0), ("turn right", 0.5)]
+    duel = SandboxEnv("duel")
+    duel.reset()
+    for action in ([2] * 6, [-1] * 6, [0.5] * 6, [np.nan] * 6):
+        with pytest.raises(ValueError, match="6 numbers, 0 or 1, for left, right, up, down, weapon, fire"):
+            duel.step(action)
+
+
+def test_nothing_follows_the_end() -> None:
+    env = SandboxEnv("landing", every=50)
+    told = played(env, 3)
+    end = env.recording()
+    with pytest.raises(gymnasium.error.ResetNeeded, match="the episode is over"):
+        env.step([0.0, 0.0, 0.0])
+    assert env.recording() == end
+    assert played(env, 3) == told  # another may begin
+
+
+def gauge(env: SandboxEnv, observation: np.ndarray, name: str) -> float:
+    return float(observation[env.observed.index(name)])
+
+
+def test_gunner_sees_the_gun_the_wind_and_the_ground() -> None:
+    env = SandboxEnv("duel", every=10)
+    first, info = env.reset(seed=2)
+    assert gauge(env, first, "may fire") == 1.0
+    assert info["lines"]["wind"].startswith(f"{abs(gauge(env, first, 'wind')):.1f} m/s")
+    turned, *_ = env.step([1, 0, 0, 0, 1, 0])
+    assert gauge(env, turned, "Red barrel") > gauge(env, first, "Red barrel")
+    assert gauge(env, turned, "Red weapon") == 1.0
+    assert gauge(env, turned, "Blue barrel") == gauge(env, first, "Blue barrel")
+    flying, *_ = env.step([0, 0, 0, 0, 0, 1])
+    assert (gauge(env, flying, "may fire"), gauge(env, flying, "shells")) == (0.0, 1.0)
+    heights = [k for k, name in enumerate(env.observed) if name.startswith("height")]
+    other, _ = env.reset(seed=3)
+    assert (first[heights] != other[heights]).any()
+    for _ in range(100):
+        later, *_ = env.step([0, 0, 0, 0, 0, 1])
+    assert gauge(env, later, "landed x") > 0.0
+
+
+def test_skip_sees_the_broom_the_weight_and_whose_turn_it_is() -> None:
+    env = SandboxEnv("curling", every=20)
+    env.reset(seed=2)
+    while not env.step([0] * 7)[0][env.observed.index("may throw")]:
+        pass
+    seen, *_ = env.step([1, 0, 1, 0, 1, 0, 0])
+    found = [gauge(env, seen, name) for name in ("broom", "weight", "turn", "team", "thrown", "stones run")]
+    assert found == [pytest.approx(0.1), pytest.approx(0.5), -1.0, 0.0, 0.0, 0.0]  # 0.2 s at 0.5 and 2.5 m/s
+    thrown, *_ = env.step([0, 0, 0, 0, 0, 1, 0])
+    assert gauge(env, thrown, "stones run") == 1.0
+
+
+def test_games_go_on_side_by_side() -> None:
+    """In processes of their own or one after the other: what a seed and actions lead to is the same."""
+    found = []
+    for mode in ("sync", "async"):
+        games = gymnasium.make_vec("sandbox/ArtilleryDuel-v0", num_envs=2, vectorization_mode=mode)
+        seen, info = games.reset(seed=5)
+        assert info["seed"].tolist() == [5, 6]
+        games.action_space.seed(1)
+        rows = [seen] + [games.step(games.action_space.sample())[0] for _ in range(20)]
+        found.append(np.stack(rows))
+        games.close()
+    assert found[0].tobytes() == found[1].tobytes()
+    assert (found[0][:, 0] != found[0][:, 1]).any()
+
+
+def test_environment_is_pickled_and_copied_before_an_episode() -> None:
+    env = SandboxEnv("landing", every=20)
+    told = played(SandboxEnv("landing", every=20), 4)
+    assert played(pickle.loads(pickle.dumps(env)), 4) == played(copy.deepcopy(env), 4) == told
+    env.reset()
+    with pytest.raises(TypeError, match="a running simulation cannot be copied"):
+        pickle.dumps(env)
+    env.close()
+    assert played(pickle.loads(pickle.dumps(env)), 4) == told
+
+
 def test_what_cannot_be_played_is_told() -> None:
     with pytest.raises(UnfitError, match="has no game with rules"):
         SandboxEnv("bounce")
@@ -131,6 +264,13 @@ def test_what_cannot_be_played_is_told() -> None:
         SandboxEnv("landing", render_mode="human")
     with pytest.raises(ValueError, match="1 or more steps"):
         SandboxEnv("landing", every=0)
+    with pytest.raises(ValueError, match=r"a whole number, not 1\.5"):
+        SandboxEnv("landing", every=1.5)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="no engine 'box2d'; engines: pymunk, exact, reference"):
+        SandboxEnv("landing", engine="box2d")
+    with pytest.raises(Refusal, match="does not model drag or polygons; these could: pymunk, reference"):
+        SandboxEnv("duel", engine="exact")
+    assert SandboxEnv("landing", bodies="ship").observed == SandboxEnv("landing").observed
     with pytest.raises(gymnasium.error.ResetNeeded):
         SandboxEnv("landing").step([0.0, 0.0, 0.0])
     with pytest.raises(ValueError, match="knows no options"):

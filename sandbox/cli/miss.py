@@ -2,7 +2,7 @@
 
 import math
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,15 +15,28 @@ from sandbox.scene.model import Scene
 if TYPE_CHECKING:
     from sandbox.games.artillery.miss import Table as MissTable
 
-STEP = click.FloatRange(min=1e-6, max=1.0)
-SPEED = click.FloatRange(0.0, 1e6, min_open=True)
+
+class Figure(click.FloatRange):
+    """A range that nan is not in."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number, or tell that it is none."""
+        number = super().convert(value, param, ctx)
+        if math.isnan(number):
+            self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
+        return number
+
+
+STEP = Figure(min=1e-5, max=1.0)
+SPEED = Figure(0.0, 1e6, min_open=True)
+ANGLE = Figure(0.0, 180.0, min_open=True, max_open=True)
 
 
 @click.command(name="miss")
 @click.argument("scene")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
 @click.option("--speed", type=SPEED, default=50.0, metavar="M/S", help="by default 50")
-@click.option("--angle", type=click.FloatRange(0.0, 180.0), default=45.0, metavar="DEG", help="by default 45")
+@click.option("--angle", type=ANGLE, default=45.0, metavar="DEG", help="by default 45")
 @click.option("--dt", "dts", type=STEP, multiple=True, metavar="S", help="a step; by default 1/15, 1/60 and 1/240")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 def command(
@@ -38,7 +51,8 @@ def command(
     except SceneError as error:
         return refused(error.faults, as_json, scene=scene)
     except ValueError as error:
-        return refused([Fault(scene, None, "world.gravity", str(error))], as_json, scene=scene)
+        falls = read.world.gravity[1] < 0.0
+        return refused([Fault(scene, None, "" if falls else "world.gravity", str(error))], as_json, scene=scene)
     if as_json:
         rows = [row._asdict() for row in found.rows]
         refusals = [{"engine": engine, "reason": reason} for engine, reason in found.refused]

@@ -1,13 +1,14 @@
 """`sandbox run`: headless runs, a table on the terminal, a folder of stored runs."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import click
 
 from sandbox.action import Spawn
+from sandbox.batch.crew import Making, MakingError, make
 from sandbox.batch.outcome import Outcome, execute
 from sandbox.batch.plan import Job, parse_sweep, plan
 from sandbox.batch.store import Store, StoreError
@@ -19,7 +20,6 @@ from sandbox.cli.scores_table import print_scores, score_rows
 from sandbox.cli.table import Row, print_runs
 from sandbox.games.player import Player
 from sandbox.measure.recorder import TooLargeError, require_memory
-from sandbox.measure.run import Progress
 from sandbox.measure.seeds import same_chances
 from sandbox.scene.address import AddressError
 from sandbox.scene.faults import Fault, SceneError
@@ -42,6 +42,7 @@ from sandbox.scene.faults import Fault, SceneError
     metavar="WHO",
     help="of a game: random, skilled, none, or a script file",
 )
+@click.option("--workers", type=click.IntRange(1, 256), default=1, metavar="N", help="how many runs at once")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="store every run in a folder, once")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw the run: .png, .svg or .pdf")
 @click.option("--body", "bodies", multiple=True, metavar="NAME", help="which bodies to draw")
@@ -56,6 +57,7 @@ def command(
     sweeps: tuple[str, ...],
     seeds: int | None,
     player: str | None,
+    workers: int,
     out: Path | None,
     plot: Path | None,
     bodies: tuple[str, ...],
@@ -101,24 +103,22 @@ def command(
     if not quiet:
         _tell_if_nothing_is_random(jobs)
     status = 0
-    rows: list[Row] = []
+    making = Making(out, audit, ledger, as_json)
+    made: dict[int, Row] = {}
     drawn: Outcome | None = None
     try:
         with _progress(jobs, quiet or as_json) as told:
-            for job, progress in zip(jobs, told, strict=True):
-                outcome = execute(
-                    job, store, progress, audit, ledger, lambda made: rows.append(made.row(as_json, ledger))
-                )
-                drawn = outcome if plot is not None else None  # else its arrays are let go
+            drawn = _make(jobs, workers, making, store, made, told)
     except KeyboardInterrupt:
         status = 130
-        click.echo(f"interrupted: {len(rows)} of {len(jobs)} runs are finished and kept", err=True)
-    except (TooLargeError, StoreError) as error:
+        click.echo(f"interrupted: {len(made)} of {len(jobs)} runs are finished and kept", err=True)
+    except MakingError as error:
         status = 2
-        click.echo(f"{jobs[len(rows)].label}: {error}", err=True)
+        click.echo(str(error), err=True)
     finally:
         if store is not None:
             store.close()
+    rows = [made[k] for k in sorted(made)]
 
     for row in rows:
         if row["status"] != "ok":
@@ -201,11 +201,48 @@ def _check_memory(jobs: list[Job]) -> None:
         raise SceneError(tuple(dict.fromkeys(faults)))
 
 
+Told = Callable[[int, Job, float], None]
+"""Called with how many runs are done, the job that is under way, and the share of it that is done."""
+
+
+def _make(
+    jobs: list[Job], workers: int, making: Making, store: Store | None, made: dict[int, Row], told: Told
+) -> Outcome | None:
+    """Make all runs, and enter each into `made` by its place as it is done; return the outcome of a single one.
+
+    Raises:
+        MakingError: a run could not be made.
+    """
+    if min(workers, len(jobs)) > 1:
+
+        def done(place: int, row: Row) -> None:
+            made[place] = row
+            told(len(made), jobs[place], 0.0)
+
+        make(jobs, workers, making, done)
+        return None
+    outcome: Outcome | None = None
+    for k, job in enumerate(jobs):
+
+        def keep(finished: Outcome, k: int = k) -> None:
+            made[k] = finished.row(making.final, making.ledger)
+
+        def under_way(share: float, k: int = k, job: Job = job) -> None:
+            told(k, job, share)
+
+        under_way(0.0)
+        try:
+            outcome = execute(job, store, under_way, making.audit, making.ledger, keep)
+        except (TooLargeError, StoreError) as error:
+            raise MakingError(job, error) from error
+    return outcome if len(jobs) == 1 else None
+
+
 @contextmanager
-def _progress(jobs: list[Job], silent: bool) -> Iterator[Iterator[Progress | None]]:
-    """Yield a progress callback for each job: bars on a terminal, nothing elsewhere."""
+def _progress(jobs: list[Job], silent: bool) -> Iterator[Told]:
+    """Yield who is told how far the runs are: a bar on a terminal, nothing elsewhere."""
     if silent or not sys.stderr.isatty():
-        yield iter([None] * len(jobs))
+        yield lambda *_: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
@@ -215,9 +252,8 @@ def _progress(jobs: list[Job], silent: bool) -> Iterator[Iterator[Progress | Non
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
         whole = bars.add_task(f"{len(jobs)} run(s)", total=float(len(jobs)))
 
-        def callbacks() -> Iterator[Progress]:
-            for k, job in enumerate(jobs):
-                bars.update(whole, description=f"{k + 1}/{len(jobs)} {job.label}", completed=float(k))
-                yield lambda share, k=k: bars.update(whole, completed=k + share)  # type: ignore[misc]
+        def told(done: int, job: Job, share: float) -> None:
+            at = min(done + 1, len(jobs))
+            bars.update(whole, description=f"{at}/{len(jobs)} {job.label}", completed=done + share)
 
-        yield callbacks()
+        yield told

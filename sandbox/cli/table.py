@@ -63,7 +63,7 @@ def print_runs(rows: Sequence[Row]) -> None:
             *([_share(row["joint_error"])] if joined else []),
             *([f"{row['broken_joints']:,}"] if torn else []),
             *(("–", "–") if row["status"] == "refused" else (f"{row['contacts']:,}", _missed(row["missed_contacts"]))),
-            *((_figure(row.get("score")), Text(row.get("over") or "goes on")) if games else ()),
+            *((_figure(row.get("score")), Text(_over(row))) if games else ()),
             *([Text(", ".join(f"{ball}: {pocket}" for ball, pocket in row["pocketed"].items()))] if fallen else []),
         )
     console = Console(width=None if sys.stdout.isatty() else WIDE)
@@ -73,6 +73,11 @@ def print_runs(rows: Sequence[Row]) -> None:
     if not scenes:
         console.print(Text(rows[0]["scene"]), soft_wrap=True)
     console.print(table)
+
+
+def _over(row: Row) -> str:
+    """Return how a game ended; none was played where the engine refused, or the scene has none."""
+    return "–" if row.get("score") is None else row.get("over") or "goes on"
 
 
 def _differs(rows: Sequence[Row], key: str) -> bool:

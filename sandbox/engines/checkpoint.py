@@ -9,6 +9,7 @@ from sandbox.action import Force, Pull, Throttle
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
+from sandbox.scene.standing import Passing
 from sandbox.trajectory import Frame
 
 
@@ -46,3 +47,12 @@ def cast(bodies: Bodies, frame: Frame) -> Bodies:
         layer=some.layer if frame.layer is None else frame.layer[there],
         visits=some.visits if frame.visits is None else frame.visits[there],
     )
+
+
+def passing_in(frame: Frame) -> Passing:
+    """Return who passes which one-way wall in a frame, by the numbers of those who are there."""
+    if frame.passing is None:
+        return ()
+    there = np.flatnonzero(frame.present)
+    numbers = np.searchsorted(there, frame.passing[:, 0])
+    return tuple(zip(numbers.tolist(), frame.passing[:, 1].tolist(), strict=True))

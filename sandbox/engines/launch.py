@@ -50,7 +50,10 @@ def launched(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tupl
     if visits is not None:
         visits = np.where(those[:, None], AWAY, visits)
     laid = Frame(frame.time, present=frame.present | those, roll=roll, layer=layer, visits=visits, **columns)
-    return replace(laid, drives=frame.drives), bodies, those
+    passing = frame.passing
+    if passing is not None:
+        passing = passing[~those[passing[:, 0]]]
+    return replace(laid, drives=frame.drives, passing=passing), bodies, those
 
 
 def _first(scene: Scene, generator: Mover) -> int:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sandbox.action import ActionError, Force, Throttle
-from sandbox.engines.checkpoint import cast
+from sandbox.engines.checkpoint import cast, passing_in
 from sandbox.engines.contract import Observer, Simulation
 from sandbox.engines.registry import start as start_engine
 from sandbox.scene.bodies import Bodies
@@ -97,7 +97,10 @@ class Leg:
             roll[self.numbers] = frame.roll
         layer = self._whole(frame.layer, self.bodies.layer, self.before.layer)
         visits = self._whole(frame.visits, np.zeros_like(self.bodies.visits))
-        return Frame(self.time, position, velocity, angle, spin, present, roll, layer, visits, frame.drives)
+        passing = frame.passing
+        if passing is not None:
+            passing = np.column_stack((self.numbers[passing[:, 0]], passing[:, 1]))
+        return Frame(self.time, position, velocity, angle, spin, present, roll, layer, visits, frame.drives, passing)
 
     def _whole(self, own: IntArray | None, everyone: IntArray, before: IntArray | None = None) -> IntArray | None:
         """Return an array of the simulation with a row for everyone; who is gone is as before."""
@@ -177,7 +180,8 @@ def begun(
         Refusal: the engine lacks something.
         ActionError: it cannot take over a steady force.
     """
-    simulation = start_engine(scene.placed(cast(bodies, frame), frame.time, broken, frame.drives), engine, wanted)
+    placed = scene.placed(cast(bodies, frame), frame.time, broken, frame.drives, passing_in(frame))
+    simulation = start_engine(placed, engine, wanted)
     for each in lasting:
         try:
             simulation.apply(each)

@@ -78,6 +78,11 @@ class Pulls:
         """The hands by the names of the bodies that they hold, as they now are."""
         return dict(self._pulls)
 
+    @property
+    def any(self) -> bool:
+        """Whether somebody is held."""
+        return bool(self._pulls)
+
     def hold(self, pull: Pull, simulation: Simulation) -> None:
         """Take hold of a body, move the hand, or let go.
 
@@ -93,8 +98,6 @@ class Pulls:
 
     def act(self, simulation: Simulation, h: float) -> None:
         """Give every body that is held the impulse of one step of h, s; who is gone by now is let go."""
-        if not self._pulls:
-            return
         frame, bodies, gravity = simulation.frame(), simulation.bodies, math.hypot(*simulation.scene.world.gravity)
         for name, pull in list(self._pulls.items()):
             number = bodies.names.index(name) if name in bodies.names else -1

@@ -172,8 +172,9 @@ class Relay:
     def _advance(self, part: float, advance: Callable[[], None]) -> None:
         """Let hands draw bodies, and the engine advance, by a part of a step."""
         simulation = self._leg.simulation
-        with self._books.hands(simulation):
-            self._pulls.act(simulation, self.settings.dt * part)
+        if self._pulls.any:
+            with self._books.hands(simulation):
+                self._pulls.act(simulation, self.settings.dt * part)
         self._leg.steps += part
         try:
             advance()

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from sandbox.action import Action
+from sandbox.games.lighting import Lighting
 from sandbox.games.referee import Referee
 from sandbox.games.rules import Logged, Policy, Press, Rules
 from sandbox.trajectory import Contacts, Frame
@@ -23,6 +24,7 @@ class Bout:
         """
         self.player = player
         self._referee, self._policy = Referee(rules, presses), policy
+        self._lighting = Lighting(rules)
 
     @property
     def stops(self) -> bool:
@@ -43,6 +45,7 @@ class Bout:
         """
         referee, policy = self._referee, self._policy
         own = referee.look(time, frame, contacts)
+        self._lighting.look(time)
         if policy is None:
             referee.watch(time, own, given)
             return given
@@ -87,4 +90,5 @@ class Bout:
             "presses": [list(press) for press in self.presses],
             "otherwise": self.otherwise,
             **log,
+            **({"lamps": lamps} if (lamps := self._lighting.told()) else {}),
         }

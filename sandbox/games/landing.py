@@ -173,6 +173,10 @@ class Landing:
             ("tilt", _marked(f"{-round(math.degrees(tilt)):+d}°", abs(tilt) > TILT)),
         )
 
+    def gauges(self) -> Sequence[tuple[str, float]]:
+        """Return how full the tank is, 0 to 1."""
+        return (("fuel", self._tank / self._full),)
+
     def _height(self, frame: Frame) -> float:
         """Return how far the lowest point of the ship is above the pad, m."""
         sine, cosine = math.sin(frame.angle[self._ship]), math.cos(frame.angle[self._ship])

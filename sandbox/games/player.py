@@ -1,6 +1,7 @@
 """Player: who plays a headless game, as a value that a run can be known by."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Self
 
 from sandbox.games.bout import Bout
@@ -30,8 +31,11 @@ class Player:
         """Return the player that a text names: one of `POLICIES`, or else the file of a script.
 
         Raises:
-            SceneError: the script cannot be read, or has faults.
+            SceneError: there is none, or the script cannot be read, or has faults.
         """
+        if text not in POLICIES and not Path(text).exists():
+            message = f"cannot be read: No such file; a player is {', '.join(POLICIES)}, or the file of a script"
+            raise SceneError([Fault(text, None, "", message)])
         return cls(text) if text in POLICIES else cls(text, read_script(text))
 
     @classmethod

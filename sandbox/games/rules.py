@@ -19,7 +19,7 @@ from sandbox.action import Action
 from sandbox.recording import Press
 from sandbox.trajectory import Contacts, Frame
 
-__all__ = ["Control", "Lit", "Logged", "Policy", "Press", "Rules", "Seen", "UnfitError"]
+__all__ = ["Control", "Gauged", "Lit", "Logged", "Policy", "Press", "Rules", "Seen", "UnfitError"]
 
 
 class UnfitError(ValueError):
@@ -91,6 +91,14 @@ class Logged(Protocol):
     @property
     def log(self) -> Sequence[tuple[float, str]]:
         """When, s, and what, in order."""
+
+
+@runtime_checkable
+class Gauged(Protocol):
+    """Rules with gauges, besides: what a player reads off the window, as numbers for who learns to play."""
+
+    def gauges(self) -> Sequence[tuple[str, float]]:
+        """Return names and values, finite; the same names in the same order throughout a game, whatever the seed."""
 
 
 @runtime_checkable

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from sandbox.trajectory import FloatArray
+
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """of games, whose scores are no more than the quantiles"""
 MOST_BINS = 10
@@ -38,7 +40,7 @@ class Scores:
         if not scores:
             raise ValueError("no game, no spread of scores")
         values = np.asarray(scores, dtype=np.float64)
-        counts, edges = np.histogram(values, _edges(float(values.min()), float(values.max())))
+        counts, edges = np.histogram(values, _edges(values))
         return cls(
             count=len(values),
             mean=float(values.mean()),
@@ -59,9 +61,16 @@ class Scores:
         }
 
 
-def _edges(least: float, most: float) -> list[float]:
-    """Return the edges of bins that are 1, 2 or 5 times a power of ten wide, of few digits, and hold all scores."""
+def _edges(scores: FloatArray) -> list[float]:
+    """Return the edges of bins that are 1, 2 or 5 times a power of ten wide, of few digits, and hold all scores.
+
+    Where all scores are whole numbers, no bin lies between two of these.
+    """
+    least, most = float(scores.min()), float(scores.max())
     width = 10.0 ** math.floor(math.log10(max(most - least, 1.0) / MOST_BINS))
     width *= next(times for times in (1.0, 2.0, 5.0, 10.0) if most - least <= width * times * MOST_BINS)
+    if (scores == np.round(scores)).all():
+        width = max(width, 1.0)
     first, last = math.floor(least / width), math.floor(most / width) + 1
-    return [width * k for k in range(first, last + 1)]
+    parts = round(1.0 / width)  # of 1, where a bin is narrower: 3 / 10 is 0.3, 3 × 0.1 is not
+    return [k / parts if width < 1.0 else width * k for k in range(first, last + 1)]

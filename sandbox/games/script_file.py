@@ -1,7 +1,7 @@
 """Script files: who presses what when, a line each: `time, control, value`; what follows a # is a remark."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from sandbox.games.rules import Control, Press
@@ -23,10 +23,7 @@ def read_script(path: str | Path) -> tuple[Press, ...]:
         reason = (error.strerror if isinstance(error, OSError) else None) or error
         raise SceneError([Fault(str(path), None, "", f"cannot be read: {reason}")]) from None
     presses, faults = [], []
-    for number, line in enumerate(lines, 1):
-        text = line.partition("#")[0].strip()
-        if not text:
-            continue
+    for number, text in _said(lines):
         try:
             presses.append(_press(text))
         except ValueError as error:
@@ -34,6 +31,14 @@ def read_script(path: str | Path) -> tuple[Press, ...]:
     if faults:
         raise SceneError(faults)
     return tuple(sorted(presses, key=lambda press: press.time))
+
+
+def _said(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
+    """Yield the lines that say something, without remarks, and their numbers from 1 on."""
+    for number, line in enumerate(lines, 1):
+        text = line.partition("#")[0].strip()
+        if text:
+            yield number, text
 
 
 def _press(text: str) -> Press:
@@ -52,15 +57,23 @@ def _press(text: str) -> Press:
 
 
 def faults_of(presses: Sequence[Press], controls: Sequence[Control], file: str) -> list[Fault]:
-    """Return what of a script a game cannot do, each fault once."""
+    """Return what of a script a game cannot do, each fault once, with the line where it is first."""
     known = {control.name: control for control in controls}
     names = ", ".join(map(repr, known))
-    found: dict[Fault, None] = {}
+    found: dict[str, Press] = {}
     for press in presses:
         if press.control not in known:
-            message = f"there is no control {press.control!r}; the game has {names}"
-            found[Fault(file, None, "", message)] = None
+            found.setdefault(f"there is no control {press.control!r}; the game has {names}", press)
         elif not known[press.control].analogue and press.value not in (0.0, 1.0):
-            message = f"{press.control!r} is 0 or 1, not {press.value:g}"
-            found[Fault(file, None, "", message)] = None
-    return list(found)
+            found.setdefault(f"{press.control!r} is 0 or 1, not {press.value:g}", press)
+    lines = _lines(file) if found else {}
+    return [Fault(file, lines.get(press), "", message) for message, press in found.items()]
+
+
+def _lines(file: str) -> dict[Press, int]:
+    """Return the line of each press; none where the file has gone since it was read."""
+    try:
+        said = [*_said(Path(file).read_text(encoding="utf-8").splitlines())]
+        return {_press(text): number for number, text in reversed(said)}  # of equals the first
+    except (OSError, ValueError):
+        return {}

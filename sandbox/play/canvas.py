@@ -1,12 +1,20 @@
 """Canvas: pictures of states as arrays, without a window."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pygame
 
+from sandbox.action import Throttle
+from sandbox.games.rules import Lit, Rules
+from sandbox.play.artillery.seen import over
 from sandbox.play.camera import Camera
+from sandbox.play.drawing.inset import Inset
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.framing import framing
+from sandbox.play.running.burning import burning
 from sandbox.play.sight import Sight
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
@@ -20,10 +28,26 @@ class Canvas:
         """Take a size, px."""
         pygame.font.init()
         self._surface = pygame.Surface(size)
-        self._picture = Picture()
+        self._picture, self._inset = Picture(), Inset()
 
-    def picture(self, scene: Scene, bodies: Bodies, frame: Frame) -> npt.NDArray[np.uint8]:
-        """Return a picture of a state, (height, width, 3)."""
+    def picture(
+        self, scene: Scene, bodies: Bodies, frame: Frame, rules: Rules, throttles: Mapping[str, Throttle]
+    ) -> npt.NDArray[np.uint8]:
+        """Return a picture of a game as the window shows it, without the words: (height, width, 3).
+
+        Args:
+            scene: as it is now.
+            bodies: with those that were spawned.
+            frame: their state.
+            rules: of the game; guns, blasts and lamps are known to them alone.
+            throttles: that were set, by the names of their thrusts.
+        """
         camera = Camera.fitting(framing(scene), self._surface.get_size())
-        self._picture.draw(self._surface, camera, Sight(scene, bodies, frame))
+        lit = rules.lit() if isinstance(rules, Lit) else frozenset[str]()
+        seen = Sight(scene, bodies, frame, flames=burning(scene, bodies, throttles, frame.time), lit=lit)
+        sight = over(rules, seen)
+        if sight.gunnery is not None:
+            sight = replace(sight, gunnery=replace(sight.gunnery, wind=None))  # its sign is the window's
+        self._picture.draw(self._surface, camera, sight)
+        self._inset.draw(self._surface, camera, sight, self._surface.get_rect())
         return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))

@@ -28,6 +28,7 @@ from sandbox.play.instruments.score_panel import covered, draw_score
 from sandbox.play.instruments.timeline import HEIGHT, Timeline
 from sandbox.play.instruments.tools import Tools
 from sandbox.play.knobs import Knobs
+from sandbox.play.messages import MOST
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 from sandbox.play.shelf import to_pick
@@ -83,7 +84,7 @@ class Desk:
         """Return what the score panel covers at the top and at the bottom of the window, px."""
         if stage.host is None or stage.gestures is not None or stage.show is None:
             return 0, 0
-        return covered(stage.host.board(), self._free, self._hud_width(stage.show), self.unit)
+        return covered(stage.host.shown().board, self._free, self._hud_width(stage.show), self.unit)
 
     @property
     def _free(self) -> pygame.Rect:
@@ -185,7 +186,7 @@ class Desk:
             if stage.gestures is not None:
                 sight = stage.gestures.seen.over(sight)
             if stage.host is not None:
-                lit = replace(sight, lit=stage.host.lit())
+                lit = replace(sight, lit=stage.host.shown().lit)
                 sight = over(stage.host.rules, lit, present=not stage.host.live.peeking)
             depth = float(foot)
             self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=depth)
@@ -217,7 +218,7 @@ class Desk:
             self.manual.draw(surface, self.unit, self.claims(stage).told)
 
     def _draw_game(self, surface: pygame.Surface, stage: Stage, host: Host, left: int) -> None:
-        draw_score(surface, host.board(), self._free, left, self.unit)
+        draw_score(surface, host.shown().board, self._free, left, self.unit)
         for note in self._honours.watch(host):
             stage.messages.tell(note, "warning")
         self._honours.draw(surface, self._free, self.unit)
@@ -283,8 +284,11 @@ class Desk:
             told = self.claims(stage).told
             if stage.game is not None:
                 stage.messages.tell("aim with the mouse; Space shoots, H lists all keys")
-            for keys, what in told if stage.game is None else ():
-                stage.messages.tell(f"{keys}: {what}")
+            elif len(told) > MOST:  # more than are seen at once
+                stage.messages.tell(f"{', '.join(keys for keys, _ in told)}: F1 tells what each does")
+            else:
+                for keys, what in told:
+                    stage.messages.tell(f"{keys}: {what}")
         return account(stage, self.claims(stage).told, rate, recording)
 
     def close(self) -> None:

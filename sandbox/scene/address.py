@@ -1,16 +1,22 @@
 """Addresses: any value of a scene by its path, as `--set` and sweeps name it.
 
-`solver.dt` · `world.gravity` · `ball.cue.velocity` · `ball.0.radius` · `ball."8 ball".mass` · `ball.*.restitution`.
+`solver.dt` · `world.gravity` · `ball.cue.velocity` · `ball.0.radius` · `ball."8 ball".mass` · `ball.*.restitution` ·
+`pinball.bumper.*.speed`.
 An element of a list is named by its `name`, or by its number from 0; `*` means every one, where none is called so.
+Numbers may stand in brackets, as faults write them: `drive[0].rate`, `ball.cue.velocity[1]`. A name that ends so itself
+is quoted.
 """
 
 import copy
+import re
 import tomllib
 from typing import Any
 
 from sandbox.scene.faults import Location
 
 EVERY = "*"
+
+_NUMBERED = re.compile(r"(.*?)((?:\[[0-9]+\])+)", re.DOTALL)
 
 
 class AddressError(ValueError):
@@ -52,7 +58,7 @@ def parse_value(text: str) -> Any:
 
 
 def parse_path(path: str) -> tuple[str, ...]:
-    """Split a dotted path; quotes hold names together, as in TOML.
+    """Split a dotted path; quotes hold names together, as in TOML, and a number in brackets is a part of its own.
 
     Raises:
         AddressError: the path is malformed.
@@ -64,13 +70,15 @@ def parse_path(path: str) -> tuple[str, ...]:
             end = rest.find(rest[0], 1)
             if end < 0:
                 raise AddressError(f"{path!r}: a quote is not closed")
-            part, rest = rest[1:end], rest[end + 1 :]
+            part, numbers, rest = rest[1:end], "", rest[end + 1 :]
         else:
             part, dot, after = rest.partition(".")
+            numbered = _NUMBERED.fullmatch(part)
+            part, numbers = numbered.groups() if numbered else (part, "")
             rest = dot + after
         if not part:
             raise AddressError(f"{path!r} is not a path, such as solver.dt or ball.cue.velocity")
-        parts.append(part)
+        parts += [part, *numbers[1:-1].split("][")] if numbers else [part]
         if not rest:
             return tuple(parts)
         if rest[0] != ".":
@@ -91,14 +99,38 @@ def assign(document: dict[str, Any], path: str, value: Any) -> tuple[dict[str, A
         result = copy.deepcopy(document)
     except RecursionError:
         raise AddressError(f"{path}: the scene's values are nested too deeply") from None
-    elements = result.get(parts[0]) if len(parts) > 2 and parts[1] == EVERY else None
+    return result, _assign_all(result, parts, path, value)
+
+
+def _assign_all(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Location:
+    """Set a value in place wherever a path leads, and return the location."""
+    if EVERY not in parts[1:-1]:
+        return _assign(result, parts, path, value)
+    place = parts.index(EVERY, 1)
+    elements, location = _followed(result, parts[:place])
     if not isinstance(elements, list) or EVERY in _names(elements):
-        return result, _assign(result, parts, path, value)
+        return _assign(result, parts, path, value)
     if not elements:
-        raise AddressError(f"{path}: the scene has no [[{parts[0]}]]")
-    for index in range(len(elements)):
-        _assign(elements[index], parts[2:], path, value)
-    return result, (parts[0],)
+        raise AddressError(f"{path}: the scene has no [[{'.'.join(parts[:place])}]]")
+    for element in elements:
+        _assign_all(element, parts[place + 1 :], path, value)
+    return location
+
+
+def _followed(here: Any, parts: tuple[str, ...]) -> tuple[Any, Location]:
+    """Return what a path leads to, with its location; None where it leads nowhere."""
+    location: Location = ()
+    for part in parts:
+        key: str | int = part
+        if isinstance(here, list):
+            try:
+                key = _index(here, part, "")
+            except AddressError:
+                return None, ()
+        elif not isinstance(here, dict) or part not in here:
+            return None, ()
+        here, location = here[key], (*location, key)
+    return here, location
 
 
 def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Location:

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Self
 
 Key = str | int
 Location = tuple[Key, ...]
@@ -34,6 +34,10 @@ class SceneError(Exception):
     def __init__(self, faults: Sequence[Fault]) -> None:
         super().__init__("\n".join(map(str, faults)))
         self.faults = tuple(faults)
+
+    def __reduce__(self) -> tuple[type[Self], tuple[tuple[Fault, ...]]]:
+        """Let it pass from one process to another, faults and all."""
+        return type(self), (self.faults,)
 
 
 def path_of(location: Location, document: Any) -> str:

@@ -73,7 +73,8 @@ def from_document(
     assignments, faults = _parsed(overrides, file)
     stated, whole, changed = document, True, set[Location]()
     if presets.has_preset(document, (path for path, _ in assignments)):
-        stated, changed, assignments = presets.set_first(document, assignments)
+        stated, changed, assignments, wrong = presets.set_first(document, assignments)
+        faults += [Fault(file, None, "--set", message) for message in wrong]
         written = presets.written_out(stated)
         document, whole = (stated, False) if written is None else (written, True)
     unset: list[Override] = []

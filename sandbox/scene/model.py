@@ -28,7 +28,7 @@ from sandbox.scene.ragdoll import Ragdoll
 from sandbox.scene.settings import Settings
 from sandbox.scene.solids import Box, Capsule, Compound, Polygon
 from sandbox.scene.stacks import Stack
-from sandbox.scene.standing import Course, Plane, Post, Wall
+from sandbox.scene.standing import Course, Passing, Plane, Post, Wall
 from sandbox.scene.surfaced import Collides, Mover, Single, Surfaced
 from sandbox.scene.weaves import Cloth, Rope
 from sandbox.scene.world import World
@@ -143,6 +143,11 @@ class Scene(Part):
         return at_rest(self)
 
     @cached_property
+    def passing(self) -> Passing:
+        """Who is being let through which one-way walls, as this state of the scene begins."""
+        return ()
+
+    @cached_property
     def began(self) -> float:
         """The time at which this state of the scene begins, s: 0, but of one that goes on (`placed`)."""
         return 0.0
@@ -153,15 +158,18 @@ class Scene(Part):
         time: float = 0.0,
         broken: Collection[int] = (),
         driven: "FloatArray | None" = None,
+        passing: Passing = (),
     ) -> "Scene":
         """Return this scene with its bodies as they have come to be by a time, s: elsewhere, fewer, or more.
 
         Joints go with their bodies, and those that are broken, by their numbers, are left out; drives go on as they
-        are, (D, 3). Only `bodies`, `links`, `driven` and `began` differ: the file that it would be
-        written to is the same.
+        are, (D, 3), and who passes a one-way wall, by the numbers of these bodies, passes on. Only `bodies`, `links`,
+        `driven`, `passing` and `began` differ: the file that it would be written to is the same.
         """
         links = self.links.without(broken).among(bodies.names, self.bodies.names)
-        return self.holding(bodies, links, time, driven)
+        scene = self.holding(bodies, links, time, driven)
+        scene.__dict__["passing"] = passing
+        return scene
 
     def holding(
         self, bodies: "Bodies", links: "Links", began: float = 0.0, driven: "FloatArray | None" = None

@@ -35,12 +35,14 @@ def written_out(document: dict[str, Any]) -> dict[str, Any] | None:
 
 def set_first(
     document: dict[str, Any], assignments: list[Assignment]
-) -> tuple[dict[str, Any], set[Location], list[Assignment]]:
+) -> tuple[dict[str, Any], set[Location], list[Assignment], list[str]]:
     """Set what a preset is made by, or is outranked by.
 
     Returns:
-        The document, what was set in it, and the assignments that are of what a preset may yet write out.
+        The document, what was set in it, the assignments that are of what a preset may yet write out, and why others,
+        which are of a preset itself, lead nowhere.
     """
+    wrong: list[str] = []
     changed: set[Location] = set()
     later: list[Assignment] = []
     for path, value in assignments:
@@ -49,9 +51,17 @@ def set_first(
                 raise AddressError(path)
             document, location = assign(document, path, value)
             changed.add(location)
-        except AddressError:
-            later.append((path, value))
-    return document, changed, later
+        except AddressError as error:
+            if any(key in document and _begins(path, key) for key in KEYS):
+                wrong.append(str(error))
+            else:
+                later.append((path, value))
+    return document, changed, later, wrong
+
+
+def _begins(path: str, key: str) -> bool:
+    """Tell whether a path leads into a table."""
+    return path == key or path.startswith((f"{key}.", f"{key}["))
 
 
 def place_of(location: Location, document: dict[str, Any], stated: dict[str, Any]) -> Location:

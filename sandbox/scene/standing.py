@@ -1,6 +1,6 @@
 """What stands: the solid things of a scene that never move, `[[plane]]`, `[[wall]]` and `[[post]]`."""
 
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
@@ -11,6 +11,9 @@ from sandbox.scene.zone import Layers
 
 Height = Annotated[float, Field(gt=0, le=1e9)]
 Course = Annotated[tuple[Point, ...], Field(min_length=2, max_length=100_000)]
+
+Passing: TypeAlias = tuple[tuple[int, int], ...]
+"""Pairs of a body, by its number, and a one-way wall that lets it through, −1 − k."""
 
 
 class Plane(Surfaced):

@@ -46,6 +46,8 @@ def test_table_tells_the_score_only_of_games(scene: str, tmp_path: Path, capfd: 
     assert lines[1].split()[-2:] == ["score", "game"]
     assert lines[2].endswith("goes on")
     plain = written(tmp_path, TOY.replace('game = "landing"', ""), "plain.toml")
+    _, lines, _ = lines_of(capfd, "run", scene, plain, "--player", "none")
+    assert [line.split()[-2:] for line in lines if "plain" in line] == [["–", "–"]]  # no game, no score
     _, lines, _ = lines_of(capfd, "run", plain)
     assert "score" not in lines[1]
     assert "score" not in json_of(capfd, "run", plain)[1]["runs"][0]
@@ -110,7 +112,7 @@ def test_script_plays(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[s
     assert row["score"] % 1.0 == 0.5
     bad = written(tmp_path, "0.1, jump, 1\n", "bad.txt")
     status, _, err = json_of(capfd, "run", scene, "--player", bad)
-    assert (status, err) == (2, [f"{bad}: there is no control 'jump'; the game has 'kick', 'aim'"])
+    assert (status, err) == (2, [f"{bad}:1: there is no control 'jump'; the game has 'kick', 'aim'"])
 
 
 def test_player_where_nobody_plays_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

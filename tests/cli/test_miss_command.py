@@ -50,8 +50,11 @@ def test_table_tells_the_truth_and_by_how_much_each_misses(capfd: pytest.Capture
 def test_what_is_wrong_is_told(capfd: pytest.CaptureFixture[str], air: str) -> None:
     status, _, err = lines_of(capfd, "miss", air, "--set", "world.gravity=[0.0, 0.0]")
     assert status == 2
-    assert "never comes down" in err[0]
+    assert "world.gravity: the shot does not come down" in err[0]
+    status, _, err = lines_of(capfd, "miss", air, "--speed", "1000")  # 1414 m/s / 9.81 m/s² is 144 s
+    assert (status, err) == (2, [f"{air}: the shot does not come down within 120 s and 1e+06 m"])
     status, _, err = lines_of(capfd, "miss", "nowhere")
     assert status == 2
-    status, _, err = lines_of(capfd, "miss", air, "--angle", "200")
-    assert (status, "--angle" in err[0]) == (2, True)
+    for option, value in (("angle", "200"), ("angle", "0"), ("angle", "nan"), ("speed", "nan"), ("dt", "nan")):
+        status, _, err = lines_of(capfd, "miss", air, f"--{option}", value)
+        assert (status, len(err), f"--{option}" in err[0], "is not in the range" in err[0]) == (2, 1, True, True)

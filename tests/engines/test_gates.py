@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sandbox.action import Remove, Spawn, Switch
 from sandbox.engines.contract import Refusal
 from sandbox.engines.relay import Relay, start
 from sandbox.measure.run import run
+from sandbox.scene.discs import Ball
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
 
@@ -139,6 +141,55 @@ def test_checkpoint_within_the_gate_goes_on_through() -> None:
     assert taken_up.state_hash() == simulation.state_hash()
 
 
+@pytest.mark.parametrize("moment", [0.13, 0.31, 0.5, 0.77])
+@pytest.mark.parametrize("steep", [0.0, 0.2])
+def test_what_lies_on_it_does_not_fall_through_where_another_engine_goes_on(steep: float, moment: float) -> None:
+    # What rests touches it at no speed but rounding, of either sign.
+    ball = {"position": [0.1, 0.15 + 0.1 * steep], "restitution": 0.3}
+    simulation = start(gate(ball, [[-1.0, -steep], [1.0, steep]], gravity=[0.3, -9.81]))
+    while simulation.time < moment - 1e-9:
+        simulation.step()
+    simulation.apply(Switch(time=moment))
+    for _ in range(60):
+        simulation.step()
+    x, y = simulation.frame().position[0]
+    assert y > steep * x + R
+
+
+def test_checkpoint_where_it_has_turned_round_within_lets_it_go_back() -> None:
+    # Its centre beyond the line, and on its way back: by place and speed alone it would be one to turn away.
+    pull = 2.0
+    scene = gate({"position": [0.5, 0.0], "velocity": [-float(np.sqrt(2.0 * pull * 0.54)), 0.0]}, gravity=[pull, 0.0])
+    simulation = start(scene)
+    while simulation.frame().velocity[0, 0] <= 0.0:
+        simulation.step()
+    assert -R < simulation.frame().position[0, 0] < 0.0
+    taken_up = Relay.resumed(simulation.checkpoint())
+    assert taken_up.state_hash() == simulation.state_hash()
+    for each in (simulation, taken_up):
+        gone(each, 150)
+        assert each.frame().passing is None
+    assert taken_up.state_hash() == simulation.state_hash()
+    assert taken_up.frame().position[0, 0] > R
+
+
+def test_who_passes_is_told_by_the_numbers_of_all_also_after_some_are_gone() -> None:
+    simulation = start(gate({"position": [3.0, 0.0]}))
+    simulation.apply(Spawn(time=0.0, ball=Ball(position=(0.5, 0.0), velocity=(-1.0, 0.0), radius=R)))
+    told = []
+    for k in range(150):
+        if k == 105:
+            simulation.apply(Remove(time=simulation.time, body="ball"))
+            simulation.apply(Switch(time=simulation.time))
+        passing = simulation.frame().passing
+        told.append(None if passing is None else passing.tolist())
+        simulation.step()
+    # It overlaps from x = 0.11 to −0.11 m, at 1 m/s and 5 ms a step; before and after, nobody passes.
+    assert told[:78] == [None] * 78
+    assert told[80:122] == [[[1, -1]]] * 42
+    assert told[124:] == [None] * 26
+
+
 def test_audit_misses_nothing_at_a_gate() -> None:
     scene = gate({"position": [0.5, 0.0], "velocity": [-60.0, 0.0]})
     assert run(scene).missed_contacts == 0
@@ -151,9 +202,6 @@ def test_engines_without_gates_refuse(engine: str) -> None:
 
 
 def test_surfaces_numbered_anew_leave_the_gate_what_it_is() -> None:
-    from sandbox.action import Spawn
-    from sandbox.scene.discs import Ball
-
     simulation = start(gate({"position": [0.5, 0.0], "velocity": [-1.0, 0.0]}))
     for k in range(3):
         simulation.apply(Spawn(time=0.0, ball=Ball(position=(3.0 + k, 0.5), radius=R, restitution=0.1 * k + 0.05)))

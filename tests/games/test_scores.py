@@ -32,6 +32,18 @@ def test_bins_hold_all_scores_and_are_round(scores: list[float]) -> None:
     assert f"{width:.0e}"[0] in "125"
 
 
+@given(st.lists(st.integers(-40, 40), min_size=1, max_size=30))
+def test_bins_of_whole_scores_are_whole(scores: list[int]) -> None:
+    assert all(edge == round(edge) for edge in Scores.of(scores).edges)
+
+
+@pytest.mark.parametrize(("score", "edge"), [(0.3, 3), (0.6, 6), (0.7, 7)])
+def test_bins_hold_their_lower_edges(score: float, edge: int) -> None:
+    found = Scores.of([score, 0.05, 1.0])
+    k = found.edges.index(edge / 10)  # where 3 × 0.1 is more than 0.3
+    assert found.counts[k] == 1
+
+
 def test_one_score_is_a_bin() -> None:
     found = Scores.of([7])
     assert (found.deviation, found.counts) == (0.0, (1,))

@@ -52,8 +52,18 @@ def test_what_a_game_does_not_have_is_told() -> None:
     ]
 
 
+def test_what_a_game_does_not_have_is_told_where_it_is_first(tmp_path: Path) -> None:
+    file = tmp_path / "s.txt"
+    file.write_text("# first\n3, tilt, 1\n\n1, plunger, 1\n3, tilt, 1\n2, left flipper, 0.5 # half\n")
+    faults = faults_of(read_script(file), CONTROLS, str(file))
+    assert [(fault.line, fault.message.split(";")[0]) for fault in faults] == [
+        (6, "'left flipper' is 0 or 1, not 0.5"),
+        (2, "there is no control 'tilt'"),
+    ]
+
+
 def test_no_file_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="cannot be read: No such file"):
+    with pytest.raises(SceneError, match="No such file; a player is random, none, skilled, or the file of a script"):
         Player.named(str(tmp_path / "none.txt"))
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(SceneError, match="cannot be read"):

@@ -9,6 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sandbox.scene.address import AddressError, assign, parse_assignment, parse_path, parse_value
+from sandbox.scene.faults import path_of
 
 DOCUMENT: dict[str, Any] = {
     "title": "t",
@@ -48,13 +49,18 @@ def test_value_is_toml_and_any_other_word_a_string(text: str, value: object) -> 
         ("ball.8 ball.mass", ("ball", "8 ball", "mass")), ("ball.'a.b'.mass", ("ball", "a.b", "mass")),
         ("""ball.'say "hi"'""", ("ball", 'say "hi"')), ("ball.0.velocity.1", ("ball", "0", "velocity", "1")),
         ("ball.it's.mass", ("ball", "it's", "mass")), ('"a"', ("a",)),
+        ("drive[0].rate", ("drive", "0", "rate")), ("ball.cue.velocity[1]", ("ball", "cue", "velocity", "1")),
+        ("wall[0].points[1][0]", ("wall", "0", "points", "1", "0")), ("ball.'a[0]'.mass", ("ball", "a[0]", "mass")),
+        ("ball.[x]", ("ball", "[x]")), ("a[0]b", ("a[0]b",)),
     ],
 )  # fmt: skip
 def test_path_is_split_at_dots_outside_quotes(path: str, parts: tuple[str, ...]) -> None:
     assert parse_path(path) == parts
 
 
-@pytest.mark.parametrize("path", ["", ".", "a.", ".a", "a..b", '"a', "'a.b", '"a"b', 'a."".b', "''", "a.'b'c"])
+@pytest.mark.parametrize(
+    "path", ["", ".", "a.", ".a", "a..b", '"a', "'a.b", '"a"b', 'a."".b', "''", "a.'b'c", "[0]", "a.[0].b"]
+)
 def test_path_malformed_is_refused(path: str) -> None:
     with pytest.raises(AddressError):
         parse_path(path)
@@ -123,6 +129,14 @@ def test_path_into_an_empty_list_is_refused() -> None:
         assign({"ball": []}, "ball.0.mass", 1)
 
 
+@pytest.mark.parametrize(
+    "location",
+    [("ball", 0, "mass"), ("ball", 2, "mass"), ("wall", 0, "points", 1, 0), ("world", "gravity", 1), ("ball", 1)],
+)
+def test_path_that_a_fault_writes_leads_to_what_it_is_about(location: tuple[str | int, ...]) -> None:
+    assert assign(DOCUMENT, path_of(location, DOCUMENT), 7)[1] == location
+
+
 @given(st.text(max_size=40), st.integers())
 @example("world." + "a." * 5000 + "b", 1)
 def test_any_path_is_followed_or_refused(path: str, value: int) -> None:
@@ -162,6 +176,14 @@ def test_star_reaches_into_values() -> None:
     assert assign(document, 'ball."*".mass', 9)[0]["ball"][1] == {"position": [2.0, 3.0], "mass": 9}
 
 
+def test_star_stands_for_every_element_of_a_list_anywhere() -> None:
+    document = {"pinball": {"bumper": [{"name": "a"}, {}], "wall": [{"points": [[0, 0], [1, 2]]}]}}
+    changed, where = assign(document, "pinball.bumper.*.speed", 2)
+    assert where == ("pinball", "bumper")
+    assert changed["pinball"]["bumper"] == [{"name": "a", "speed": 2}, {"speed": 2}]
+    assert assign(document, "pinball.wall.*.points.*[1]", 7)[0]["pinball"]["wall"] == [{"points": [[0, 7], [1, 7]]}]
+
+
 def test_element_called_star_is_the_one_that_is_meant() -> None:
     document = {"ball": [{"name": "a"}, {"name": "*"}]}
     changed, where = assign(document, "ball.*.mass", 2)
@@ -179,6 +201,9 @@ def test_element_called_star_is_the_one_that_is_meant() -> None:
         ({"ball": [{"mass": 1}]}, "ball.*", "no element"),
         ({"world": {"gravity": [0, 0]}}, "world.*.x", "no world"),
         ({"ball": [3]}, "ball.*.mass", r"\w"),
+        ({"pinball": {"bumper": []}}, "pinball.bumper.*.speed", r"no \[\[pinball.bumper\]\]"),
+        ({"pinball": {"wall": []}}, "pinball.bumper.*.speed", "no pinball.bumper"),
+        ({"ball": [{}]}, "ball.b.shapes.*.x", "no element 'b'"),
     ],
 )  # fmt: skip
 def test_star_that_leads_nowhere_is_refused(document: dict[str, Any], path: str, words: str) -> None:

@@ -197,6 +197,21 @@ def test_overrides_reach_elements_and_what_they_stand_for() -> None:
 
 
 @pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("pinball.bumper[9].speed=1", "no element '9'; names: pop; numbers: 0 to"),
+        ("pinball.bumper.pup.speed=1", "no element 'pup'; names: pop"),
+        ("pinball.bumpr.pop.speed=1", "the scene has no pinball.bumpr"),
+    ],
+)
+def test_override_of_an_element_that_there_is_not_tells_which_there_are(override: str, words: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        loads(TEXT, overrides=[override])
+    assert words in str(caught.value)
+    assert len(caught.value.faults) == 1
+
+
+@pytest.mark.parametrize(
     ("changes", "path", "words"),
     [
         ({"bumper": [{"position": [0, 0], "radios": 1.0}]}, "pinball.bumper[0].radios", "did you mean 'radius'?"),
@@ -212,6 +227,7 @@ def test_overrides_reach_elements_and_what_they_stand_for() -> None:
         ({"drops": [{"position": [0, 0], "facing": [1, 0], "count": 0}]}, "pinball.drops[0].count", "1 or more"),
         ({"slingshot": [{"points": [[0, 0], [1, 0], [2, 0]]}]}, "pinball.slingshot[0].points", "three posts"),
         ({"gate": [{"points": [[0, 0], [0, 0]]}]}, "pinball.gate[0].points[1]", "ends of a line"),
+        ({"ramp": [{"points": [[0, 0], [0, 0.5]], "width": 0.026}]}, "pinball.ramp[0].width", "more than 0.02698 m"),
         ({"ramp": [{"points": [[0, 0], [0, 0.1]]}]}, "pinball.ramp[0].climb", "longer than the ramp, 0.1 m"),
         ({"flipper": [{"pivot": [0, 0], "length": 0.001}]}, "pinball.flipper[0].length", "inside the other"),
         ({"flipper": [{"pivot": [0, 0], "stops": [1, 1]}]}, "pinball.flipper[0].stops", "one and the same"),
@@ -248,11 +264,25 @@ def test_fault_is_told_with_file_line_and_path() -> None:
 
 
 def test_faults_of_what_is_written_out_point_at_the_element() -> None:
+    bank = '[[pinball.drops]]\nname = "bank"\nposition = [0.2, 0.5]\nfacing = [0, -1]\n'
+    with pytest.raises(SceneError) as caught:
+        loads(TEXT.replace('name = "side"', 'name = "bank 2"') + bank, "two.toml")
+    (fault,) = caught.value.faults
+    assert (fault.file, fault.line, fault.path) == ("two.toml", 19, "wall.bank 2.name")
+    assert "unique" in fault.message
+
+
+def test_elements_that_are_called_alike_are_told_by_themselves() -> None:
     with pytest.raises(SceneError) as caught:
         loads(TEXT.replace('name = "side"', 'name = "right pop"'), "two.toml")
     (fault,) = caught.value.faults
-    assert (fault.file, fault.line, fault.path) == ("two.toml", 7, "post.right pop.name")
-    assert "unique" in fault.message
+    assert str(fault) == (
+        "two.toml:8: pinball.bumper.pop.name: 'right pop' is what pinball.wall[0] is called; names are unique"
+    )
+    with pytest.raises(SceneError) as caught:
+        loads(TEXT.replace("[0.2, 0.7]", "[0.25, 0.7]"), "two.toml")
+    (fault,) = caught.value.faults
+    assert str(fault).startswith("two.toml:10: pinball.bumper.pop.mirrored: puts it onto itself")
 
 
 def test_a_scene_is_one_table() -> None:

@@ -127,6 +127,11 @@ def test_stated_heights_are_the_ground() -> None:
     ("change", "path", "told"),
     [
         (("position = 30.0", "position = 199.5"), "artillery.player.Red.position", "from 1.5 to 198.5 m"),
+        (
+            ("position = 170.0", "position = 32.9"),
+            "artillery.player.Blue.position",
+            "is where 'Red' stands",
+        ),
         (("width = 200.0", "width = 200.0\nheights = [1.0, 2.0]"), "terrain.heights", "leave out `columns`"),
         (('name = "Blue"', 'name = "Red"'), "artillery.player.Red.name", "names are unique"),
         (("[artillery]", "[artillery]\nwind = 5.0"), "artillery.wind", "world.linear_drag"),

@@ -1,11 +1,15 @@
 """Gates: one-way walls. Who comes from the right of one is let through, for as long as the two overlap.
 
+Who is passing is part of a state: where a space goes on from one, what lies on a wall touches it anew, at no speed but
+rounding, and could not be told from what leaves it.
+
 Munk2D keeps to what `begin` decides of a contact until it ends; until then `pre_solve` is called all the same.
 `separate`, which would tell the end, is of no use: it is called for what still touches when a space goes, and pymunk
 has let go of its own objects by then.
 """
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, TypeAlias
 
 import numpy as np
 import pymunk
@@ -13,6 +17,9 @@ import pymunk
 from sandbox.engines.native.approach import closing_speed
 from sandbox.scene.surfaces import Surfaces
 from sandbox.trajectory import BoolArray
+
+Who: TypeAlias = tuple[int, int]
+"""The ids of a body and a wall."""
 
 
 class Gates:
@@ -25,7 +32,9 @@ class Gates:
         self.tick = 0
         """counts substeps"""
         self._handled: set[tuple[int, int]] = set()
-        self._passing: dict[tuple[int, int], dict[tuple[pymunk.Shape, pymunk.Shape], int]] = {}
+        self._passing: dict[Who, dict[tuple[pymunk.Shape, pymunk.Shape] | None, int]] = {}
+        self._last = -1  # the substep in which somebody was passing
+        self._goes_on = False
 
     def renew(self, surfaces: Surfaces, touching: BoolArray) -> None:
         """Watch the pairs (S, S) of surfaces of which one may be such a wall's."""
@@ -33,6 +42,18 @@ class Gates:
             if (a, b) not in self._handled:
                 self._handled.add((a, b))
                 self._space.on_collision(a + 1, b + 1, begin=self._begin)
+
+    def go_on(self, passing: Iterable[Who]) -> None:
+        """Go on from a state in which some were passing, told by their ids and those of the walls."""
+        self._goes_on = True
+        for who in passing:
+            self._passing[who], self._last = {None: self.tick}, self.tick
+
+    def passing(self) -> list[Who]:
+        """Return who is passing what now, by their ids."""
+        if self._last != self.tick:
+            return []
+        return [who for who, pairs in self._passing.items() if self.tick in pairs.values()]
 
     def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
         wall, shape = self._told_apart(arbiter)
@@ -47,7 +68,7 @@ class Gates:
         """Take note that a contact is still being ignored."""
         wall, shape = self._told_apart(arbiter)
         if wall is not None:
-            self._passing.setdefault(_who(shape, wall), {})[shape, wall] = self.tick
+            self._passing.setdefault(_who(shape, wall), {})[shape, wall] = self._last = self.tick
 
     def _told_apart(self, arbiter: pymunk.Arbiter) -> tuple[pymunk.Shape | None, pymunk.Shape]:
         """Return the wall that lets pass, if one of the two is such, and the other."""
@@ -63,10 +84,13 @@ class Gates:
         """
         assert isinstance(wall, pymunk.Segment) and shape.body is not None
         side = shape.bb.center() - shape.body.velocity * self._h - wall.a
-        return bool((wall.b - wall.a).cross(side) >= 0.0 and closing_speed(arbiter) >= 0.0)
+        if (wall.b - wall.a).cross(side) < 0.0:
+            return False
+        touched = self._goes_on and self.tick == 1  # before the space was made, and was not passing
+        return touched or closing_speed(arbiter) >= 0.0
 
 
-def _who(shape: pymunk.Shape, wall: pymunk.Shape) -> tuple[int, int]:
+def _who(shape: pymunk.Shape, wall: pymunk.Shape) -> Who:
     """Return the ids of a body and a wall."""
     assert shape.body is not None and wall.body is not None
     return shape.body.id, wall.body.id

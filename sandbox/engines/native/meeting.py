@@ -93,6 +93,20 @@ class MeetingBodies(Members):
             self._add(number, bodies, state)
         self._register()
         self.drives.watch(self._kinds)
+        if self._scene.began and self._setter.gates.walls:
+            walls = {number: each for each, number in self._ground.ids.items()}
+            pairs = [(n, walls[wall]) for n, wall in self._scene.passing if n in self._members]
+            self._setter.gates.go_on([(self._members[n].body.id, wall) for n, wall in pairs])
+
+    def passing(self) -> IntArray | None:
+        """Return who is being let through a one-way wall, and which, −1 − k, (P, 2); none where nobody is."""
+        who = self._setter.gates.passing()
+        if not who:
+            return None
+        numbers = {member.body.id: n for n, member in self._members.items()}
+        walls = self._ground.ids
+        pairs = sorted((numbers[body], walls[wall]) for body, wall in who if body in numbers)
+        return np.asarray(pairs, np.int64) if pairs else None
 
     def _kinds(self, number: int) -> set[int]:
         """Return the collision types of a body's shapes."""
@@ -225,7 +239,10 @@ class MeetingBodies(Members):
         if not self._moving:
             return
         self.field.time = time
-        self._apply_forces()
+        if self._dragged:
+            self.steady.apply_with_drag(self._members, self._reader, self._read(), self._scene.world, self._h)
+        else:
+            self.steady.apply(self._members)
         if self._setter.gates.walls:
             self._setter.gates.tick += 1
         if self.drives:
@@ -244,13 +261,6 @@ class MeetingBodies(Members):
     def pairs(self) -> IntArray:
         """Return who is in contact, (K, 2) numbers, fixed things being −1 − k; a pair may be listed twice."""
         return self._reader.pairs() if self._moving else np.empty((0, 2), np.int64)
-
-    def _apply_forces(self) -> None:
-        """Set what pymunk forgets after each step: the drag on all bodies, the steady forces on some."""
-        if self._dragged:
-            self.steady.apply_with_drag(self._members, self._reader, self._read(), self._scene.world, self._h)
-        else:
-            self.steady.apply(self._members)
 
     def _read(self) -> tuple[IntArray, FloatArray]:
         if self._state is None:

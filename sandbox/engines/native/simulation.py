@@ -122,7 +122,7 @@ class NativeSimulation(Running):
         self._advance(int(whole))
         if self._population.felt is not None:  # which can take a shorter step, with its contacts
             if rest:
-                self._substep(int(whole), share=rest)
+                self._substep(int(whole), self.time, share=rest)
             self._part = part
             self._guard()
             self._retire()
@@ -130,7 +130,7 @@ class NativeSimulation(Running):
             return
         before, drives = [array.copy() for array in self._state()], self._population.meeting.drives
         driven = drives.told()
-        self._substep(int(whole), look=False, share=rest)  # its contacts lie beyond the end
+        self._substep(int(whole), self.time, look=False, share=rest)  # its contacts lie beyond the end
         self._part = part
         self._guard()
         for now, old in zip(self._state(), before, strict=True):
@@ -175,7 +175,10 @@ class NativeSimulation(Running):
         layer = population.layer.copy() if len(scene.layers) > 1 else None
         visits = population.visits.copy() if scene.zones else None
         drives = population.meeting.drives.told() if scene.drives else None
-        return Frame(self.time, position, velocity, angle, angular_velocity, present, roll, layer, visits, drives)
+        passing = population.meeting.passing()
+        return Frame(
+            self.time, position, velocity, angle, angular_velocity, present, roll, layer, visits, drives, passing
+        )
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
@@ -222,16 +225,17 @@ class NativeSimulation(Running):
         if not together:
             self._population.free.step(substeps)
         if together or self._notes is not None or len(self._population.meeting):
+            time = self.time
             for k in range(substeps):
-                self._substep(k, fly=together)
+                self._substep(k, time, fly=together)
 
-    def _substep(self, k: int, look: bool = True, fly: bool = True, share: float = 1.0) -> None:
-        """Advance by h, the k-th time in this step; those in flight may have done so already.
+    def _substep(self, k: int, time: float, look: bool = True, fly: bool = True, share: float = 1.0) -> None:
+        """Advance by h, the k-th time in the step that began at a time, s; those in flight may have done so already.
 
         A share of it is booked: what lies beyond is cut off afterwards.
         """
         population, h = self._population, self._h
-        start = self.time + k * h
+        start = time + k * h
         before = self._seen() if self._observer is not None else None
         opening = self._books.opening() if self._books is not None else None
         if fly:

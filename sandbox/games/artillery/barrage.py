@@ -61,6 +61,11 @@ class Barrage:
         for k, shell in enumerate(new):  # what the rules spawn stands before what a hand does
             shell.number = first + k
 
+    def disturb(self) -> None:
+        """Note that what flies now does so in another air than it was fired in."""
+        for shell in self.shells:
+            shell.exact, shell.disturbed = None, True
+
     def follow(self, seen: Seen, passed: float) -> list[Action]:
         """Look where all shells have gone since the last frame, a time before, s."""
         actions: list[Action] = []
@@ -135,7 +140,22 @@ class Barrage:
         if near.any() or still or time - shell.rolling > ROLLS:
             x, y = shell.place.tolist()
             return self._go_off(shell, (x, y - ROLLER), time)
-        return [] if 0.0 <= shell.place[0] <= self._field.ground.width else self._left(shell, time)
+        if 0.0 <= shell.place[0] <= self._field.ground.width:
+            return []
+        return self._left(shell, time) if self._edges == "open" else self._roll_past(shell, time)
+
+    def _roll_past(self, shell: Shell, time: float) -> list[Action]:
+        """Let what has rolled past a side roll on within; it goes off where the ground there stands higher."""
+        ground = self._field.ground
+        beyond = returned(shell.place, shell.velocity, ground, self._edges)
+        assert beyond is not None
+        (x, y), (vx, vy) = (each.tolist() for each in beyond)
+        surface = float(ground.surface(x))
+        if y < surface:
+            return self._go_off(shell, (x, y), time)
+        place = x, max(y, surface + ROLLER)
+        shell.place, shell.velocity = np.array(place), beyond[1]
+        return [Move(time=time, body=shell.name, position=place, velocity=(vx, vy))]
 
     def _split(self, shell: Shell, time: float) -> list[Action]:
         """Let a cluster come apart: its momentum stays, the fragments fly on beside each other."""
@@ -167,7 +187,8 @@ class Barrage:
         """Note what a shot came to, if it is one that was fired and came down by itself."""
         if shell.whole and shell.rolling is None:
             exact = None if shell.exact is None else shell.exact.place
-            self.shots.append(Shot(shell.shooter.name, shell.weapon.name, place, exact, time - shell.fired, time))
+            flown = time - shell.fired
+            self.shots.append(Shot(shell.shooter.name, shell.weapon.name, place, exact, flown, time, shell.disturbed))
 
     def _shell(
         self, time: float, tank: Tank, weapon: Weapon, place: FloatArray, velocity: FloatArray, rolls: bool = False

@@ -61,7 +61,8 @@ class Field:
         """of this turn"""
         self.cues: list[str] = []
         """names of sounds"""
-        self._pull = math.hypot(*scene.world.gravity)
+        self.pull = math.hypot(*scene.world.gravity)
+        """m/s², with which dirt falls"""
         self._since = 0.0
         self._stood: dict[str, float] = {}  # how high each tank stood when it began to fall, m
 
@@ -132,4 +133,4 @@ class Field:
     def _fallen(self, time: float) -> bool:
         """Tell whether all dirt has come down that falls."""
         drops = [(since, each.drop) for since, loose in self.falling for each in loose]
-        return not self._pull or all(0.5 * self._pull * (time - since) ** 2 >= drop for since, drop in drops)
+        return not self.pull or all(0.5 * self.pull * (time - since) ** 2 >= drop for since, drop in drops)

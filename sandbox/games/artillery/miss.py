@@ -9,7 +9,7 @@ import numpy as np
 from sandbox.engines.contract import Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.registry import ENGINES, start
-from sandbox.games.artillery.flight import NOBODY, Landing, landing
+from sandbox.games.artillery.flight import LONGEST, NOBODY, Landing, landing
 from sandbox.games.artillery.ground import Ground
 from sandbox.games.artillery.shells import MASS, RADIUS, Step
 from sandbox.scene.discs import Ball
@@ -19,8 +19,8 @@ from sandbox.trajectory import FloatArray, Frame
 
 STEPS = 1 / 15, 1 / 60, 1 / 240
 """s, of the table"""
-LONGEST = 1_000_000
-"""steps that a shot is followed"""
+LATER = 2.0
+"""times as long as the longest true flight, that an engine's is followed"""
 FAR = 1e6
 """m, beyond which no shot is looked for"""
 
@@ -67,7 +67,7 @@ def miss_table(world: World, speed: float, angle: float, dts: Sequence[float] = 
         dts: steps, s.
 
     Raises:
-        ValueError: the shot never comes down.
+        ValueError: the shot does not come down, or so late or far away that it is not followed.
     """
     velocity = speed * np.array([math.cos(angle), math.sin(angle)])
     world = World(**{key: getattr(world, key) for key in ("gravity", "linear_drag", "quadratic_drag", "wind")})
@@ -97,7 +97,7 @@ def _exact(world: World, velocity: FloatArray) -> Landing:
     """Return where a shot comes down that starts on level ground, from there on.
 
     Raises:
-        ValueError: it never does.
+        ValueError: it never does, or too late, or too far away.
     """
     near = _from(FAR, world, velocity)
     return _from(1.0 + 2.0 * abs(near.place[0]), world, velocity)  # nearer to 0, where there is less to round
@@ -107,7 +107,7 @@ def _from(half: float, world: World, velocity: FloatArray) -> Landing:
     """Return the same, found on ground that goes so far to either side, m."""
     down = landing(world, np.array([half, 0.0]), velocity, Ground(np.zeros(2), 2.0 * half))
     if down is None:
-        raise ValueError("the shot never comes down")
+        raise ValueError(f"the shot does not come down within {LONGEST:g} s and {FAR:g} m")
     return down._replace(place=(down.place[0] - half, down.place[1]))
 
 
@@ -116,21 +116,21 @@ def flown(world: World, velocity: FloatArray, engine: str, settings: Settings) -
 
     Raises:
         Refusal: it does not fly it.
-        ValueError: the shot never comes down.
+        ValueError: the shot does not come down.
     """
     vx, vy = velocity.tolist()
     ball = Ball(position=(0.0, 0.0), velocity=(vx, vy), radius=RADIUS, mass=MASS, collides="none")
     scene = Scene(world=world, solver=settings, balls=(ball,))
     simulation = start(scene, engine, settings)
     before, now = simulation.frame(), simulation.frame()
-    for _ in range(LONGEST):
+    for _ in range(math.ceil(LATER * LONGEST / settings.dt)):
         before = now
         simulation.step()
         now = simulation.frame()
         if now.position[0, 1] <= 0.0:
             break
     else:
-        raise ValueError("the shot never comes down")
+        raise ValueError(f"on {engine} the shot does not come down within {LATER * LONGEST:g} s")
     simulation.close()
     half = 1.0 + 2.0 * abs(float(now.position[0, 0]))
     step = Step(_state(before, half), _state(now, half), now.time - before.time)

@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import Literal
 
+import numpy as np
+
 from sandbox.action import Action, SetParameter
 from sandbox.games.artillery.aim import Aim
 from sandbox.games.artillery.barrage import Barrage
@@ -16,6 +18,12 @@ from sandbox.games.artillery.weapons import WEAPONS
 from sandbox.games.rules import Control, Seen
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
+
+HEIGHTS = 33
+"""of the ground, evenly from side to side, that gauges tell"""
+
+AIR = frozenset({"gravity", "wind", "linear_drag", "quadratic_drag"})
+"""Of the world, what decides how shells fly."""
 
 Phase = Literal["begin", "aim", "fly", "settle"]
 """Of a turn: the next player gets the gun, aims it; shells are in the air; ground and tanks come to rest."""
@@ -100,6 +108,7 @@ class ArtilleryRules:
     def look(self, seen: Seen) -> Sequence[Action]:
         """Go on with the turn: aim as long as keys are held, follow what flies, wait until all is still."""
         passed, self._time = seen.time - self._time, seen.time
+        self._breathe(seen.actions)
         self.barrage.know(seen)
         self.field.tanks.see(seen.frame)
         match self.phase:
@@ -137,10 +146,35 @@ class ArtilleryRules:
             told.append(("last shot", self.shots[-1].told))
         return told
 
+    def gauges(self) -> Sequence[tuple[str, float]]:
+        """Return whose turn it is, the wind, every gun and what its tank has, the last shot, and the ground."""
+        field, last = self.field, next((shot.place for shot in reversed(self.shots) if shot.place is not None), None)
+        person = self.phase == "aim" and self.shooter.player.bot is None
+        found = [("turn", float(self.turn)), ("shooter", self._number), ("may fire", person)]
+        found += [("wind", self.world.wind[0]), ("shells", len(self.barrage.shells))]
+        for tank in field.tanks.every:
+            own = {"health": tank.health, "money": tank.money, "points": tank.points}
+            gun = {"barrel": tank.angle, "power": tank.power, "weapon": tank.weapon}
+            found += [(f"{tank.name} {name}", value) for name, value in (own | gun).items()]
+        found += [("landed x", -1.0 if last is None else last[0])]
+        heights = field.ground.surface(np.linspace(0.0, field.ground.width, HEIGHTS))
+        return [*found, *((f"height {k}", height) for k, height in enumerate(heights.tolist()))]
+
     def cues(self) -> Sequence[str]:
         """Return the sounds since the last call."""
         cues, self.field.cues = self.field.cues, []
         return cues
+
+    def _breathe(self, actions: Sequence[Action]) -> None:
+        """Go on in the air that a hand has made another; what flies through both has no exact flight."""
+        for action in actions:
+            key = action.path.removeprefix("world.") if isinstance(action, SetParameter) else ""
+            if not isinstance(action, SetParameter) or key not in AIR:
+                continue
+            value = tuple(action.value) if isinstance(action.value, list) else action.value
+            self.world = self.world.model_copy(update={key: value})
+            self.field.pull = math.hypot(*self.world.gravity)
+            self.barrage.disturb()
 
     def _begin_turn(self) -> list[Action]:
         """Let the next who is alive have the gun, in a wind of the turn's own; or end the game."""

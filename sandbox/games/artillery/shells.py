@@ -42,6 +42,8 @@ class Shell:
     """s, when it left the muzzle"""
     exact: Landing | None = None
     """where the exact flight comes down"""
+    disturbed: bool = False
+    """Air or gravity became others on its way."""
     whole: bool = True
     """It is what was fired, no fragment of it."""
     rolling: float | None = None

@@ -19,6 +19,8 @@ class Shot(NamedTuple):
     """s"""
     time: float = 0.0
     """s, when it came down, or was seen to have left"""
+    disturbed: bool = False
+    """Air or gravity became others on its way: no one flight is the exact one."""
 
     @property
     def off(self) -> float | None:
@@ -28,6 +30,8 @@ class Shot(NamedTuple):
     @property
     def told(self) -> str:
         """In words."""
+        if self.disturbed:
+            return f"{'gone' if self.place is None else f'at {self.place[0]:.2f} m'}; the air changed on its way"
         if self.place is None:
             return "gone" if self.exact is None else f"gone; exactly at {self.exact[0]:.2f} m"
         if self.exact is None:

@@ -258,6 +258,22 @@ class Curling:
             ]
         return [*shown, ("", self._told)] if self._told else shown
 
+    def gauges(self) -> Sequence[tuple[str, float]]:
+        """Return how the stone is aimed, m, whether a person is to let it go, and how the match stands."""
+        score = self._score
+        return (
+            ("broom", self._broom),
+            ("weight", self._weight),
+            ("turn", self._turn),
+            ("may throw", self._ready and not self._by_itself),
+            ("stones run", self._running),
+            ("team", score.team),
+            ("hammer", score.hammer),
+            ("thrown", score.thrown),
+            ("ends played", score.played),
+            *zip((f"{team} points" for team in TEAMS), score.points, strict=True),
+        )
+
     def cues(self) -> Sequence[str]:
         """Return the names of the sounds since the last call."""
         cues, self._cues = self._cues, []

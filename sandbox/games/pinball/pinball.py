@@ -8,6 +8,7 @@ from sandbox.games.pinball.controls import CONTROLS, FLIPPERS, NUDGES, PLUNGER
 from sandbox.games.pinball.course import Course
 from sandbox.games.pinball.drops import banks_of
 from sandbox.games.pinball.effects import Again, Award, Cue, Effect, Machine, Now, Save, Say, Serve, Take
+from sandbox.games.pinball.gauges import gauges
 from sandbox.games.pinball.holes import Holes
 from sandbox.games.pinball.lamps import lamps_of
 from sandbox.games.pinball.modes import Modes
@@ -53,6 +54,7 @@ class Pinball:
             Search(board, self.holes, self.banks),
         )  # fmt: skip
         self._ticking = tuple(each for each in self.machines if type(each).tick is not Machine.tick)
+        self._lamped = tuple(each for each in self.machines if type(each).lights is not Machine.lights)
         self.course = Course(board, self.holes, self.nudge)
         self.course.machines = self.machines
         self.up: set[str] = set()
@@ -112,15 +114,21 @@ class Pinball:
         message, until = self.said
         if self.nudge.tilted:
             message, until = "TILT!", time + SAID
-        saved = 0.0 if course.fresh else course.saved - time
-        return panel(course.sheets, course.turn, self.modes, saved, message if time < until else "")
+        return panel(course.sheets, course.turn, self.modes, self._saved(time), message if time < until else "")
+
+    def gauges(self) -> Sequence[tuple[str, float]]:
+        """Return what the panel and the lamps of lanes and targets show, as numbers."""
+        saved = self._saved(0.0 if self._now is None else self._now.time)
+        return list(gauges(self.course, self.modes, self.multiball, self.lamps, self.banks, max(saved, 0.0)))
 
     def lit(self) -> frozenset[str]:
         """Return whose lamps are lit; a tilted table is dark."""
         now = self._now
         if now is None or self.nudge.tilted:
             return frozenset()
-        lights = [light for machine in self.machines for light in machine.lights(now)]
+        lights = [light for machine in self._lamped for light in machine.lights(now)]
+        if not lights:
+            return frozenset()
         blinking = {light.name for light in lights if light.blinks}
         on = blinking if now.time % BLINK < 0.5 * BLINK else set[str]()
         return frozenset(on | {light.name for light in lights} - blinking)
@@ -129,6 +137,10 @@ class Pinball:
         """Return the sounds since the last call."""
         cues, self._cues = self._cues, []
         return cues
+
+    def _saved(self, time: float) -> float:
+        """Return for how long drained balls come back, from a time on, s; 0 or less for none."""
+        return 0.0 if self.course.fresh else self.course.saved - time
 
     def _refresh(self, now: Now) -> None:
         """Bring up to date what others than the engine change."""

@@ -9,6 +9,7 @@ import numpy as np
 import pygame
 
 from sandbox.action import Action, ActionError, Spawn, actions_from_json, in_order
+from sandbox.games.lighting import Lightings
 from sandbox.play.breaks import broken_by
 from sandbox.play.camera import Box, Camera
 from sandbox.play.drawing.inset import Inset
@@ -60,6 +61,10 @@ class Film:
             self.breaks: FloatArray = trajectory.breaks(len(self.scene.links))
         except ValueError as error:
             raise SceneError([Fault(name, None, "broken_time", str(error))]) from None
+        try:
+            self._lamps = Lightings.of((trajectory.info.get("game") or {}).get("lamps", ()))
+        except ValueError as error:
+            raise SceneError([Fault(name, None, "info.game", str(error))]) from None
         self._graph = RunGraph(trajectory, self.scene, self.bodies)
 
     @property
@@ -132,6 +137,7 @@ class Film:
             overlapping=overlapping(self.scene, self.bodies, frame) if by_contact else None,
             flashes=tuple(self._flashes(time, FLASH * speed, speed)),
             broken=broken_by(self.breaks, time),
+            lit=self._lamps.at(time),
         )
 
     def contacts(self, time: float, speed: float = 1.0) -> Contacts:

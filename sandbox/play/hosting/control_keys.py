@@ -26,6 +26,9 @@ NAMED: dict[str, tuple[int, ...]] = {
 }
 """Keys that write nothing; all others are called by what they write."""
 
+DIRECTIONS = ("left", "right", "up", "down")
+"""of a gamepad's cross"""
+
 
 class KeyNameError(ValueError):
     """Rules call a key by a name that there is not, or claim one that no scene can."""
@@ -66,6 +69,8 @@ def told(controls: tuple[Control, ...]) -> tuple[tuple[str, str], ...]:
         keys = " or ".join(" ".join(word.capitalize() for word in key.split()) for key in control.keys)
         pad = f"; gamepad: {_buttons(control.pad)}" if control.pad else ""
         rows.append((keys or "Gamepad", f"{control.about}{pad}"))
+    if any(control.pad for control in controls):
+        rows.append(("Gamepad Start", "pause, go on"))
     return tuple(rows)
 
 
@@ -77,5 +82,5 @@ def _buttons(pad: str) -> str:
             which = "right stick" if word[1:-1] == "right" else "stick"
             words.append(f"{which} {sticks[word[-1]][word[0] == '+']}")
         else:
-            words.append(word.upper() if word != "up" and len(word) <= 2 else word)
+            words.append(f"D-pad {word}" if word in DIRECTIONS else word.upper() if len(word) <= 2 else word)
     return ", ".join(words)

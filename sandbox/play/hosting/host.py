@@ -3,24 +3,13 @@
 A control may be held by several keys and a gamepad at once; it is let go with the last of them.
 """
 
-from typing import NamedTuple
-
 from sandbox.games.referee import Referee
 from sandbox.games.registry import rules_of
 from sandbox.games.rules import Control, Lit, Logged, Rules, UnfitError
+from sandbox.play.hosting.past import Board, Past, Shown
 from sandbox.play.messages import Messages
 from sandbox.play.running.live import Live
 from sandbox.scene.model import Scene
-
-
-class Board(NamedTuple):
-    """What is shown of a game."""
-
-    score: str
-    lines: tuple[tuple[str, str], ...]
-    """labels and texts"""
-    over: str | None
-    """why it is over; None while it goes on"""
 
 
 def refereed(scene: Scene, messages: Messages) -> Referee | None:
@@ -50,6 +39,7 @@ class Host:
         self._game: Referee | None = None  # whose cues were heard last
         self._told = False
         self._read = 0  # entries of the game's log
+        self._past = Past()
 
     @property
     def rules(self) -> Rules:
@@ -113,15 +103,18 @@ class Host:
         self._read = len(log)
         return [text for _, text in log[known:]]
 
-    def board(self) -> Board:
-        """Return what is shown."""
-        rules = self.rules
+    def shown(self) -> Shown:
+        """Return what is seen of the game, as it was at the time that is looked at."""
+        live, rules = self.live, self.rules
+        then = self._past.at(live.frame.time) if live.peeking else None
+        if then is not None:
+            return then
         score = f"{rules.score:,}" if isinstance(rules.score, int) else f"{rules.score:,.1f}"
-        return Board(score.replace(",", " "), tuple(rules.lines()), rules.over)
-
-    def lit(self) -> frozenset[str]:
-        """Return the names of the parts whose lamps are lit."""
-        return self.rules.lit() if isinstance(self.rules, Lit) else frozenset()
+        board = Board(score.replace(",", " "), tuple(rules.lines()), rules.over)
+        now = Shown(board, rules.lit() if isinstance(rules, Lit) else frozenset())
+        if not live.peeking:
+            self._past.note(live.frame.time, live.end, now)
+        return now
 
     def cues(self) -> tuple[str, ...]:
         """Return the sounds of what happened since the last call; what is seen again on a way back is not heard."""

@@ -6,7 +6,7 @@ import pygame
 
 from sandbox.play.drawing.palette import FAINT, GREEN, INK, LINE, WARNING
 from sandbox.play.drawing.text import measure, write
-from sandbox.play.hosting.host import Board
+from sandbox.play.hosting.past import Board
 from sandbox.play.instruments.icons import draw_disc
 from sandbox.play.instruments.plates import plate, shortened, wrapped
 

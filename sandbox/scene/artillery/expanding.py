@@ -62,6 +62,12 @@ def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
                 ("artillery", "player", k, "position"),
                 f"is beside the ground, on which a tank stands from {half:g} to {width - half:g} m",
             )
+            continue
+        before = artillery.players[:k]
+        close = [each.name for each in before if abs(each.position - player.position) < 2.0 * half]
+        if close:
+            message = f"is where {close[0]!r} stands; tanks stand {2.0 * half:g} m or more apart"
+            yield ("artillery", "player", k, "position"), message
 
 
 def expanded(scene: Scene) -> Scene:

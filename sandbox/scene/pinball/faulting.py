@@ -3,10 +3,11 @@
 import math
 from collections.abc import Iterator
 
-from sandbox.scene.faults import Location
+from sandbox.scene.faults import Location, path_of
 from sandbox.scene.model import Scene
 from sandbox.scene.pinball.described import Pinball
 from sandbox.scene.pinball.element import Corner, Element, Line
+from sandbox.scene.pinball.mirroring import both
 from sandbox.scene.pinball.moving import Flipper, Plunger
 from sandbox.scene.pinball.painted import Art
 from sandbox.scene.pinball.rounding import RoundingError, length_of, rounded
@@ -30,8 +31,9 @@ def faults_of(scene: Scene) -> Iterator[Found]:
         yield from _corners(("pinball", "outline"), pinball.outline, True, pinball.tolerance)
     for kind, those in elements_of(pinball):
         for k, element in enumerate(those):
-            for location, message in _wrong(element, pinball.tolerance):
+            for location, message in _wrong(element, pinball):
                 yield ("pinball", kind, k, *location), message
+    yield from _called_alike(pinball)
 
 
 def elements_of(pinball: Pinball) -> Iterator[tuple[str, tuple[Element, ...]]]:
@@ -41,8 +43,25 @@ def elements_of(pinball: Pinball) -> Iterator[tuple[str, tuple[Element, ...]]]:
             yield field.alias, getattr(pinball, name)
 
 
-def _wrong(element: Element, tolerance: float) -> Iterator[Found]:
+def _called_alike(pinball: Pinball) -> Iterator[Found]:
+    """Yield the elements that are called as another one is."""
+    first: dict[str, Location] = {}
+    for kind, those in elements_of(pinball):
+        for k, element in enumerate(those if kind != "art" else ()):  # of paint nobody speaks by name
+            here: Location = ("pinball", kind, k)
+            names = [name for name, _ in both(element, kind, k, pinball.axis)]
+            if len(set(names)) < len(names):
+                yield (*here, "mirrored"), f"puts it onto itself: it stands on the table's axis, x = {pinball.axis!r} m"
+                names = names[:1]
+            for name in names:
+                there = first.setdefault(name, here)
+                if there is not here:
+                    yield (*here, "name"), f"{name!r} is what {path_of(there, {})} is called; names are unique"
+
+
+def _wrong(element: Element, pinball: Pinball) -> Iterator[Found]:
     """Yield what is wrong with one element, located within it."""
+    tolerance = pinball.tolerance
     match element:
         case Line():
             yield from _corners(("points",), element.points, element.closed, tolerance)
@@ -51,7 +70,7 @@ def _wrong(element: Element, tolerance: float) -> Iterator[Found]:
         case Art() if element.points is not None:
             yield from _corners(("points",), element.points, True, tolerance)
         case Ramp():
-            yield from _ramp(element, tolerance)
+            yield from _ramp(element, tolerance, 2.0 * pinball.ball_radius)
         case Gate() | Spinner() | Drain() if math.dist(*element.points) < CLOSEST:
             yield ("points", 1), "lies on the point before it; they are the ends of a line"
         case Spinner() if math.dist(*element.points) <= element.thickness:
@@ -86,11 +105,11 @@ def _corners(at: Location, corners: tuple[Corner, ...], closed: bool, tolerance:
         yield (*at, error.corner), str(error)
 
 
-def _ramp(ramp: Ramp, tolerance: float) -> Iterator[Found]:
+def _ramp(ramp: Ramp, tolerance: float, ball: float) -> Iterator[Found]:
     wrong = list(_corners(("points",), ramp.points, False, tolerance))
     yield from wrong
-    if ramp.width <= LEAST_DEPTH:
-        yield ("width",), f"is too narrow for any ball; more than {LEAST_DEPTH} m"
+    if ramp.width <= max(ball, LEAST_DEPTH):
+        yield ("width",), f"is too narrow for the ball; more than {max(ball, LEAST_DEPTH):.4g} m"
     if wrong:
         return
     length = length_of(rounded(ramp.points, False, tolerance))

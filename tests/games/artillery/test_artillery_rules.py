@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandbox.action import Action, actions_from_json
+from sandbox.action import Action, SetParameter, actions_from_json
+from sandbox.engines.relay import start
 from sandbox.games.artillery.bot import chances
 from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.rules import ArtilleryRules
@@ -16,6 +17,7 @@ from sandbox.games.artillery.tanks import PER_KILL
 from sandbox.games.artillery.weapons import WEAPONS, Weapon
 from sandbox.games.bout import Bout
 from sandbox.games.policies import Nobody, Script
+from sandbox.games.referee import Referee
 from sandbox.games.registry import rules_of
 from sandbox.games.rules import Press, UnfitError
 from sandbox.measure.replay import rerun
@@ -24,7 +26,7 @@ from sandbox.measure.seeds import seeded
 from sandbox.recording import Recording
 from sandbox.scene.file import loads
 from sandbox.scene.model import Scene
-from sandbox.trajectory import Trajectory
+from sandbox.trajectory import Contacts, Trajectory
 
 TEXT = """
 [world]
@@ -168,6 +170,37 @@ def test_wind_is_of_the_turn_and_of_the_seed() -> None:
     assert winds[0] == [float(chances(2, 2 * turn).uniform(-6.0, 6.0)) for turn in (1, 2)]
 
 
+@pytest.mark.parametrize(("time", "disturbed"), [(0.05, False), (1.0, True)])
+def test_air_that_a_hand_changes_is_the_exact_flights_too(time: float, disturbed: bool) -> None:
+    """Fired at 0.1 s: before that there is another exact flight, on the way there is none."""
+    scene = loads(TEXT)
+    rules, relay = rules_of(scene), start(scene, "reference", scene.solver.replace(**RK4))
+    assert isinstance(rules, ArtilleryRules)
+    referee, contacts = Referee(rules), Contacts.none()
+    while not rules.shots:
+        for action in referee.look(relay.time, relay.frame(), contacts):
+            relay.apply(action)
+        done: list[Action] = []
+        if abs(relay.time - time) < 0.011:
+            done.append(SetParameter(time=relay.time, path="world.gravity", value=[0.5, -6.0]))
+            done.append(SetParameter(time=relay.time, path="world.linear_drag", value=0.08))
+        if abs(relay.time - 0.1) < 0.01:
+            done += referee.press(relay.time, "fire", 1.0)
+        for action in done:
+            relay.apply(action)
+        referee.saw(done)
+        relay.step()
+        contacts = relay.contacts()
+    relay.close()
+    (shot,) = rules.shots
+    assert shot.disturbed == disturbed
+    if disturbed:
+        assert (shot.exact, shot.off) == (None, None)
+        assert shot.told.endswith("; the air changed on its way")
+    else:
+        assert shot.off == pytest.approx(0.0, abs=1e-5)  # rk4's own error at 20 ms, and rounding
+
+
 def test_dirt_lifts_who_stands_under_it() -> None:
     scene = loads(TEXT, overrides=["artillery.wind=0"])
     rules = rules_of(scene)
@@ -240,6 +273,32 @@ def test_a_roller_rolls_before_it_goes_off() -> None:
     way = way[~np.isnan(way)]
     assert abs(way[-1] - way[0]) > 1.0
     assert (made.contact_pair == [roller, -1]).all(axis=1).any()
+
+
+SLOPE = [40.0 - 0.2 * k for k in range(100)]
+HILL = [*SLOPE[:49:-1], *SLOPE[50:]]
+
+
+@pytest.mark.parametrize(
+    ("edges", "heights", "where"),
+    [("open", SLOPE, None), ("rubber", SLOPE, (60.0, 98.0)), ("wrap", SLOPE, (0.0, 1.0)), ("wrap", HILL, (5.0, 40.0))],
+)
+def test_what_rolls_meets_the_sides_as_what_flies_does(
+    edges: str, heights: list[float], where: tuple[float, float] | None
+) -> None:
+    """Down to the right side: it leaves, is thrown back, strikes the cliff on the far side, or rolls on there."""
+    text = TEXT.replace("width = 240.0\ncolumns = 240\nheight = 20.0", f"width = 100.0\nheights = {heights}")
+    text = text.replace("position = 50.0", "position = 30.0").replace("position = 190.0", "position = 45.0")
+    scene = loads(text.replace("speed = 60.0", f'edges = "{edges}"\nspeed = 30.0'))
+    rules, made, _ = played(scene, taps("weapon", "weapon", "weapon", "fire"))
+    assert rules.shots[0].weapon == "roller"
+    way = made.position[:, made.number("shell 2"), 0]
+    assert 100.0 < np.nanmax(way) < 100.5  # a step of 20 ms beyond the side
+    if where is None:
+        assert not rules.field.blasts
+    else:
+        (blast,) = rules.field.blasts
+        assert where[0] < blast.place[0] < where[1]
 
 
 def test_keys_set_the_gun_and_only_in_turn() -> None:

@@ -42,5 +42,5 @@ def test_misses_fall_with_each_integrators_order(drags: tuple[float, float]) -> 
 
 def test_what_never_comes_down_is_told() -> None:
     rising = world().model_copy(update={"gravity": (0.0, 0.0)})
-    with pytest.raises(ValueError, match="never comes down"):
+    with pytest.raises(ValueError, match="does not come down within"):
         miss_table(rising, 50.0, 1.0, (0.1,))

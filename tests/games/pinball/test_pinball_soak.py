@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from passing_watch import TIP, Watch
 
 from sandbox.action import Move
+from sandbox.engines.contract import Observer
 from sandbox.engines.relay import start
 from sandbox.games.pinball.board import MARGIN
 from sandbox.games.pinball.hand import PinballHand
@@ -20,7 +22,7 @@ from sandbox.measure.play_out import play_out
 from sandbox.measure.run import Auditor
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
-from sandbox.trajectory import Frame, IntArray
+from sandbox.trajectory import FloatArray, Frame, IntArray
 
 TABLES = sorted((Path(__file__).parents[3] / "scenes" / "pinball").glob("*.toml"))
 
@@ -49,6 +51,10 @@ class Game(NamedTuple):
     seconds: float
     missed: list[tuple[float, str, str]]
     """contacts that the engine never saw: when, s, and between whom"""
+    through: list[tuple[float, str]]
+    """balls that went through a bat, or a gate from its wrong side: when, s, and which of the two"""
+    deepest: float
+    """m, that a ball got into a bat"""
 
 
 class Keeper:
@@ -79,6 +85,9 @@ def play(scene: Scene, policy: Policy, seconds: float, audit: bool = False) -> G
     simulation.contacts()
     auditor = Auditor(scene, simulation) if audit else None
     rules = Pinball(scene, simulation.bodies)
+    watch = Watch(scene, simulation.bodies, rules.board.balls)
+    if auditor is not None:
+        simulation.watch(_Both(auditor, watch))
     referee, keeper, said = Referee(rules), Keeper(rules, scene.solver.dt), list[tuple[float, str]]()
     while rules.over is None and simulation.time < seconds:
         frame = simulation.frame()
@@ -96,7 +105,18 @@ def play(scene: Scene, policy: Policy, seconds: float, audit: bool = False) -> G
             simulation.apply(action)
         simulation.step()
     missed = [] if auditor is None else [(t, *named(scene, pair)) for t, pair in zip(*auditor.missed, strict=True)]
-    return Game(rules, said, simulation.time, missed)
+    return Game(rules, said, simulation.time, missed, watch.through, watch.deepest)
+
+
+class _Both:
+    """Two observers of one simulation."""
+
+    def __init__(self, *those: Observer) -> None:
+        self.those = those
+
+    def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
+        for each in self.those:
+            each(time, start, end, touching)
 
 
 def named(scene: Scene, pair: IntArray) -> tuple[str, str]:
@@ -113,6 +133,8 @@ def test_no_ball_is_stuck_lost_or_through_anything_in_an_hour_of_play(path: Path
     while left > 0.0:
         game = play(seeded(path, seed), PLAYERS[player](seed), left, audit=True)
         assert game.missed == [], seed
+        assert game.through == [], seed
+        assert game.deepest < TIP, seed
         words = [text for _, text in game.said]
         for trouble in ("ball found", "ball lost: back to the plunger", "a ball is gone"):
             assert trouble not in words, (seed, game.said)

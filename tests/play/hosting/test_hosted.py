@@ -19,8 +19,9 @@ from sandbox.play.drawing.palette import WARNING
 from sandbox.play.framing import framing
 from sandbox.play.hosting.control_keys import KeyNameError, codes_of, told
 from sandbox.play.hosting.gamepad import LAYOUTS, PLAYSTATION, RUNGS, XBOX, Gamepads, layout_of
-from sandbox.play.hosting.host import Board, Host
+from sandbox.play.hosting.host import Host
 from sandbox.play.hosting.jingle import FIGURES, figure_of, jingle
+from sandbox.play.hosting.past import MOST, Board, Past, Shown
 from sandbox.play.instruments.score_panel import draw_score
 from sandbox.play.running.live import Live
 from sandbox.play.sound import Sounds
@@ -28,18 +29,21 @@ from sandbox.play.stage import Stage
 from sandbox.play.window import Window
 from sandbox.recording import Recording
 from sandbox.scene.file import load
-from sandbox.scene.shipped import shipped
+from sandbox.scene.shipped import find, shipped
 
 UP, LEFT, R, P = pygame.K_UP, pygame.K_LEFT, pygame.K_r, pygame.K_p
 
 
 class Buttons(Toy):
-    """The toy with two keys for a control."""
+    """The toy with two keys for a control, and a lamp that is lit by every second point."""
 
     controls = (
         Control("kick", "kick it", ("up", "left shift"), "a -lefty"),
         Control("aim", "how far", ("left",), "lt", analogue=True),
     )
+
+    def lit(self) -> frozenset[str]:
+        return frozenset({"lamp"} if int(self.score) % 2 else ())
 
 
 @pytest.fixture(autouse=True)
@@ -90,8 +94,14 @@ def test_help_lists_controls_and_scene_keys_are_theirs(window: Window) -> None:
     assert claims.told == (
         ("Up or Left Shift", "kick it; gamepad: A, stick up"),
         ("Left", "how far; gamepad: LT"),
+        ("Gamepad Start", "pause, go on"),
     )
     assert {UP, LEFT, pygame.K_LSHIFT} <= window.desk.claimed(window.stage)
+
+
+def test_help_tells_the_cross_of_a_gamepad_from_its_stick() -> None:
+    (_, what), *_ = told((Control("go", "go", ("left",), "y left +leftx up"),))
+    assert what == "go; gamepad: Y, D-pad left, stick right, D-pad up"
 
 
 def test_restart_is_a_new_game(window: Window) -> None:
@@ -123,6 +133,47 @@ def test_going_back_brings_the_score_of_then(window: Window) -> None:
     live.seek(150)
     live.arrive()
     assert host_of(window).rules.score == scores[0]
+
+
+def test_looking_back_shows_the_score_and_lamps_of_then(window: Window) -> None:
+    seen = {}
+    for _ in range(30):
+        live = turned(window)
+        seen[live.frame.time] = host_of(window).shown()
+    assert len({(shown.board.score, shown.lit) for shown in seen.values()}) > 2
+    for time, shown in seen.items():
+        live.scrub(time)
+        assert host_of(window).shown() == shown
+    assert host_of(window).rules.score == float(shown.board.score)  # the game itself stays where it is
+    live.settle()
+    live.arrive()
+    assert host_of(window).shown() == shown
+
+
+def test_past_of_another_way_is_forgotten() -> None:
+    def shown(score: str) -> Shown:
+        return Shown(Board(score, (), None), frozenset())
+
+    past = Past()
+    assert past.at(1.0) is None
+    for time in range(10):
+        past.note(float(time), float(time), shown(str(time // 2)))
+    assert [past.at(time) for time in (-1.0, 4.0, 5.5, 99.0)] == [shown(score) for score in ("0", "2", "2", "4")]
+    past.note(5.0, 9.0, shown("2"))  # seen again
+    assert past.at(9.0) == shown("4")
+    past.note(5.0, 5.0, shown("three"))  # played on from there
+    assert [past.at(time) for time in (4.9, 5.0, 9.0)] == [shown("2"), shown("three"), shown("three")]
+
+
+def test_past_of_a_long_game_is_thinned_where_it_is_long_ago() -> None:
+    past = Past()
+    for time in range(3 * MOST):
+        past.note(float(time), float(time), Shown(Board(str(time), (), None), frozenset()))
+    found = [int(then.board.score) for time in range(3 * MOST) if (then := past.at(float(time)))]
+    assert len(set(found)) <= MOST
+    assert found[-100:] == list(range(3 * MOST - 100, 3 * MOST))
+    assert found == sorted(found)
+    assert found[0] == 0
 
 
 def test_what_was_held_later_is_let_go_of_on_another_way(window: Window) -> None:
@@ -170,7 +221,7 @@ def test_session_that_is_saved_replays(window: Window, tmp_path: Path) -> None:
 def test_panel_is_drawn_and_tells_the_end(window: Window) -> None:
     turned(window)
     host = host_of(window)
-    assert host.board() == Board("0.0", (("bounces", "0"), ("aim", "0.50")), None)
+    assert host.shown().board == Board("0.0", (("bounces", "0"), ("aim", "0.50")), None)
     going = pygame.surfarray.array3d(window.surface)
     rules = host.rules
     assert isinstance(rules, Toy)
@@ -389,3 +440,12 @@ def test_scene_that_its_game_does_not_fit_is_shown_without(tmp_path: Path, monke
     level, text = stage.messages.shown()[-1]
     assert (level, text.partition(",")[0]) == ("warning", "landing needs a body 'ship'")
     stage.close()
+
+
+def test_a_game_of_many_keys_says_where_they_are_told() -> None:
+    opened = Window(Stage(), size=(900, 600), say=lambda _: None)
+    opened.stage.open(find("duel"))
+    opened.turn(0.02)
+    said = [text for _, text in opened.stage.messages.shown()]
+    assert said == ["Left, Right, Up, Down, W, Space, Gamepad Start: F1 tells what each does"]
+    opened.close()

@@ -1,0 +1,51 @@
+"""Films of games with lamps: a stored run shows those that were lit."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sandbox.games.player import Player
+from sandbox.measure.run import run
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.lamps import RADIUS
+from sandbox.play.footage.film import Film
+from sandbox.play.footage.still import offscreen, pixels
+from sandbox.scene.faults import SceneError
+from sandbox.scene.file import load
+from sandbox.trajectory import Trajectory
+
+CLASSIC = Path(__file__).parents[3] / "scenes" / "pinball" / "classic.toml"
+
+
+@pytest.fixture(scope="module")
+def played() -> Trajectory:
+    scene = load(CLASSIC, ("world.duration=8.0",))
+    return run(scene, audit=False, bout=Player("skilled").bout(scene))
+
+
+def test_picture_of_a_run_shows_the_lamps_that_were_lit(played: Trajectory, tmp_path: Path) -> None:
+    played.save(tmp_path / "run.npz")
+    film = Film(Trajectory.load(tmp_path / "run.npz"))
+    dark = Film(replace(played, info=played.info | {"game": None}))
+    time, names = next((time, names) for time, names in played.info["game"]["lamps"] if names)
+    assert film.sight(time, frozenset()).lit == frozenset(names)
+    lamps = {part.name: part.light for part in film.scene.play.parts}
+    shots = []
+    for each in (film, dark):
+        surface = offscreen((540, 960))
+        camera = Camera.fitting(each.box, (540, 960))
+        each.draw(surface, camera, time, caption=False)
+        shots.append(pixels(surface, (540, 960)).astype(int).sum(axis=2))
+    brighter = np.argwhere(shots[0] > shots[1])
+    assert len(brighter)
+    rows_and_columns = camera.to_screen(np.asarray([lamps[name] for name in names]))[:, ::-1]
+    away = np.linalg.norm(brighter[:, None] - rows_and_columns[None], axis=2).min(axis=1)
+    assert away.max() <= 6.5 * RADIUS * camera.scale + 2.0  # no farther than a glow reaches
+
+
+def test_lamps_that_are_none_are_told(played: Trajectory) -> None:
+    info = played.info | {"game": played.info["game"] | {"lamps": [["never", 3]]}}
+    with pytest.raises(SceneError, match=r"info\.game: these are no lamps"):
+        Film(replace(played, info=info))
