@@ -4,34 +4,9 @@ A substep: the torque ramps; the body glides under the mean of it between its st
 """
 
 import math
-from typing import NamedTuple
 
 from sandbox.engines.driving.glide import glide
 from sandbox.scene.drives import TorqueDrive
-
-
-class Ramped(NamedTuple):
-    """What a torque did in a substep."""
-
-    torque: float
-    """at its end, N·m in the sense of the drive"""
-    mean: float
-    """over it"""
-    steady: bool
-    """it is what is wanted, and was so before"""
-
-
-class Turned(NamedTuple):
-    """Where a substep brings a body."""
-
-    angle: float
-    """rad"""
-    spin: float
-    """rad/s"""
-    at: int
-    """the stop onto which it is pressed: −1 for its rest, 1 for its end, or 0"""
-    press: float
-    """N·m, what presses it there; signed as spins are"""
 
 
 class Torque:
@@ -46,22 +21,27 @@ class Torque:
         self._end = abs(end - self.rest)
         self._edge = max(self._end - drive.hold_within, 0.0)
 
-    def ramped(self, torque: float, level: float, h: float) -> Ramped:
-        """Let a torque, N·m, go towards the one that a level asks for, for h, s."""
+    def ramped(self, torque: float, level: float, h: float) -> tuple[float, float, bool]:
+        """Let a torque, N·m in the sense of the drive, go towards the one that a level asks for, for h, s.
+
+        Returns:
+            It at the end; its mean on the way; and whether it is, and was before, what is wanted. A plain tuple, as
+            that is made for each step of each flipper.
+        """
         drive = self.drive
         wanted = level * drive.torque if level > 0.0 else -drive.return_ratio * drive.torque
         old = torque
         if old == wanted:
-            return Ramped(old, old, True)
+            return old, old, True
         step = drive.torque * h / drive.ramp if drive.ramp > 0.0 else math.inf
         gap = wanted - old
         if abs(gap) > step:
             torque = old + math.copysign(step, gap)
-            return Ramped(torque, 0.5 * (old + torque), False)
+            return torque, 0.5 * (old + torque), False
         share = abs(gap) / step  # of the substep in which it still goes there
-        return Ramped(wanted, wanted - 0.5 * gap * share, False)
+        return wanted, wanted - 0.5 * gap * share, False
 
-    def turned(self, angle: float, spin: float, mean: float, fall: float, h: float) -> Turned:
+    def turned(self, angle: float, spin: float, mean: float, fall: float, h: float) -> tuple[float, float, int, float]:
         """Return where a body comes in h, s, that meets nothing.
 
         Args:
@@ -70,6 +50,10 @@ class Torque:
             mean: torque of the drive, N·m in its sense.
             fall: torque of the body's weight about the hinge, N·m.
             h: s.
+
+        Returns:
+            Its angle, rad, and spin, rad/s; the stop onto which it is pressed, −1 for its rest, 1 for its end, or 0;
+            and the torque that presses it there, N·m, signed as spins are.
         """
         sense, moment = self.sense, self.moment
         driving = mean * self.drive.hold_ratio if mean > 0.0 else mean
@@ -86,4 +70,4 @@ class Torque:
         )
         new = self.drive.stops[1] if at > 0 else self.rest + sense * place  # to the bit, whatever was added up
         press = sense * ((driving if at > 0 else mean) + own) if at else 0.0
-        return Turned(new, sense * speed, at, press)
+        return new, sense * speed, at, press

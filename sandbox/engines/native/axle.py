@@ -88,7 +88,7 @@ class Axle:
 
     def settle(self) -> None:
         """Work out where the centre of mass of a body on a hinge is, and how fast."""
-        self.place, self.velocity = self.seated(self.angle, self.spin)
+        self.place, self.velocity = seated(self.mount.hinge, self._seat, self.angle, self.spin)
 
     def seated(self, angle: float, spin: float) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return where the centre of mass is at an angle, rad, and how fast at a spin, rad/s: m and m/s."""

@@ -4,13 +4,14 @@ So contacts have their levers from the hinge: its mass nothing can move, and abo
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from sandbox.engines.driving.arc import about, heaviness, seated
 from sandbox.engines.driving.plunger import along, placed, pulled
 from sandbox.engines.driving.stroke import struck
-from sandbox.engines.driving.torque import Torque, Turned
+from sandbox.engines.driving.torque import Torque
 from sandbox.engines.reference.motion import State
 from sandbox.engines.roster import Roster
 from sandbox.scene.driven import Mount
@@ -78,6 +79,19 @@ class Lead:
         return -self.mass * (self.gravity[0] * x + self.gravity[1] * y)
 
 
+class Turned(NamedTuple):
+    """Where a substep brings a body on a hinge, as `Torque.turned` has it."""
+
+    angle: float
+    """rad"""
+    spin: float
+    """rad/s"""
+    at: int
+    """the stop onto which it is pressed: −1 for its rest, 1 for its end, or 0"""
+    press: float
+    """N·m, what presses it there; signed as spins are"""
+
+
 class Hinge(Lead):
     """A body on a hinge, driven by a torque."""
 
@@ -120,7 +134,7 @@ class Hinge(Lead):
         self._torque, mean, _ = self._law.ramped(torque, level, h)
         self.fall = heaviness(self.mount.hinge, angle, self.mass, self.gravity)
         self._planned = angle, spin, mean, h
-        self.turned, self._h = self._law.turned(*self._planned[:3], self.fall, h), h
+        self.turned, self._h = Turned(*self._law.turned(*self._planned[:3], self.fall, h)), h
 
     def place(self, moved: State) -> None:
         """Write the end of the planned substep; what presses onto a stop is a spin for that to take away."""
@@ -141,7 +155,8 @@ class Hinge(Lead):
         """
         angle, spin, mean, h = self._planned
         stood = self.stands
-        self.turned = self._law.turned(angle, spin, mean, self.fall + self.moment * spun / h, h)._replace(press=0.0)
+        turned = Turned(*self._law.turned(angle, spin, mean, self.fall + self.moment * spun / h, h))
+        self.turned = turned._replace(press=0.0)
         return stood and self.stands
 
     def done(self, after: State) -> None:
