@@ -7,13 +7,15 @@ from types import MappingProxyType
 
 import numpy as np
 
-from sandbox.action import ActionError
 from sandbox.engines.acting import derived
+from sandbox.engines.driving.plunger import asked
 from sandbox.engines.expiry import Expiry
 from sandbox.engines.fixtures import Fixtures, fixtures_of
 from sandbox.engines.kernel import kernel
 from sandbox.engines.limits import FARTHEST, FASTEST
 from sandbox.scene.bodies import Bodies
+from sandbox.scene.driven import Mount, mounts
+from sandbox.scene.drives import PlungerDrive, TorqueDrive
 from sandbox.scene.links import Links
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Collides, Scene, Single
@@ -51,6 +53,9 @@ class Roster:
         """(N, Z) how each is with each zone"""
         self.caught: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
         """(N,) who stands still, as zones hold it"""
+        self.drives: FloatArray = scene.driven.copy()
+        """(D, 3) of each drive, as a frame tells them"""
+        self._mounts: dict[str, Mount] = mounts(scene)
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
         self._expiry = Expiry(bodies, scene.began, h)
@@ -75,6 +80,24 @@ class Roster:
         # What nothing can turn gets no moment: its spin stays as it is, bit for bit.
         turns = moves & (meet.turnable | self._twisted)
         self.inverse_moment: FloatArray = np.where(turns, 1.0 / bodies.moment, 0.0)
+        self.held: dict[int, Mount] = {}
+        """how drives hold the bodies that are there, by number"""
+        if self._mounts:
+            self._hold()
+
+    def _hold(self) -> None:
+        """Let drives hold their bodies: nothing moves a hinge, nor what is led whatever it meets."""
+        names, bodies = self.bodies.names, self.bodies
+        numbers = {names.index(name): mount for name, mount in self._mounts.items() if name in names}
+        self.held = {n: mount for n, mount in sorted(numbers.items()) if self.present[n]}
+        self.hinge: FloatArray = np.zeros((len(bodies), 2))
+        """(N, 2) m, in each body's own frame, the point about which it turns: its centre but for those on a hinge"""
+        self.led: BoolArray = np.zeros(len(bodies), np.bool_)
+        """(N,) goes on whatever is in its way"""
+        for n, mount in self.held.items():
+            self.hinge[n], self.led[n] = mount.hinge, not isinstance(mount.drive, TorqueDrive)
+            about = bodies.moment[n] + bodies.mass[n] * (mount.hinge[0] ** 2 + mount.hinge[1] ** 2)
+            self.inverse_mass[n], self.inverse_moment[n] = 0.0, 0.0 if self.led[n] else 1.0 / about
 
     @property
     def links(self) -> Links:
@@ -93,12 +116,11 @@ class Roster:
         self.throttles[number] = level
 
     def drive(self, number: int, level: float) -> None:
-        """Refuse: no engine of these models drives, so that none gets a scene that has some.
-
-        Raises:
-            ActionError: always.
-        """
-        raise ActionError(f"there is no drive {number} here to ask for a level of {level:g}")
+        """Ask the scene's drive of that number for a level."""
+        before, _, rate = self.drives[number].tolist()
+        if isinstance(self.scene.drives[number], PlungerDrive):
+            self.drives[number, 2] = asked(before, level, rate)
+        self.drives[number, 0] = level
 
     @property
     def mobile(self) -> BoolArray:

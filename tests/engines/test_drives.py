@@ -9,8 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sandbox.engines.relay import start
-
 TORQUE, RAMP, RETURN, HOLD, WITHIN = 0.513, 0.030, 0.058, 0.75, math.radians(6.0)
 STROKE = END - REST
 UP = (1, 2, 4)
@@ -44,7 +42,7 @@ def stroke(begin, wanted, place, to, arm=0.0, pull=0.0):
     return float(done.t_events[0][0]), float(done.y_events[0][0][1])
 
 
-def measured(dt, gravity=(0.0, 0.0), substeps=1):
+def measured(start, dt, gravity=(0.0, 0.0), substeps=1):
     """Time and speed of the first arrival at the end, and the time of the way back from there."""
     running = start(scene(bat(), gravity=gravity, dt=dt, substeps=substeps))
     press(running)
@@ -68,8 +66,8 @@ def measured(dt, gravity=(0.0, 0.0), substeps=1):
     return up, speed, running.time - begin
 
 
-def test_stroke_is_as_fast_as_the_flipper_whose_figures_it_has():
-    up, speed, down = measured(1e-3)
+def test_stroke_is_as_fast_as_the_flipper_whose_figures_it_has(start):
+    up, speed, down = measured(start, 1e-3)
     # Visual Pinball's flipper by these figures: 34 ms, 76 rad/s, 5.3 m/s at its tip, 118 ms back; within 5 %
     assert up == pytest.approx(0.034, rel=0.05)
     assert speed == pytest.approx(76.0, rel=0.05)
@@ -78,12 +76,12 @@ def test_stroke_is_as_fast_as_the_flipper_whose_figures_it_has():
 
 
 @pytest.mark.parametrize("gravity", [0.0, 0.77])
-def test_stroke_obeys_the_equation_of_motion(gravity):
+def test_stroke_obeys_the_equation_of_motion(start, gravity):
     arm = scene(bat()).bodies
     centre = float(np.hypot(*(arm.position[0])))
     told = stroke(0.0, TORQUE, 0.0, STROKE, centre, MASS * gravity)
     back = stroke(TORQUE, -RETURN * TORQUE, STROKE, 0.0, centre, MASS * gravity)
-    up, speed, down = measured(1e-4, (0.0, -gravity))
+    up, speed, down = measured(start, 1e-4, (0.0, -gravity))
     # The torque that rises within a step is taken at its mean, an error of second order; weight as at its beginning,
     # of first: its torque is 1 / 300 of the drive's, and changes by a hundredth of itself in a step.
     assert up == pytest.approx(told[0], rel=3e-5)
@@ -91,7 +89,7 @@ def test_stroke_obeys_the_equation_of_motion(gravity):
     assert down == pytest.approx(back[0], abs=1.1e-4)  # the step in which it arrives
 
 
-def test_stroke_converges_in_second_order_but_for_where_the_torque_jumps():
+def test_stroke_converges_in_second_order_but_for_where_the_torque_jumps(start):
     """Angle and speed at 30 ms, when the torque has just risen: all of it is smooth before."""
     errors = []
     for substeps in UP:
@@ -107,7 +105,7 @@ def test_stroke_converges_in_second_order_but_for_where_the_torque_jumps():
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.2)
 
 
-def test_bat_stays_on_its_hinge_and_within_its_stops():
+def test_bat_stays_on_its_hinge_and_within_its_stops(start):
     running = start(scene(bat(), gravity=(0.0, -9.81)))
     arm = np.hypot(*running.frame().position[0])
     for k in range(400):
@@ -121,7 +119,7 @@ def test_bat_stays_on_its_hinge_and_within_its_stops():
         np.testing.assert_allclose(frame.velocity[0], way, atol=1e-13)
 
 
-def test_bat_mirrored_moves_mirrored():
+def test_bat_mirrored_moves_mirrored(start):
     """What turns the other way has its stops the other way round."""
     left, right = start(scene(bat())), start(scene(bat(stops=[-REST, -END], angle=-REST)))
     for running in (left, right):
@@ -134,7 +132,7 @@ def test_bat_mirrored_moves_mirrored():
 
 @pytest.mark.parametrize("arm", [0.02, 0.05, 0.075])
 @pytest.mark.parametrize("held", [True, False], ids=["off its end stop", "off its rest"])
-def test_ball_that_pushes_a_bat_off_its_stop_feels_its_inertia(arm, held):
+def test_ball_that_pushes_a_bat_off_its_stop_feels_its_inertia(start, arm, held):
     """Effective mass I/r²: J = (1 + e) v / (1/m + r²/I)."""
     speed, e = 3.0, 0.8
     drive = {"stops": [-0.5, 0.0]} if held else {}
@@ -153,7 +151,7 @@ def test_ball_that_pushes_a_bat_off_its_stop_feels_its_inertia(arm, held):
 
 
 @pytest.mark.parametrize("arm", [0.02, 0.05, 0.075])
-def test_ball_that_presses_a_bat_onto_its_stop_is_thrown_back_as_by_a_wall(arm):
+def test_ball_that_presses_a_bat_onto_its_stop_is_thrown_back_as_by_a_wall(start, arm):
     running = start(scene(bar(), {"ball": [ball(arm, 0.01 + BALL + 0.0015, 0.0, -3.0, restitution=0.8)]}))
     for _ in range(5):
         running.step()
@@ -163,7 +161,7 @@ def test_ball_that_presses_a_bat_onto_its_stop_is_thrown_back_as_by_a_wall(arm):
 
 
 @pytest.mark.parametrize("held", [True, False], ids=["held", "at rest"])
-def test_ball_rests_on_a_bat_without_jitter(held):
+def test_ball_rests_on_a_bat_without_jitter(start, held):
     drive = {"stops": [-0.5, 0.0], "hold_within": 0.1} if held else {}
     lying = ball(0.06, 0.01 + BALL + 1e-4, restitution=0.5, friction=0.3)
     running = start(scene(bar(**drive), {"ball": [lying]}, gravity=(0.0, -0.77)))
@@ -177,7 +175,7 @@ def test_ball_rests_on_a_bat_without_jitter(held):
     assert 0.0 < frame.position[0, 1] - 0.01 < BALL
 
 
-def test_two_balls_on_either_side_of_a_bat():
+def test_two_balls_on_either_side_of_a_bat(start):
     """One presses it onto its stop, one off it, at once: momentum about the hinge is what the stop took or more."""
     below = ball(0.05, -(0.01 + BALL + 0.0015), 0.0, 3.0, name="below") | {"name": "below"}
     above = ball(0.03, 0.01 + BALL + 0.0015, 0.0, -3.0)
@@ -191,7 +189,7 @@ def test_two_balls_on_either_side_of_a_bat():
 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(1.0, 8.0)), min_size=4, max_size=4))
-def test_no_ball_passes_a_flapping_bat(throws):
+def test_no_ball_passes_a_flapping_bat(start, throws):
     """Balls thrown onto a bat that flaps, at 1 kHz: none ever is with its centre inside, nor past it in one step."""
     balls = [
         ball(0.005 + 0.065 * x, 0.06 + 0.05 * k + 0.02 * y, 0.0, -v, restitution=0.8) | {"name": f"b{k}"}
@@ -214,7 +212,7 @@ def test_no_ball_passes_a_flapping_bat(throws):
         side = np.where(over, np.sign(height), 0.0)
 
 
-def test_account_closes_and_what_drives_gave_is_there():
+def test_account_closes_and_what_drives_gave_is_there(start):
     lying = ball(0.05, 0.01, restitution=0.8, friction=0.3)
     running = start(scene(bat(), {"ball": [lying]}, gravity=(0.0, -0.77)))
     running.account()
@@ -236,7 +234,7 @@ def _energy(running):
     return total_energy(running)
 
 
-def test_pair_with_coefficients_of_its_own_keeps_them_at_a_bat():
+def test_pair_with_coefficients_of_its_own_keeps_them_at_a_bat(start):
     """Coefficients that pymunk's factors cannot mix are set as two touch; a bat on its stop is a wall besides."""
     tables = bar()
     del tables["box"][0]["restitution"]

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from flippers import BALL, ball, press, scene
 
-from sandbox.engines.relay import start
-
 TRAVEL, SPEED = 0.043, 1.03  # m, m/s: a pinball machine's
 RATE, BACK = 20.0, 5.0  # rad/s
 
@@ -32,7 +30,7 @@ def after(running, steps):
     return running.frame()
 
 
-def test_stroke_turns_at_its_rate_and_stops_on_its_stops():
+def test_stroke_turns_at_its_rate_and_stops_on_its_stops(start):
     running = start(scene(gate()))
     press(running, 0.3)  # anything above 0 is all the way
     frame = after(running, 30)
@@ -49,7 +47,7 @@ def test_stroke_turns_at_its_rate_and_stops_on_its_stops():
 
 
 @pytest.mark.parametrize("back", [None, 0.0])
-def test_stroke_without_a_way_back_of_its_own(back):
+def test_stroke_without_a_way_back_of_its_own(start, back):
     running = start(scene(gate(**({} if back is None else {"return_rate": back}))))
     press(running)
     after(running, 10)
@@ -57,7 +55,7 @@ def test_stroke_without_a_way_back_of_its_own(back):
     assert after(running, 5).angle[0] == pytest.approx(0.2 if back == 0.0 else 0.2 - 5e-3 * BACK, rel=1e-12)
 
 
-def test_ball_is_thrown_by_a_stroke_as_by_a_wall_that_moves():
+def test_ball_is_thrown_by_a_stroke_as_by_a_wall_that_moves(start):
     """V' = u + e u, u = ω r the speed of the place that hits a ball at rest."""
     arm = 0.06
     running = start(scene(gate(), {"ball": [ball(arm, 0.01 + BALL + 0.0005, restitution=1.0)]}))
@@ -69,7 +67,7 @@ def test_ball_is_thrown_by_a_stroke_as_by_a_wall_that_moves():
 
 
 @pytest.mark.parametrize("shape", ["box", "ball"])
-def test_restitution_falls_with_the_speed_of_the_place_that_hits(shape):
+def test_restitution_falls_with_the_speed_of_the_place_that_hits(start, shape):
     """E = e₀ / (1 + f v), v = ω r: of a bar, and of a disc that goes about a hinge 60 mm off."""
     arm, falloff, e = 0.06, 0.5, 0.8
     own = {"restitution": e, "restitution_falloff": falloff}
@@ -99,14 +97,14 @@ def test_restitution_falls_with_the_speed_of_the_place_that_hits(shape):
     assert frame.angular_velocity[number] == RATE
 
 
-def test_stroke_holds_against_whatever_hits_it():
+def test_stroke_holds_against_whatever_hits_it(start):
     running = start(scene(gate(), {"ball": [ball(0.05, 0.05, 0.0, -8.0, mass=100.0) | {"mass": 100.0}]}))
     frame = after(running, 20)
     assert (frame.angle[1], frame.angular_velocity[1]) == (0.0, 0.0)
     assert frame.velocity[0, 1] > 0.0
 
 
-def test_plunger_is_drawn_as_fast_as_a_hand_does_and_stays():
+def test_plunger_is_drawn_as_fast_as_a_hand_does_and_stays(start):
     running = start(scene(rod()))
     press(running, 0.5)
     frame = after(running, 50)  # a quarter of the time that a full pull takes
@@ -121,7 +119,7 @@ def test_plunger_is_drawn_as_fast_as_a_hand_does_and_stays():
 
 
 @pytest.mark.parametrize("pull", [0.25, 0.5, 1.0])
-def test_plunger_springs_forward_as_a_cosine(pull):
+def test_plunger_springs_forward_as_a_cosine(start, pull):
     running = start(scene(rod(), dt=1e-3))
     press(running, pull)
     after(running, 250)
@@ -141,7 +139,7 @@ def test_plunger_springs_forward_as_a_cosine(pull):
 
 
 @pytest.mark.parametrize("pull", [0.25, 0.5, 1.0])
-def test_ball_on_a_plunger_leaves_at_the_speed_of_its_pull(pull):
+def test_ball_on_a_plunger_leaves_at_the_speed_of_its_pull(start, pull):
     lying = ball(0.0, BALL + 1e-5, restitution=0.3)
     running = start(scene(rod(), {"ball": [lying]}, gravity=(0.0, -0.77)))
     press(running, pull)
@@ -151,7 +149,7 @@ def test_ball_on_a_plunger_leaves_at_the_speed_of_its_pull(pull):
     assert fastest == pytest.approx(pull * SPEED, rel=0.03)  # e of the plunger's gain in a step, 25 mm/s, and gravity
 
 
-def test_account_of_strokes_and_plungers_closes():
+def test_account_of_strokes_and_plungers_closes(start):
     from sandbox.engines.energy import total_energy
 
     own, more = gate(), rod()
@@ -172,7 +170,7 @@ def test_account_of_strokes_and_plungers_closes():
     assert entries["actions"] == pytest.approx(0.0, abs=1e-15)
 
 
-def test_what_is_led_through_walls_is_no_missed_contact():
+def test_what_is_led_through_walls_is_no_missed_contact(engine):
     """A head of 40 mm that springs through a wall, its half a step: it passes by what it is, and nothing is amiss."""
     import sandbox
     from sandbox.action import Drive
@@ -180,6 +178,6 @@ def test_what_is_led_through_walls_is_no_missed_contact():
     walls = [{"points": [[-1.0, -0.15], [1.0, -0.15]]}]
     made = scene(rod(travel=0.2, speed=40.0), {"wall": walls})
     told = tuple(Drive(time=time, drive="flip", level=level) for time, level in ((0.0, 1.0), (0.4, 0.0)))
-    run = sandbox.run(made, actions=told)
+    run = sandbox.run(made, engine, actions=told)
     assert run.position[:, 0, 1].min() == pytest.approx(-0.25, rel=1e-12)
     assert (run.missed_contacts, len(run.contact_time)) == (0, 0)

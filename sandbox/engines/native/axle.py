@@ -4,12 +4,12 @@ A space moves bodies by their old velocity and kicks them afterwards. So before 
 from where it has to be by as much as that will carry it; what it meets, meets it there, at its speed.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import pymunk
 from pymunk._chipmunk_cffi import lib
 
+from sandbox.engines.driving.arc import seated
 from sandbox.scene.driven import Mount
 from sandbox.scene.drives import PlungerDrive
 
@@ -88,15 +88,11 @@ class Axle:
 
     def settle(self) -> None:
         """Work out where the centre of mass of a body on a hinge is, and how fast."""
-        self.place, self.velocity = self.seated(self.angle, self.spin)
+        self.place, self.velocity = seated(self.mount.hinge, self._seat, self.angle, self.spin)
 
     def seated(self, angle: float, spin: float) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return where the centre of mass is at an angle, rad, and how fast at a spin, rad/s: m and m/s."""
-        x, y = self.mount.hinge
-        cos, sin = math.cos(angle), math.sin(angle)
-        dx, dy = sin * y - cos * x, -sin * x - cos * y
-        place = self._seat[0] + dx, self._seat[1] + dy
-        return place, (0.0 - spin * dy, 0.0 + spin * dx)  # no −0, which is another state bit by bit
+        return seated(self.mount.hinge, self._seat, angle, spin)
 
     def _aim(self, angle: float, spin: float) -> None:
         """Have the next step bring the body to an angle, by a rate that it has meanwhile."""

@@ -1,10 +1,9 @@
-"""Hinge: a drive by torque in a pymunk space. The torque's rule is Visual Pinball's, of its flippers.
+"""Hinge: a drive by torque in a pymunk space.
 
-A substep: the torque ramps; the body glides under the mean of it between its stops, exactly as to when it reaches one
-(`glide.py`); pymunk finds what it meets there, kicks it to its new speed, and solves contacts. A body that is pressed
-onto a stop is held there by a one-sided limit which pymunk solves together with the contacts. Where all that it meets
-presses it onto its stop as well, it is immovable for that substep: contact and limit in turn would not get there in 10
-iterations.
+A substep: the torque ramps and the body glides between its stops (`driving/torque.py`); pymunk finds what it meets
+there, kicks it to its new speed, and solves contacts. A body that is pressed onto a stop is held there by a one-sided
+limit which pymunk solves together with the contacts. Where all that it meets presses it onto its stop as well, it is
+immovable for that substep: contact and limit in turn would not get there in 10 iterations.
 """
 
 import math
@@ -13,8 +12,9 @@ from typing import Any
 import pymunk
 from pymunk._chipmunk_cffi import ffi, lib
 
+from sandbox.engines.driving.arc import heaviness
+from sandbox.engines.driving.torque import Torque
 from sandbox.engines.native.axle import Axle, Start
-from sandbox.engines.native.glide import glide
 from sandbox.scene.drives import TorqueDrive
 
 WIDE = 1e12
@@ -34,12 +34,9 @@ class Hinge(Axle):
         """Go on from a start; the ground is the space's own body."""
         super().__init__(start)
         assert isinstance(start.mount.drive, TorqueDrive)
-        self._drive, self.moment, self._mass = start.mount.drive, float(start.body.moment), start.mass
-        self.torque = start.state[1]
-        rest, end = self._drive.stops
-        self._sense, self._end = math.copysign(1.0, end - rest), abs(end - rest)
-        self._rest = rest
-        self._edge = max(self._end - self._drive.hold_within, 0.0)
+        self.moment, self._mass = float(start.body.moment), start.mass
+        self._law, self.torque = Torque(start.mount.drive, self.moment), start.state[1]
+        self._sense, rest = self._law.sense, self._law.rest
         self._angles = rest - WIDE, rest + WIDE
         self.limit = pymunk.RotaryLimitJoint(ground, self.body, *self._angles)
         self.limit.max_bias = BARELY
@@ -75,59 +72,17 @@ class Hinge(Axle):
         self._off = self._met = False
 
     def _move(self) -> None:
-        h, sense, moment = self._h, self._sense, self.moment
-        mean, steady = self._ramp()
-        self.fall = self._heaviness()
-        driving = mean * self._drive.hold_ratio if mean > 0.0 else mean
-        own = sense * self.fall
-        place = sense * (self.angle - self._rest)
-        where = glide(
-            place,
-            sense * self.spin,
-            h,
-            (mean + own) / moment,
-            (driving + own) / moment,
-            self._edge,
-            self._end,
-            self._drive.bounce,
-        )
-        place, speed, self.at = where
-        angle, spin = self._rest + sense * place, sense * speed
-        if self.at > 0:  # to the bit, whatever was added up
-            angle = self._drive.stops[1]
+        h, law = self._h, self._law
+        self.torque, mean, steady = law.ramped(self.torque, self.level, h)
+        self.fall = heaviness(self.mount.hinge, self.angle, self._mass, self._gravity)
+        angle, spin, self.at, press = law.turned(self.angle, self.spin, mean, self.fall, h)
         self._aim(angle, self.spin)
-        self.kick = moment * (spin - self.spin) / h
+        self.kick = self.moment * (spin - self.spin) / h
         if self.at:
-            self.kick += sense * ((driving if self.at > 0 else mean) + own)
+            self.kick += press
         self._settled = self.at != 0 and steady and not self.spin and angle == self.angle
         self._arm(self.at)
         self.angle = angle
-
-    def _ramp(self) -> tuple[float, bool]:
-        """Let the torque go towards the wanted one; return its mean over the substep, and whether it is there."""
-        drive = self._drive
-        wanted = self.level * drive.torque if self.level > 0.0 else -drive.return_ratio * drive.torque
-        old = self.torque
-        if old == wanted:
-            return old, True
-        step = drive.torque * self._h / drive.ramp if drive.ramp > 0.0 else math.inf
-        gap = wanted - old
-        if abs(gap) > step:
-            self.torque = old + math.copysign(step, gap)
-            return 0.5 * (old + self.torque), False
-        self.torque = wanted
-        share = abs(gap) / step  # of the substep in which it still goes there
-        return wanted - 0.5 * gap * share, False
-
-    def _heaviness(self) -> float:
-        """Return the torque of the body's weight about the hinge, N·m."""
-        gx, gy = self._gravity
-        if not (gx or gy):
-            return 0.0
-        x, y = self.mount.hinge
-        cos, sin = math.cos(self.angle), math.sin(self.angle)
-        dx, dy = sin * y - cos * x, -sin * x - cos * y
-        return self._mass * (dx * gy - dy * gx)
 
     def _arm(self, at: int) -> None:
         """Let the limit hold at a stop, or at none."""

@@ -25,11 +25,11 @@ class Worked(NamedTuple):
     """The work on driven bodies in a substep, J."""
 
     driven: float
-    """by their drives, stops included"""
+    """by their drives, stops included; with the height of what nothing stops"""
     weight: float
     """by their weight, as the steps have it"""
     lifted: float
-    """the potential energy that they gained"""
+    """the potential energy that those by torque gained"""
 
 
 def meant(axles: list[Axle], before: "State", now: "State", velocity: FloatArray, spin: FloatArray) -> None:
@@ -73,7 +73,11 @@ def worked(
         n = axle.number
         mass = float(bodies.mass[n])
         shift = now.position[n] - before.position[n]
-        lifted -= mass * float(shift @ np.asarray(gravity))
+        rise = -mass * float(shift @ np.asarray(gravity))
+        if isinstance(axle, Hinge):
+            lifted += rise
+        else:
+            driven += rise  # it carries that weight, whatever this is
         if isinstance(axle, Plunger):
             given = mass * (now.velocity[n] - before.velocity[n]) + met.linear[n]
             driven += float(given @ velocity[n])

@@ -1,9 +1,9 @@
 """Strokes: drives that nothing stops, in a pymunk space, where what they move is kinematic."""
 
-import math
-
 from pymunk._chipmunk_cffi import lib
 
+from sandbox.engines.driving.plunger import along, asked, placed, pulled
+from sandbox.engines.driving.stroke import struck
 from sandbox.engines.native.axle import Axle, Start
 from sandbox.scene.drives import PlungerDrive, StrokeDrive
 
@@ -20,20 +20,15 @@ class Stroke(Axle):
 
     def before(self) -> None:
         """Prepare the body for a substep."""
-        drive, pressed = self._drive, self.level > 0.0
-        stop = drive.stops[pressed]
-        left = stop - self.angle
-        rate = drive.rate if pressed or drive.return_rate is None else drive.return_rate
-        self._arrives = abs(left) <= rate * self._h
-        if not left or not rate:
+        angle, spin, self._arrives = struck(self._drive, self.level, self.angle, self._h)
+        if not spin:
             if self.spin:
                 self._halt()
             return
-        spin = math.copysign(rate, left)
         if spin != self.spin:
             self.spin = spin
             lib.cpBodySetAngularVelocity(self._record, spin)
-        self.angle = stop if self._arrives else self.angle + spin * self._h
+        self.angle = angle
         self._aim(self.angle, spin)
 
     def after(self) -> None:
@@ -54,51 +49,26 @@ class Plunger(Axle):
         super().__init__(start)
         assert isinstance(start.mount.drive, PlungerDrive)
         self._drive, self._arrives = start.mount.drive, False
-        x, y = self._drive.direction
-        length = math.hypot(x, y)
-        self._ux, self._uy = x / length, y / length
+        self._along = along(self._drive)
         _, self.pull, self.rate = start.state
         """how far it is drawn back, m, and how fast that grows, m/s"""
         lib.cpBodySetVelocity(self._record, self.velocity)
 
     def set(self, level: float) -> None:
-        """Ask for another level from now on; a hand that lets go has stood still."""
-        if not level > 0.0 and self.level > 0.0:
-            self.rate = 0.0
-        self.level = level
+        """Ask for another level from now on."""
+        self.level, self.rate = level, asked(self.level, level, self.rate)
 
     def before(self) -> None:
         """Prepare the body for a substep."""
-        wanted = self.level * self._drive.travel
-        if self.pull == wanted:  # which no spring has reached that was not halted there
+        if self.pull == self.level * self._drive.travel and not self.rate:  # it stands where it has to
             self._arrives = False
             return
-        if wanted > 0.0:
-            self._draw(wanted)
-        else:
-            self._spring()
-        x, y = self.mount.home
-        vx, vy = 0.0 - self.rate * self._ux, 0.0 - self.rate * self._uy  # never −0
-        self.place, self.velocity = (x - self.pull * self._ux, y - self.pull * self._uy), (vx, vy)
-        lib.cpBodySetPosition(self._record, (self.place[0] - vx * self._h, self.place[1] - vy * self._h))
+        h = self._h
+        self.pull, self.rate, self._arrives = pulled(self._drive, self.level, self.pull, self.rate, h)
+        self.place, self.velocity = placed(self.mount.home, self._along, self.pull, self.rate)
+        (x, y), (vx, vy) = self.place, self.velocity
+        lib.cpBodySetPosition(self._record, (x - vx * h, y - vy * h))
         lib.cpBodySetVelocity(self._record, (vx, vy))
-
-    def _draw(self, wanted: float) -> None:
-        """Go towards the wanted pull, m, as fast as a hand does."""
-        rate = self._drive.travel / self._drive.draw_time
-        self.rate = math.copysign(rate, wanted - self.pull)
-        self._arrives = abs(wanted - self.pull) <= rate * self._h
-        self.pull = wanted if self._arrives else self.pull + self.rate * self._h
-
-    def _spring(self) -> None:
-        """Spring forward for a substep, or onto the stop, at the speed of that moment."""
-        omega = self._drive.speed / self._drive.travel
-        cos, sin = math.cos(omega * self._h), math.sin(omega * self._h)
-        pull, rate = self.pull, self.rate
-        self.pull, self.rate = pull * cos + rate / omega * sin, rate * cos - pull * omega * sin
-        self._arrives = self.pull <= 0.0
-        if self._arrives:
-            self.pull, self.rate = 0.0, -math.hypot(pull * omega, rate)
 
     def after(self) -> None:
         """Stand still once the body is where it has to be."""

@@ -20,6 +20,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from sandbox.engines.account import Account, Cause
+from sandbox.engines.reference.driven.drives import Drives
 from sandbox.engines.reference.impulses import contact_work
 from sandbox.engines.reference.joints.field import Field
 from sandbox.engines.reference.joints.solver import JointSolver
@@ -37,7 +38,9 @@ GAUSS = tuple((0.5 + 0.5 * node * math.sqrt(0.6), weight / 18.0) for node, weigh
 class Idle:
     """Who keeps no books, and takes no notice."""
 
-    def population_changed(self, u: Inputs, joints: JointSolver | None, penalty: Penalty | None) -> None:
+    def population_changed(
+        self, u: Inputs, joints: JointSolver | None, penalty: Penalty | None, drives: Drives | None
+    ) -> None:
         """Take note of who is there, and what acts on them."""
 
     def flown(self, start: State, free: State, shift: FloatArray | None) -> None:
@@ -60,6 +63,9 @@ class Idle:
 
     def struck(self, moved: State, contacts: Manifolds, impulse: FloatArray, worth: FloatArray | None) -> None:
         """Book what impulses (K, 2), N·s, of impacts at the end of a step did to velocities; `worth` as above."""
+
+    def led(self, before: State, after: State, h: float, contacts: Manifolds, impulse: FloatArray) -> None:
+        """Book what drives did in a step of h, s, between two states, and with what impulses (K, 2) of contacts."""
 
     def done(self, time: float, after: State, h: float) -> None:
         """Book the rest of a step of h, s, that began at a time, s, and led to a state."""
@@ -85,12 +91,18 @@ class Bookkeeper(Idle):
         self.account = Account()
         self._roster, self._field, self._share = roster, field, share
 
-    def population_changed(self, u: Inputs, joints: JointSolver | None, penalty: Penalty | None) -> None:
+    def population_changed(
+        self, u: Inputs, joints: JointSolver | None, penalty: Penalty | None, drives: Drives | None
+    ) -> None:
         """Take note of who is there, and what acts on them; `penalty` is one of the books' own."""
         roster = self._roster
-        self._u, self._joints, self._penalty = u, joints, penalty
+        self._u, self._joints, self._penalty, self._drives = u, joints, penalty, drives
         moving = roster.mobile  # who is held has no motion, but height
-        self._inertia: FloatArray = np.where(moving, (roster.bodies.mass,) * 2 + (roster.bodies.moment,), 0.0).T
+        self._everyone: FloatArray = np.where(moving, (roster.bodies.mass,) * 2 + (roster.bodies.moment,), 0.0).T
+        self._inertia = self._everyone
+        if drives is not None:  # the motion of the driven is booked for itself
+            self._inertia = self._everyone.copy()
+            self._inertia[list(roster.held)] = 0.0
         self._weight: FloatArray = self._inertia[:, :1] * roster.scene.world.gravity
         self._lifted: FloatArray = self._inertia[:, :1] * (roster.gravity - np.asarray(roster.scene.world.gravity))
         breaks = np.full(len(roster.scene.links), np.inf)
@@ -122,8 +134,19 @@ class Bookkeeper(Idle):
         self._end = moved[1].copy()
         mean = 0.5 * (self._start[1] + self._end)
         self._touch(contacts, impulse, mean, worth)
+        self._taken = 0.0 if self._drives is None else self._drives.taken(contacts, impulse, mean)
         if self._joints is not None and self._joints.how == "impulses":
             self.account.enter(Cause.JOINTS, self._joints.work(mean))
+
+    def led(self, before: State, after: State, h: float, contacts: Manifolds, impulse: FloatArray) -> None:
+        """Book drives: what the driven gained, less what contacts and weight gave them."""
+        assert self._drives is not None
+        work = self._drives.work(before, after, h)
+        if self._penalty is not None:  # whose forces are booked whole, and against what moves freely alone
+            self._taken = self._drives.taken(contacts, impulse, 0.5 * (self._start[1] + self._end))
+            self.account.enter(Cause.INTEGRATOR, self._taken)
+        self.account.enter(Cause.DRIVES, work.gained - self._taken - work.weight)
+        self.account.enter(Cause.INTEGRATOR, work.weight + work.lifted)
 
     def struck(self, moved: State, contacts: Manifolds, impulse: FloatArray, worth: FloatArray | None) -> None:
         """Book impacts."""
@@ -246,7 +269,8 @@ class Bookkeeper(Idle):
         roster = self._roster
         pose = np.column_stack((roster.position, roster.angle))
         rate = np.column_stack((roster.velocity, roster.angular_velocity))
-        total = self._kinetic(np.zeros_like(rate), rate) - float((self._weight * roster.position).sum())
+        weight = self._everyone[:, :1] * roster.scene.world.gravity
+        total = 0.5 * float((self._everyone * rate * rate).sum()) - float((weight * roster.position).sum())
         if self._potential.attracts:
             total += self._attracted(pose)
         return total + self._strained(pose) if self._potential.springs else total

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.overlap import BIAS, slop_of
+from sandbox.engines.reference.driven.lacks import drives_lack
 from sandbox.scene.demands import BALLS, Demand, demands, unmodelled
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
@@ -56,6 +57,7 @@ class ReferenceEngine:
         Demand.THRUST,
         Demand.LAYERS,
         Demand.ZONES,
+        Demand.DRIVES,
     }
 
     def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
@@ -63,6 +65,8 @@ class ReferenceEngine:
         wanted = demands(scene)
         lacks = unmodelled(scene, self.capabilities)
         lacks += self._detection_lacks(wanted, settings)
+        if Demand.DRIVES in wanted:
+            lacks += drives_lack(scene, wanted, settings)
         if settings.broad_phase == "oriented" and Demand.POLYGONS not in wanted:
             lacks.append("broad_phase 'oriented' is for polygons, of which the scene has none; 'grid' or 'sweep' do")
         if settings.stretch is not None and settings.joints != "relaxation":

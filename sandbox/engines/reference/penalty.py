@@ -3,6 +3,7 @@
 import numpy as np
 
 from sandbox.engines.reference.candidates import Candidates
+from sandbox.engines.reference.driven.drives import Drives
 from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.integrators import Step
 from sandbox.engines.reference.manifolds import Manifolds
@@ -24,6 +25,7 @@ class Penalty:
         assert settings.stiffness is not None
         self._roster, self._finder, self._settings = roster, finder, settings
         self._stiffness = settings.stiffness
+        self.drives: Drives | None = None
         self.population_changed()
         self._keys: IntArray = np.empty(0, np.int64)
         self._given: tuple[Manifolds, FloatArray] = finder.overlaps(roster.position).of(slice(0)), np.zeros((0, 2))
@@ -76,9 +78,12 @@ class Penalty:
         roster = self._roster
         spin = rates[:, 2] if rates.shape[1] == 3 else np.zeros((len(rates), 3))[:, 2]
         turn = acceleration[:, 2] if rates.shape[1] == 3 else np.zeros((len(rates), 3))[:, 2]
-        penalty_forces(
-            contacts, row, rates, spin, roster.inverse_mass, roster.inverse_moment, self._stiffness, acceleration, turn
-        )
+        inverse = roster.inverse_mass, self._inverse_moment
+        penalty_forces(contacts, row, rates, spin, *inverse, self._stiffness, acceleration, turn)
+
+    @property
+    def _inverse_moment(self) -> FloatArray:
+        return self._roster.inverse_moment if self.drives is None else self.drives.yielding
 
     def stored(self, pose: FloatArray) -> float:
         """Return what the springs of all contacts at (N, ≥ 2) poses store, ½ k overlap² each, J."""
@@ -88,7 +93,7 @@ class Penalty:
         """Return the power, W, of all contacts in a state, along normals and across, less that of their springs."""
         contacts, roster = self._finder.overlaps(x[0]), self._roster
         spin = x[1, :, 2] if x.shape[2] == 3 else np.zeros((x.shape[1], 3))[:, 2]
-        inverse = roster.inverse_mass, roster.inverse_moment
+        inverse = roster.inverse_mass, self._inverse_moment
         return penalty_losses(contacts, x[1], spin, *inverse, self._stiffness)
 
     def _note(self, position: FloatArray, impulse: FloatArray, near: Candidates, reach: float) -> None:

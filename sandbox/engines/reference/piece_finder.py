@@ -98,5 +98,8 @@ class PieceFinder(Finder):
         way = (end - start)[self.able]
         length = np.sqrt((way[:, :2] ** 2).sum(axis=1))
         if way.shape[1] == 3:
-            length += np.abs(way[:, 2]) * self._roster.radius[self.able]
+            reach = self._roster.radius[self.able]
+            if self._roster.held:
+                reach = reach + np.hypot(*self._roster.hinge[self.able].T)
+            length += np.abs(way[:, 2]) * reach
         return float(length.max(initial=0.0))

@@ -36,11 +36,14 @@ class Pieces:
         self.surface: IntArray = roster.meet.surfaces.of_shape
         self.local: FloatArray = shapes.corner
         self.local_middle: FloatArray = shapes.middle
+        if roster.held:  # poses are those of hinges
+            self.local = shapes.corner - np.repeat(roster.hinge[shapes.body], np.diff(shapes.first), axis=0)
+            self.local_middle = shapes.middle - roster.hinge[shapes.body]
         self.reach: FloatArray = shapes.reach
         self.radius: FloatArray = np.concatenate((shapes.radius, segments[:, 4]))
         ends = segments[:, :4].reshape(-1, 2)
         self.first: IntArray = np.concatenate((shapes.first, shapes.first[-1] + 2 * np.arange(1, len(segments) + 1)))
-        self.corner: FloatArray = np.concatenate((shapes.corner, ends))
+        self.corner: FloatArray = np.concatenate((self.local, ends))
         """(V + 2G, 2) m, in the world as it was last laid out"""
         self.middle: FloatArray = np.empty((self.count, 2))
         """(S, 2) m, likewise"""
@@ -48,6 +51,9 @@ class Pieces:
         self.moves: BoolArray = roster.mobile[self.body]
         self.able: BoolArray = roster.moving[self.body] & (self.meets > NOTHING)
         self.apart: IntArray = apart_keys(roster.links)
+        if roster.held:
+            self.able = self.able & ~roster.led[self.body]
+            self.apart = np.union1d(self.apart, led_keys(roster))
         self.group: IntArray = roster.bodies.group
         """(N,) of each body"""
 
@@ -64,6 +70,14 @@ class Pieces:
 def apart_keys(links: Links) -> IntArray:
     """Return keys of the pairs of bodies that joints keep from meeting, (K,), ascending."""
     return np.sort([pair_key(a, b) for a, b in links.apart().tolist()]).astype(np.int64)
+
+
+def led_keys(roster: Roster) -> IntArray:
+    """Return keys of the pairs of bodies of which nothing moves either, (K,), ascending: led ones, and fixed ones."""
+    firm = np.flatnonzero(roster.led | roster.bodies.fixed)
+    led = np.flatnonzero(roster.led)
+    keys = [pair_key(min(a, b), max(a, b)) for a in led.tolist() for b in firm.tolist() if a != b]
+    return np.unique(np.asarray(keys, np.int64))
 
 
 @kernel

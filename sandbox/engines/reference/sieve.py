@@ -1,7 +1,7 @@
 """Sieve: which of those that are near each other do not meet, though their kinds could.
 
 Two that share no layer pass over each other, one-way walls let through who comes from their right, and of two that
-are held, or fixed, neither yields. A scene that knows none of this has no sieve.
+are held, led or fixed, neither yields. A scene that knows none of this has no sieve.
 """
 
 import numpy as np
@@ -36,7 +36,7 @@ class Sieve:
     def population_changed(self, position: FloatArray) -> None:
         """Take note of who is on which layer, who is held, where they are, (N, ≥ 2) m, and where walls run."""
         self._bits: IntArray = 1 << self._roster.layer
-        self._moving: BoolArray = self._roster.moving
+        self._yields: BoolArray = (self._roster.inverse_mass > 0.0) | (self._roster.inverse_moment > 0.0)
         self._thing = self._roster.fixtures.segment_thing
         if self.gates is not None:
             self.gates.renew(position)
@@ -46,7 +46,7 @@ class Sieve:
         balls, segments = near
         if len(balls):
             a, b = owner[balls >> FIRST], owner[balls & SECOND]
-            balls = balls[(self._moving[a] | self._moving[b]) & (self._bits[a] & self._bits[b] != 0)]
+            balls = balls[(self._yields[a] | self._yields[b]) & (self._bits[a] & self._bits[b] != 0)]
         if len(segments):
             body, thing = owner[segments >> FIRST], self._thing[segments & SECOND]
             meets = self._bits[body] & self._of_fixed[thing] != 0

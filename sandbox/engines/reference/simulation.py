@@ -189,8 +189,9 @@ class ReferenceSimulation(Running):
         position, velocity, angle, spin = (a.copy() for a in (r.position, r.velocity, r.angle, r.angular_velocity))
         layer = r.layer.copy() if len(r.scene.layers) > 1 else None
         visits = r.visits.copy() if r.scene.zones else None
+        drives = r.drives.copy() if len(r.drives) else None
         present, passing = r.present.copy(), self._stage.passing
-        return Frame(self.time, position, velocity, angle, spin, present, None, layer, visits, None, passing)
+        return Frame(self.time, position, velocity, angle, spin, present, None, layer, visits, drives, passing)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
@@ -223,7 +224,8 @@ class ReferenceSimulation(Running):
         self._ledger.record(end, now if came is None else joined(now, came))
         if self._observer is not None:
             # The observer may keep what it is given: these arrays are never written to again.
-            self._observer(start, before[0, :, :2], after[0, :, :2], self._ledger.pairs())
+            centres = self._stage.centres
+            self._observer(start, centres(before), centres(after), self._ledger.pairs())
 
 
 def _falls_off(single: Single, scene: Scene) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 
 from sandbox.engines.reference.integrators import INTEGRATORS, amplification
 from sandbox.engines.reference.springs import LEAST_RESTITUTION, damping_of
+from sandbox.scene.driven import mounts
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -26,10 +27,20 @@ DAMPER = 1.3
 def lightest(scene: Scene) -> float:
     """Return the smallest reduced mass, kg, of a pair that can meet: two equal balls have half the mass of one."""
     meet, bodies = meetings(scene), scene.bodies
-    masses = bodies.mass[~meet.free & ~bodies.fixed]
+    mass, moving, hinged = bodies.mass, ~bodies.fixed, False
+    if scene.drives:
+        mass, moving = mass.copy(), moving.copy()
+        for name, mount in mounts(scene).items():
+            if name in bodies.names:
+                n = bodies.names.index(name)
+                moving[n] = mount.drive.kind == "torque"
+                hinged = hinged or bool(moving[n])
+                arm = math.hypot(*mount.hinge)  # at its far end it is lightest: I / r²
+                mass[n] = (bodies.moment[n] + bodies.mass[n] * arm * arm) / (bodies.radius[n] + arm) ** 2
+    masses = mass[~meet.free & moving]
     if not len(masses):
         return 1.0
-    return float(masses.min()) * (0.5 if meet.ball_ball else 1.0)
+    return float(masses.min()) * (0.5 if meet.ball_ball or hinged else 1.0)
 
 
 def suited(scene: Scene, settings: Settings) -> float:

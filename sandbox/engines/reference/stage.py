@@ -15,6 +15,7 @@ import numpy as np
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.reference.ball_finder import BallFinder
 from sandbox.engines.reference.books import Bookkeeper, Idle
+from sandbox.engines.reference.driven.drives import Drives
 from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.impulses import approach, remembered, solve_overlaps, solve_velocities
 from sandbox.engines.reference.integrators import INTEGRATORS
@@ -50,6 +51,7 @@ class Stage:
         self._given: FloatArray = np.zeros((len(self._links), 2))  # N·s or N·m·s by each link, in this substep
         self._field = Field(roster)
         self._sieve = Sieve(roster) if Sieve.needed(roster.scene) else None
+        self.drives: Drives | None = None
         self.finder = self._new_finder()
         self._fixtures = roster.fixtures
         self._parting: Parting | None = None
@@ -71,14 +73,21 @@ class Stage:
     def _tell_books(self) -> None:
         """Let the books know who is there. What looks for contacts on their behalf is no work of the stage's."""
         own = None if self.penalty is None else Penalty(self._roster, self._settings, self._new_finder())
-        self.books.population_changed(self.u, self._joints, own)
+        if own is not None:
+            own.drives = self.drives
+        self.books.population_changed(self.u, self._joints, own, self.drives)
 
     def _new_finder(self) -> Finder:
         assert self._settings.broad_phase
-        kind = PieceFinder if self._roster.meet.solids else BallFinder
+        kind = PieceFinder if self._pieced else BallFinder
         finder = kind(self._roster, self._settings.broad_phase)
         finder.sieve = self._sieve
         return finder
+
+    @property
+    def _pieced(self) -> bool:
+        """Bodies are looked at piece by piece, wherever those lie: not all are discs about their own centres."""
+        return self._roster.meet.solids or len(self._roster.drives) > 0
 
     def _joint_solver(self) -> JointSolver | None:
         """Return what holds the scene's links, if it has any."""
@@ -93,7 +102,7 @@ class Stage:
     def enter(self) -> None:
         """Take the state from the roster, whose bodies may have been changed."""
         roster = self._roster
-        posed = len(self._links) > 0 or not self._field.empty  # these work on poses, whether anything turns or not
+        posed = len(self._links) > 0 or not self._field.empty or bool(roster.held)
         turns = posed or bool(roster.inverse_moment.any() or roster.angular_velocity.any())
         parts = [roster.position, roster.velocity]
         if turns:
@@ -103,14 +112,17 @@ class Stage:
             ]
         self.x: State = np.stack(parts)
         if self._sieve is not None:
-            self._sieve.population_changed(self.x[0])
+            self._sieve.population_changed(self.x[0])  # centres, until drives put hinges in their places
+        self.drives = Drives.of(roster, self.drives)
+        if self.drives is not None:
+            self.drives.enter(self.x)
         # Overlap goes on being corrected, except for who is gone.
         kept = np.zeros((len(roster.position), 3))
         kept[: len(self.push)] = self.push
         self.push = np.where(roster.moving[:, None], kept, 0.0)
         self._pushes = bool(self.push.any())
         self._no_spin: FloatArray = np.zeros((len(roster.position), 3))
-        if roster.meet.solids != isinstance(self.finder, PieceFinder):  # keys mean other pairs from now on
+        if self._pieced != isinstance(self.finder, PieceFinder):  # keys mean other pairs from now on
             work, self.finder = self.finder.work, self._new_finder()
             self.finder.work = work
             self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
@@ -128,6 +140,7 @@ class Stage:
             self._parting = Parting(roster)
             self.finder.use(self._parting.codes)
         if self.penalty is not None:
+            self.penalty.drives = self.drives
             self.penalty.population_changed()
         if self._joints is not None:
             self._joints.use(roster.inverse_mass, roster.inverse_moment, roster.linked())
@@ -140,7 +153,7 @@ class Stage:
 
     def visit(self, roster: ZonedRoster) -> None:
         """Let the zones of the roster note who came in during the substep that has ended, and do what they do."""
-        if roster.look(self.x[0]):
+        if roster.look(self.centres(self.x)):
             self.leave()
             with self.books.doing(Cause.DRIVES):
                 if roster.settle():
@@ -169,11 +182,20 @@ class Stage:
         roster.position[:], roster.velocity[:] = self.x[0, :, :2], self.x[1, :, :2]
         if self.x.shape[2] == 3:
             roster.angle[:], roster.angular_velocity[:] = self.x[0, :, 2], self.x[1, :, 2]
+        if self.drives is not None:
+            self.drives.leave(self.x)
+
+    def centres(self, x: State) -> FloatArray:
+        """Return where the centres of all bodies are in a state, (N, 2) m."""
+        return x[0, :, :2] if self.drives is None else self.drives.centred(x)
 
     def apply_forces(self) -> None:
         """Gather what acts: gravity, steady forces, air."""
         roster, world = self._roster, self._roster.scene.world
         moving = roster.moving[:, None]
+        if roster.held:  # what acts on them is their drives' concern
+            moving = moving.copy()
+            moving[list(roster.held)] = False
         steady = np.zeros_like(self.x[1])
         steady[:, :2] = np.where(moving, roster.gravity, 0.0) + roster.force * roster.inverse_mass[:, None]
         if steady.shape[1] == 3:
@@ -197,18 +219,31 @@ class Stage:
 
     def moved(self, h: float) -> State:
         """Return the state a time h, s, ahead, as if nothing were hit on the way. Nothing is changed."""
-        if self.penalty is not None:
-            moved = self.penalty.moved(self._integrator.step, self.time, self.x, self.u, h)
+        x = self.x
+        if self.drives is not None:
+            x, moved = self._driven(self.drives, h)
+        elif self.penalty is not None:
+            moved = self.penalty.moved(self._integrator.step, self.time, x, self.u, h)
         else:
-            moved = self._integrator.step(transition, self.time, self.x, self.u, h)
+            moved = self._integrator.step(transition, self.time, x, self.u, h)
         shift = h * self.push[:, : moved.shape[2]] if self._pushes else None
-        self.books.flown(self.x, moved, shift)
+        self.books.flown(x, moved, shift)
         if shift is not None:
             moved[0] += shift
         if self._joints is not None and self._joints.how != "impulses":
             self._joints.project(self.x, moved, h)
             self.finder.work["joint_iterations"] += self._joints.visits
         return moved
+
+    def _driven(self, drives: Drives, h: float) -> tuple[State, State]:
+        """Return from where on and to where the state goes in h, s, where some of it is led by drives."""
+        penalty, step = self.penalty, self._integrator.step
+        if penalty is None:
+            moved = step(transition, self.time, drives.begin(self.x, h), self.u, h)
+        else:
+            moved = drives.spring(self.x, h, lambda x: (penalty.moved(step, self.time, x, self.u, h), *penalty.given()))
+        drives.place(moved)
+        return drives.start, moved
 
     def overlaps(self, x: State) -> Manifolds:
         """Return the contacts in a state; they are good until the next look. Springs have looked while they moved."""
@@ -234,7 +269,8 @@ class Stage:
             self._pushes = bool(target.any())
             if self._pushes:
                 self.finder.work["contact_iterations"] += contacts.size * self._settings.iterations
-                inverse = self._roster.inverse_mass, self._roster.inverse_moment
+                turning = self._roster.inverse_moment if self.drives is None else self.drives.firm
+                inverse = self._roster.inverse_mass, turning
                 solve_overlaps(contacts, target, self.push, *inverse, np.zeros_like(target), self._settings.iterations)
         self._memory = contacts.key.copy(), impulse, h
         self._done(moved, contacts, impulse, h)
@@ -259,12 +295,12 @@ class Stage:
         self.books.met(moved)
         impulse = np.zeros((contacts.size, 2))
         joined = self._joints is not None and self._joints.how == "impulses"
-        if not (contacts.size or joined):
+        if not (contacts.size or joined or self.drives is not None):
             return impulse
         share = self._integrator.share
         if self._joints is not None and joined:
             self._joints.prepare(kick_pose(moved, share, h), h)
-        bounce = self._bounce(contacts, self.x[1])
+        bounce = self._bounce(contacts, self.x[1] if self.drives is None else self.drives.start[1])
         key, old, old_h = self._memory
         remembered(contacts.key, key, old, impulse)
         # What rests takes impulses in proportion to the time. Never more: a blow does not grow with it.
@@ -273,7 +309,7 @@ class Stage:
         self._solve(contacts, bounce.speed, moved[1], impulse, joined)
         self.books.held(moved, contacts, impulse, bounce.worth)
         if share:
-            change = moved[1] - kicked
+            change = moved[1] - (kicked if self.drives is None else self.drives.released(kicked))
             moved[0] += (share * h) * change
             contacts.separation[:] += (share * h) * self._approach(contacts, change)
         return impulse
@@ -303,6 +339,13 @@ class Stage:
     ) -> None:
         inverse = self._roster.inverse_mass, self._roster.inverse_moment
         self.finder.work["contact_iterations"] += contacts.size * self._settings.iterations
+        if self.drives is not None:
+            rows = None
+            if self._joints is not None and joined:
+                self.finder.work["joint_iterations"] += self._joints.visits
+                rows = self._joints.rows
+            self.drives.solve(contacts, bounce, rows, velocity, impulse, self._settings.iterations)
+            return
         if self._joints is not None and joined:
             self.finder.work["joint_iterations"] += self._joints.visits
             rows, times = self._joints.rows, self._settings.iterations
@@ -318,13 +361,16 @@ class Stage:
     def _done(self, after: State, contacts: Manifolds, impulse: FloatArray, h: float) -> None:
         before, self.x = self.x, after
         start, self.time = self.time, self.time + h
+        if self.drives is not None:
+            self.drives.done(after)
+            self.books.led(before, after, h, contacts, impulse)
         self.books.done(start, after, h)
         if self._joints is not None and len(self._breakable):
             self._given += h * self._joints.load(after)
         if self.witness is not None:
             self.witness(start, self.time, before, after, contacts, impulse)
         if self._sieve is not None and self._sieve.gates is not None:
-            self._sieve.gates.settle(self.finder.at_gates(after[0]), after[0])
+            self._sieve.gates.settle(self.finder.at_gates(after[0]), self.centres(after))
 
 
 Detection = Callable[[Stage, float], None]

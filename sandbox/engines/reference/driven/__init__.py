@@ -1,0 +1,1 @@
+"""Driven: bodies that drives hold, on the hand-written solvers."""
