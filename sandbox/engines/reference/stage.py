@@ -15,23 +15,23 @@ import numpy as np
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.reference.ball_finder import BallFinder
 from sandbox.engines.reference.books import Bookkeeper, Idle
+from sandbox.engines.reference.contact_solver import ContactSolver
 from sandbox.engines.reference.driven.drives import Drives
 from sandbox.engines.reference.finder import Finder
-from sandbox.engines.reference.impulses import approach, remembered, solve_overlaps, solve_velocities
+from sandbox.engines.reference.forces import inputs_of
+from sandbox.engines.reference.impulses import remembered, solve_overlaps
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.reference.joints.field import Field
 from sandbox.engines.reference.joints.solver import JointSolver, kick_pose
-from sandbox.engines.reference.joints.together import solve_together
 from sandbox.engines.reference.manifolds import Manifolds
-from sandbox.engines.reference.motion import Inputs, State, transition
-from sandbox.engines.reference.parting import Bounce, Parting
+from sandbox.engines.reference.motion import State, transition
 from sandbox.engines.reference.penalty import Penalty
 from sandbox.engines.reference.piece_finder import PieceFinder
 from sandbox.engines.reference.sieve import Sieve
+from sandbox.engines.reference.tearing import Tearing
 from sandbox.engines.reference.witness import Witness
 from sandbox.engines.reference.zoned_roster import ZonedRoster
 from sandbox.engines.roster import Roster
-from sandbox.scene.links import LinkKind
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import FloatArray, IntArray
 
@@ -47,14 +47,12 @@ class Stage:
         self._integrator = INTEGRATORS[settings.integrator]
         self._links = roster.scene.links
         self._joints = self._joint_solver()
-        self._breakable: IntArray = np.flatnonzero(np.isfinite(self._links.strength))
-        self._given: FloatArray = np.zeros((len(self._links), 2))  # N·s or N·m·s by each link, in this substep
+        self._tearing = Tearing(self._links)
         self._field = Field(roster)
         self._sieve = Sieve(roster) if Sieve.needed(roster.scene) else None
         self.drives: Drives | None = None
         self.finder = self._new_finder()
         self._fixtures = roster.fixtures
-        self._parting: Parting | None = None
         self.penalty = Penalty(roster, settings, self.finder) if settings.response == "penalty" else None
         self.time = 0.0
         self.witness: Witness | None = None
@@ -121,7 +119,6 @@ class Stage:
         kept[: len(self.push)] = self.push
         self.push = np.where(roster.moving[:, None], kept, 0.0)
         self._pushes = bool(self.push.any())
-        self._no_spin: FloatArray = np.zeros((len(roster.position), 3))
         if self._pieced != isinstance(self.finder, PieceFinder):  # keys mean other pairs from now on
             work, self.finder = self.finder.work, self._new_finder()
             self.finder.work = work
@@ -132,13 +129,13 @@ class Stage:
             self._fixtures = roster.fixtures
             self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
         self.finder.population_changed()
+        times = self._settings.iterations
+        self._solver = ContactSolver(roster, times, self._joints, self.drives, self.finder.work)
         if self._sieve is not None and self._sieve.gates is not None:
             overlaps = self.finder.at_gates(self.x[0])
             self._sieve.gates.begin(overlaps, self.closing(overlaps, self.x))
-        self._parting = None
-        if Parting.needed(roster):
-            self._parting = Parting(roster)
-            self.finder.use(self._parting.codes)
+        if self._solver.parting is not None:
+            self.finder.use(self._solver.parting.codes)
         if self.penalty is not None:
             self.penalty.drives = self.drives
             self.penalty.population_changed()
@@ -160,17 +157,11 @@ class Stage:
                     self.enter()
 
     def tear(self, h: float, time: float) -> None:
-        """Break what gave more than its strength, on average over a substep of h, s, that ended at a time, s.
-
-        Over a substep and not over the pieces that impacts cut it into: the shorter one is, the larger its forces.
-        """
-        if not len(self._breakable):
+        """Break what gave more than its strength, on average over a substep of h, s, that ended at a time, s."""
+        if not self._tearing.any:
             return
-        force = np.hypot(*self._given[self._breakable].T) / h
-        self._given[:] = 0.0
-        broken = self._breakable[force > self._links.strength[self._breakable]]
+        broken = self._tearing.torn(h)
         if len(broken):
-            self._breakable = np.setdiff1d(self._breakable, broken)
             self.leave()
             with self.books.doing(Cause.PARTED):
                 self._roster.part(broken, time)
@@ -191,29 +182,7 @@ class Stage:
 
     def apply_forces(self) -> None:
         """Gather what acts: gravity, steady forces, air."""
-        roster, world = self._roster, self._roster.scene.world
-        moving = roster.moving[:, None]
-        if roster.held:  # what acts on them is their drives' concern
-            moving = moving.copy()
-            moving[list(roster.held)] = False
-        steady = np.zeros_like(self.x[1])
-        steady[:, :2] = np.where(moving, roster.gravity, 0.0) + roster.force * roster.inverse_mass[:, None]
-        if steady.shape[1] == 3:
-            steady[:, 2] = roster.torque * roster.inverse_moment
-        forces: list[Callable[[float, State], FloatArray]] = [] if self._field.empty else [self._field]
-        springs = self._links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
-        if self._joints is not None and self._joints.how != "xpbd" and len(springs):
-            joints = self._joints
-            forces.append(lambda _, x: joints.forces(x))
-        self.u = Inputs(
-            steady,
-            world.linear_drag,
-            world.quadratic_drag,
-            world.wind,
-            moving.astype(np.float64),
-            forces=tuple(forces),
-            rubbing=bool(springs.figures[:, 2].any()),
-        )
+        self.u = inputs_of(self._roster, self._field, self._joints, self.x.shape[2])
         if isinstance(self.books, Bookkeeper):
             self._tell_books()
 
@@ -282,8 +251,8 @@ class Stage:
         """
         held = self._held(moved, lasting, h)
         struck = np.zeros((clash.size, 2))
-        bounce = self._bounce(clash, moved[1])
-        self._solve(clash, bounce.speed, moved[1], struck)
+        bounce = self._solver.bounce(clash, moved[1])
+        self._solver.solve(clash, bounce.speed, moved[1], struck)
         self.books.struck(moved, clash, struck, bounce.worth)
         self._done(moved, lasting.joined(clash), np.concatenate((held, struck)), h)
 
@@ -300,31 +269,19 @@ class Stage:
         share = self._integrator.share
         if self._joints is not None and joined:
             self._joints.prepare(kick_pose(moved, share, h), h)
-        bounce = self._bounce(contacts, self.x[1] if self.drives is None else self.drives.start[1])
+        bounce = self._solver.bounce(contacts, self.x[1] if self.drives is None else self.drives.start[1])
         key, old, old_h = self._memory
         remembered(contacts.key, key, old, impulse)
         # What rests takes impulses in proportion to the time. Never more: a blow does not grow with it.
         impulse *= min(h / old_h, 1.0)
         kicked = moved[1].copy()
-        self._solve(contacts, bounce.speed, moved[1], impulse, joined)
+        self._solver.solve(contacts, bounce.speed, moved[1], impulse, joined)
         self.books.held(moved, contacts, impulse, bounce.worth)
         if share:
             change = moved[1] - (kicked if self.drives is None else self.drives.released(kicked))
             moved[0] += (share * h) * change
-            contacts.separation[:] += (share * h) * self._approach(contacts, change)
+            contacts.separation[:] += (share * h) * self._solver.approach(contacts, change)
         return impulse
-
-    def _bounce(self, contacts: Manifolds, velocity: FloatArray) -> Bounce:
-        """Return how fast contacts are to part that approach with some velocities."""
-        approach = self._approach(contacts, velocity)
-        if self._parting is None:
-            return Bounce(approach * contacts.coefficient[:, 0], None)
-        return self._parting.bounce(contacts, approach)
-
-    def _approach(self, contacts: Manifolds, velocity: FloatArray) -> FloatArray:
-        out = np.empty(contacts.size)
-        approach(contacts, velocity, self._spin(velocity), out)
-        return out
 
     def gentle(self, h: float) -> float:
         """Return the closing speed, m/s, that the forces of a substep or two bring about: of what rests, not hits."""
@@ -332,31 +289,7 @@ class Stage:
 
     def closing(self, contacts: Manifolds, x: State) -> FloatArray:
         """Return how fast each contact closes in a state, (K,) m/s."""
-        return -self._approach(contacts, x[1])
-
-    def _solve(
-        self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray, joined: bool = False
-    ) -> None:
-        inverse = self._roster.inverse_mass, self._roster.inverse_moment
-        self.finder.work["contact_iterations"] += contacts.size * self._settings.iterations
-        if self.drives is not None:
-            rows = None
-            if self._joints is not None and joined:
-                self.finder.work["joint_iterations"] += self._joints.visits
-                rows = self._joints.rows
-            self.drives.solve(contacts, bounce, rows, velocity, impulse, self._settings.iterations)
-            return
-        if self._joints is not None and joined:
-            self.finder.work["joint_iterations"] += self._joints.visits
-            rows, times = self._joints.rows, self._settings.iterations
-            solve_together(contacts, bounce, rows, velocity, *inverse, impulse, times)
-            return
-        spin = self._spin(velocity)
-        solve_velocities(contacts, bounce, velocity, spin, *inverse, impulse, self._settings.iterations)
-
-    def _spin(self, velocity: FloatArray) -> FloatArray:
-        """Return the spins (N,) among rates (N, D): zeros where nothing turns."""
-        return (velocity if velocity.shape[1] == 3 else self._no_spin)[:, 2]
+        return -self._solver.approach(contacts, x[1])
 
     def _done(self, after: State, contacts: Manifolds, impulse: FloatArray, h: float) -> None:
         before, self.x = self.x, after
@@ -365,8 +298,8 @@ class Stage:
             self.drives.done(after)
             self.books.led(before, after, h, contacts, impulse)
         self.books.done(start, after, h)
-        if self._joints is not None and len(self._breakable):
-            self._given += h * self._joints.load(after)
+        if self._joints is not None and self._tearing.any:
+            self._tearing.note(h * self._joints.load(after))
         if self.witness is not None:
             self.witness(start, self.time, before, after, contacts, impulse)
         if self._sieve is not None and self._sieve.gates is not None:
