@@ -27,14 +27,12 @@ class Drives:
         self.state: FloatArray = scene.driven.copy()
         """(D, 3) of each drive, as a frame tells them; of those that hold somebody not up to date"""
         self._axles: dict[int, Axle] = {}
+        self.axles: list[Axle] = []
+        """the bodies that are held"""
         self._hinges: dict[int, Hinge] = {}  # by the ids of their bodies
         self._watched: set[int] = set()
         self._gravity = (0.0, 0.0), (0.0, 0.0)
         self._last: FloatArray | None = None
-
-    def __bool__(self) -> bool:
-        """Tell whether there are any."""
-        return bool(self._axles)
 
     def holds(self, name: str) -> bool:
         """Tell whether a body is driven."""
@@ -71,6 +69,7 @@ class Drives:
             self._axles[mount.number] = hinge
         else:
             self._axles[mount.number] = Plunger(start) if isinstance(mount.drive, PlungerDrive) else Stroke(start)
+        self.axles = list(self._axles.values())
 
     def leave(self, number: int) -> None:
         """Let go of a body, by its number, that leaves the space."""
@@ -81,6 +80,7 @@ class Drives:
                 if isinstance(axle, Hinge):
                     del self._hinges[axle.body.id]
                     self._space.remove(axle.limit)
+        self.axles = list(self._axles.values())
 
     def watch(self, kind: Callable[[int], set[int]]) -> None:
         """Be told what bodies on hinges meet; `kind` gives the types of the shapes of a body by its number."""
@@ -111,12 +111,12 @@ class Drives:
 
     def before(self) -> None:
         """Prepare the driven bodies for a substep."""
-        for axle in self._axles.values():
+        for axle in self.axles:
             axle.before()
 
     def after(self) -> None:
         """Look what has become of them."""
-        for axle in self._axles.values():
+        for axle in self.axles:
             axle.after()
 
     def write(
@@ -140,14 +140,9 @@ class Drives:
                 position[n], velocity[n] = axle.seated(float(angle[n]), float(spin[n]))
 
     @property
-    def axles(self) -> list[Axle]:
-        """The bodies that are held."""
-        return list(self._axles.values())
-
-    @property
     def numbers(self) -> list[int]:
         """Their numbers."""
-        return [axle.number for axle in self._axles.values()]
+        return [axle.number for axle in self.axles]
 
     def end(self, before: FloatArray, share: float) -> None:
         """Stand for good as it was a share of the last substep after its beginning, (D, 3)."""

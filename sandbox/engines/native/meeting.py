@@ -229,7 +229,7 @@ class MeetingBodies(Members):
             heavy = meet.turnable[number] and math.isinf(self.moment(number))
             if heavy and number not in self.drives.numbers:
                 self.give_moment(number, float(self._moments[number]))
-        if self.drives:
+        if self.drives.axles:
             self.drives.weigh(scene.world.gravity, gravity_of(scene))
             self.drives.watch(self._kinds)
         self._ground.renew(scene, self._surface_of_fixed)
@@ -245,7 +245,7 @@ class MeetingBodies(Members):
             self.steady.apply(self._members)
         if self._setter.gates.walls:
             self._setter.gates.tick += 1
-        if self.drives:
+        if self.drives.axles:
             self.drives.before()
             self._space.step(self._h)
             self.drives.after()
@@ -277,7 +277,7 @@ class MeetingBodies(Members):
         at = self._reader.slots
         position[at], velocity[at] = state[:, 0:2], state[:, 3:5]
         angle[at], angular_velocity[at] = state[:, 2], state[:, 5]
-        if self.drives:
+        if self.drives.axles:
             self.drives.write(position, velocity, angle, angular_velocity)
 
     def touching(self, steady: bool = False) -> Touching | ComplexArray:
