@@ -1,37 +1,17 @@
 """Books: the account of a pymunk run, substep by substep."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from sandbox.engines.account import Account, Cause
 from sandbox.engines.native.hauls import Hauls, Momenta, motors, springs
 from sandbox.engines.native.kicks import Kicks, kicks_of
 from sandbox.engines.native.population import Population
+from sandbox.engines.native.states import State
 from sandbox.engines.native.strides import meant, worked
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.potential import Potential
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
-
-
-class State(NamedTuple):
-    """Where N bodies are, and how fast."""
-
-    position: FloatArray
-    """(N, 2) m"""
-    angle: FloatArray
-    """(N,) rad"""
-    velocity: FloatArray
-    """(N, 2) m/s"""
-    spin: FloatArray
-    """(N,) rad/s"""
-
-    def towards(self, other: "State", share: float) -> "State":
-        """Return the state that lies a share of the way to another; the other itself, to the bit, for 1."""
-        if share == 1.0:
-            return other
-        return State(*(old + (new - old) * share for old, new in zip(self, other, strict=True)))
 
 
 class Books:

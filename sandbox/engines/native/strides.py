@@ -1,11 +1,10 @@
 """Strides: what drives gave to their bodies in a substep, and what these gave back, for the account.
 
 A body on a hinge has one degree of freedom: all work on it is an angular impulse about the hinge times a mean spin.
-What
-pushes a kinematic body is whatever it takes to move it so: what it changed by, less what contacts gave.
+What pushes a kinematic body is whatever it takes to move it so: what it changed by, less what contacts gave.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,12 +12,10 @@ from sandbox.engines.native.axle import Axle
 from sandbox.engines.native.hauls import Momenta
 from sandbox.engines.native.hinge import Hinge
 from sandbox.engines.native.points import Points
+from sandbox.engines.native.states import State
 from sandbox.engines.native.strokes import Plunger
 from sandbox.scene.bodies import Bodies
 from sandbox.trajectory import FloatArray
-
-if TYPE_CHECKING:
-    from sandbox.engines.native.books import State
 
 
 class Worked(NamedTuple):
@@ -32,7 +29,7 @@ class Worked(NamedTuple):
     """the potential energy that those by torque gained"""
 
 
-def meant(axles: list[Axle], before: "State", now: "State", velocity: FloatArray, spin: FloatArray) -> None:
+def meant(axles: list[Axle], before: State, now: State, velocity: FloatArray, spin: FloatArray) -> None:
     """Put mean velocities and spins of driven bodies in place: those about what pymunk takes for their centres."""
     for axle in axles:
         n = axle.number
@@ -44,7 +41,7 @@ def meant(axles: list[Axle], before: "State", now: "State", velocity: FloatArray
 
 def worked(
     axles: list[Axle],
-    states: tuple["State", "State"],
+    states: tuple[State, State],
     means: tuple[FloatArray, FloatArray],
     points: Points,
     bodies: Bodies,
