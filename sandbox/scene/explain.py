@@ -2,6 +2,8 @@
 
 import difflib
 import json
+import math
+import re
 from typing import Any, get_args
 
 from pydantic import BaseModel
@@ -44,6 +46,14 @@ _EXPECTED = {
     "literal_error": "one of {expected}",
 }
 
+_RANGES = {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}
+
+_DEGREES = 720
+"""What is more than two turns in degrees is not taken for such."""
+
+_RAD = re.compile(r"\brad\b(?!/)")
+"""rad, and not rad/s"""
+
 
 def explain(details: Any) -> tuple[Location, str]:
     """Return the location of one of pydantic's errors, and what is wrong there and would be right."""
@@ -77,9 +87,25 @@ def explain(details: Any) -> tuple[Location, str]:
         expected = f"an array of {context.get('max_length', context.get('min_length'))}"
     elif kind in _EXPECTED:
         expected = _EXPECTED[kind].format(**context)
+        if kind in _RANGES and abs(value) <= _DEGREES and _is_angle(tuple(details["loc"])):
+            expected += f", in rad; {value:g}° is {math.radians(value):.4g}"
     else:
         expected = details["msg"].removeprefix("Input should be ")
     return location, f"{_shown(value)} is not right here; it should be {expected}"
+
+
+def _is_angle(location: Location) -> bool:
+    """Tell whether what stands at a location is in rad, as the docstring of its field says."""
+    from sandbox.scene.docstrings import docstrings  # reads sources, which only this wants
+
+    last = max(k for k, key in enumerate(location) if isinstance(key, str))
+    try:
+        model = model_at(location[:last])
+    except (KeyError, StopIteration):  # it lies in one of several forms that a value may have
+        return False
+    told = docstrings(model)
+    name = next((name for name, field in model.model_fields.items() if (field.alias or name) == location[last]), "")
+    return _RAD.search(told.get(name, "")) is not None
 
 
 def place_of(details: Any) -> Location:

@@ -1,14 +1,12 @@
 """Schema: the JSON Schema of a scene file, from the model, so that editors complete and check one."""
 
-import ast
-import inspect
 import json
-import textwrap
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
+from sandbox.scene.docstrings import docstrings
 from sandbox.scene.model import Scene
 from sandbox.scene.part import Part
 
@@ -48,25 +46,8 @@ class _Generator(GenerateJsonSchema):
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         result = super().model_schema(schema)
-        descriptions = _docstrings(schema["cls"])
+        descriptions = docstrings(schema["cls"])
         for name, field in schema["cls"].model_fields.items():
             if name in descriptions:
                 result["properties"][field.alias or name]["description"] = descriptions[name]
         return result
-
-
-def _docstrings(model: type[Part]) -> dict[str, str]:
-    """Return what is written below the fields of a model and of those it inherits from."""
-    found: dict[str, str] = {}
-    for part in reversed(model.__mro__):
-        if issubclass(part, Part):
-            (definition,) = ast.parse(textwrap.dedent(inspect.getsource(part))).body
-            assert isinstance(definition, ast.ClassDef)
-            for field, text in zip(definition.body, definition.body[1:], strict=False):
-                match field, text:
-                    case (
-                        ast.AnnAssign(target=ast.Name(id=name)),
-                        ast.Expr(value=ast.Constant(value=str(words))),
-                    ):
-                        found[name] = inspect.cleandoc(words)
-    return found

@@ -137,3 +137,22 @@ def test_fault_is_one_line_whatever_it_speaks_of() -> None:
     assert str(Fault("s.toml", 3, "ball.cue", "is wrong")) == "s.toml:3: ball.cue: is wrong"
     assert str(Fault("s.toml", None, "", "is wrong")) == "s.toml: is wrong"
     assert str(Fault("a\nb", 1, "é", "\x1b[31m \u2028 \x85 \ud800")) == "a\\nb:1: é: \\x1b[31m \\u2028 \\x85 \\ud800"
+
+
+FLIPPER = "[pinball]\n[[pinball.flipper]]\npivot = [0.1, 0.1]\nstops = [{}, 0.35]\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[pinball]\nslope = 6.5\n", "1.5 or less, in rad; 6.5° is 0.1134"),
+        (FLIPPER.format(-31), "-10 or more, in rad; -31° is -0.5411"),
+        (FLIPPER.format(-3100), "-10 or more"),  # no angle in degrees either
+        ("[[shot]]\naim = 1e9\nspeed = 1.0\n", "1e+06 or less"),
+        ("[[ball]]\nposition = [0, 0]\nradius = 0.1\nangular_velocity = 1e99\n", "1e+12 or less"),  # rad/s
+    ],
+)
+def test_angle_in_degrees_is_told_in_radians(text: str, told: str) -> None:
+    with pytest.raises(SceneError) as error:
+        loads(text)
+    assert str(error.value.faults[0]).endswith(f"it should be {told}")
