@@ -22,19 +22,18 @@ try:
 except ImportError:
     raise ImportError("sandbox.gym needs gymnasium: pip install 'sandbox2d[gym]'") from None
 
-from sandbox.action import Action, ActionError
+from sandbox.action import ActionError
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import able, engine_named
-from sandbox.engines.relay import Relay, start
-from sandbox.games.referee import Referee
 from sandbox.games.registry import required_rules
 from sandbox.games.rules import Gauged, Rules
+from sandbox.measure.episode import Episode
 from sandbox.measure.seeds import seeded
 from sandbox.recording import Recording
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
 from sandbox.scene.shipped import find
-from sandbox.trajectory import Contacts, FloatArray
+from sandbox.trajectory import FloatArray
 
 GAMES = {
     "ArtilleryDuel": ("artillery/duel", 10),
@@ -114,11 +113,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         )
         self.observation_space = spaces.Box(-LIMIT, LIMIT, (len(self.observed),), np.float32)
         self.metadata = self.metadata | {"render_fps": max(round(1.0 / (self.scene.solver.dt * every)), 1)}
-        self._relay: Relay | None = None
-        self._game: Referee | None = None
-        self._played = self.scene
-        self._done: list[Action] = []
-        self._levels: list[float] = []
+        self._episode: Episode | None = None
         self._ended = False
         self._canvas: Any = None
 
@@ -140,12 +135,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         super().reset(seed=self.scene.world.seed if seed is None and first else seed)
         number = seed if seed is not None else self.scene.world.seed if first else int(self.np_random.integers(SEEDS))
         self._release()
-        self._played = seeded(self.scene, number)
-        rules = required_rules(self._played)
-        self._relay, self._game = start(self._played, self.engine), Referee(rules)
-        self._relay.contacts()
-        self._done, self._levels, self._ended = [], [0.0] * len(self.controls), False
-        self._look(Contacts.none())
+        self._episode, self._ended = Episode(seeded(self.scene, number), self.engine), False
         return self._observation(), self._info()
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -155,35 +145,29 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             ValueError: the action is not one number for each control, finite, or 0 or 1; nothing has happened then.
             ResetNeeded: no episode has begun, or it is over.
         """
-        relay, game = self._going()
+        episode = self._going()
         if self._ended:
             raise gymnasium.error.ResetNeeded("the episode is over; call reset before the next step")
         levels = self._levels_of(action)
-        before, failed = game.rules.score, None
+        before, failed = episode.rules.score, None
         try:
-            self._press(levels)
+            episode.press(levels)
             for _ in range(self.every):
-                relay.step()
-                self._look(relay.contacts())
-                if game.rules.over is not None or self._late:
+                episode.step()
+                if episode.ended:
                     break
         except (Divergence, Exhaustion, ActionError) as error:
             failed = str(error)
         info = self._info() | ({} if failed is None else {"failed": failed})
-        over = game.rules.over is not None
-        late = not over and (self._late or failed is not None)
+        over = episode.rules.over is not None
+        late = not over and (episode.late or failed is not None)
         self._ended = over or late
-        return self._observation(), float(game.rules.score - before), over, late, info
+        return self._observation(), float(episode.rules.score - before), over, late, info
 
-    def _going(self) -> tuple[Relay, Referee]:
-        if self._relay is None or self._game is None:
+    def _going(self) -> Episode:
+        if self._episode is None:
             raise gymnasium.error.ResetNeeded("call reset before step, render or recording")
-        return self._relay, self._game
-
-    @property
-    def _late(self) -> bool:
-        assert self._relay is not None
-        return self._relay.time >= self.scene.world.duration - 0.5 * self.scene.solver.dt
+        return self._episode
 
     def _levels_of(self, action: Any) -> list[float]:
         """Return how far an action presses each control.
@@ -202,73 +186,42 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         found: list[float] = np.clip(levels, 0.0, 1.0).tolist()
         return found
 
-    def _press(self, levels: list[float]) -> None:
-        """Set the controls that an action changes."""
-        relay, game = self._going()
-        for k, (control, level) in enumerate(zip(self.controls, levels, strict=True)):
-            value = level if control.analogue else float(level > 0.5)
-            if value != self._levels[k]:
-                self._levels[k] = value
-                acts = game.press(relay.time, control.name, value)
-                self._do(acts)
-                game.saw(acts)
-
-    def _look(self, contacts: Contacts) -> None:
-        """Let the rules see the state, and do what they say."""
-        relay, game = self._going()
-        self._do(game.look(relay.time, relay.frame(), contacts))
-
-    def _do(self, acts: Sequence[Action]) -> None:
-        relay, _ = self._going()
-        for act in acts:
-            relay.apply(act)
-            self._done.append(act)
-
     def _observation(self) -> Observation:
-        relay, game = self._going()
-        frame, some = relay.frame(), self._numbers
+        episode = self._going()
+        frame, some = episode.frame(), self._numbers
         columns: list[FloatArray] = [frame.position[some], frame.velocity[some]]
         columns += [each[some, None] for each in (frame.angle, frame.angular_velocity, frame.present.astype(float))]
-        others = [*(value for _, value in _gauges(game.rules)), relay.time, float(game.rules.score)]
+        others = [*(value for _, value in _gauges(episode.rules)), episode.time, float(episode.rules.score)]
         state = np.concatenate((np.hstack(columns).ravel(), others))
         bounded = np.clip(np.nan_to_num(state, posinf=LIMIT, neginf=-LIMIT), -LIMIT, LIMIT)
         return np.asarray(bounded, np.float32)
 
     def _info(self) -> dict[str, Any]:
-        relay, game = self._going()
-        rules = game.rules
+        episode = self._going()
+        rules = episode.rules
         return {
-            "time": relay.time,
+            "time": episode.time,
             "score": rules.score,
             "over": rules.over,
             "lines": dict(rules.lines()),
-            "seed": self._played.world.seed,
+            "seed": episode.scene.world.seed,
         }
 
     def recording(self) -> Recording:
         """Return the episode up to now, to be replayed: `sandbox replay` shows it."""
-        relay, game = self._going()
-        return Recording(
-            scene=self._played,
-            engine=self.engine,
-            settings=self._played.solver,
-            actions=tuple(self._done),
-            duration=relay.time,
-            state_hash=relay.state_hash(),
-            presses=game.presses,
-            score=game.rules.score,
-        )
+        return self._going().recording()
 
     def render(self) -> Any:
         """Return a picture, (height, width, 3) of 0 to 255, or None without a render mode."""
         if self.render_mode is None:
             return None
-        relay, game = self._going()
+        episode = self._going()
         if self._canvas is None:
             from sandbox.play.canvas import Canvas  # pygame is for who wants to see something
 
             self._canvas = Canvas(SIZE)
-        return self._canvas.picture(relay.scene, relay.bodies, relay.frame(), game.rules, relay.throttles)
+        relay = episode.relay
+        return self._canvas.picture(relay.scene, relay.bodies, episode.frame(), episode.rules, relay.throttles)
 
     def close(self) -> None:
         """Release the engine, and what pictures are drawn on."""
@@ -276,9 +229,9 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         self._canvas = None
 
     def _release(self) -> None:
-        if self._relay is not None:
-            self._relay.close()
-        self._relay = self._game = None
+        if self._episode is not None:
+            self._episode.close()
+        self._episode = None
 
 
 def _steps(every: int) -> int:
