@@ -75,12 +75,14 @@ class Company:
         if self._watch is not None:
             self._missed += [frame.time] * self._watch.look(frame)
         for each in (self._ghost, self.trust):
+            if each is None:
+                continue
+            been = each.step  # all that was done up to then it has done; after one step there may be several things
             for at, action in redone:
-                if each is not None and at > each.step:
+                if at > been:
                     each.follow(at)
                     self._let(each, action)
-            if each is not None:
-                each.follow(step)
+            each.follow(step)
         if self.trust is not None:
             self.trust.look(frame, step)
         if self._ghost is not None:

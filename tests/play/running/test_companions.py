@@ -100,6 +100,26 @@ def test_ghost_does_what_the_session_does_and_keeps_its_engine() -> None:
     assert session.engine == "reference"
 
 
+@pytest.mark.parametrize("at_once", [1, 7])
+def test_ghost_and_twin_do_all_that_was_done_after_one_step(at_once: int) -> None:
+    """As rules do several things at once, and as it is done again on a way back: the last push stands."""
+    pushes = tuple(Impulse(time=0.01, body="ball", impulse=(x, 0.0)) for x in (1.0, 2.0, 4.0))
+    session = Session(BOUNCE, "pymunk", actions=pushes)
+    company = Company(session)
+    company.show_ghost(True)
+    company.show_trust(True)
+    for _ in range(42 // at_once):
+        session.advance(at_once)
+        company.advance(session.redone())
+    assert company.trust is not None
+    assert company.trust.spread is not None
+    ghost = company.ghost_frame
+    assert ghost is not None
+    np.testing.assert_allclose(ghost.velocity[0, 0], session.frame.velocity[0, 0], rtol=1e-12)  # all three pushes
+    assert session.frame.velocity[0, 0] > 0.0
+    assert company.trust.spread < 1e-11  # of 1e-12 m at first: nothing has been hit
+
+
 def test_ghost_that_cannot_follow_says_why_and_another_engine_goes_on() -> None:
     session = Session(BOUNCE, "pymunk")
     company = Company(session)
