@@ -1,6 +1,11 @@
 """The command line as a process that Ctrl-C reaches, wherever the tests were started from."""
 
+import signal
+import subprocess
 import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 # A shell may start its children with SIGINT ignored, and they would inherit that.
 _MAIN = """
@@ -13,3 +18,18 @@ runpy.run_module("sandbox", run_name="__main__", alter_sys=True)
 def interruptible(*words: str) -> list[str]:
     """Return what runs the command line in a process that heeds SIGINT."""
     return [sys.executable, "-c", _MAIN, *words]
+
+
+def interrupted(words: Sequence[str], ready: Callable[[], bool], folder: Path | None = None) -> tuple[int, str, str]:
+    """Send Ctrl-C to a command, in a folder, once it is so far; return its status, its output, and its errors."""
+    pipe = subprocess.PIPE
+    command = subprocess.Popen(interruptible(*words), stdout=pipe, stderr=pipe, text=True, cwd=folder)
+    try:
+        while not ready():
+            assert command.poll() is None
+            time.sleep(0.001)
+        command.send_signal(signal.SIGINT)
+        out, err = command.communicate(timeout=120)
+    finally:
+        command.kill()
+    return command.returncode, out, err

@@ -2,10 +2,8 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +12,7 @@ import pyarrow.parquet as parquet
 import pytest
 from calling import DROP, json_of, lines_of, process, written
 from films import gif_frames, mp4_frames
-from interruptible import interruptible
+from interruptible import interrupted
 from PIL import Image
 
 from sandbox.action import Impulse, Spawn
@@ -429,21 +427,9 @@ def test_interrupt_keeps_what_is_finished_and_leaves_no_half_file(suffix: str, t
     out.mkdir()
     words = ["export", "run.npz", "--to", "out/first.png", "--to", f"out/film{suffix}", "--to", "out/last.png"]
     film = ["--fps", "2"] if suffix in (".gif", ".mp4") else []
-    command = subprocess.Popen(
-        interruptible(*words, *film),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=tmp_path,
+    status, printed, err = interrupted(
+        [*words, *film], lambda: (out / "first.png").exists() and bool(list(out.glob(".*.tmp"))), tmp_path
     )
-    try:
-        while not ((out / "first.png").exists() and list(out.glob(".*.tmp"))):
-            assert command.poll() is None
-            time.sleep(0.001)
-        command.send_signal(signal.SIGINT)
-        printed, err = command.communicate(timeout=120)
-    finally:
-        command.kill()
-    assert (command.returncode, err) == (130, "interrupted: 1 of 3 files are finished and kept\n")
+    assert (status, err) == (130, "interrupted: 1 of 3 files are finished and kept\n")
     assert printed == "written: out/first.png (1 frame)\n"
     assert [path.name for path in out.iterdir()] == ["first.png"]

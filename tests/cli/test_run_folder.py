@@ -2,10 +2,7 @@
 
 import json
 import shlex
-import signal
 import sqlite3
-import subprocess
-import time
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -13,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from calling import DROP, document_of, json_of, lines_of, written
-from interruptible import interruptible
+from interruptible import interrupted
 
 from sandbox.batch.store import Store
 from sandbox.trajectory import Trajectory
@@ -153,16 +150,8 @@ def test_damaged_file_is_told_in_one_line(tmp_path: Path, capfd: pytest.CaptureF
 def test_interrupt_keeps_what_is_finished(flags: str, tmp_path: Path) -> None:
     scene, folder = written(tmp_path, DROP.replace("duration = 0.5", "duration = 20.0")), tmp_path / "runs"
     words = ["run", scene, "--seeds", "500", "--out", str(folder), *shlex.split(flags)]
-    command = subprocess.Popen(interruptible(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
-        while len(list(folder.glob("*.npz"))) < 3:
-            assert command.poll() is None
-            time.sleep(0.01)
-        command.send_signal(signal.SIGINT)
-        out, err = command.communicate(timeout=120)
-    finally:
-        command.kill()
-    assert command.returncode == 130, err
+    status, out, err = interrupted(words, lambda: len(list(folder.glob("*.npz"))) >= 3)
+    assert status == 130, err
 
     with Store(folder) as store:
         rows = store.rows()

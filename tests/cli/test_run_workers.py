@@ -3,13 +3,11 @@
 import os
 import re
 import signal
-import subprocess
-import time
 from pathlib import Path
 
 import pytest
 from calling import DROP, document_of, json_of, lines_of, written
-from interruptible import interruptible
+from interruptible import interrupted
 
 from sandbox.batch.crew import CrewError, Making, Worker
 from sandbox.batch.plan import plan
@@ -48,16 +46,8 @@ def test_workers_take_from_the_store_what_it_has(tmp_path: Path, capfd: pytest.C
 def test_interrupt_ends_workers_and_keeps_what_is_finished(tmp_path: Path) -> None:
     scene, folder = written(tmp_path, DROP.replace("duration = 0.5", "duration = 20.0")), tmp_path / "runs"
     words = ["run", scene, "--seeds", "500", "--workers", "2", "--json", "--out", str(folder)]
-    command = subprocess.Popen(interruptible(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
-        while len(list(folder.glob("*.npz"))) < 3:
-            assert command.poll() is None
-            time.sleep(0.01)
-        command.send_signal(signal.SIGINT)
-        out, err = command.communicate(timeout=120)
-    finally:
-        command.kill()
-    assert command.returncode == 130, err
+    status, out, err = interrupted(words, lambda: len(list(folder.glob("*.npz"))) >= 3)
+    assert status == 130, err
     first, *_ = err.splitlines(keepends=True)
     told = re.fullmatch(r"interrupted: (\d+) of 500 runs are finished and kept\n", err.removeprefix(first))
     assert first.endswith("all seeds are the same run\n")

@@ -5,9 +5,9 @@ import numpy as np
 from sandbox.engines.reference.driven.drives import Drives
 from sandbox.engines.reference.impulses import approach, solve_velocities
 from sandbox.engines.reference.joints.solver import JointSolver
-from sandbox.engines.reference.joints.together import solve_together
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.parting import Bounce, Parting
+from sandbox.engines.reference.together import NO_STOPS, solve_together
 from sandbox.engines.roster import Roster
 from sandbox.trajectory import FloatArray
 
@@ -70,7 +70,7 @@ class ContactSolver:
         if self._drives is not None:
             self._drives.solve(contacts, bounce, rows, velocity, impulse, times)
         elif rows is not None:
-            solve_together(contacts, bounce, rows, velocity, *self._inverse, impulse, times)
+            solve_together(contacts, bounce, rows, NO_STOPS, velocity, *self._inverse, impulse, times)
         else:
             solve_velocities(contacts, bounce, velocity, self._spin(velocity), *self._inverse, impulse, times)
 

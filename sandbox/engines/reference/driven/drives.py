@@ -11,11 +11,11 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from sandbox.engines.reference.driven.lead import Hinge, Lead, lead_of
-from sandbox.engines.reference.driven.stops import Stops, solve_with_stops
 from sandbox.engines.reference.joints.rows import Rows, rows_of
 from sandbox.engines.reference.joints.ties import ties_of
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.motion import State
+from sandbox.engines.reference.together import Stops, solve_together
 from sandbox.engines.roster import Roster
 from sandbox.trajectory import FloatArray, IntArray
 
@@ -150,7 +150,7 @@ class Drives:
         impulse: FloatArray,
         iterations: int,
     ) -> None:
-        """Give contacts, joints and stops their impulses; the arguments are those of `solve_with_stops`."""
+        """Give contacts, joints and stops their impulses; the arguments are those of `solve_together`."""
         inverse_moment, stopped = self._roster.inverse_moment.copy(), list[Hinge]()
         for hinge in self._hinges:
             if hinge.way and _presses(contacts, hinge.number, hinge.way):
@@ -164,7 +164,7 @@ class Drives:
         )
         rows = self._no_rows if rows is None else rows
         inverse = self._roster.inverse_mass, inverse_moment
-        solve_with_stops(contacts, bounce, rows, stops, velocity, *inverse, impulse, iterations)
+        solve_together(contacts, bounce, rows, stops, velocity, *inverse, impulse, iterations)
         given = dict(zip(stops.body.tolist(), stops.given.tolist(), strict=True))
         for hinge in self._hinges:
             hinge.hold(given.get(hinge.number, 0.0))

@@ -1,6 +1,8 @@
-"""Stops: what holds bodies on hinges, in turns with contacts and joints, so that all of them agree."""
+"""Together: contacts, joints, and the stops of what drives turn, as impulses that take turns until all agree."""
 
 from typing import NamedTuple
+
+import numpy as np
 
 from sandbox.engines.kernel import bare_kernel
 from sandbox.engines.reference.impulses import solve_once, start_with
@@ -21,8 +23,11 @@ class Stops(NamedTuple):
     """(S,) N·m·s, against that sense; that to start with, and then the sum"""
 
 
+NO_STOPS = Stops(np.empty(0, np.int64), np.empty(0), np.empty(0))
+
+
 @bare_kernel
-def solve_with_stops(
+def solve_together(
     now: Manifolds,
     bounce: FloatArray,
     rows: Rows,
@@ -33,7 +38,7 @@ def solve_with_stops(
     impulse: FloatArray,
     iterations: int,
 ) -> None:
-    """Give contacts, joints and stops the impulses that they ask for, in this order in each pass.
+    """Give contacts, joints and stops the impulses that they ask for, in this order in each pass, as Munk2D does.
 
     Args:
         now: K contacts.
