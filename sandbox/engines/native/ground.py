@@ -64,14 +64,15 @@ class Ground:
             self._setter.gates.walls.update(shapes)
         return shapes
 
-    def reshape(self, before: Scene, after: Scene) -> None:
-        """Let walls take the course that they have in another scene; `renew` has to follow."""
+    def reshape(self, before: Scene, after: Scene) -> bool:
+        """Let walls take the course that they have in another scene; `renew` has to follow. Tell whether some do."""
         if not self._laid or before.walls == after.walls:
-            return
-        first = len(before.planes)
+            return False
+        first, changed = len(before.planes), False
         for number, (old, new) in enumerate(zip(before.walls, after.walls, strict=True), first):
             if old.points == new.points:
                 continue
+            changed = True
             body, shapes = self._things[number]
             self._space.remove(*shapes)
             for shape in shapes:
@@ -80,6 +81,7 @@ class Ground:
             shapes[:] = self._shapes(new, body, np.zeros(2), self.reach)  # a wall is as long as it is
             for k in shuffled(len(shapes)):
                 self._space.add(shapes[k])
+        return changed
 
     def renew(self, scene: Scene, surface: IntArray) -> None:
         """Give the fixed things their surfaces (F,) anew, and let those be met that now are solid."""

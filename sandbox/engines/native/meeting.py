@@ -58,9 +58,10 @@ class MeetingBodies(Members):
         self.probes = Probes(self._space, scene.zones)
         self.tethers = Tethers(self._space)
         self._polygons = False
+        self._single = False  # whether two touch in one place at most, and nothing else is listed
         self._named: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
-        self._encounters = Encounters(self._space, self._reader, self._setter.laws)
+        self._encounters = Encounters(self._space, self._reader, self._setter.laws, len(scene.fixed_names))
         self.field = Field(scene)
         self.drives = Drives(scene, self._space, settings.h)
         self.drives.weigh(scene.world.gravity, gravity_of(scene))
@@ -92,6 +93,7 @@ class MeetingBodies(Members):
         for number, state in zip(numbers[order].tolist(), states[order].tolist(), strict=True):
             self._add(number, bodies, state)
         self._register()
+        self._single = not (self._polygons or self.joints or self._scene.zones or self._setter.gates.walls)
         self.drives.watch(self._kinds)
         if self._scene.began and self._setter.gates.walls:
             walls = {number: each for each, number in self._ground.ids.items()}
@@ -216,7 +218,8 @@ class MeetingBodies(Members):
 
     def renew(self, scene: Scene, meet: Meetings) -> None:
         """Go on with a scene's changed air, gravity, coefficients or walls, or with more surfaces."""
-        self._ground.reshape(self._scene, scene)
+        if self._ground.reshape(self._scene, scene):
+            self._single = False  # who leant on what was there before is remembered no more, and no listing tells
         self._scene = scene
         self._dragged = scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
         self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
@@ -282,7 +285,9 @@ class MeetingBodies(Members):
 
     def touching(self, steady: bool = False) -> Touching | ComplexArray:
         """Return who touches whom now, and how, as `Encounters.touching` does."""
-        return self._encounters.touching(self._polygons, steady) if self._moving else NOTHING
+        if not self._moving:
+            return NOTHING
+        return self._encounters.touching(self._polygons, self._single, steady)
 
     def points(self) -> Points:
         """Return the contact points of the last substep; from the first call on, their impulses add up."""

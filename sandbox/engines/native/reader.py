@@ -49,8 +49,10 @@ class Reader:
     def __init__(self, space: pymunk.Space) -> None:
         self._space = space
         self._bodies, self._arbiters, self._forces = Buffer(), Buffer(), Buffer()
-        self._listing = ffi.new("pmBatchedData *")  # of arbiters, as `get_space_arbiters` makes one at each call
-        self._listing.floatArray, self._listing.intArray = self._arbiters._float_arr, self._arbiters._int_arr
+        self._listing = _listing(self._arbiters)
+        self.keep_last = False
+        """whether the vectors of the look before are asked for; set once, after a look"""
+        self._last: tuple[Buffer, Any, IntArray] | None = None  # the listing before: buffer, listing, rows
         self._number_of = IdTable({})
         self._moving: IntArray = np.empty(0, np.int64)
         self._words, self._width = b"", 4  # who touched at the last look, and how many vectors a contact has
@@ -136,6 +138,8 @@ class Reader:
         Those who touch, listed in the same order as at the last look, are the same contacts: then their impulses are
         all that is new.
         """
+        if self.keep_last:
+            self._turn_over()
         self._arbiters.clear()
         self._listing.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
         lib.cpSpaceEachCachedArbiter(self._space._space, LIST, self._listing)
@@ -149,6 +153,26 @@ class Reader:
             self._live = np.flatnonzero(np.frombuffer(words, np.int64)[2::3])
             self._firsts = self._live * self._width
         return same
+
+    def _turn_over(self) -> None:
+        """Let the present listing be the last, and go on with the buffers of the one before."""
+        spare = Buffer() if self._last is None else self._last[0]
+        listing = _listing(spare) if self._last is None else self._last[1]
+        self._last = self._arbiters, self._listing, self._firsts
+        self._arbiters, self._listing = spare, listing
+
+    def last_vectors(self, rows: IntArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return impulses, N·s, and normals (K,) of some of those that touched at the look before."""
+        assert self._last is not None
+        arbiters, _, firsts = self._last
+        vectors = np.frombuffer(arbiters.float_buf(), np.complex128)
+        return vectors[firsts[rows]], vectors[firsts[rows] + 1]
+
+    def cached(self) -> IntArray:
+        """Return the numbers (C, 2) of those who do not touch at the last look, and are remembered."""
+        words = np.frombuffer(self._words, np.int64).reshape(-1, 3)
+        gone = words[words[:, 2] == 0]
+        return np.column_stack([self._number_of.numbers(gone[:, k]) for k in (0, 1)])
 
     def impulses(self) -> ComplexArray:
         """Return the impulses (K,) N·s of what touched at the last look, on the first of each."""
@@ -170,3 +194,10 @@ class Reader:
             twice = words[:, 2].take(live) > 1
             point = np.where(twice, 0.5 * (point + (vectors[:, 4] + vectors[:, 5]) * 0.5), point)
         return Touching(a, b, vectors[:, 0], vectors[:, 1], point)
+
+
+def _listing(arbiters: Buffer) -> Any:
+    """Return what a listing of arbiters is written by, as `get_space_arbiters` makes one at each call."""
+    listing = ffi.new("pmBatchedData *")
+    listing.floatArray, listing.intArray = arbiters._float_arr, arbiters._int_arr
+    return listing

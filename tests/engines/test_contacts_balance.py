@@ -1,0 +1,121 @@
+"""Impulses of contacts and each body's change of momentum: they agree to rounding, whoever parts and meets again.
+
+Shapes that part are remembered by pymunk for some substeps, and what it tells of them once they meet again counts
+twice what they had then. Piles that settle do so thousands of times.
+"""
+
+import numpy as np
+import pytest
+
+from sandbox.action import Action, Move, Remove, Reshape, Spawn, Toggle
+from sandbox.engines.relay import start
+from sandbox.scene.discs import Ball
+from sandbox.scene.file import load, loads
+from sandbox.scene.model import Scene
+from sandbox.scene.shipped import find
+from sandbox.scene.solids import Box
+from sandbox.trajectory import Contacts
+
+GRAVITY = np.array([0.0, -9.81])
+
+ROUNDED = 1e-10
+"""N·s: of some 1e5 additions of parts of 1e-2 N·s to a sum of at most 10, a thousandfold"""
+
+FLOORED = """
+[world]
+gravity = [0.0, -9.81]
+duration = 3.0
+[solver]
+dt = 0.005
+[[wall]]
+name = "floor"
+points = [[-3.0, 0.0], [3.0, 0.0]]
+thickness = 0.1
+restitution = 0.5
+friction = 0.5
+[[wall]]
+name = "shelf"
+points = [[-0.5, 0.6], [0.5, 0.7]]
+thickness = 0.02
+restitution = 0.5
+friction = 0.5
+[[scatter]]
+name = "ball"
+lower = [-0.7, 0.8]
+upper = [0.7, 2.4]
+count = 30
+radius = 0.07
+restitution = 0.8
+friction = 0.6
+"""
+
+
+def pile(persistence: int) -> Scene:
+    return load(find("pile"), ["grid.ball.rows=8", "grid.ball.columns=10", f"solver.persistence={persistence}"])
+
+
+def unbalanced(scene: Scene, settle: int, steps: int, actions: dict[int, Action]) -> tuple[float, Contacts]:
+    """Return by how much momentum and impulses differ at most, N·s, of bodies that are there all the time.
+
+    Args:
+        scene: what runs.
+        settle: steps before anybody asks for contacts.
+        steps: after that.
+        actions: what is done before which of these.
+    """
+    simulation = start(scene, "pymunk")
+    for _ in range(settle):
+        simulation.step()
+    simulation.contacts()
+    began = simulation.frame()
+    found = []
+    for k in range(steps):
+        if k in actions:
+            simulation.apply(actions[k])
+        simulation.step()
+        if k % 50 == 0:
+            found.append(simulation.contacts())
+    contacts, ended = Contacts.joined([*found, simulation.contacts()]), simulation.frame()
+    bodies, count = simulation.bodies, len(began.position)
+    momentum = bodies.mass[:, None] * (ended.time - began.time) * GRAVITY
+    for (first, second), impulse in zip(contacts.pair.tolist(), contacts.impulse, strict=True):
+        momentum[first] -= impulse
+        if second >= 0:
+            momentum[second] += impulse
+    gained = bodies.mass[:count, None] * (ended.velocity[:count] - began.velocity)
+    there = ended.present[:count] & ~bodies.fixed[:count]
+    return float(np.abs(gained - momentum[:count])[there].max()), contacts
+
+
+@pytest.mark.parametrize("persistence", [1, 3, 10])
+@pytest.mark.parametrize("settle", [0, 150])
+def test_impulses_on_each_ball_of_a_pile_balance_its_momentum(persistence: int, settle: int) -> None:
+    error, contacts = unbalanced(pile(persistence), settle, 360, {})
+    assert error < ROUNDED
+    between = contacts.pair[contacts.pair[:, 1] >= 0]
+    assert len(between) > len(np.unique(between, axis=0)) > 100  # some have met again
+
+
+@pytest.mark.parametrize(
+    "actions",
+    [
+        {},
+        {150: Remove(time=0.0, body="ball-3")},
+        {
+            150: Move(time=0.0, body="ball-4", position=(2.0, 1.0)),
+            170: Move(time=0.0, body="ball-4", position=(0.0, 2.0)),
+        },
+        {150: Spawn(time=0.0, ball=Ball(name="new", position=(0.0, 2.5), radius=0.1, restitution=0.9))},
+        {150: Spawn(time=0.0, box=Box(name="new", position=(0.0, 2.5), size=(0.3, 0.2)))},
+        {150: Toggle(time=0.0, thing="shelf", solid=False), 158: Toggle(time=0.0, thing="shelf", solid=True)},
+        {150: Reshape(time=0.0, thing="shelf", points=((-0.5, 0.601), (0.5, 0.7)))},
+        {150: Reshape(time=0.0, thing="shelf", points=((-0.5, 0.6), (0.0, 0.6), (0.5, 0.7)))},
+    ],
+    ids=["none", "remove", "move", "ball", "box", "toggle", "reshape", "corner"],
+)
+@pytest.mark.parametrize("persistence", [3, 20])
+def test_impulses_balance_whatever_is_done_meanwhile(actions: dict[int, Action], persistence: int) -> None:
+    scene = loads(FLOORED.replace("dt = 0.005", f"dt = 0.005\npersistence = {persistence}"))
+    error, contacts = unbalanced(scene, 0, 600, actions)
+    assert error < ROUNDED
+    assert len(contacts) > 300
