@@ -265,7 +265,7 @@ def test_what_cannot_be_played_is_told() -> None:
     with pytest.raises(ValueError, match="1 or more steps"):
         SandboxEnv("landing", every=0)
     with pytest.raises(ValueError, match=r"a whole number, not 1\.5"):
-        SandboxEnv("landing", every=1.5)  # type: ignore[arg-type]
+        SandboxEnv("landing", **{"every": 1.5})
     with pytest.raises(ValueError, match="no engine 'box2d'; engines: pymunk, exact, reference"):
         SandboxEnv("landing", engine="box2d")
     with pytest.raises(Refusal, match="does not model drag or polygons; these could: pymunk, reference"):

@@ -24,7 +24,7 @@ from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import start as start_engine
 from sandbox.engines.succession import Succession
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene, default_name
+from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Contacts, Frame
 
@@ -208,19 +208,12 @@ class Relay:
                     self._leg.bodies = replace(self._leg.bodies, elements=self._leg.simulation.bodies.elements)
 
     def _spawn(self, action: Spawn) -> None:
-        name = action.single.name or self._new_name()
+        name = action.single.name or self.bodies.new_name("spawned", self.scene.fixed_names)
         if name in self.bodies.names:
             raise ActionError(f"a body or fixed thing is called {name!r} already")
         named = action.named(name)
         self._leg.simulation.apply(named)
         self._leg.joined_by(self.bodies.joined_by(named.single, name))
-
-    def _new_name(self) -> str:
-        """Return a name for a body without one, that nobody has."""
-        taken, number = {*self.bodies.names, *self.scene.fixed_names}, len(self.bodies)
-        while (name := default_name("spawned", number)) in taken:
-            number += 1
-        return name
 
     def _switch(self, action: Switch) -> None:
         try:

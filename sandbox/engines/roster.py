@@ -14,7 +14,7 @@ from sandbox.engines.fixtures import Fixtures, fixtures_of
 from sandbox.engines.kernel import kernel
 from sandbox.engines.limits import FARTHEST, FASTEST
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.driven import Mount, mounts
+from sandbox.scene.driven import Mount, about_hinge, mounts
 from sandbox.scene.drives import PlungerDrive, TorqueDrive
 from sandbox.scene.links import Links
 from sandbox.scene.meetings import Meetings, meetings
@@ -96,7 +96,7 @@ class Roster:
         """(N,) goes on whatever is in its way"""
         for n, mount in self.held.items():
             self.hinge[n], self.led[n] = mount.hinge, not isinstance(mount.drive, TorqueDrive)
-            about = bodies.moment[n] + bodies.mass[n] * (mount.hinge[0] ** 2 + mount.hinge[1] ** 2)
+            about = about_hinge(mount, float(bodies.mass[n]), float(bodies.moment[n]))
             self.inverse_mass[n], self.inverse_moment[n] = 0.0, 0.0 if self.led[n] else 1.0 / about
 
     @property

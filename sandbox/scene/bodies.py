@@ -5,6 +5,7 @@ in the order of the file.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -86,6 +87,13 @@ class Bodies:
     def shapes(self) -> Shapes:
         """The convex pieces that the bodies consist of."""
         return shapes_of(self.element, self.elements)
+
+    def new_name(self, kind: str, others: Sequence[str]) -> str:
+        """Return a name for one more body of a kind, that nobody has, nor any of the others."""
+        taken, number = {*self.names, *others}, len(self)
+        while (name := default_name(kind, number)) in taken:
+            number += 1
+        return name
 
     def joined_by(self, single: Single, name: str) -> "Bodies":
         """Return these bodies and one more, which gets the next number."""

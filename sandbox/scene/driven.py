@@ -134,6 +134,11 @@ def _least(mount: Mount, mass: float) -> float:
     return mass * (mount.hinge[0] ** 2 + mount.hinge[1] ** 2)
 
 
+def about_hinge(mount: Mount, mass: float, moment: float) -> float:
+    """Return the moment of inertia about the hinge, kg·m², of a body of some mass and moment about its centre."""
+    return moment + _least(mount, mass)
+
+
 def at_rest(scene: Scene) -> FloatArray:
     """Return the state of each drive as a scene starts, (D, 3): level, torque or pull, pace."""
     return np.zeros((len(scene.drives), 3))

@@ -39,7 +39,7 @@ class Books:
         self._breaks = np.full(len(population.scene.links), np.inf)
         self._potential: tuple[tuple[Scene, Bodies], Potential] | None = None
         population.meeting.field.told = {}
-        population.meeting.points()  # from now on what contacts begin with is remembered
+        population.meeting.encounters.points()  # from now on what contacts begin with is remembered
 
     def opening(self) -> State | None:
         """Return the state that a substep is booked from; none while gravity alone acts on all that moves."""
@@ -74,7 +74,7 @@ class Books:
         held = p.meeting.tethers.held
         hauls = springs(p.meeting.tethers, whole.position, whole.angle, p.h) if held else ((), ())
         stiff, damped = (tuple(each.times(share) for each in some) for some in hauls)
-        points = p.meeting.points().times(share)
+        points = p.meeting.encounters.points().times(share)
 
         self._move(before, now, counts, share, kicks, (velocity, spin))
         for each in stiff:

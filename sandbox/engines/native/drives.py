@@ -12,7 +12,7 @@ from sandbox.engines.native.axle import Axle, Start, on_axle
 from sandbox.engines.native.hinge import Hinge
 from sandbox.engines.native.strokes import Plunger, Stroke
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.driven import Mount, mounts
+from sandbox.scene.driven import Mount, about_hinge, mounts
 from sandbox.scene.drives import PlungerDrive, TorqueDrive
 from sandbox.scene.model import Scene
 from sandbox.trajectory import FloatArray
@@ -49,8 +49,7 @@ class Drives:
         """
         mount = self._mounts[name]
         x, y, angle, *_ = state
-        arm = mount.hinge[0] ** 2 + mount.hinge[1] ** 2
-        moment = float(bodies.moment[number]) + float(bodies.mass[number]) * arm
+        moment = about_hinge(mount, float(bodies.mass[number]), float(bodies.moment[number]))
         kind = pymunk.Body.DYNAMIC if isinstance(mount.drive, TorqueDrive) else pymunk.Body.KINEMATIC
         return on_axle(mount, angle, (x, y), kind, moment)
 

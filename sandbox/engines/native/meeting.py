@@ -11,7 +11,6 @@ from sandbox.engines.native.encounters import Encounters
 from sandbox.engines.native.field import Field
 from sandbox.engines.native.ground import Ground, shuffled
 from sandbox.engines.native.members import Member, Members
-from sandbox.engines.native.points import Points
 from sandbox.engines.native.probes import Probes
 from sandbox.engines.native.reader import Reader
 from sandbox.engines.native.space import (
@@ -61,7 +60,8 @@ class MeetingBodies(Members):
         self._single = False  # whether two touch in one place at most, and nothing else is listed
         self._named: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
-        self._encounters = Encounters(self._space, self._reader, self._setter.laws, len(scene.fixed_names))
+        self.encounters = Encounters(self._space, self._reader, self._setter.laws, len(scene.fixed_names))
+        """what the space tells of contacts"""
         self.field = Field(scene)
         self.drives = Drives(scene, self._space, settings.h)
         self.drives.weigh(scene.world.gravity, gravity_of(scene))
@@ -287,11 +287,7 @@ class MeetingBodies(Members):
         """Return who touches whom now, and how, as `Encounters.touching` does."""
         if not self._moving:
             return NOTHING
-        return self._encounters.touching(self._polygons, self._single, steady)
-
-    def points(self) -> Points:
-        """Return the contact points of the last substep; from the first call on, their impulses add up."""
-        return self._encounters.points()
+        return self.encounters.touching(self._polygons, self._single, steady)
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a body that is not finite or beyond all bounds, and what is the matter; else None."""

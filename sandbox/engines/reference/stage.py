@@ -13,11 +13,11 @@ from collections.abc import Callable
 import numpy as np
 
 from sandbox.engines.account import Account, Cause
-from sandbox.engines.reference.ball_finder import BallFinder
 from sandbox.engines.reference.books import Bookkeeper, Idle
 from sandbox.engines.reference.contact_solver import ContactSolver
 from sandbox.engines.reference.driven.drives import Drives
 from sandbox.engines.reference.finder import Finder
+from sandbox.engines.reference.finders import finder_of, suits
 from sandbox.engines.reference.forces import inputs_of
 from sandbox.engines.reference.impulses import remembered, solve_overlaps
 from sandbox.engines.reference.integrators import INTEGRATORS
@@ -26,7 +26,6 @@ from sandbox.engines.reference.joints.solver import JointSolver, kick_pose
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.motion import State, transition
 from sandbox.engines.reference.penalty import Penalty
-from sandbox.engines.reference.piece_finder import PieceFinder
 from sandbox.engines.reference.sieve import Sieve
 from sandbox.engines.reference.tearing import Tearing
 from sandbox.engines.reference.witness import Witness
@@ -77,15 +76,7 @@ class Stage:
 
     def _new_finder(self) -> Finder:
         assert self._settings.broad_phase
-        kind = PieceFinder if self._pieced else BallFinder
-        finder = kind(self._roster, self._settings.broad_phase)
-        finder.sieve = self._sieve
-        return finder
-
-    @property
-    def _pieced(self) -> bool:
-        """Bodies are looked at piece by piece, wherever those lie: not all are discs about their own centres."""
-        return self._roster.meet.solids or len(self._roster.drives) > 0
+        return finder_of(self._roster, self._settings.broad_phase, self._sieve)
 
     def _joint_solver(self) -> JointSolver | None:
         """Return what holds the scene's links, if it has any."""
@@ -119,7 +110,7 @@ class Stage:
         kept[: len(self.push)] = self.push
         self.push = np.where(roster.moving[:, None], kept, 0.0)
         self._pushes = bool(self.push.any())
-        if self._pieced != isinstance(self.finder, PieceFinder):  # keys mean other pairs from now on
+        if not suits(self.finder, roster):  # keys mean other pairs from now on
             work, self.finder = self.finder.work, self._new_finder()
             self.finder.work = work
             self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h

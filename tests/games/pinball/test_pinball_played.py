@@ -9,13 +9,14 @@ from sandbox.action import actions_from_json
 from sandbox.engines.relay import start
 from sandbox.games.pinball.hand import PinballHand
 from sandbox.games.player import Player
-from sandbox.games.registry import rules_of
+from sandbox.games.registry import required_rules, rules_of
 from sandbox.games.rules import Seen, UnfitError
 from sandbox.measure.run import run
 from sandbox.recording import Press, Recording
-from sandbox.scene.file import loads
+from sandbox.scene.file import load, loads
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
+from sandbox.scene.shipped import find
 from sandbox.trajectory import Contacts, Trajectory
 
 TABLE = """
@@ -169,9 +170,8 @@ def test_table_without_a_ball_is_refused() -> None:
 
 
 def test_hand_plays_pinball_alone() -> None:
-    scene = plain()
-    frame = start(scene, "pymunk").frame()
+    other, frame = required_rules(load(find("landing"))), start(plain(), "pymunk").frame()
     with pytest.raises(UnfitError, match="pinball alone"):
-        PinballHand(1).decide(Seen(0.0, frame, Contacts.none(), ()), object())  # type: ignore[arg-type]
+        PinballHand(1).decide(Seen(0.0, frame, Contacts.none(), ()), other)
     with pytest.raises(ValueError, match="0 to 1"):
         PinballHand(1, 1.5)

@@ -3,7 +3,7 @@
 So contacts have their levers from the hinge: its mass nothing can move, and about it the body has one moment.
 """
 
-import math
+from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from sandbox.engines.driving.stroke import struck
 from sandbox.engines.driving.torque import Torque
 from sandbox.engines.reference.motion import State
 from sandbox.engines.roster import Roster
-from sandbox.scene.driven import Mount
+from sandbox.scene.driven import Mount, about_hinge
 from sandbox.scene.drives import PlungerDrive, StrokeDrive, TorqueDrive
 from sandbox.scene.part import Point
 from sandbox.trajectory import FloatArray
@@ -23,13 +23,13 @@ STILL = 1e-9
 """rad/s that rounding leaves to a body that is pressed onto its stop"""
 
 
-class Lead:
+class Lead(ABC):
     """What all of them have. A substep: `plan`, `begin`, `place`; after contacts, `done`."""
 
     def __init__(self, roster: Roster, number: int, mount: Mount) -> None:
         self.number, self.mount = number, mount
         self.mass = float(roster.bodies.mass[number])
-        self.moment = float(roster.bodies.moment[number]) + self.mass * math.hypot(*mount.hinge) ** 2
+        self.moment = about_hinge(mount, self.mass, float(roster.bodies.moment[number]))
         """of inertia about the hinge, kg·m²"""
         self.gravity: Point = roster.scene.world.gravity
         self.state: FloatArray = roster.drives[mount.number]
@@ -37,10 +37,11 @@ class Lead:
         drive = mount.drive
         self._seat = mount.home if isinstance(drive, PlungerDrive) else drive.pivot
 
+    @abstractmethod
     def plan(self, x: State, h: float) -> None:
         """Work out where h, s, brings the body from a state (2, N, 3), as if it met nothing."""
-        raise NotImplementedError
 
+    @abstractmethod
     def begin(self, x: State) -> None:
         """Write the velocity into a state that the body has through the planned substep."""
 
@@ -51,13 +52,13 @@ class Lead:
         self.place(end)
         x[1, n] = (end[0, n] - x[0, n]) / h
 
+    @abstractmethod
     def place(self, moved: State) -> None:
         """Write the end of the planned substep into a state."""
-        raise NotImplementedError
 
+    @abstractmethod
     def done(self, after: State) -> None:
         """Take the planned substep as done; its contacts are resolved."""
-        raise NotImplementedError
 
     def enter(self, x: State) -> None:
         """Write the hinge into a state, in the place of the centre of mass."""
@@ -135,6 +136,9 @@ class Hinge(Lead):
         self.fall = heaviness(self.mount.hinge, angle, self.mass, self.gravity)
         self._planned = angle, spin, mean, h
         self.turned, self._h = Turned(*self._law.turned(*self._planned[:3], self.fall, h)), h
+
+    def begin(self, x: State) -> None:
+        """Leave it the velocity that it has: its torque is a force among the others."""
 
     def place(self, moved: State) -> None:
         """Write the end of the planned substep; what presses onto a stop is a spin for that to take away."""
@@ -245,5 +249,6 @@ class Plunger(Lead):
 
 def lead_of(roster: Roster, number: int, mount: Mount) -> Lead:
     """Return what leads a body of that number."""
-    kinds: dict[str, type[Lead]] = {"torque": Hinge, "stroke": Stroke, "plunger": Plunger}
+    kinds: dict[str, type[Hinge] | type[Stroke] | type[Plunger]]
+    kinds = {"torque": Hinge, "stroke": Stroke, "plunger": Plunger}
     return kinds[mount.drive.kind](roster, number, mount)
