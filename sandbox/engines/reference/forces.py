@@ -12,7 +12,7 @@ from sandbox.scene.links import LinkKind
 from sandbox.trajectory import FloatArray
 
 
-def inputs_of(roster: Roster, field: Field, joints: JointSolver | None, coordinates: int) -> Inputs:
+def forces_on(roster: Roster, field: Field, joints: JointSolver | None, coordinates: int) -> Inputs:
     """Return what acts on the bodies of a roster.
 
     Args:

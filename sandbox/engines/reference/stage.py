@@ -18,7 +18,7 @@ from sandbox.engines.reference.contact_solver import ContactSolver
 from sandbox.engines.reference.driven.drives import Drives
 from sandbox.engines.reference.finder import Finder
 from sandbox.engines.reference.finders import finder_of, suits
-from sandbox.engines.reference.forces import inputs_of
+from sandbox.engines.reference.forces import forces_on
 from sandbox.engines.reference.impulses import remembered, solve_overlaps
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.reference.joints.field import Field
@@ -173,7 +173,7 @@ class Stage:
 
     def apply_forces(self) -> None:
         """Gather what acts: gravity, steady forces, air."""
-        self.u = inputs_of(self._roster, self._field, self._joints, self.x.shape[2])
+        self.u = forces_on(self._roster, self._field, self._joints, self.x.shape[2])
         if isinstance(self.books, Bookkeeper):
             self._tell_books()
 

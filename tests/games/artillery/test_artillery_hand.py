@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from dueling import two_tanks
 
 from sandbox.games.artillery.hand import ArtilleryHand
 from sandbox.games.artillery.rules import ArtilleryRules
@@ -15,26 +16,7 @@ from sandbox.measure.run import run
 from sandbox.scene.file import load, loads
 from sandbox.scene.shipped import find
 
-FIELD = """
-[world]
-gravity = [0.0, -9.81]
-duration = 12.0
-[solver]
-dt = 0.02
-[terrain]
-width = 240.0
-columns = 240
-height = 20.0
-[artillery]
-money = 0
-[[artillery.player]]
-name = "Red"
-position = 50.0
-[[artillery.player]]
-name = "Blue"
-position = 190.0
-bot = 0.0
-"""
+FIELD = two_tanks("duration = 12.0", "money = 0", blue="bot = 0.0")
 
 
 def played(policy: Policy) -> tuple[ArtilleryRules, Bout, str]:

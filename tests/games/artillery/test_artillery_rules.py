@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dueling import two_tanks
 
 from sandbox.action import Action, SetParameter, actions_from_json
 from sandbox.engines.relay import start
@@ -28,29 +29,8 @@ from sandbox.scene.file import loads
 from sandbox.scene.model import Scene
 from sandbox.trajectory import Contacts, Trajectory
 
-TEXT = """
-[world]
-gravity = [0.0, -9.81]
-linear_drag = 0.03
-duration = 14.0
-seed = 2
-[solver]
-dt = 0.02
-[terrain]
-width = 240.0
-columns = 240
-height = 20.0
-[artillery]
-speed = 60.0
-wind = 6.0
-[[artillery.player]]
-name = "Red"
-position = 50.0
-[[artillery.player]]
-name = "Blue"
-position = 190.0
-"""
-BOTS = TEXT.replace("position = 50.0", "position = 50.0\nbot = 1.0").replace("190.0", "190.0\nbot = 0.9")
+WORLD, GAME = "linear_drag = 0.03\nduration = 14.0\nseed = 2", "speed = 60.0\nwind = 6.0"
+TEXT, BOTS = two_tanks(WORLD, GAME), two_tanks(WORLD, GAME, red="bot = 1.0", blue="bot = 0.9")
 RK4: dict[str, Any] = {"integrator": "rk4"}
 
 

@@ -1,0 +1,26 @@
+"""Scenes of two tanks, 140 m from each other on level columns."""
+
+
+def two_tanks(world: str = "", game: str = "", red: str = "", blue: str = "") -> str:
+    """Return a scene with further lines in `[world]`, in `[artillery]`, and of the two players."""
+    return f"""
+[world]
+gravity = [0.0, -9.81]
+{world}
+[solver]
+dt = 0.02
+[terrain]
+width = 240.0
+columns = 240
+height = 20.0
+[artillery]
+{game}
+[[artillery.player]]
+name = "Red"
+position = 50.0
+{red}
+[[artillery.player]]
+name = "Blue"
+position = 190.0
+{blue}
+"""
