@@ -2,7 +2,19 @@
 
 from sandbox.measure.forecast.forecasts import FAILED, warnings
 from sandbox.measure.forecast.notes import notes
-from sandbox.measure.forecast.passages import Passage, largest_safe_dt, passages, top_speeds
+from sandbox.measure.forecast.passages import Passage, largest_safe_dt, passages
+from sandbox.measure.forecast.speeds import Speeds, top_speeds
 from sandbox.measure.forecast.warning import Warning, at_most
 
-__all__ = ["Passage", "FAILED", "Warning", "at_most", "largest_safe_dt", "notes", "passages", "top_speeds", "warnings"]
+__all__ = [
+    "FAILED",
+    "Passage",
+    "Speeds",
+    "Warning",
+    "at_most",
+    "largest_safe_dt",
+    "notes",
+    "passages",
+    "top_speeds",
+    "warnings",
+]

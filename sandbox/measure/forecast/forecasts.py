@@ -12,7 +12,7 @@ from sandbox.measure.forecast.events import event_warnings
 from sandbox.measure.forecast.kicks import kick_warnings
 from sandbox.measure.forecast.laid import Laid, laid
 from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, Passage, farther, meet_each_other, passages
-from sandbox.measure.forecast.springs import spring_warnings
+from sandbox.measure.forecast.springs import damper_warnings, spring_warnings
 from sandbox.measure.forecast.stacks import stack_warnings
 from sandbox.measure.forecast.stretch import stretch_warnings
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most
@@ -103,23 +103,29 @@ def _duration(scene: Scene, settings: Settings) -> Iterator[Warning]:
 
 def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
     times = farther(settings)
-    for passage, others in alike(passages(scene, meet)):
+    at_risk = [passage for passage in passages(scene, meet) if passage.odds(settings.h / times) > ROUNDING]
+    own = {passage.thing for passage in at_risk if not passage.struck}
+    at_risk = [passage for passage in at_risk if not passage.struck or passage.thing not in own]
+    for passage, things in alike(at_risk):
         odds = passage.odds(settings.h / times)
-        if odds <= ROUNDING:
-            continue
         safe = passage.safe_h * settings.substeps * times
         way = passage.speed * settings.h
         thing = passage.thing if passage.thing in (ANOTHER, ANOTHER_BODY) else repr(passage.thing)
-        if others:
-            thing += f" and {others:,} other{'s' if others > 1 else ''} like it"
+        if things:
+            thing += f" and {things:,} other{'s' if things > 1 else ''} like it"
+        ball = repr(passage.ball)
+        if passage.others:
+            ball += f" and {passage.others:,} other{'s' if passage.others > 1 else ''} like it"
+        if passage.struck:
+            ball += ", struck by others,"
         message = (
-            f"{passage.ball!r} can close on {thing} at up to {passage.speed:.4g} m/s, {way:.3g} m a substep, "
+            f"{ball} can close on {thing} at up to {passage.speed:.4g} m/s, {way:.3g} m a substep, "
             f"and pass through unseen: odds up to {100 * odds:.3g} %; dt <= {at_most(safe)} s would be safe"
         )
         figures: Figures = {
             "ball": passage.ball,
             "thing": passage.thing,
-            "others": others,
+            "others": things,
             "speed": passage.speed,
             "odds": odds,
             "safe_dt": safe,
@@ -208,6 +214,7 @@ FORECASTS: dict[str, Forecast] = {
     "rounding": Forecast(lambda s: _rounding(s.scene, s.settings, s.meet)),
     "kicks": Forecast(lambda s: kick_warnings(s.scene, s.settings, s.meet)),
     "springs": Forecast(lambda s: spring_warnings(s.scene, s.settings)),
+    "dampers": Forecast(lambda s: damper_warnings(s.scene, s.settings), frozenset({"reference"})),
     "chains": Forecast(lambda s: chain_warnings(s.scene, s.settings)),
     "stretch": Forecast(lambda s: stretch_warnings(s.scene, s.settings)),
     "stacks": Forecast(lambda s: stack_warnings(s.scene, s.settings, s.close)),
