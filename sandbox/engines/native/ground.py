@@ -6,7 +6,7 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.limits import FARTHEST, FASTEST
-from sandbox.engines.native.space import SurfaceSetter, category, fixed_shapes, reach_of
+from sandbox.engines.native.space import LONGEST_REACH, SurfaceSetter, category, fixed_shapes, half_plane_ends, reach_of
 from sandbox.engines.rebound import stretches
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Plane, Post, Scene, Wall
@@ -24,7 +24,8 @@ class Ground:
         self._space, self._setter = space, setter
         self._things: list[tuple[pymunk.Body, list[pymunk.Shape]]] = []
         self.reach = math.inf
-        """m, how far from the middle of the scene planes are planes"""
+        """m, how far from the middle of the scene planes are planes at present"""
+        self._planes: tuple[Plane, ...] = ()
         self._middle, self._limit = np.zeros(6), np.full(6, math.inf)
         self._laid = False
 
@@ -33,10 +34,9 @@ class Ground:
         if self._laid:
             return
         self._laid = True
-        starts, speeds = bodies.position[~bodies.fixed], np.hypot(*bodies.velocity[~bodies.fixed].T)
-        centre, reach = reach_of(scene, starts, speeds)
+        centre, reach = reach_of(bodies.position[~bodies.fixed])
         if scene.planes:
-            self._middle[0:2], self.reach = centre, reach
+            self._middle[0:2], self.reach, self._planes = centre, reach, scene.planes
         every: list[pymunk.Shape] = []
         for thing, number in zip(scene.fixed, surface.tolist(), strict=True):
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
@@ -49,8 +49,31 @@ class Ground:
             every += shapes
         for k in shuffled(len(every)):
             self._space.add(every[k])
+        self._bound()
+
+    def _bound(self) -> None:
+        """Bound what `within` asks for by the present reach."""
         where = min(self.reach, FARTHEST)
         self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
+
+    def extend(self, place: FloatArray) -> None:
+        """Lengthen the half-planes until they reach as far as (M, 2) m, at most `LONGEST_REACH`.
+
+        The reach doubles as often as it has to, by where bodies are, so that it is the same whenever a run ends. A
+        body that moves farther than the reach within one step can be beyond the ends, at twice the reach, before that.
+        """
+        far = np.abs(place - self._middle[0:2])
+        far = far[far <= LONGEST_REACH]  # whatever is beyond, or not a number, nothing can reach
+        if not len(far) or far.max() <= self.reach:
+            return
+        while self.reach < far.max():
+            self.reach = min(2.0 * self.reach, LONGEST_REACH)
+        for plane, (_, shapes) in zip(self._planes, self._things, strict=False):  # planes come first
+            for shape in shapes:
+                assert isinstance(shape, pymunk.Segment)
+                shape.unsafe_set_endpoints(*half_plane_ends(plane, self._middle[0:2], self.reach))
+                self._space.reindex_shape(shape)
+        self._bound()
 
     def _shapes(
         self, thing: Plane | Wall | Post, body: pymunk.Body, centre: FloatArray, reach: float
@@ -107,8 +130,8 @@ class Ground:
         return np.asarray(np.abs(state - self._middle) <= self._limit)
 
     def reaches(self, place: FloatArray) -> bool:
-        """Tell whether planes are planes at a place; so they are until there are some."""
-        return bool((np.abs(place - self._middle[0:2]) <= self.reach).all())
+        """Tell whether planes can be made to reach a place; they can until there are some."""
+        return math.isinf(self.reach) or bool((np.abs(place - self._middle[0:2]) <= LONGEST_REACH).all())
 
 
 def _filter(thing: Plane | Wall | Post, scene: Scene) -> pymunk.ShapeFilter:
