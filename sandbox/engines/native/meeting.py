@@ -9,7 +9,7 @@ from sandbox.engines.limits import BEYOND, FARTHEST
 from sandbox.engines.native.drives import Drives
 from sandbox.engines.native.encounters import Encounters
 from sandbox.engines.native.field import Field
-from sandbox.engines.native.ground import Ground, shuffled
+from sandbox.engines.native.ground import Ground, jointed_surfaces, shuffled
 from sandbox.engines.native.members import Member, Members
 from sandbox.engines.native.probes import Probes
 from sandbox.engines.native.reader import Reader
@@ -224,7 +224,7 @@ class MeetingBodies(Members):
         self._dragged = scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
         self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
         self._touches, self._noted = meet.touches, meet.noted
-        self._setter.renew(meet)
+        self._setter.renew(meet, jointed_surfaces(scene, self._surface_of_fixed))
         self._space.gravity = gravity_of(scene)
         for number, (_, own) in self._members.items():
             for piece, shape in own:
