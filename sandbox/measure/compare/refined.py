@@ -115,12 +115,13 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
             return None
         # Beyond the time at which a perturbation matters, agreement is not to be had, nor of use.
         other = perturb(scene)
-        enough, jumps = _horizon(scene, other, engine, settings, coarse, tolerance)
+        enough, _ = _horizon(scene, other, engine, settings, coarse, tolerance)
     except TookTooLongError:
         return None
     began = perf_counter()
     work = each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
     agrees, halvings, about = 0.0, 0, "it was halved no further"
+    horizon: float | None = None
     while halvings < HALVINGS:
         each *= 2
         finer = half(settings)
@@ -140,16 +141,19 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
             close = min(agree_until(fine, coarse, scene, AGREE * tolerance), missed)
             agrees = min(agree_until(fine, coarse, scene, tolerance), missed)
             coarse, settings, halvings, work = fine, finer, halvings + 1, work + each
-            if jumps and enough <= close < scene.world.duration:  # a smaller step makes less of a contact's step
-                enough, jumps = _horizon(scene, other, engine, settings, coarse, tolerance)
-            if close >= enough and not jumps:
-                about = f"agrees with the halving before within {AGREE * tolerance:.2g} m"
-                break
+            horizon = None
+            if close >= enough:
+                horizon, jumps = _horizon(scene, other, engine, settings, coarse, tolerance)
+                enough = max(enough, horizon)
+                if close >= enough and not jumps:  # a jump is as high as a step is long: a smaller one makes less of it
+                    about = f"agrees with the halving before within {AGREE * tolerance:.2g} m"
+                    break
         except TookTooLongError:
             about = f"more halvings would take longer than {PATIENCE:g} s"
             break
     try:
-        horizon, _ = _horizon(scene, other, engine, settings, coarse, tolerance)
+        if horizon is None:
+            horizon, _ = _horizon(scene, other, engine, settings, coarse, tolerance)
     except TookTooLongError:
         horizon = min(enough, agrees)
     return Refined(engine, settings, halvings, coarse, agrees, about, horizon, work)

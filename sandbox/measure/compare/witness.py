@@ -14,7 +14,7 @@ import numpy as np
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.drift import momentum_drift
-from sandbox.measure.compare.errors import errors
+from sandbox.measure.compare.errors import Errors, errors
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.compare.refined import Refined, half, preferences
 from sandbox.measure.energy import energies
@@ -34,6 +34,8 @@ CONVERGES = 2.0
 """The error left by a method of the first order is what its last halving has changed; twice that is allowed."""
 CONTRADICTS = 4.0
 """Beyond so many times what its last two halvings have changed, a witness converges to something else."""
+IMPACT = 2.0
+"""An impact seen a step late leaves a body (1 + e)·v·h off; a halving may change nothing of that by chance."""
 RUNS = 3
 """The fewest runs from which a witness may contradict: two halvings, as one alone may change little by chance."""
 GROWTH = 0.01
@@ -45,6 +47,8 @@ METHODS: tuple[dict[str, object], ...] = (
     {"detection": "bisect"},
 )
 """Asked after the preferences of `refined`: other integrators, and other ways to find impacts."""
+CHOICES = ("integrator", "detection", "joints", "half_kick")
+"""Settings by which two methods of one engine differ."""
 SOURCES = frozenset({Demand.THRUST, Demand.MOTORS, Demand.DRIVES, Demand.KICKS, Demand.ZONES})
 """What may bring energy into a scene."""
 
@@ -66,7 +70,7 @@ class _Testimony(NamedTuple):
     contradicts: bool
     """it converges to something else after that"""
     apart: float
-    """m, how far it is off just then"""
+    """m, how far it gets from the answer"""
 
 
 def confirmed(scene: Scene, found: Refined, settings: Settings, tolerance: float, until: float) -> Confirmation:
@@ -95,11 +99,11 @@ def confirmed(scene: Scene, found: Refined, settings: Settings, tolerance: float
         testimony = _testimony(scene, name, wanted, found, tolerance, until)
         if testimony is None:
             continue
-        by = _method(name, wanted, found)
+        by = _method(scene, name, wanted, found)
         if testimony.until >= until:
             return Confirmation(until, by, limit)
         if testimony.contradicts:
-            what = f"{by} comes to another answer, at first {testimony.apart:.2g} m away"
+            what = f"{by} comes to another answer, {testimony.apart:.2g} m away"
             return Confirmation(testimony.until, by if testimony.until > 0.0 else None, what)
         if best is None or testimony.until > best.until:
             best = Confirmation(testimony.until, by, f"{by} confirms no more, and has not converged")
@@ -131,16 +135,17 @@ def _witnesses(scene: Scene, found: Refined, settings: Settings) -> Iterator[tup
 
 
 def _choices(settings: Settings) -> tuple[object, ...]:
-    return settings.integrator, settings.detection, settings.joints, settings.half_kick
+    return tuple(getattr(settings, key) for key in CHOICES)
 
 
-def _method(name: str, wanted: Settings, found: Refined) -> str:
+def _method(scene: Scene, name: str, wanted: Settings, found: Refined) -> str:
     """Name a witness: another engine by its name, another method of the same with what it does otherwise."""
     if name != found.engine:
         return name
-    other = {key: getattr(wanted, key) for key in ("integrator", "detection", "joints", "half_kick")}
-    said = [f"{key} {value}" for key, value in other.items() if value and value != getattr(found.settings, key)]
-    return f"{name} ({', '.join(said) or 'plain'})"
+    mine, its = (ENGINES[name].resolve(scene, each) for each in (wanted, found.settings))
+    other = {key: getattr(mine, key) for key in CHOICES if getattr(mine, key) != getattr(its, key)}
+    said = [f"without {key}" if value is False else f"{key} {value}" for key, value in other.items()]
+    return f"{name} with {' and '.join(said)}".replace("with without", "without")
 
 
 def _testimony(
@@ -151,8 +156,9 @@ def _testimony(
     moving = ~scene.bodies.fixed
     each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
     allowed, work = max(SHARE * found.work, (2**RUNS - 1) * each), 0
-    runs: list[Trajectory] = []
+    coarse: Trajectory | None = None
     changed: list[FloatArray] = []
+    """by each halving, at each frame, m"""
     testimony: _Testimony | None = None
     while work + each <= allowed:
         try:
@@ -162,18 +168,20 @@ def _testimony(
         if run.status != "ok":
             break
         away = errors(run, found.trajectory, moving)
-        if runs:
-            step = errors(run, runs[-1], moving).position
+        if coarse is not None:
+            step = errors(run, coarse, moving).position
             before = 0.5 * changed[-1] if changed else step
-            testimony = _heard(run, away.time, away.position, step, np.maximum(step, before), tolerance, until)
-            contradicts = testimony.contradicts and len(runs) + 1 >= RUNS
+            fastest = float(np.hypot(*np.moveaxis(run.velocity[run.time <= until], 2, 0)).max(initial=0.0))
+            slack = tolerance + CONTRADICTS * np.maximum(step, before) + IMPACT * fastest * settings.h
+            testimony = _heard(run, away, step, slack, tolerance, until)
+            contradicts = testimony.contradicts and len(changed) + 2 >= RUNS
             testimony = testimony._replace(contradicts=contradicts)
             if testimony.until >= until or contradicts:
                 break
             changed.append(step)
         elif not (away.position[away.time <= until] > tolerance).any() and not len(run.missed_time):
             return _Testimony(until, False, 0.0)
-        runs, work, each = [run], work + each, 2 * each
+        coarse, work, each = run, work + each, 2 * each
         finer = half(settings)
         if finer is None:
             break
@@ -182,23 +190,30 @@ def _testimony(
 
 
 def _heard(
-    run: Trajectory, time: FloatArray, away: FloatArray, step: FloatArray, most: FloatArray, tolerance: float,
-    until: float,
-) -> _Testimony:  # fmt: skip
-    """Return what a witness says: K frames' distances from the answer, from its own run before, and at most of two."""
+    run: Trajectory, away: Errors, step: FloatArray, slack: FloatArray, tolerance: float, until: float
+) -> _Testimony:
+    """Return what a witness says.
+
+    Args:
+        run: its last.
+        away: from the answer, at K frames.
+        step: (K,) what its last halving has changed, m.
+        slack: (K,) m, by how much it may be away before it is sure to converge to something else.
+        tolerance: of positions, m.
+        until: s, beyond which it is not heard.
+    """
     end = min(until, float(np.min(run.missed_time, initial=np.inf)))
-    agrees = (away <= tolerance) | ((away <= CONVERGES * step) & (step <= CLOSE * tolerance))
-    against = np.flatnonzero(~agrees & (time <= end))
+    apart, heard = away.position, away.time <= end
+    agrees = (apart <= tolerance) | ((apart <= CONVERGES * step) & (step <= CLOSE * tolerance))
+    against = np.flatnonzero(~agrees & heard)
     if not len(against):
         return _Testimony(end, False, 0.0)
-    first = int(against[0])
-    # What goes apart does so from small beginnings: so it is asked whether it leaves what may be its own error at all.
-    gone = (away > tolerance + CONTRADICTS * most) & (time <= end)
-    later = np.flatnonzero(gone[first:])
-    contradicts = bool(len(later)) and bool((away[first:][: later[0] + 1] > tolerance).all())
-    return _Testimony(
-        float(time[first - 1]) if first else 0.0, contradicts, float(away[first + later[0]]) if contradicts else 0.0
-    )
+    beyond = np.flatnonzero((apart > slack) & heard)
+    contradicts = len(beyond) > 0
+    # What converges to something else begins to leave the answer before it is sure that it does.
+    last = np.flatnonzero(agrees[: beyond[0]]) if contradicts else np.arange(against[0])
+    agreed = float(away.time[last[-1]]) if len(last) else 0.0
+    return _Testimony(agreed, contradicts, float(apart[beyond].max(initial=0.0)))
 
 
 def _lawful_until(scene: Scene, run: Trajectory, tolerance: float) -> tuple[float, str]:
