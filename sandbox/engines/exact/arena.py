@@ -50,17 +50,20 @@ RESTITUTION, FRICTION, FALLOFF = range(3)
 
 GX, GY, HOP, NOW, NOW_LATE, SECOND, INSTANT = range(7)
 BY_NORMAL, BY_RUBBING, BY_PHANTOM, BY_KICKS = range(7, 11)
+BATCH, BATCH_BEFORE = range(11, 13)
 """Places of `world`: gravity, m/s²; the speed of a hop, m/s; the time of the last event, s, and what rounding has cut
 off it; the starts of the second and of the instant in which events are being counted; energy that impulses along
-normals and along surfaces took, J, negative, that either gave, and that kicks brought."""
+normals and along surfaces took, J, negative, that either gave, and that kicks brought; when the present batch of
+events and the one before it began, s."""
 
 NONE, SLIP_ENDS, EDGE, FLAT, KNOB, BALL = range(6)
 """Kinds of event, in the order in which those of one ball at one instant happen."""
 
 RECORDING, ROWS, EVENTS, IN_SECOND, AT_INSTANT, WHO, WHAT, WITH, BUDGET, PREDICTIONS, PAIR_TESTS, ACCOUNTING = range(12)
+IN_BATCH = 12
 """Places of `count`: whether contacts are logged, how many rows there are; events so far, in the present second and
 instant; the last event's ball, kind and partner; how many events a second may have; how often a ball looked ahead,
-and at how many others, flats and knobs; whether energy is accounted for."""
+and at how many others, flats and knobs; whether energy is accounted for; events in the present batch."""
 
 HOP_TIME, HOP_MOST = 5e-5, 5e-4
 """s and m/s: what would rest on a ball or on anything round hops instead, with g·HOP_TIME or HOP_MOST if that is less:
@@ -94,9 +97,9 @@ class Arena(NamedTuple):
     knob_tags: IntArray
     """(K, 2)"""
     world: FloatArray
-    """(11,)"""
+    """(13,)"""
     counts: IntArray
-    """(12,)"""
+    """(13,)"""
     log: FloatArray
     """(C, 7) time, point, normal, impulse"""
     log_pair: IntArray
@@ -120,11 +123,12 @@ def arena_of(roster: Roster) -> Arena:
         others=np.empty(0, np.int64),
         surfaces=np.empty((3, 0, 0)),
         **_laid(roster.scene),
-        world=np.zeros(11),
-        counts=np.zeros(12, np.int64),
+        world=np.zeros(13),
+        counts=np.zeros(13, np.int64),
         log=np.empty((0, 7)),
         log_pair=np.empty((0, 2), np.int64),
     )
+    arena.world[BATCH_BEFORE] = -np.inf  # there is none before the first
     return renewed(arena, roster)
 
 
