@@ -93,7 +93,7 @@ def test_warning_where_gravity_alone_makes_a_hit() -> None:
 
 
 def test_forecast_of_speed_counts_kicks_in() -> None:
-    from sandbox.measure.forecast.passages import top_speeds
+    from sandbox.measure.forecast import top_speeds
 
     def fastest(**wall: Any) -> float:
         scene = from_document({"ball": [BALL], "wall": [{**WALL, **wall}], "world": {"duration": 1}})
