@@ -19,7 +19,6 @@ from sandbox.scene.faults import Fault
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
 
-
 TABLES = "8-ball, 9-ball, snooker or three-cushion"
 """Scenes to name where another is none."""
 

@@ -68,7 +68,7 @@ def find(text: str) -> Path:
 
 
 def scenes_in(text: str) -> tuple[str, ...]:
-    """Return the names of the scenes of a folder, sorted: on the disk as given, or one of the shipped ones, such as `tutorial`.
+    """Return the names of the scenes of a folder, sorted: on the disk, or a shipped one, such as `tutorial`.
 
     A TOML file without any key of a scene is none; one that cannot be read is left to whom reads it. What is a file or
     a shipped scene's name is no folder, and has none.

@@ -174,11 +174,7 @@ def test_faulty_scenes_are_told_all_at_once(tmp_path: Path, capfd: pytest.Captur
         ("--engine", None, ""),
         ("nowhere", None, ""),
         ("--sweep", None, ""),
-        *(
-            (file, line, path)
-            for file in (bad, worse)
-            for line, path in ((3, "ball.a.position"), (4, "ball.a.radius"))
-        ),
+        *((file, line, path) for file in (bad, worse) for line, path in ((3, "ball.a.position"), (4, "ball.a.radius"))),
     ]
     assert len(err) == len(told)
     assert err[3].startswith(f"{bad}:3: ball.a.position: ")
