@@ -181,7 +181,9 @@ def _index(elements: list[Any], parts: tuple[str, ...], path: str) -> int:
     some = [name for name in names if name is not None]
     maker = next((name for name in some if part.startswith(f"{name}-")), None)
     if maker is not None:
-        raise AddressError(f"{path}: {part!r} is laid out by {before}.{quoted(maker)}, which has the keys for all of it")
+        raise AddressError(
+            f"{path}: {part!r} is laid out by {before}.{quoted(maker)}, which has the keys for all of it"
+        )
     close = difflib.get_close_matches(part, some, n=1)
     if close:
         raise AddressError(f"{path}: no element {part!r}; did you mean {close[0]!r}?")

@@ -117,7 +117,7 @@ def _range(location: Location, violated: str, context: Any, value: float) -> str
     bound = context[violated]
     bounds = next((each for each in _bounds(location) if each.get(violated) == bound), {violated: bound})
     low, high = bounds.get("ge", bounds.get("gt")), bounds.get("le", bounds.get("lt"))
-    if low is not None and high is not None and (low == -high or (0 <= low and high <= _LARGE)):
+    if low is not None and high is not None and (low == -high or (low >= 0 and high <= _LARGE)):
         positive = "gt" in bounds or 0 < low < 1 / _LARGE
         if not positive:
             return f"between {low:g} and {high:g}" + (" exclusive" if "lt" in bounds else "")
@@ -170,7 +170,7 @@ def _annotation_at(location: Location) -> Any:
             inner = get_args(annotation)
             if not inner:
                 return None
-            annotation = inner[0] if inner[-1] is Ellipsis else inner[key] if int(key) < len(inner) else None
+            annotation = inner[0] if inner[-1] is Ellipsis else inner[int(key)] if int(key) < len(inner) else None
         while get_origin(annotation) is not tuple and get_args(annotation):  # Annotated, or one that may be left out
             annotation = get_args(annotation)[0]
     return annotation if Ellipsis not in get_args(annotation) else None

@@ -149,7 +149,10 @@ FLIPPER = "[pinball]\n[[pinball.flipper]]\npivot = [0.1, 0.1]\nstops = [{}, 0.35
         (FLIPPER.format(-31), "must be between -10 and 10, is -31; angles are in rad, and -31° is -0.5411"),
         (FLIPPER.format(-3100), "must be between -10 and 10, is -3100"),  # no angle in degrees either
         ("[[shot]]\naim = 1e9\nspeed = 1.0\n", "must be between -1e+06 and 1e+06, is 1000000000"),
-        ("[[ball]]\nposition = [0, 0]\nradius = 0.1\nangular_velocity = 1e99\n", "must be between -1e+12 and 1e+12, is 1e+99"),  # rad/s
+        (
+            "[[ball]]\nposition = [0, 0]\nradius = 0.1\nangular_velocity = 1e99\n",
+            "must be between -1e+12 and 1e+12, is 1e+99",
+        ),  # rad/s
     ],
 )
 def test_angle_in_degrees_is_told_in_radians(text: str, told: str) -> None:

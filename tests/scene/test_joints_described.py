@@ -39,7 +39,7 @@ def test_joint_of_every_kind_is_read() -> None:
         ('kind="spirng"\nbetween=["a","b"]', ['s.toml:10: joint[0].kind: is "spirng"; a joint is one']),
         ('kind=5\nbetween=["a","b"]', ["s.toml:10: joint[0].kind: "]),
         ('kind="rod"', ["s.toml:9: joint[0].between: is missing"]),
-        ('kind="rod"\nbetween="a"', ['s.toml:11: joint[0].between: must be the name of']),
+        ('kind="rod"\nbetween="a"', ["s.toml:11: joint[0].between: must be the name of"]),
         ('kind="rod"\nbetween=[]', ["s.toml:11: joint[0].between: must be the name of one"]),
         ('kind="rod"\nbetween=["a","b","a"]', ["s.toml:11: joint[0].between: "]),
         ('kind="rod"\nbetween=["a",5]', ["s.toml:11: joint[0].between[1]: must be text in quotes, is 5"]),
@@ -64,14 +64,23 @@ def test_joint_of_every_kind_is_read() -> None:
             ["s.toml:9: joint[0].at: state either `at`, a place in the world, or `anchors`"],
         ),
         ('kind="pivot"\nbetween=["a"]\nat=[0,0]\nanchors=[[0,0],[1,0]]', ["s.toml:12: joint[0].at: state either `at`"]),
-        ('kind="motor"\nbetween=["a"]\nrate=1\nmax_torque=0', ["s.toml:13: joint[0].max_torque: must be greater than 0, is 0"]),
+        (
+            'kind="motor"\nbetween=["a"]\nrate=1\nmax_torque=0',
+            ["s.toml:13: joint[0].max_torque: must be greater than 0, is 0"],
+        ),
         ('kind="gear"\nbetween=["a"]\nratio=0', ["s.toml:12: joint[0].ratio: is next to nothing"]),
         ('kind="gear"\nbetween=["a"]\nratio=-1e-9', ["s.toml:12: joint[0].ratio: is next to nothing"]),
         (
             'kind="spring"\nbetween=["a"]\nstiffness=-1\ndamping=inf',
-            ["s.toml:12: joint[0].stiffness: must be greater than 0, is -1", "s.toml:13: joint[0].damping: must be a finite number"],
+            [
+                "s.toml:12: joint[0].stiffness: must be greater than 0, is -1",
+                "s.toml:13: joint[0].damping: must be a finite number",
+            ],
         ),
-        ('kind="spring"\nbetween=["a"]\nstiffness=1e31', ["s.toml:12: joint[0].stiffness: must be at most 1e+30, is 1e+31"]),
+        (
+            'kind="spring"\nbetween=["a"]\nstiffness=1e31',
+            ["s.toml:12: joint[0].stiffness: must be at most 1e+30, is 1e+31"],
+        ),
     ],
 )
 def test_fault_of_a_joint_is_told_with_line_and_path(text: str, told: list[str]) -> None:
@@ -98,7 +107,7 @@ def test_fault_of_a_joint_is_told_with_line_and_path(text: str, told: list[str])
         ('[[thrust]]\nbody="q"\nforce=[1,0]', ["s.toml:10: thrust[0].body: no body is named 'q'"]),
         (
             '[[thrust]]\nbody="a"\nforce=[1]\nkey="spc"',
-            ["s.toml:11: thrust[0].force: must be an array of 2, has 1", 's.toml:12: thrust[0].key: must be one of'],
+            ["s.toml:11: thrust[0].force: must be an array of 2, has 1", "s.toml:12: thrust[0].key: must be one of"],
         ),
         ('[[thrust]]\nbody="a"\nforce=[1,0]\nbegin=3\nend=3', ["s.toml:13: thrust[0].end: is not later than `begin`"]),
         (

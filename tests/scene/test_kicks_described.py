@@ -25,7 +25,11 @@ NONE = {"restitution_falloff": 0}
         ),
         ({"post": [{**POST, "kick": {}}]}, "post[0].kick.speed", "is missing"),
         ({"post": [{**POST, "kick": {"speed": -1}}]}, "post[0].kick.speed", "must be at least 0"),
-        ({"post": [{**POST, "kick": {"speed": 1, "threshold": 0}}]}, "post[0].kick.threshold", "must be at least 0.001"),
+        (
+            {"post": [{**POST, "kick": {"speed": 1, "threshold": 0}}]},
+            "post[0].kick.threshold",
+            "must be at least 0.001",
+        ),
         ({"post": [{**POST, "one_way": True}]}, "post[0].one_way", "unknown key"),
         ({"wall": [{**WALL, "kick": {"speed": 1, "profile": "ends"}}]}, "wall[0].kick.profile", "one of"),
         ({"wall": [{**WALL, "solid": 1}]}, "wall[0].solid", "true or false"),

@@ -224,7 +224,11 @@ def test_override_of_an_element_that_there_is_not_tells_which_there_are(override
         ({"wall": [{"points": [[0, 0], [1, 0]], "closed": True}]}, "pinball.wall[0].points", "enclose nothing"),
         ({"wall": [{"points": [[0, 0], [1, 0]], "fill": "#000000"}]}, "pinball.wall[0].fill", "a closed line"),
         ({"standup": [{"position": [0, 0], "facing": [0, 0]}]}, "pinball.standup[0].facing", "has no direction"),
-        ({"drops": [{"position": [0, 0], "facing": [1, 0], "count": 0}]}, "pinball.drops[0].count", "must be between 1 and 20"),
+        (
+            {"drops": [{"position": [0, 0], "facing": [1, 0], "count": 0}]},
+            "pinball.drops[0].count",
+            "must be between 1 and 20",
+        ),
         ({"slingshot": [{"points": [[0, 0], [1, 0], [2, 0]]}]}, "pinball.slingshot[0].points", "three posts"),
         ({"gate": [{"points": [[0, 0], [0, 0]]}]}, "pinball.gate[0].points[1]", "ends of a line"),
         ({"ramp": [{"points": [[0, 0], [0, 0.5]], "width": 0.026}]}, "pinball.ramp[0].width", "more than 0.02698 m"),

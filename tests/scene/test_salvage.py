@@ -85,7 +85,7 @@ def test_material_that_is_only_misspelt_is_not_called_missing_too(broken: str) -
     [
         (
             "[[plane]]\npoint = [0, 'x']\nnormal = [0, 1]\n[[ball]]\nposition = [0, -5000]\nradius = 1\n",
-            "plane[0].point",
+            "plane[0].point[1]",
         ),
         (
             "[[plane]]\npoint = [0, -9000]\nnormal = 'x'\n[[ball]]\nposition = [0, -9999]\nradius = 1\n",

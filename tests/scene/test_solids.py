@@ -44,7 +44,10 @@ def test_scene_of_solids_and_joints_is_read_back_as_it_was_written(scene: Scene)
             "[[capsule]]\nposition=[0,0]\nradius=-1\n",
             ["s.toml:1: capsule[0].length: is", "s.toml:3: capsule[0].radius"],
         ),
-        ('[[capsule]]\nposition=[0,0]\nradius="1"\nlength=1\n', ['s.toml:3: capsule[0].radius: must be a number, is "1"']),
+        (
+            '[[capsule]]\nposition=[0,0]\nradius="1"\nlength=1\n',
+            ['s.toml:3: capsule[0].radius: must be a number, is "1"'],
+        ),
         ("[[polygon]]\nposition=[0,0]\n", ["s.toml:1: polygon[0].points: is missing"]),
         ("[[polygon]]\npoints=[[0,0],[1,0]]\n", ["s.toml:2: polygon[0].points: must be an array of 3 or more"]),
         ("[[polygon]]\npoints=[[0,0],[1,1],[2,2]]\n", ["s.toml:2: polygon[0].points[0]: the outline turns straight"]),
@@ -95,7 +98,10 @@ def test_scene_of_solids_and_joints_is_read_back_as_it_was_written(scene: Scene)
             "[[box]]\nposition=[0,0]\nsize=[1e9,1e9]\ndensity=1e29\n",
             ["s.toml:4: box[0].density: gives a mass of 1e+47"],
         ),
-        ("[[box]]\nposition=[0,0]\nsize=[1e9,1e9]\nmass=1e31\n", ["s.toml:4: box[0].mass: must be at most 1e+30, is 1e+31"]),
+        (
+            "[[box]]\nposition=[0,0]\nsize=[1e9,1e9]\nmass=1e31\n",
+            ["s.toml:4: box[0].mass: must be at most 1e+30, is 1e+31"],
+        ),
         (
             "[[capsule]]\nposition=[0,0]\nlength=1e-9\nradius=1e-9\ndensity=1e-3\n",
             ["s.toml:5: capsule[0].density: gives a mass of 5.1"],
