@@ -60,10 +60,9 @@ compiled_rebound, compiled_kicked, compiled_kick_gain = kernel(rebound), kernel(
 """The same for kernels; for one contact at a time compiling takes longer than it saves."""
 
 
-def stretches(points: Sequence[Point], closed: bool) -> list[tuple[float, float]]:
+def stretches(points: Sequence[Point]) -> list[tuple[float, float]]:
     """Return for each segment of a polyline at which shares of the whole length it begins and ends."""
-    ends = (*points, points[0]) if closed else tuple(points)
-    lengths = [math.dist(a, b) for a, b in pairwise(ends)]
+    lengths = [math.dist(a, b) for a, b in pairwise(points)]
     whole, begin = math.fsum(lengths), 0.0
     found = []
     for length in lengths:

@@ -32,6 +32,8 @@ def account(stage: Stage, claimed: tuple[tuple[str, str], ...], rate: float, rec
         step=show.step_number,
         time=show.frame.time,
         paused=stage.paused,
+        waits_for_start=stage.waits_for_start,
+        unfocused=stage.unfocused,
         ended=_ended(show),
         replay=live is None,
         speed=show.pace.speed,

@@ -31,7 +31,7 @@ class Commands:
         self._turned: dict[str, Value] = {}  # knobs since the last `settle`, the last turned last
         stage, desk = seat.stage, seat.desk
         self._deeds: dict[Command, Callable[[], object]] = {
-            Command.PAUSE: self._pause,
+            Command.PAUSE: stage.toggle_pause,
             Command.STEP: stage.step,
             Command.BACK: stage.back,
             Command.RESTART: stage.restart,
@@ -100,9 +100,6 @@ class Commands:
     def _help(self) -> None:
         self._let_go()
         self._seat.desk.toggle_help()
-
-    def _pause(self) -> None:
-        self._seat.stage.paused = not self._seat.stage.paused
 
     def _home(self) -> None:
         """Show the scene as it began; where that is seen already, the bodies where they are now."""

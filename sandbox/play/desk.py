@@ -113,6 +113,11 @@ class Desk:
         """Return the codes of those keys."""
         return frozenset(self.claims(stage).deeds)
 
+    @property
+    def covers(self) -> bool:
+        """Whether help or the picker lies over the scene."""
+        return self.picker is not None or self.manual.open
+
     def open_picker(self, path: Path | None) -> None:
         """Offer the scenes."""
         self.picker = Picker(to_pick(path))
@@ -159,7 +164,7 @@ class Desk:
                 stage.paused = True
                 show.scrub(time)
             if held and not self._timeline.held:
-                show.settle()
+                stage.compute(show.settle)
             return held or self._timeline.held
         return False
 

@@ -8,8 +8,11 @@ import pygame
 
 from sandbox.play.camera import Box, Camera
 from sandbox.play.desk import Desk
+from sandbox.play.drawing.picture import Picture
 from sandbox.play.footage.taking import Taking
 from sandbox.play.framing import around, framing, lies_down
+from sandbox.play.instruments.thumbnail import frame_in_flight
+from sandbox.play.sight import Sight
 from sandbox.play.stage import Stage
 
 TITLE = "sandbox"
@@ -61,6 +64,19 @@ class Seat:
             return self.stage.path.stem
         show = self.stage.show
         return (show.scene.title if show is not None else "") or "scene"
+
+    def preview(self) -> pygame.Surface | None:
+        """Return a picture of the scene that is being opened, as it will begin; None where none is."""
+        scene = self.stage.opening
+        if scene is None or (self.stage.show is not None and self.stage.show.scene is scene):
+            return None
+        size = self.surface.get_size()
+        made = pygame.Surface(size, 0, self.surface)
+        free = size[0] - self.desk.panel.width, size[1] - self.desk.foot
+        turned = lies_down(scene, free)
+        camera = Camera.fitting(framing(scene), size, inset=self.desk.panel.width, foot=self.desk.foot, turned=turned)
+        Picture().draw(made, camera, Sight(scene, scene.bodies, frame_in_flight(scene)), unit=self.desk.unit)
+        return made
 
     def home(self) -> None:
         """Show the scene whole."""

@@ -102,6 +102,10 @@ class Status:
     time: float
     """s, simulated"""
     paused: bool = False
+    waits_for_start: bool = False
+    """a real-time game that no key has started yet"""
+    unfocused: bool = False
+    """another window has the keyboard, and time stands still"""
     ended: str | None = None
     """why nothing comes after this moment"""
     replay: bool = False

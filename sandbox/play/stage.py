@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.registry import ENGINES, USUAL, engine_named, usual
+from sandbox.games.registry import REAL_TIME
 from sandbox.play.billiards.game import PLAYERS, Game, Players
 from sandbox.play.billiards.gestures import Gestures
 from sandbox.play.billiards.seats import Seats
@@ -21,6 +22,7 @@ from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 from sandbox.play.shelf import neighbour
 from sandbox.play.wishes import Wishes
+from sandbox.play.worker import Compute, compute_here
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import Override, load
 from sandbox.scene.model import Scene
@@ -49,6 +51,16 @@ class Stage:
         self.host: Host | None = None
         """of the game with rules that is on"""
         self._paused = False
+        self.waits_for_start = False
+        """a real-time game has been opened, and no key has started it yet"""
+        self.covered = False
+        """help or the picker covers the scene; time stands still meanwhile"""
+        self.unfocused = False
+        """another window has the keyboard; time stands still meanwhile"""
+        self.compute: Compute = compute_here
+        """calls all that may have to compile; the window lets it run beside itself"""
+        self.opening: Scene | None = None
+        """the scene whose session is being started"""
         self.hands = Hands()
         self.messages = Messages()
         self.faults: tuple[str, ...] = ()
@@ -114,10 +126,12 @@ class Stage:
         self._again, self._tried = again, None
         self.hands.forget()
         self.faults = ()
+        if not same:
+            self.waits_for_start = again is None and self.host is not None and file.play.game in REAL_TIME
         if isinstance(show, Live):
             # What rules and hands do next, no twin can tell.
             self._wishes.begin(show.company, trusting=len(show.bodies) <= FEW and self.host is None)
-            self._seats.take(show, file, self.messages.tell)
+            self.compute(lambda: self._seats.take(show, file, self.messages.tell))
         self.on_new(same)
 
     def seat(self, players: Players) -> None:
@@ -138,7 +152,11 @@ class Stage:
     def _start(
         self, scene: Scene, path: Path | None, file: Scene, engine: str, settings: Settings | None, same: bool
     ) -> bool:
-        live = begun(scene, engine, settings, self.messages)
+        self.opening = scene
+        try:
+            live = self.compute(lambda: begun(scene, engine, settings, self.messages))
+        finally:
+            self.opening = None
         if live is not None:
             self.put_on(live, path, file, same)
         return live is not None
@@ -148,7 +166,7 @@ class Stage:
         if isinstance(self.show, Stored):
             self.show.scrub(self.show.begin)
         elif self._again is not None and self.file is not None:
-            self.put_on(self._again(), self.path, self.file, same=True, again=self._again)
+            self.put_on(self.compute(self._again), self.path, self.file, same=True, again=self._again)
         elif self.show is not None and self.file is not None:
             try:
                 scene = self._wishes.as_turned(self.file)
@@ -188,14 +206,16 @@ class Stage:
         if self.live is None:
             self._tell_why_not("has no ghost; replay it with --engine")
             return
-        self._wishes.toggle_ghost(self.live.company)
+        company = self.live.company
+        self.compute(lambda: self._wishes.toggle_ghost(company))
 
     def toggle_trust(self) -> None:
         """Begin to watch a twin from here, or end it."""
         if self.live is None:
             self._tell_why_not("has no twin; `sandbox play` plays its scene")
             return
-        self._wishes.toggle_trust(self.live.company)
+        company = self.live.company
+        self.compute(lambda: self._wishes.toggle_trust(company))
 
     def next_engine(self) -> None:
         """Go on with the next engine that can, from the same state; who cannot says why."""
@@ -210,10 +230,11 @@ class Stage:
 
     def switch(self, engine: str) -> bool:
         """Go on with an engine; return whether it could."""
-        if not isinstance(self.show, Live) or engine == self.show.engine:
+        live = self.live
+        if live is None or engine == live.engine:
             return False
         try:
-            note = self.show.switch(engine)
+            note = self.compute(lambda: live.switch(engine))
         except ActionError as error:
             self.messages.tell(str(error), "warning")
             return False
@@ -253,7 +274,7 @@ class Stage:
             self._tell_why_not("cannot be changed; `sandbox play` plays its scene")
             return False
         try:
-            deed(live)
+            self.compute(lambda: deed(live))
         except ActionError as error:
             self.messages.tell(str(error), "warning")
             return False
@@ -261,32 +282,45 @@ class Stage:
 
     def go_on(self, elapsed: float) -> None:
         """Let real time pass, s."""
-        if self.show is None:
+        show = self.show
+        if show is None:
             return
         game, still = self.game, self._seats.waits and not self.hands.holding
-        self.show.go_on(elapsed, self.paused or still)
+        stands = self.paused or self.waits_for_start or self.covered or self.unfocused or still
+        self.compute(lambda: show.go_on(elapsed, stands))
         if game is not None:
             self.act(lambda _: game.go_on(elapsed))
             self.messages.take(game.notes)
         if self.host is not None:
             self.messages.take(self.host.notes())
-        if isinstance(self.show, Live) and self.show.wants_pause:
-            self.paused, self.show.wants_pause = True, False
-        elif isinstance(self.show, Stored) and self.show.at_end:
+        if isinstance(show, Live) and show.wants_pause:
+            self.paused, show.wants_pause = True, False
+        elif isinstance(show, Stored) and show.at_end:
             self.paused = True
-        self.messages.take(self.show.notes)
+        self.messages.take(show.notes)
+
+    def start_game(self) -> None:
+        """Let the time of a real-time game begin."""
+        self.waits_for_start = self.paused = False
+
+    def toggle_pause(self) -> None:
+        """Pause, or resume; a game that has not begun begins."""
+        if self.waits_for_start:
+            self.start_game()
+        else:
+            self.paused = not self.paused
 
     def step(self) -> None:
         """Make one step; a running scene pauses."""
-        self.paused = True
+        self.paused, self.waits_for_start = True, False
         if self.show is not None:
-            self.show.step()
+            self.compute(self.show.step)
 
     def back(self) -> None:
         """Go one step back; a running scene pauses."""
-        self.paused = True
+        self.paused, self.waits_for_start = True, False
         if self.show is not None:
-            self.show.back()
+            self.compute(self.show.back)
 
     def slower(self) -> None:
         """Go one rung slower."""

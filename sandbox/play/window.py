@@ -22,9 +22,24 @@ from sandbox.play.mouse import Mouse
 from sandbox.play.screen import close_screen, open_screen, unit
 from sandbox.play.seat import TITLE, Seat
 from sandbox.play.stage import Stage
+from sandbox.play.worker import Wait, Worker
 
 RATE = 60
 """pictures a second, at most"""
+WAIT_RATE = 20
+"""pictures a second while something compiles"""
+
+PRESSES = frozenset(
+    {
+        pygame.KEYDOWN,
+        pygame.TEXTINPUT,
+        pygame.MOUSEBUTTONDOWN,
+        pygame.MOUSEWHEEL,
+        pygame.JOYBUTTONDOWN,
+        pygame.JOYHATMOTION,
+    }
+)
+"""What hands do while they wait for the scene; it is not meant for what comes then."""
 
 
 class Window(Seat):
@@ -60,7 +75,9 @@ class Window(Seat):
         self.commands = Commands(self, self.mouse)
         self._clock = pygame.time.Clock()
         stage.on_new = self.renew
-        COMPILING.on_begin = self._show_wait
+        self._worker = Worker(self._wait)
+        stage.compute = self._worker.compute
+        COMPILING.on_begin = self._note_compiling
         if stage.show is not None:
             self.renew(False)
 
@@ -79,11 +96,14 @@ class Window(Seat):
         self.commands.settle()
         if self.leaving is not None:
             return
+        self.stage.covered = self.desk.covers
         compiled = COMPILING.seconds
         self.stage.go_on(elapsed)
         if COMPILING.seconds > compiled:
             self._clock.tick()  # that time was not the scene's
         self.draw()
+        if COMPILING.seconds > compiled:
+            pygame.event.get(tuple(PRESSES))
         pygame.display.flip()
         self.taking.roll(self.surface, elapsed)
 
@@ -92,8 +112,33 @@ class Window(Seat):
         self.make_room()
         self.desk.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
 
-    def _show_wait(self, what: str) -> None:
-        """Say what the next picture has to wait for; it takes no events in. What others wait for keeps none waiting."""
+    def _wait(self, done: Callable[[float], bool]) -> None:
+        """Stay alive until a job of the worker is done: show what is waited for, and close at Esc and the cross.
+
+        What compiles takes seconds: keys and buttons that were pressed meanwhile are dropped. Other events come later.
+        """
+        wait, later = Wait(self._worker), []
+        behind = self.preview() or self.surface.copy()
+        while not done(1.0 / WAIT_RATE):
+            surface = pygame.display.get_surface() or self.surface
+            surface.blit(behind, (0, 0))
+            self.desk.draw_wait(surface, wait.told())
+            pygame.display.flip()
+            for event in pygame.event.get():
+                if event.type == pygame.QUIT or (event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE):
+                    self.leaving = 0
+                later.append(event)
+            if self.leaving is not None:
+                pygame.display.iconify()
+        for event in later:
+            if not (wait.compiled and event.type in PRESSES):
+                pygame.event.post(event)
+        if wait.compiled:
+            self._clock.tick()
+
+    def _note_compiling(self, what: str) -> None:
+        """Take note that a kernel is being compiled. What other threads wait for keeps none waiting."""
+        self._worker.note_compiling(what)
         if threading.current_thread() is not threading.main_thread():
             return
         self.desk.draw_wait(self.surface, what)
@@ -104,8 +149,15 @@ class Window(Seat):
         """Take one event in."""
         if event.type == pygame.QUIT:
             self.leaving = 0
+        elif event.type == pygame.WINDOWFOCUSLOST:
+            self.stage.unfocused = True
+        elif event.type in (pygame.WINDOWFOCUSGAINED, pygame.KEYDOWN, pygame.MOUSEBUTTONDOWN):
+            self.stage.unfocused = False
         elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
             self._resize()
+        if self._starts(event):
+            self.stage.start_game()
+            return
         for error in self._gamepads.take(event, self.stage.host, lambda: self.commands.do(Command.PAUSE)):
             self.stage.messages.tell(str(error), "warning")
         command = self._keyboard.command(event, self.desk.claimed(self.stage))
@@ -117,12 +169,20 @@ class Window(Seat):
         elif event.type == pygame.KEYDOWN:
             claims = self.desk.claims(self.stage)
             deed = claims.deed(event.key, self._keyboard.again)
-            if deed is not None and not event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
+            waits = self.stage.waits_for_start
+            if deed is not None and not waits and not event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
                 self.stage.act(deed)
                 if event.key in claims.releases:
                     self._held[event.key] = claims.releases[event.key]
         else:
             self.mouse.take(event)
+
+    def _starts(self, event: pygame.event.Event) -> bool:
+        """Tell whether an event starts the game that waits for it: Space, or any button of a gamepad."""
+        if not self.stage.waits_for_start or self.desk.covers or self.stage.faults:
+            return False
+        space = event.type == pygame.KEYDOWN and event.key == pygame.K_SPACE
+        return space or event.type == pygame.JOYBUTTONDOWN
 
     def _let_go(self, event: pygame.event.Event) -> None:
         """Do what the release of a claimed key asks for, also where the release itself will go elsewhere."""
@@ -163,4 +223,5 @@ class Window(Seat):
         self.taking.end_film()
         self.desk.close()
         self.stage.close()
+        self._worker.close()
         close_screen()

@@ -279,7 +279,7 @@ def test_middle_is_where_a_kick_is_most_and_ends_have_none(speed: float, share: 
 @settings(max_examples=30)
 @given(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), min_size=3, max_size=6, unique=True), st.booleans())
 def test_stretches_follow_each_other_from_nothing_to_the_whole(points: list[tuple[float, float]], closed: bool) -> None:
-    parts = stretches(points, closed)
+    parts = stretches((*points, points[0]) if closed else points)
     assert parts[0][0] == 0.0
     assert parts[-1][1] == pytest.approx(1.0, rel=1e-14)  # sums round
     assert all(a[1] == b[0] for a, b in pairwise(parts))

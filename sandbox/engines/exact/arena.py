@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sandbox.engines.fixtures import Fixtures, fixtures_of
+from sandbox.engines.fixtures import Fixtures, fixtures_of, straightened
 from sandbox.engines.rebound import kicked, stretches
 from sandbox.engines.roster import ALL, NOTHING, Roster
 from sandbox.scene.model import Plane, Scene, Wall
@@ -184,7 +184,7 @@ def _bear(arena: Arena, scene: Scene) -> None:
             continue
         middle, mine = thing.kick.profile == "middle", arena.flat_tags[:, THING] == k
         if isinstance(thing, Wall):
-            parts = np.repeat(stretches(thing.points, thing.closed), 2, axis=0)  # each segment has two sides
+            parts = np.repeat(stretches(straightened(thing)), 2, axis=0)  # each segment has two sides
             flats[mine, BEGIN], flats[mine, SPAN] = parts[:, 0], parts[:, 1] - parts[:, 0]
         flats[mine, KICK], flats[mine, THRESHOLD], flats[mine, MIDDLE] = thing.kick.speed, thing.kick.threshold, middle
         flats[mine, TO_APPROACH] = to_approach = thing.kick.adds_to == "approach"

@@ -11,7 +11,9 @@ from typing import NamedTuple
 import numpy as np
 import pymunk
 
+from sandbox.engines.fixtures import WallSegment
 from sandbox.engines.native.approach import closing_speed
+from sandbox.engines.native.chains import smooth
 from sandbox.engines.native.gates import Gates
 from sandbox.engines.native.record import address_of
 from sandbox.engines.rebound import kick_gain, kicked, rebound, share_at
@@ -21,6 +23,9 @@ from sandbox.trajectory import FloatArray
 
 Stretches = dict[pymunk.Shape, tuple[float, float]]
 """At which shares of its whole wall each segment of one that kicks begins and ends."""
+
+Joints = dict[pymunk.Shape, WallSegment]
+"""The segments of walls that run on beyond an end of theirs."""
 
 
 @dataclass
@@ -62,6 +67,7 @@ class Laws:
     space: pymunk.Space
     gates: Gates
     stretches: Stretches = field(default_factory=dict)
+    joints: Joints = field(default_factory=dict)
     told: dict[int, Given] | None = None
     """what kicked in the last substep, by the addresses of arbiters; where a dict is put here"""
     _known: dict[tuple[int, int], list[Law]] = field(default_factory=dict)
@@ -83,6 +89,8 @@ class Laws:
         if not arbiter.process_collision:
             self.gates.passed(arbiter)
             return
+        if self.joints:
+            smooth(arbiter, self.joints)
         law = known[0]
         arbiter.restitution, arbiter.friction = law.restitution, law.friction
         if law.steady:

@@ -71,7 +71,7 @@ class Parting:
         share, middle = 0.5, kick.profile == "middle"
         if middle and isinstance(thing, Wall):
             ends = (*thing.points, thing.points[0]) if thing.closed else thing.points
-            each = zip(ends[:-1], ends[1:], stretches(thing.points, thing.closed), strict=True)
+            each = zip(ends[:-1], ends[1:], stretches(ends), strict=True)
             share = min((_away(a, b, point), share_at(a, b, part, point)) for a, b, part in each)[1]
         speed = kicked(kick.speed, kick.threshold, middle, share, closing)
         return kick_gain(restitution, falloff, speed, kick.adds_to == "approach", closing)

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.compare.horizon import agree_until, nudged
+from sandbox.measure.compare.horizon import agree_until, perturb
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.joint_error import HOLDING
 from sandbox.measure.recorder import frame_count
@@ -107,7 +107,7 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
         if coarse.status != "ok":
             return None
         # Beyond the time at which a nudge matters, agreement is not to be had, nor of use.
-        other = nudged(scene)
+        other = perturb(scene)
         enough = scene.world.duration
         if other is not None:
             enough = agree_until(coarse, patient_run(other, engine, settings, PATIENCE / 5.0), scene, tolerance)

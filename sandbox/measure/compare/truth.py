@@ -6,7 +6,7 @@ from typing import Literal
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.closed_form import solution
 from sandbox.measure.compare.closed import as_run
-from sandbox.measure.compare.horizon import NUDGE, agree_until, nudged
+from sandbox.measure.compare.horizon import NUDGE, agree_until, perturb
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.compare.refined import refined
 from sandbox.measure.forecast.events import event_warnings
@@ -86,7 +86,7 @@ def truth_of(scene: Scene, settings: Settings, tolerance: float) -> Truth | None
 
 def _horizon(scene: Scene, engine: str, settings: Settings, found: Trajectory, tolerance: float) -> float:
     """Return until when a nudge changes nothing beyond the tolerance, s."""
-    other = nudged(scene)
+    other = perturb(scene)
     if other is None:
         return scene.world.duration
     again = run(other, engine, audit=False, **settings.model_dump())

@@ -51,6 +51,8 @@ def rows(status: Status) -> tuple[Row, ...]:
     ]
     if status.ended is not None:
         found.append(Row(f"ENDED: {status.ended} (R restarts)", WARNING, "triangle", bold=True, rank=2))
+    elif status.unfocused:
+        found.append(Row("PAUSED  (another window is active)", WARNING, "bars", bold=True, rank=2))
     elif status.paused:
         space_claimed = any("space" in key.lower() for key, _ in status.claimed)
         keys = "P" if space_claimed else "P or Space"
@@ -123,6 +125,8 @@ def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int
         top = block.bottom + _pad(size)
         below = pygame.Rect(free.left, top, free.width, free.bottom - top)
         return _draw_faults(surface, status.faults, below if below.height > 6 * size else free, size)
+    if status.waits_for_start:
+        _draw_start(surface, free, size)
     box = _draw_picked(surface, status.picked, free, block, size)
     _draw_messages(surface, status.messages, free, (block, box), size)
     return nothing
@@ -183,6 +187,16 @@ def draw_mark(surface: pygame.Surface, mark: Mark, at: tuple[float, float], radi
     elif mark == "bars":
         for side in (-0.75, 0.2):
             pygame.draw.rect(surface, colour, (x + side * radius, y - radius, 0.65 * radius, 2 * radius))
+
+
+def _draw_start(surface: pygame.Surface, free: pygame.Rect, size: float) -> None:
+    """Draw how a real-time game starts, in the middle."""
+    text, large = "Press Space to start", 1.5 * size
+    wide, high = measure(text, large, bold=True)
+    rect = pygame.Rect(0, 0, wide + 2 * round(large), high + round(1.2 * large))
+    rect.center = free.center
+    plate(surface, rect, 0.5 * size, opacity=240, edge=SKY)
+    write(surface, text, rect.center, large, INK, "center", bold=True)
 
 
 def _draw_rate(surface: pygame.Surface, status: Status, free: pygame.Rect, block: pygame.Rect, size: float) -> None:
