@@ -58,7 +58,8 @@ def framing(scene: Scene, reach: Box | None = None) -> Box:
     flown = _union([start, *(_orbits(scene, bodies, start) if scene.attractions else _flight(scene, bodies))])
     met = [(corners.min(axis=0), corners.max(axis=0)) for corners in things]
     if reach is not None:
-        flown = _union([flown, (np.asarray(reach[0]), np.asarray(reach[1]))])
+        start = _union([start, (np.asarray(reach[0]), np.asarray(reach[1]))])
+        flown = _union([start, flown])
     near = NEAR * float((flown[1] - flown[0]).max())
     met = [each for each in met if (each[0] <= flown[1] + near).all() and (each[1] >= flown[0] - near).all()]
     low, high = _union([start, *met]) if met else flown
