@@ -87,7 +87,8 @@ class Scene(Part):
     cloths: tuple[Cloth, ...] = Field((), alias="cloth")
     ragdolls: tuple[Ragdoll, ...] = Field((), alias="ragdoll")
     joints: tuple[Joint, ...] = Field((), alias="joint")
-    """Holds one body to the world, or two together: rod, pivot, slide, groove, rotary_limit, motor, gear, spring or rotary_spring."""
+    """Holds one body to the world, or two together: rod, pivot, slide, groove, rotary_limit, motor, gear, spring,
+    rotary_spring."""
     attractions: tuple[Attraction, ...] = Field((), alias="attraction")
     thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
     drives: tuple[Drive, ...] = Field((), alias="drive")

@@ -1,6 +1,6 @@
 import json
-from functools import cache
 from collections.abc import Iterator
+from functools import cache
 from typing import Any, get_args
 
 import pytest
