@@ -33,6 +33,7 @@ def account(stage: Stage, claimed: tuple[tuple[str, str], ...], rate: float, rec
         time=show.frame.time,
         paused=stage.paused,
         waits_for_start=stage.waits_for_start,
+        question=stage.question,
         unfocused=stage.unfocused,
         ended=_ended(show),
         replay=live is None,

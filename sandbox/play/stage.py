@@ -12,17 +12,20 @@ from sandbox.games.registry import REAL_TIME
 from sandbox.play.billiards.game import PLAYERS, Game, Players
 from sandbox.play.billiards.gestures import Gestures
 from sandbox.play.billiards.seats import Seats
-from sandbox.play.hands import Hands
+from sandbox.play.camera import Box
+from sandbox.play.framing import look_ahead
+from sandbox.play.hands import Hands, count_changes
 from sandbox.play.hosting.host import Host, hosted
 from sandbox.play.instruments.knob import Value
 from sandbox.play.knobs import turned
 from sandbox.play.messages import Messages
-from sandbox.play.running.beginning import begun
+from sandbox.play.running.beginning import begun, played_again
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 from sandbox.play.shelf import neighbour
 from sandbox.play.wishes import Wishes
 from sandbox.play.worker import Compute, compute_here
+from sandbox.recording import Recording
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import Override, load
 from sandbox.scene.model import Scene
@@ -45,6 +48,8 @@ class Stage:
         """
         self.show: Live | Stored | None = None
         self.path: Path | None = None
+        self.reach: Box | None = None
+        """where the bodies come without a hand, m, as far as that is known"""
         self.file: Scene | None = None
         """the scene as its file has it"""
         self._seats = Seats()
@@ -59,6 +64,11 @@ class Stage:
         """another window has the keyboard; time stands still meanwhile"""
         self.compute: Compute = compute_here
         """calls all that may have to compile; the window lets it run beside itself"""
+        self.question: str | None = None
+        """what is asked before hand-made changes are lost"""
+        self.saves_at_end = False
+        """the session is saved when the window closes"""
+        self._lost: Recording | None = None  # what Ctrl+Z brings back
         self.opening: Scene | None = None
         """the scene whose session is being started"""
         self.hands = Hands()
@@ -123,9 +133,13 @@ class Stage:
         if self.show is not None:
             self.show.close()
         self.show, self.path, self.file = show, path, file
+        if isinstance(show, Stored):
+            self.reach = show.film.box
+        elif again is not None and not same:
+            self.reach = None
         self._again, self._tried = again, None
         self.hands.forget()
-        self.faults = ()
+        self.faults, self.question, self._lost = (), None, None
         if not same:
             self.waits_for_start = again is None and self.host is not None and file.play.game in REAL_TIME
         if isinstance(show, Live):
@@ -155,6 +169,9 @@ class Stage:
         self.opening = scene
         try:
             live = self.compute(lambda: begun(scene, engine, settings, self.messages))
+            if live is not None and not same:
+                started = live
+                self.reach = self.compute(lambda: look_ahead(started.scene, started.engine, settings))
         finally:
             self.opening = None
         if live is not None:
@@ -173,7 +190,36 @@ class Stage:
             except SceneError as error:
                 self.messages.tell(str(error), "error")
                 return
+            made, before = self.count_unsaved(restart=True), self.live
+            lost = before.session.recording() if made and before is not None and before.busy is None else None
             self._start(scene, self.path, self.file, self.show.engine, self.show.session.wanted, same=True)
+            self._lost = lost
+
+    def count_unsaved(self, restart: bool = False) -> int:
+        """Return how many hand-made changes would be lost; those of a game are its own.
+
+        Args:
+            restart: by a restart, which keeps the values that were set.
+        """
+        live = self.live
+        if live is None or self.host is not None or self.game is not None:
+            return 0
+        kept = SetParameter if restart else ()
+        actions = [action for action in live.session.unsaved if not isinstance(action, kept)]
+        return count_changes(actions, live.scene.play.arrows)
+
+    def bring_back(self) -> None:
+        """Go back to the session as it was before a restart, or before something later was replaced."""
+        live = self.live
+        lost = self._lost
+        if live is not None and live.session.replaced is not None:
+            lost = live.session.replaced.recording
+        if lost is None or live is None or self.file is None:
+            self.messages.tell("there is nothing to bring back", "warning")
+            return
+        known = lost
+        self.put_on(self.compute(lambda: played_again(known)), self.path, self.file, same=True)
+        self.messages.tell("the session is back as it was")
 
     def reload(self) -> None:
         """Read the scene's file again, and start it at 0."""

@@ -29,6 +29,20 @@ RATE = 60
 WAIT_RATE = 20
 """pictures a second while something compiles"""
 
+MODIFIERS = frozenset(
+    {
+        pygame.K_LCTRL,
+        pygame.K_RCTRL,
+        pygame.K_LSHIFT,
+        pygame.K_RSHIFT,
+        pygame.K_LALT,
+        pygame.K_RALT,
+        pygame.K_LMETA,
+        pygame.K_RMETA,
+    }
+)
+"""Keys that ask for nothing by themselves."""
+
 PRESSES = frozenset(
     {
         pygame.KEYDOWN,
@@ -96,11 +110,12 @@ class Window(Seat):
         self.commands.settle()
         if self.leaving is not None:
             return
-        self.stage.covered = self.desk.covers
+        self.stage.covered = self.desk.covers or self.stage.question is not None
         compiled = COMPILING.seconds
         self.stage.go_on(elapsed)
         if COMPILING.seconds > compiled:
             self._clock.tick()  # that time was not the scene's
+        self.follow(elapsed)
         self.draw()
         if COMPILING.seconds > compiled:
             pygame.event.get(tuple(PRESSES))
@@ -110,6 +125,7 @@ class Window(Seat):
     def draw(self) -> None:
         """Draw what is on, and what surrounds it."""
         self.make_room()
+        self.desk.out_of_sight = self.loses_sight
         self.desk.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
 
     def _wait(self, done: Callable[[float], bool]) -> None:
@@ -125,7 +141,9 @@ class Window(Seat):
             self.desk.draw_wait(surface, wait.told())
             pygame.display.flip()
             for event in pygame.event.get():
-                if event.type == pygame.QUIT or (event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE):
+                escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
+                asks = not self.stage.saves_at_end and self.stage.count_unsaved() > 0
+                if (escape or event.type == pygame.QUIT) and not asks:
                     self.leaving = 0
                 later.append(event)
             if self.leaving is not None:
@@ -148,7 +166,7 @@ class Window(Seat):
     def take(self, event: pygame.event.Event) -> None:
         """Take one event in."""
         if event.type == pygame.QUIT:
-            self.leaving = 0
+            self.commands.do(Command.QUIT)
         elif event.type == pygame.WINDOWFOCUSLOST:
             self.stage.unfocused = True
         elif event.type in (pygame.WINDOWFOCUSGAINED, pygame.KEYDOWN, pygame.MOUSEBUTTONDOWN):
@@ -161,6 +179,7 @@ class Window(Seat):
         for error in self._gamepads.take(event, self.stage.host, lambda: self.commands.do(Command.PAUSE)):
             self.stage.messages.tell(str(error), "warning")
         command = self._keyboard.command(event, self.desk.claimed(self.stage))
+        self._dismiss(event, command)
         self._let_go(event)
         if self.desk.handle(event, self.stage):
             return
@@ -176,6 +195,19 @@ class Window(Seat):
                     self._held[event.key] = claims.releases[event.key]
         else:
             self.mouse.take(event)
+
+    def _dismiss(self, event: pygame.event.Event, command: Command | None) -> None:
+        """Take back a question that is answered by doing something else; the panel may ask and confirm as well."""
+        asked = self.commands.asked
+        if asked is None:
+            return
+        if event.type == pygame.KEYDOWN:
+            other = command != asked and event.key not in MODIFIERS and not self._keyboard.again
+        else:
+            left = self.surface.get_width() - self.desk.panel.width
+            other = event.type == pygame.MOUSEBUTTONDOWN and event.pos[0] < left
+        if other:
+            self.commands.dismiss()
 
     def _starts(self, event: pygame.event.Event) -> bool:
         """Tell whether an event starts the game that waits for it: Space, or any button of a gamepad."""

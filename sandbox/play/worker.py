@@ -78,7 +78,7 @@ class Worker:
         while (job := self._jobs.get()) is not None:
             try:
                 self._result = job()
-            except BaseException as error:  # raised again where the owner waits
+            except BaseException as error:  # noqa: BLE001  # raised again where the owner waits
                 self._error = error
             self._done.set()
             self._stirred.set()

@@ -16,7 +16,7 @@ from sandbox.engines.native.approach import closing_speed
 from sandbox.engines.native.chains import smooth
 from sandbox.engines.native.gates import Gates
 from sandbox.engines.native.record import address_of
-from sandbox.engines.rebound import kicked, rebound, share_at
+from sandbox.engines.rebound import kick_gain, kicked, rebound, share_at
 from sandbox.scene.kick import Kick
 from sandbox.scene.surfaces import Surfaces
 from sandbox.trajectory import FloatArray
@@ -99,13 +99,16 @@ class Laws:
         if closing <= 0.0:
             return
         alone = rebound(law.restitution, law.falloff, closing)
-        more = 0.0 if law.kick is None else self._kick(law.kick, arbiter, closing)
+        more = 0.0
+        if law.kick is not None:
+            kick, to_approach = self._kick(law.kick, arbiter, closing), law.kick.adds_to == "approach"
+            more = kick_gain(law.restitution, law.falloff, kick, to_approach, closing)
         arbiter.restitution = (alone + more) / closing
         if more and self.told is not None:
             self.told[address_of(arbiter._arbiter)] = Given(closing, alone, more)
 
     def _kick(self, kick: Kick, arbiter: pymunk.Arbiter, closing: float) -> float:
-        """Return what a contact is kicked by, m/s."""
+        """Return the speed with which a contact is kicked, m/s."""
         if closing <= kick.threshold:
             return 0.0
         share, middle = 0.5, kick.profile == "middle"

@@ -13,14 +13,16 @@ from sandbox.measure.forecast.joint_starts import joint_start_warnings
 from sandbox.measure.forecast.kicks import kick_warnings
 from sandbox.measure.forecast.laid import Laid, laid
 from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, Passage, farther, meet_each_other, passages
+from sandbox.measure.forecast.speeds import Speeds
 from sandbox.measure.forecast.springs import damper_warnings, spring_warnings
 from sandbox.measure.forecast.stacks import stack_warnings
 from sandbox.measure.forecast.stretch import stretch_warnings
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most
-from sandbox.scene.meetings import Meetings, meetings
-from sandbox.scene.model import Scene
+from sandbox.scene.meetings import Meetings, meetings, reach
+from sandbox.scene.model import Plane, Scene
 from sandbox.scene.settings import Settings
 from sandbox.scene.starts import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps
+from sandbox.scene.zone import mask_of
 
 ENOUGH_ITERATIONS = 3
 """With fewer, bouncing groups can gain energy on pymunk. Measured on break shots of 6 to 36 balls, e = 0.95 and 1, 240
@@ -116,7 +118,7 @@ def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Wa
             thing += f" and {things:,} other{'s' if things > 1 else ''} like it"
         ball = repr(passage.ball)
         if passage.others:
-            ball += f" and {passage.others:,} other{'s' if passage.others > 1 else ''} like it"
+            ball += f" and {passage.others:,} other{'s' if passage.others > 1 else ''} about as fast"
         if passage.struck:
             ball += ", struck by others,"
         message = (
@@ -132,6 +134,35 @@ def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Wa
             "safe_dt": safe,
         }
         yield Warning("tunnelling", message, figures)
+
+
+def _depth(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
+    """Yield what gets behind the surface of a plane by more than its half width before the contact is found.
+
+    A contact is found at the end of a substep, up to v·h deep; a plane pushes a body out from there. `bisect`, `swept`
+    and `shrink` go back to the moment of impact.
+    """
+    if settings.detection not in (None, "discrete"):
+        return
+    bodies, speeds = scene.bodies, Speeds(scene, meet)
+    layers = reach(scene, bodies)
+    movers = meet.touches & ~bodies.fixed & (bodies.thin > 0.0)
+    for plane, name in zip(scene.fixed, scene.fixed_names, strict=False):
+        able = np.flatnonzero(movers & (layers & mask_of(plane.layers, scene.layers) != 0))
+        if not isinstance(plane, Plane) or not len(able):
+            continue
+        speed = speeds.toward(plane)[able]
+        k = int(np.argmax(speed / bodies.thin[able]))
+        half, way = float(bodies.thin[able[k]]), float(speed[k]) * settings.h
+        if way <= half * (1.0 + ROUNDING):
+            continue
+        body, safe = bodies.names[able[k]], settings.dt * half / way
+        message = (
+            f"{body!r} can meet {name!r} at up to {speed[k]:.4g} m/s and be {way:.3g} m deep in it when the contact is "
+            f"found; dt <= {at_most(safe)} s keeps that below its half width, {half:.3g} m"
+        )
+        figures: Figures = {"ball": body, "thing": name, "speed": float(speed[k]), "depth": way, "safe_dt": safe}
+        yield Warning("depth", message, figures)
 
 
 def alike(found: Iterable[Passage]) -> list[tuple[Passage, int]]:
@@ -209,6 +240,7 @@ def _rounding(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warn
 FORECASTS: dict[str, Forecast] = {
     "duration": Forecast(lambda s: _duration(s.scene, s.settings)),
     "tunnelling": Forecast(lambda s: _tunnelling(s.scene, s.settings, s.meet)),
+    "depth": Forecast(lambda s: _depth(s.scene, s.settings, s.meet)),
     "entry": Forecast(lambda s: entry_warnings(s.scene, s.settings, s.meet)),
     "overlap": Forecast(lambda s: _overlaps(s.scene, s.meet, s.close)),
     "iterations": Forecast(lambda s: _iterations(s.settings, s.meet), frozenset({"pymunk"})),

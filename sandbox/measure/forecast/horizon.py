@@ -5,8 +5,8 @@ the diameter (N. S. Krylov, Works on the Foundations of Statistical Physics, 197
 ν·ln(1 + 4λ/d). A disc has ν = 2·n·d·√π·σ·χ impacts a second, with n discs on a square metre, σ² the mean square of one
 component of their velocities, and χ = (1 − 7φ/16)/(1 − φ)² for the covered share φ (D. Henderson 1975).
 
-That is the mean over the balls. The horizon is that of the ball whose error grows fastest, which is `FASTEST` times that
-rate. Measured against `exact`, gases of 16 to 625 balls that cover 3 to 50 % of their box, three seeds each, all balls
+That is the mean over the balls. The horizon is that of the ball whose error grows fastest, `FASTEST` times as fast.
+Measured against `exact`, gases of 16 to 625 balls that cover 3 to 50 % of their box, three seeds each, all balls
 perturbed (`compare.horizon.perturb`): the rate is 0.75 to 1.45 times that, the more the more balls there are.
 """
 

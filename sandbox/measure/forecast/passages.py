@@ -37,7 +37,7 @@ class Passage:
     reach: float
     """m, that one substep may cover"""
     others: int = 0
-    """bodies that differ from this one in nothing that matters here"""
+    """bodies that need about as short a substep"""
     struck: bool = False
     """The speed is one that the body may get by impacts of others; by itself it is slower."""
 
@@ -77,14 +77,16 @@ def farther(settings: Settings) -> float:
     return math.inf if settings.detection in ("swept", "shrink") else 1.0
 
 
-MOST_EACH = 20
+MOST_EACH = 5
 """Passages given for one thing: those that need the shortest substeps."""
+ALIKE = 1.1
+"""Ratio of the shortest substeps of two bodies up to which they are one passage."""
 
 
 def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
     """Return for each thing, and for bodies among themselves, which bodies can pass it, each at its own speed.
 
-    Bodies of one speed and size are one passage. Where impacts by others can make a body faster than any is by itself,
+    Bodies about as fast for their size are one passage, which has the figures of the worst of them. Where impacts by others can make a body faster than any is by itself,
     the worst such passage is added.
     """
     meet = meetings(scene) if meet is None else meet
@@ -134,16 +136,16 @@ def _groups(
     """Return a passage for bodies alike, the one that needs the shortest substep first, at most `MOST_EACH`."""
     with np.errstate(divide="ignore", over="ignore"):  # at rest, or as good as: never
         order = np.argsort(reach / speed, kind="stable")
-    first: dict[tuple[float, float], int] = {}
-    count: dict[tuple[float, float], int] = {}
+    found: list[Passage] = []
     for k in order.tolist():
-        key = float(speed[k]), float(reach[k])
-        if key not in first:
-            if len(first) == MOST_EACH:
-                break
-            first[key] = k
-        count[key] = count.get(key, 0) + 1
-    return [Passage(names[number[k]], thing, *key, others=count[key] - 1) for key, k in first.items()]
+        each = Passage(names[number[k]], thing, float(speed[k]), float(reach[k]))
+        if found and (each.safe_h <= ALIKE * found[-1].safe_h or not math.isfinite(each.safe_h)):
+            found[-1] = replace(found[-1], others=found[-1].others + 1)
+        elif len(found) == MOST_EACH:
+            break
+        else:
+            found.append(each)
+    return found
 
 
 MOST_CLOSING = 200

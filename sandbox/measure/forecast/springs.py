@@ -82,7 +82,7 @@ def damper_warnings(scene: Scene, settings: Settings) -> Iterator[Warning]:
             continue
         safe = settings.dt * limit / damped
         message = (
-            f"the damping of {mode.springs} is too strong for the step on the reference: c·h/m = {damped:.3g}, and "
+            f"the damping of {mode.group} is too strong for the step on the reference: c·h/m = {damped:.3g}, and "
             f"from {limit:.3g} on velocities grow without bound; dt <= {at_most(safe)} s, or pymunk, would be right"
         )
         figures: Figures = {"joint": mode.joint, "damping_h": damped, "limit": limit, "safe_dt": safe}
@@ -100,21 +100,23 @@ class Mode(NamedTuple):
     """1/s: the largest c/m of any motion of the group"""
     joint: str
     """the group's first spring"""
-    count: int
-    """springs in the group"""
+    springs: int
+    """in the group"""
 
     @property
-    def springs(self) -> str:
+    def group(self) -> str:
         """The group, in words."""
         return (
-            f"the {self.count:,} springs connected with {self.joint!r}" if self.count > 1 else f"spring {self.joint!r}"
+            f"the {self.springs:,} springs connected with {self.joint!r}"
+            if self.springs > 1
+            else f"spring {self.joint!r}"
         )
 
     @property
     def swings(self) -> str:
         """The group and its verb."""
-        if self.count > 1:
-            return f"the {self.count:,} springs that hang together with {self.joint!r} swing"
+        if self.springs > 1:
+            return f"the {self.springs:,} springs that hang together with {self.joint!r} swing"
         return f"the spring {self.joint!r} swings"
 
 

@@ -77,7 +77,7 @@ class Slingshot(Scoring):
     thickness: Size = 0.008
     """of the rubber, m"""
     speed: Speed = 2.16
-    """that it adds in its middle, m/s"""
+    """that it adds to the approach in its middle, m/s"""
     threshold: Threshold = 0.054
     """m/s"""
     score: Points = 10
