@@ -33,7 +33,8 @@ class Anchored(Joined):
     """A joint that holds each body in one point."""
 
     anchors: tuple[Point, Point] = ((0.0, 0.0), (0.0, 0.0))
-    """where it holds each, in the body's own frame, from its position; of the world, a place in it"""
+    """the two points that it holds, m, in the order of `between`: each in the frame of its body, from the body's
+    position. With one body the first is the body's, and the second is a place in the world"""
 
 
 class Rod(Anchored):
@@ -51,7 +52,8 @@ class Pivot(Joined):
     at: Point | None = None
     """where, in the world as it starts"""
     anchors: tuple[Point, Point] | None = None
-    """or where in each body's own frame, from its position"""
+    """or where in each body's own frame, from its position, m, in the order of `between`; with one body the first is
+    the body's, and the second is a place in the world"""
 
 
 class Slide(Anchored):

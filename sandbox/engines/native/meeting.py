@@ -9,7 +9,7 @@ from sandbox.engines.limits import BEYOND, FARTHEST
 from sandbox.engines.native.drives import Drives
 from sandbox.engines.native.encounters import Encounters
 from sandbox.engines.native.field import Field
-from sandbox.engines.native.ground import Ground, shuffled
+from sandbox.engines.native.ground import Ground, jointed_surfaces, shuffled
 from sandbox.engines.native.members import Member, Members
 from sandbox.engines.native.probes import Probes
 from sandbox.engines.native.reader import Reader
@@ -224,7 +224,7 @@ class MeetingBodies(Members):
         self._dragged = scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
         self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
         self._touches, self._noted = meet.touches, meet.noted
-        self._setter.renew(meet)
+        self._setter.renew(meet, jointed_surfaces(scene, self._surface_of_fixed))
         self._space.gravity = gravity_of(scene)
         for number, (_, own) in self._members.items():
             for piece, shape in own:
@@ -290,10 +290,17 @@ class MeetingBodies(Members):
         return self.encounters.touching(self._polygons, self._single, steady)
 
     def beyond(self) -> tuple[int, str] | None:
-        """Return a body that is not finite or beyond all bounds, and what is the matter; else None."""
+        """Return a body that is not finite or beyond all bounds, and what is the matter; else None.
+
+        Half-planes are made longer first for one that strays.
+        """
         if not self._moving:
             return None
         numbers, state = self._read()
+        within = self._ground.within(state)
+        if within.all():
+            return None
+        self.extend_planes()
         within = self._ground.within(state)
         if within.all():
             return None
@@ -303,8 +310,13 @@ class MeetingBodies(Members):
         return int(numbers[worst]), f"is more than {self._ground.reach:g} m out, where pymunk's half-planes end"
 
     def reaches(self, place: FloatArray) -> bool:
-        """Tell whether planes are planes at a place; so they are until there are some."""
+        """Tell whether planes can be made to reach a place."""
         return self._ground.reaches(place)
+
+    def extend_planes(self) -> None:
+        """Make half-planes reach the bodies that are here, where they do not."""
+        if self._moving and math.isfinite(self._ground.reach):
+            self._ground.extend(self._read()[1][:, 0:2])
 
     def push(self, number: int, force: FloatArray, torque: float) -> None:
         """Let a steady force (N) and torque (N·m) act on a body from now on."""

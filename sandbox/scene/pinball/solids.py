@@ -67,7 +67,7 @@ class Slingshot(Scoring):
     """its three posts, m: the ends of the side that kicks, and the one behind"""
     thickness: Size = 0.008
     speed: Speed = 2.16
-    """that it adds in its middle, m/s"""
+    """that it adds to the approach in its middle, m/s"""
     threshold: Threshold = 0.054
     """m/s"""
     score: Points = 10
