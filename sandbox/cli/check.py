@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from sandbox.cli.reading import fault_rows, path_of, print_json
+from sandbox.cli.reading import fault_rows, path_of, print_json, scenes_of
 from sandbox.engines.registry import ENGINES
 from sandbox.games.registry import fitting_rules
 from sandbox.measure.forecast import at_most, largest_safe_dt, notes, warnings
@@ -32,7 +32,7 @@ def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, 
         return _expand(scenes[0], overrides)
     documents = []
     status = 0
-    for name in scenes:
+    for name in scenes_of(scenes):
         try:
             scene = load(path_of(name), overrides)
             rules = fitting_rules(scene, path_of(name))

@@ -1,23 +1,28 @@
-"""Telling: all warnings of a scene, one after the other."""
+"""Forecasts: the table of all forecasts, and the warnings that they give of a scene."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from sandbox.measure.forecast.chains import chain_warnings
 from sandbox.measure.forecast.entries import entry_warnings
 from sandbox.measure.forecast.events import event_warnings
+from sandbox.measure.forecast.joint_starts import joint_start_warnings
 from sandbox.measure.forecast.kicks import kick_warnings
 from sandbox.measure.forecast.laid import Laid, laid
 from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, Passage, farther, meet_each_other, passages
-from sandbox.measure.forecast.springs import spring_warnings
+from sandbox.measure.forecast.speeds import Speeds
+from sandbox.measure.forecast.springs import damper_warnings, spring_warnings
 from sandbox.measure.forecast.stacks import stack_warnings
 from sandbox.measure.forecast.stretch import stretch_warnings
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most
-from sandbox.scene.meetings import Meetings, meetings
-from sandbox.scene.model import Scene
+from sandbox.scene.meetings import Meetings, meetings, reach
+from sandbox.scene.model import Plane, Scene
 from sandbox.scene.settings import Settings
 from sandbox.scene.starts import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps
+from sandbox.scene.zone import mask_of
 
 ENOUGH_ITERATIONS = 3
 """With fewer, bouncing groups can gain energy on pymunk. Measured on break shots of 6 to 36 balls, e = 0.95 and 1, 240
@@ -31,31 +36,63 @@ LOST = 0.1
 """The share of a substep's way that rounding may take: positions are sums of such ways, each rounded alike. Measured
 with a ball of 1 m at 1 m/s, steps of 0.01 s (`sandbox extremes --axes offset`): see there."""
 
+FAILED = "failed_forecast"
+"""Kind of the warning that stands for a forecast that raised an exception."""
+
+EVENT_DRIVEN = frozenset({"exact"})
+"""Engines that take no steps, and refuse what overlaps."""
+
 GRAZE = 1e-6
 """The share of a half width by which bodies that were laid out to touch may overlap: rounding."""
 
 
+@dataclass(frozen=True)
+class Situation:
+    """A scene and the settings it is to run with, and what several forecasts derive from them."""
+
+    scene: Scene
+    settings: Settings
+
+    @cached_property
+    def meet(self) -> Meetings:
+        """Which bodies can touch what."""
+        return meetings(self.scene)
+
+    @cached_property
+    def close(self) -> Laid:
+        """Pairs of bodies that lie on or in each other at the start."""
+        return laid(self.scene)
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """One forecast: a function of a situation, and the engines that it applies to."""
+
+    find: Callable[[Situation], Iterable[Warning]]
+    engines: frozenset[str] | None = None
+    """None: every engine that takes steps"""
+
+    def concerns(self, engine: str) -> bool:
+        """Return whether it applies to an engine."""
+        return engine not in EVENT_DRIVEN if self.engines is None else engine in self.engines
+
+
 def warnings(scene: Scene, settings: Settings | None = None, engine: str | None = None) -> list[Warning]:
-    """Return what would go wrong with a scene at its own settings or others; of an engine, only what concerns it."""
-    settings = scene.solver if settings is None else settings
-    meet, close = meetings(scene), laid(scene)
-    events = [*event_warnings(scene, meet)] if engine in (None, "exact") else []
-    if engine == "exact":  # it takes no steps, and refuses what overlaps
-        return events
-    return [
-        *_duration(scene, settings),
-        *_tunnelling(scene, settings, meet),
-        *entry_warnings(scene, settings, meet),
-        *_overlaps(scene, meet, close),
-        *(() if engine == "reference" else _iterations(settings, meet)),
-        *_rounding(scene, settings, meet),
-        *kick_warnings(scene, settings, meet),
-        *spring_warnings(scene, settings),
-        *chain_warnings(scene, settings),
-        *stretch_warnings(scene, settings),
-        *stack_warnings(scene, settings, close),
-        *events,
-    ]
+    """Return what the formulas foretell of a scene, without running it; only what concerns one engine, if given.
+
+    A forecast that fails unexpectedly becomes a warning of kind `failed_forecast`; the others still answer.
+    """
+    situation = Situation(scene, scene.solver if settings is None else settings)
+    found: list[Warning] = []
+    for name, forecast in FORECASTS.items():
+        if engine is not None and not forecast.concerns(engine):
+            continue
+        try:
+            found += forecast.find(situation)
+        except Exception as error:  # noqa: BLE001, one forecast's fault must not cost the answers of the others
+            message = f"the forecast {name!r} failed with {type(error).__name__}: {error}; please report this scene"
+            found.append(Warning(FAILED, message, {"forecast": name}))
+    return found
 
 
 def _duration(scene: Scene, settings: Settings) -> Iterator[Warning]:
@@ -69,28 +106,63 @@ def _duration(scene: Scene, settings: Settings) -> Iterator[Warning]:
 
 def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
     times = farther(settings)
-    for passage, others in alike(passages(scene, meet)):
+    at_risk = [passage for passage in passages(scene, meet) if passage.odds(settings.h / times) > ROUNDING]
+    own = {passage.thing for passage in at_risk if not passage.struck}
+    at_risk = [passage for passage in at_risk if not passage.struck or passage.thing not in own]
+    for passage, things in alike(at_risk):
         odds = passage.odds(settings.h / times)
-        if odds <= ROUNDING:
-            continue
         safe = passage.safe_h * settings.substeps * times
         way = passage.speed * settings.h
         thing = passage.thing if passage.thing in (ANOTHER, ANOTHER_BODY) else repr(passage.thing)
-        if others:
-            thing += f" and {others:,} other{'s' if others > 1 else ''} like it"
+        if things:
+            thing += f" and {things:,} other{'s' if things > 1 else ''} like it"
+        ball = repr(passage.ball)
+        if passage.others:
+            ball += f" and {passage.others:,} other{'s' if passage.others > 1 else ''} about as fast"
+        if passage.struck:
+            ball += ", struck by others,"
         message = (
-            f"{passage.ball!r} can close on {thing} at up to {passage.speed:.4g} m/s, {way:.3g} m a substep, "
+            f"{ball} can close on {thing} at up to {passage.speed:.4g} m/s, {way:.3g} m a substep, "
             f"and pass through unseen: odds up to {100 * odds:.3g} %; dt <= {at_most(safe)} s would be safe"
         )
         figures: Figures = {
             "ball": passage.ball,
             "thing": passage.thing,
-            "others": others,
+            "others": things,
             "speed": passage.speed,
             "odds": odds,
             "safe_dt": safe,
         }
         yield Warning("tunnelling", message, figures)
+
+
+def _depth(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
+    """Yield what gets behind the surface of a plane by more than its half width before the contact is found.
+
+    A contact is found at the end of a substep, up to v·h deep; a plane pushes a body out from there. `bisect`, `swept`
+    and `shrink` go back to the moment of impact.
+    """
+    if settings.detection not in (None, "discrete"):
+        return
+    bodies, speeds = scene.bodies, Speeds(scene, meet)
+    layers = reach(scene, bodies)
+    movers = meet.touches & ~bodies.fixed & (bodies.thin > 0.0)
+    for plane, name in zip(scene.fixed, scene.fixed_names, strict=False):
+        able = np.flatnonzero(movers & (layers & mask_of(plane.layers, scene.layers) != 0))
+        if not isinstance(plane, Plane) or not len(able):
+            continue
+        speed = speeds.toward(plane)[able]
+        k = int(np.argmax(speed / bodies.thin[able]))
+        half, way = float(bodies.thin[able[k]]), float(speed[k]) * settings.h
+        if way <= half * (1.0 + ROUNDING):
+            continue
+        body, safe = bodies.names[able[k]], settings.dt * half / way
+        message = (
+            f"{body!r} can meet {name!r} at up to {speed[k]:.4g} m/s and be {way:.3g} m deep in it when the contact is "
+            f"found; dt <= {at_most(safe)} s keeps that below its half width, {half:.3g} m"
+        )
+        figures: Figures = {"ball": body, "thing": name, "speed": float(speed[k]), "depth": way, "safe_dt": safe}
+        yield Warning("depth", message, figures)
 
 
 def alike(found: Iterable[Passage]) -> list[tuple[Passage, int]]:
@@ -163,3 +235,24 @@ def _rounding(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warn
                 f"rounded by up to {worst:.2g} of itself; move the scene closer"
             )
             yield Warning("rounding", message, {"ball": name, "share": worst})
+
+
+FORECASTS: dict[str, Forecast] = {
+    "duration": Forecast(lambda s: _duration(s.scene, s.settings)),
+    "tunnelling": Forecast(lambda s: _tunnelling(s.scene, s.settings, s.meet)),
+    "depth": Forecast(lambda s: _depth(s.scene, s.settings, s.meet)),
+    "entry": Forecast(lambda s: entry_warnings(s.scene, s.settings, s.meet)),
+    "overlap": Forecast(lambda s: _overlaps(s.scene, s.meet, s.close)),
+    "iterations": Forecast(lambda s: _iterations(s.settings, s.meet), frozenset({"pymunk"})),
+    "rounding": Forecast(lambda s: _rounding(s.scene, s.settings, s.meet)),
+    "kicks": Forecast(lambda s: kick_warnings(s.scene, s.settings, s.meet)),
+    "joints": Forecast(lambda s: joint_start_warnings(s.scene)),
+    "springs": Forecast(lambda s: spring_warnings(s.scene, s.settings)),
+    "dampers": Forecast(lambda s: damper_warnings(s.scene, s.settings), frozenset({"reference"})),
+    "chains": Forecast(lambda s: chain_warnings(s.scene, s.settings)),
+    "stretch": Forecast(lambda s: stretch_warnings(s.scene, s.settings)),
+    "stacks": Forecast(lambda s: stack_warnings(s.scene, s.settings, s.close)),
+    "events": Forecast(lambda s: event_warnings(s.scene, s.meet), EVENT_DRIVEN),
+}
+"""All forecasts, in the order in which their warnings are listed. A new one is a function in a module of its own and a
+line here."""
