@@ -11,6 +11,7 @@ from sandbox.measure.forecast.entries import entry_warnings
 from sandbox.measure.forecast.events import event_warnings
 from sandbox.measure.forecast.kicks import kick_warnings
 from sandbox.measure.forecast.laid import Laid, laid
+from sandbox.measure.forecast.orbits import orbit_warnings
 from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, Passage, farther, meet_each_other, passages
 from sandbox.measure.forecast.speeds import Speeds
 from sandbox.measure.forecast.springs import damper_warnings, spring_warnings
@@ -132,6 +133,8 @@ def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Wa
             "odds": odds,
             "safe_dt": safe,
         }
+        if passage.struck:
+            figures["struck"] = True
         yield Warning("tunnelling", message, figures)
 
 
@@ -247,6 +250,7 @@ FORECASTS: dict[str, Forecast] = {
     "kicks": Forecast(lambda s: kick_warnings(s.scene, s.settings, s.meet)),
     "springs": Forecast(lambda s: spring_warnings(s.scene, s.settings)),
     "dampers": Forecast(lambda s: damper_warnings(s.scene, s.settings), frozenset({"reference"})),
+    "orbits": Forecast(lambda s: orbit_warnings(s.scene, s.settings, s.meet)),
     "chains": Forecast(lambda s: chain_warnings(s.scene, s.settings)),
     "stretch": Forecast(lambda s: stretch_warnings(s.scene, s.settings)),
     "stacks": Forecast(lambda s: stack_warnings(s.scene, s.settings, s.close)),
