@@ -357,7 +357,8 @@ def _merged(told: list[Warning], concerned: list[Warning], trial: Trial) -> tupl
         return [*told, *found], []
     families = {FAMILY.get(each.kind, each.kind) for each in found}
     seen = {_whom(each, trial): each for each in reversed(found) if each.kind in NAMES_BODIES}
-    kept, refuted = [], []
+    kept: list[Warning] = []
+    refuted: list[Warning] = []
     for each in told:
         if each.kind not in REFUTABLE or each not in concerned:
             kept.append(each)
