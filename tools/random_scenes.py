@@ -249,7 +249,7 @@ def cradle(random: Random) -> Document:
         some.append(
             ball(top[0] + length * math.sin(angle), -length * math.cos(angle), radius, name=f"b{k}", restitution=1.0)
         )
-        rods.append({"kind": "rod", "between": [f"b{k}"], "anchors": [top, [0, 0]]})
+        rods.append({"kind": "rod", "between": [f"b{k}"], "anchors": [[0, 0], top]})
     return {"world": world(3.0), "ball": some, "joint": rods}
 
 

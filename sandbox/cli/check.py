@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from sandbox.cli.reading import fault_rows, path_of, print_json, refused
+from sandbox.cli.reading import fault_rows, path_of, print_json, refused, scenes_of
 from sandbox.engines.registry import ENGINES, UnknownEngineError, engine_named
 from sandbox.games.registry import fitting_rules
 from sandbox.measure.forecast import FAILED, Answer, at_most, forecast, largest_safe_dt, notes, unknown_speeds
@@ -51,7 +51,7 @@ def command(
             return refused([Fault("--engine", None, "", str(error))], as_json)
     documents = []
     status = 0
-    for name in scenes:
+    for name in scenes_of(scenes):
         try:
             scene = load(path_of(name), overrides)
             rules = fitting_rules(scene, path_of(name))

@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from sandbox.cli.naming import plural, with_other_engine
 from sandbox.cli.output import make_folder, require_folder
 from sandbox.cli.reading import gathering, path_of, print_json, refused
 from sandbox.engines.contract import Refusal
@@ -17,6 +18,9 @@ from sandbox.games.billiards.rules.registry import RULES
 from sandbox.scene.faults import Fault
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
+
+TABLES = "8-ball, 9-ball, snooker or three-cushion"
+"""Scenes to name where another is none."""
 
 
 @click.command(name="match")
@@ -61,7 +65,9 @@ def command(
         path = path_of(scene)
         found = [load(path, overrides)]
         begin = found[0].world.seed if seed is None else seed
-    if found:
+    if found and found[0].surface is None:
+        faults.append(Fault(scene, None, "", f"is not a billiard table: it has no [surface]; such as {TABLES}"))
+    elif found:
         with gathering(faults, scene, (GameError,)):
             Match.begin(found[0], game, count, **terms)
     if not faults and out is not None:
@@ -71,7 +77,7 @@ def command(
         return refused(faults, as_json, frames=[])
     missing = engine_named(engine).missing(found[0], found[0].solver)
     if missing:
-        click.echo(f"{scene}: {Refusal(engine, missing, able(found[0]))}", err=True)
+        click.echo(f"{scene}: {Refusal(engine, missing, able(found[0]))}{with_other_engine(found[0])}", err=True)
         return 1
 
     names, wins, rows, status = [each.strip() for each in players.split(",")], [0] * count, list[dict[str, Any]](), 0
@@ -116,5 +122,6 @@ def _told(number: int, frame: Frame, seats: list[int], names: list[str]) -> str:
         who = seats[state.winner]
         ends = f"player {who + 1} ({names[who]}) wins"
     scores = " : ".join(str(state.scores[seats.index(who)]) for who in range(len(seats)))
-    fouls = sum(bool(turn.fouls) for turn in frame.turns)
-    return f"frame {number}: {ends}, {scores}; {len(frame.shots)} shots, {fouls} fouls, {frame.session.duration:.0f} s"
+    shots = plural(len(frame.shots), "shot")
+    fouls = plural(sum(bool(turn.fouls) for turn in frame.turns), "foul")
+    return f"frame {number}: {ends}, {scores}; {shots}, {fouls}, {frame.session.duration:.0f} s"

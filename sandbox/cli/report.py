@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from sandbox.cli.naming import engines_in
-from sandbox.cli.reading import gathering, path_of, print_json, refused
+from sandbox.cli.reading import gathering, path_of, print_json, refused, scenes_of
 from sandbox.interrupt import uninterrupted
 from sandbox.measure.compare import compare
 from sandbox.measure.recorder import TooLargeError
@@ -55,7 +55,7 @@ def command(
     faults: list[Fault] = []
     names = engines_in(engines, faults)
     read: list[tuple[str, Scene]] = []
-    for name in scenes or [scene.name for scene in shipped() if scene.name.startswith(USUAL)]:
+    for name in scenes_of(scenes) or [scene.name for scene in shipped() if scene.name.startswith(USUAL)]:
         with gathering(faults):
             read.append((name, load(path_of(name), overrides)))
     if not math.isfinite(patience):

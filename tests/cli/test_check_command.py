@@ -36,7 +36,7 @@ def test_json_of_a_faulty_scene_tells_every_fault_with_its_place(
     assert (document["demands"], document["engines"], document["warnings"]) == ([], {}, [])
     assert all(set(fault) == {"file", "line", "path", "message"} for fault in document["faults"])
     told = [(fault["file"], fault["line"], fault["path"]) for fault in document["faults"]]
-    assert told == [(scene, 3, "ball.a.position[1]"), (scene, 4, "ball.a.radius")]
+    assert told == [(scene, 3, "ball.a.position"), (scene, 4, "ball.a.radius")]
     status, out, lines = lines_of(capfd, "check", scene)
     assert (status, out) == (2, [])
     assert lines == [f"{scene}:{f['line']}: {f['path']}: {f['message']}" for f in document["faults"]]

@@ -44,4 +44,4 @@ def test_all_that_is_wrong_is_told_at_once(capfd: pytest.CaptureFixture[str]) ->
 def test_scene_without_a_floor_is_no_table(capfd: pytest.CaptureFixture[str]) -> None:
     status, _, err = lines_of(capfd, "match", "bounce")
     assert status == 2
-    assert "no floor" in err[0]
+    assert "is not a billiard table" in err[0]

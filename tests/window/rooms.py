@@ -74,7 +74,7 @@ normal = [0.0, 1.0]
 [[ball]]
 name = "a"
 position = [0.0, 1.0]
-velocity = [2e6, 0.0]
+velocity = [2e7, 0.0]
 radius = 0.5
 """
 """After 0.3 s the ball is where pymunk's half-planes have ended."""

@@ -41,6 +41,7 @@ from sandbox.engines.exact.arena import (
     SURFACE,
     THING,
     THRESHOLD,
+    TO_APPROACH,
     UX,
     UY,
     VX,
@@ -59,7 +60,7 @@ from sandbox.engines.exact.log import add_impulse, open_rest, open_row
 from sandbox.engines.exact.predict import parallel
 from sandbox.engines.exact.roots import NOISE
 from sandbox.engines.kernel import bare_kernel as kernel
-from sandbox.engines.rebound import compiled_kicked, compiled_rebound
+from sandbox.engines.rebound import compiled_kick_gain, compiled_kicked, compiled_rebound
 from sandbox.trajectory import FloatArray
 
 TICKS = 8.0 * 2.0**-52
@@ -81,10 +82,12 @@ def hit_flat(arena: Arena, i: int, f: int) -> None:
     restitution, friction = arena.surfaces[RESTITUTION, mine, its], arena.surfaces[FRICTION, mine, its]
     closing = max(-(state[i, VX] * nx + state[i, VY] * ny), 0.0)
     press = -(state[i, AX] * nx + state[i, AY] * ny)
-    parting = compiled_rebound(restitution, arena.surfaces[FALLOFF, mine, its], closing)
+    falloff = arena.surfaces[FALLOFF, mine, its]
+    parting = compiled_rebound(restitution, falloff, closing)
     kick = 0.0
     if arena.flats[f, KICK] > 0.0:
         kick = flat_kick(arena.flats, f, state[i, X], state[i, Y], closing)
+        kick = compiled_kick_gain(restitution, falloff, kick, arena.flats[f, TO_APPROACH] != 0.0, closing)
     rests = False
     if press > 0.0 and kick == 0.0:
         hop = 2.0 * parting / press
@@ -106,7 +109,7 @@ def hit_flat(arena: Arena, i: int, f: int) -> None:
 
 @kernel
 def flat_kick(flats: FloatArray, f: int, x: float, y: float, closing: float) -> float:
-    """Return what a flat that is hit from (x, y) kicks with, m/s."""
+    """Return the speed with which a flat that is hit from (x, y) kicks, m/s."""
     share = ((x - flats[f, PX]) * flats[f, UX] + (y - flats[f, PY]) * flats[f, UY]) / flats[f, WHOLE]
     share = flats[f, BEGIN] + flats[f, SPAN] * min(max(share, 0.0), 1.0)
     return compiled_kicked(flats[f, KICK], flats[f, THRESHOLD], flats[f, MIDDLE] != 0.0, share, closing)

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pymunk
 
+from sandbox.engines.fixtures import straightened, wall_segments
 from sandbox.engines.limits import FARTHEST, FASTEST
-from sandbox.engines.native.space import SurfaceSetter, category, fixed_shapes, reach_of
+from sandbox.engines.native.space import LONGEST_REACH, SurfaceSetter, category, fixed_shapes, half_plane_ends, reach_of
 from sandbox.engines.rebound import stretches
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Plane, Post, Scene, Wall
@@ -24,7 +25,8 @@ class Ground:
         self._space, self._setter = space, setter
         self._things: list[tuple[pymunk.Body, list[pymunk.Shape]]] = []
         self.reach = math.inf
-        """m, how far from the middle of the scene planes are planes"""
+        """m, how far from the middle of the scene planes are planes at present"""
+        self._planes: tuple[Plane, ...] = ()
         self._middle, self._limit = np.zeros(6), np.full(6, math.inf)
         self._laid = False
 
@@ -33,10 +35,9 @@ class Ground:
         if self._laid:
             return
         self._laid = True
-        starts, speeds = bodies.position[~bodies.fixed], np.hypot(*bodies.velocity[~bodies.fixed].T)
-        centre, reach = reach_of(scene, starts, speeds)
+        centre, reach = reach_of(bodies.position[~bodies.fixed])
         if scene.planes:
-            self._middle[0:2], self.reach = centre, reach
+            self._middle[0:2], self.reach, self._planes = centre, reach, scene.planes
         every: list[pymunk.Shape] = []
         for thing, number in zip(scene.fixed, surface.tolist(), strict=True):
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
@@ -49,8 +50,31 @@ class Ground:
             every += shapes
         for k in shuffled(len(every)):
             self._space.add(every[k])
+        self._bound()
+
+    def _bound(self) -> None:
+        """Bound what `within` asks for by the present reach."""
         where = min(self.reach, FARTHEST)
         self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
+
+    def extend(self, place: FloatArray) -> None:
+        """Lengthen the half-planes until they reach as far as (M, 2) m, at most `LONGEST_REACH`.
+
+        The reach doubles as often as it has to, by where bodies are, so that it is the same whenever a run ends. A
+        body that moves farther than the reach within one step can be beyond the ends, at twice the reach, before that.
+        """
+        far = np.abs(place - self._middle[0:2])
+        far = far[far <= LONGEST_REACH]  # whatever is beyond, or not a number, nothing can reach
+        if not len(far) or far.max() <= self.reach:
+            return
+        while self.reach < far.max():
+            self.reach = min(2.0 * self.reach, LONGEST_REACH)
+        for plane, (_, shapes) in zip(self._planes, self._things, strict=False):  # planes come first
+            for shape in shapes:
+                assert isinstance(shape, pymunk.Segment)
+                shape.unsafe_set_endpoints(*half_plane_ends(plane, self._middle[0:2], self.reach))
+                self._space.reindex_shape(shape)
+        self._bound()
 
     def _shapes(
         self, thing: Plane | Wall | Post, body: pymunk.Body, centre: FloatArray, reach: float
@@ -58,8 +82,11 @@ class Ground:
         """Return the shapes of a fixed thing; what they meet, and their surfaces, are yet to be said."""
         shapes = list(fixed_shapes(thing, body, centre, reach))
         if isinstance(thing, Wall) and thing.kick is not None:
-            parts = stretches(thing.points, thing.closed)
+            parts = stretches(straightened(thing))
             self._setter.laws.stretches |= dict(zip(shapes, parts, strict=True))
+        if isinstance(thing, Wall):
+            joints = {shape: part for shape, part in zip(shapes, wall_segments(thing), strict=True) if any(part.joints)}
+            self._setter.laws.joints |= joints
         if isinstance(thing, Wall) and thing.one_way:
             self._setter.gates.walls.update(shapes)
         return shapes
@@ -77,6 +104,7 @@ class Ground:
             self._space.remove(*shapes)
             for shape in shapes:
                 self._setter.laws.stretches.pop(shape, None)
+                self._setter.laws.joints.pop(shape, None)
                 self._setter.gates.walls.discard(shape)
             shapes[:] = self._shapes(new, body, np.zeros(2), self.reach)  # a wall is as long as it is
             for k in shuffled(len(shapes)):
@@ -107,8 +135,14 @@ class Ground:
         return np.asarray(np.abs(state - self._middle) <= self._limit)
 
     def reaches(self, place: FloatArray) -> bool:
-        """Tell whether planes are planes at a place; so they are until there are some."""
-        return bool((np.abs(place - self._middle[0:2]) <= self.reach).all())
+        """Tell whether planes can be made to reach a place; they can until there are some."""
+        return math.isinf(self.reach) or bool((np.abs(place - self._middle[0:2]) <= LONGEST_REACH).all())
+
+
+def jointed_surfaces(scene: Scene, surface: IntArray) -> set[int]:
+    """Return the surfaces of walls of several segments; `surface` (F,) are those of the fixed things."""
+    walls = zip(scene.walls, surface[len(scene.planes) :].tolist(), strict=False)
+    return {number for wall, number in walls if len(wall.points) > 2}
 
 
 def _filter(thing: Plane | Wall | Post, scene: Scene) -> pymunk.ShapeFilter:

@@ -11,16 +11,21 @@ from typing import NamedTuple
 import numpy as np
 import pymunk
 
+from sandbox.engines.fixtures import WallSegment
 from sandbox.engines.native.approach import closing_speed
+from sandbox.engines.native.chains import smooth
 from sandbox.engines.native.gates import Gates
 from sandbox.engines.native.record import address_of
-from sandbox.engines.rebound import kicked, rebound, share_at
+from sandbox.engines.rebound import kick_gain, kicked, rebound, share_at
 from sandbox.scene.kick import Kick
 from sandbox.scene.surfaces import Surfaces
 from sandbox.trajectory import FloatArray
 
 Stretches = dict[pymunk.Shape, tuple[float, float]]
 """At which shares of its whole wall each segment of one that kicks begins and ends."""
+
+Joints = dict[pymunk.Shape, WallSegment]
+"""The segments of walls that run on beyond an end of theirs."""
 
 
 @dataclass
@@ -62,6 +67,7 @@ class Laws:
     space: pymunk.Space
     gates: Gates
     stretches: Stretches = field(default_factory=dict)
+    joints: Joints = field(default_factory=dict)
     told: dict[int, Given] | None = None
     """what kicked in the last substep, by the addresses of arbiters; where a dict is put here"""
     _known: dict[tuple[int, int], list[Law]] = field(default_factory=dict)
@@ -83,6 +89,8 @@ class Laws:
         if not arbiter.process_collision:
             self.gates.passed(arbiter)
             return
+        if self.joints:
+            smooth(arbiter, self.joints)
         law = known[0]
         arbiter.restitution, arbiter.friction = law.restitution, law.friction
         if law.steady:
@@ -91,13 +99,16 @@ class Laws:
         if closing <= 0.0:
             return
         alone = rebound(law.restitution, law.falloff, closing)
-        more = 0.0 if law.kick is None else self._kick(law.kick, arbiter, closing)
+        more = 0.0
+        if law.kick is not None:
+            kick, to_approach = self._kick(law.kick, arbiter, closing), law.kick.adds_to == "approach"
+            more = kick_gain(law.restitution, law.falloff, kick, to_approach, closing)
         arbiter.restitution = (alone + more) / closing
         if more and self.told is not None:
             self.told[address_of(arbiter._arbiter)] = Given(closing, alone, more)
 
     def _kick(self, kick: Kick, arbiter: pymunk.Arbiter, closing: float) -> float:
-        """Return what a contact is kicked by, m/s."""
+        """Return the speed with which a contact is kicked, m/s."""
         if closing <= kick.threshold:
             return 0.0
         share, middle = 0.5, kick.profile == "middle"

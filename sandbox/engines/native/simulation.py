@@ -154,6 +154,7 @@ class NativeSimulation(Running):
                 leaving = perform(action, NativeCast(self._population))
                 self._population.changed()
                 self._still = None
+            self._population.meeting.extend_planes()
             self._population.capture()
             if self._notes is not None:
                 self._notes.changed()
@@ -289,7 +290,7 @@ class NativeSimulation(Running):
         return population.position, population.velocity, population.angle, population.angular_velocity
 
     def _guard(self) -> None:
-        """Stop what is no longer finite and bounded, or has left the reach within which planes are planes."""
+        """Stop what is no longer finite and bounded, or farther out than half-planes can reach."""
         population = self._population
         for half in (population.free, population.meeting, *(() if population.felt is None else (population.felt,))):
             beyond = half.beyond()

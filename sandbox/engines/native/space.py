@@ -7,19 +7,20 @@ tells by its bodies alone who touched.
 import math
 from collections.abc import Iterator
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 import pymunk
 
+from sandbox.engines.fixtures import wall_segments
 from sandbox.engines.native.coefficients import factors, wrong_pairs
+from sandbox.engines.native.drag import is_dragged
 from sandbox.engines.native.gates import Gates
 from sandbox.engines.native.laws import Laws
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Collides, Plane, Post, Scene, Wall
 from sandbox.scene.near import BoolArray, FloatArray
-from sandbox.scene.part import BACKING
+from sandbox.scene.part import BACKING, Point
 from sandbox.scene.settings import Settings
 
 FIXED, LOOSE, SOLITARY = 0b001, 0b010, 0b100
@@ -29,7 +30,8 @@ KINDS = 3
 """how many of these there are on each layer: the bits of layer k are theirs, shifted by 3·k"""
 
 SHORTEST_REACH, LONGEST_REACH = 5e3, 5e6
-"""m; pymunk's half-planes are segments, whose noise grows with their length: 3e-13 m at a reach of 5e3."""
+"""m; pymunk's half-planes are segments, whose noise grows with their length: 3e-13 m at a reach of 5e3, and a
+thousand times as much at 5e6."""
 
 
 def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
@@ -49,8 +51,7 @@ def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
 
 def gravity_of(scene: Scene) -> tuple[float, float]:
     """Return the gravity that the space itself applies: with drag none, the drag's force holds it then."""
-    dragged = scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
-    return (0.0, 0.0) if dragged else scene.world.gravity
+    return (0.0, 0.0) if is_dragged(scene.world) else scene.world.gravity
 
 
 @cache
@@ -66,18 +67,16 @@ def category(fixed: bool, collides: Collides, group: int = 0, layers: int = 1) -
     return pymunk.ShapeFilter(group, categories=own * each, mask=others * each)
 
 
-def reach_of(scene: Scene, starts: FloatArray, speeds: FloatArray) -> tuple[FloatArray, float]:
-    """Return a centre (2,) and how far from it, in each coordinate, bodies may stray while planes stay planes.
+def reach_of(starts: FloatArray) -> tuple[FloatArray, float]:
+    """Return the centre (2,) of where bodies start, (N, 2) m, and how far from it half-planes reach at first, m.
 
-    The reach covers twice the way that the fastest body can go in the scene's duration under its gravity.
+    The reach follows from places alone, never from the length of the run: contact normals are rounded by it, and a
+    shorter run has to be the beginning of a longer one, bit for bit. `Ground.extend` lengthens it for those that stray.
     """
     if not len(starts):
         return np.zeros(2), SHORTEST_REACH
     low, high = starts.min(axis=0), starts.max(axis=0)
-    time, gravity = scene.world.duration, math.hypot(*scene.world.gravity)
-    way = float(speeds.max()) * time + 0.5 * gravity * time**2 + math.hypot(*scene.world.wind) * time
-    reach = 2.0 * (float((high - low).max()) + way)
-    return (low + high) / 2.0, float(np.clip(reach, SHORTEST_REACH, LONGEST_REACH))
+    return (low + high) / 2.0, float(np.clip(2.0 * (high - low).max(), SHORTEST_REACH, LONGEST_REACH))
 
 
 def fixed_shapes(
@@ -87,9 +86,10 @@ def fixed_shapes(
     if isinstance(thing, Plane):
         yield _half_plane(thing, body, centre, reach)
     elif isinstance(thing, Wall):
-        ends = (*thing.points, thing.points[0]) if thing.closed else thing.points
-        for a, b in pairwise(ends):
-            yield pymunk.Segment(body, a, b, thing.thickness / 2.0)
+        for part in wall_segments(thing):
+            segment = pymunk.Segment(body, part.a, part.b, thing.thickness / 2.0)
+            segment.set_neighbors(part.before or part.a, part.after or part.b)
+            yield segment
     else:
         yield pymunk.Circle(body, thing.radius, thing.position)
 
@@ -116,7 +116,13 @@ def body_shapes(
 
 
 def _half_plane(plane: Plane, body: pymunk.Body, centre: FloatArray, reach: float) -> pymunk.Segment:
-    """Return a long segment, as thick as a plane's backing is deep, sunk until its face is the plane.
+    """Return a long segment, as thick as a plane's backing is deep, sunk until its face is the plane."""
+    a, b = half_plane_ends(plane, centre, reach)
+    return pymunk.Segment(body, a, b, BACKING)
+
+
+def half_plane_ends(plane: Plane, centre: FloatArray, reach: float) -> tuple[Point, Point]:
+    """Return the ends of the segment that stands for a half-plane, m: twice its reach to both sides.
 
     Its middle lies below `centre`, so its ends are out of reach however far off the plane's own point is.
     """
@@ -125,7 +131,7 @@ def _half_plane(plane: Plane, body: pymunk.Body, centre: FloatArray, reach: floa
     point = np.asarray(plane.point)
     middle = point + along * float((centre - point) @ along) - normal * BACKING
     a, b = middle - along * 2.0 * reach, middle + along * 2.0 * reach
-    return pymunk.Segment(body, (float(a[0]), float(a[1])), (float(b[0]), float(b[1])), BACKING)
+    return (float(a[0]), float(a[1])), (float(b[0]), float(b[1]))
 
 
 class SurfaceSetter:
@@ -139,8 +145,13 @@ class SurfaceSetter:
         self._elasticity: list[float] = []
         self._friction: list[float] = []
 
-    def renew(self, meet: Meetings) -> None:
-        """Work out each surface's factors, and laws for the pairs that no factors can serve."""
+    def renew(self, meet: Meetings, jointed: set[int]) -> None:
+        """Work out each surface's factors, and laws for the pairs that no factors can serve.
+
+        Args:
+            meet: what meets what.
+            jointed: surfaces of walls of several segments.
+        """
         surfaces, touching = meet.surfaces, meet.touching
         stated = [(s.restitution, s.friction) for s in surfaces.surfaces]
         self._elasticity = factors(surfaces.restitution, touching, [e for e, _ in stated])
@@ -150,6 +161,8 @@ class SurfaceSetter:
             *wrong_pairs(surfaces.friction, touching, self._friction),
             *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
         }
+        if meet.solids:
+            wrong |= {(a, b) for a, b in _pairs(touching) if a in jointed or b in jointed}
         self.laws.renew(surfaces, wrong)
         if surfaces.one_way.any():
             self.gates.renew(surfaces, touching)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.measure.compare.errors import errors
-from sandbox.measure.compare.horizon import agree_until, nudged
+from sandbox.measure.compare.horizon import agree_until, perturb
 from sandbox.measure.compare.patience import patient_run
 from sandbox.measure.compare.runs import common_frames, there
 from sandbox.measure.compare.truth import truth_of
@@ -76,7 +76,7 @@ class Disagreement:
             return self._parting(scene, ran(scene, self.engines[0]), truth.trajectory, truth.trusted_until)
         one, other = (ran(scene, engine) for engine in self.engines)
         parting = self._parting(scene, one, other, scene.world.duration)
-        moved = nudged(scene) if parting is not None else None
+        moved = perturb(scene) if parting is not None else None
         if parting is None or moved is None:
             return parting
         for engine, run in zip(self.engines, (one, other), strict=True):

@@ -49,6 +49,14 @@ def gap(scene: Scene, bodies: Bodies, position: FloatArray, angle: FloatArray, p
     return gaps
 
 
+def bounding_gaps(bodies: Bodies, thing: Plane | Wall | Post) -> FloatArray:
+    """Return how far each body's bounding disc is from a fixed thing, (N,) m; of a ball that is its gap."""
+    if isinstance(thing, Plane):
+        normal = np.asarray(thing.normal) / math.hypot(*thing.normal)
+        return np.asarray((bodies.position - np.asarray(thing.point)) @ normal - bodies.radius)
+    return _of_disc(bodies.position, bodies.radius, thing, bodies.position, 0.0)
+
+
 def _from_zone(centre: FloatArray, zone: Zone) -> FloatArray:
     """Return the distance of a centre from a zone, (T,) m: it is noted when it is inside."""
     nearest = np.full(len(centre), np.inf)
@@ -59,7 +67,7 @@ def _from_zone(centre: FloatArray, zone: Zone) -> FloatArray:
 
 
 def _of_disc(
-    centre: FloatArray, radius: float, thing: Wall | Post | None, other: FloatArray, its_radius: float
+    centre: FloatArray, radius: FloatArray | float, thing: Wall | Post | None, other: FloatArray, its_radius: float
 ) -> FloatArray:
     """Return the gap of a disc from another, or from a fixed thing."""
     if thing is None:

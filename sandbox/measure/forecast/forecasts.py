@@ -9,6 +9,7 @@ import numpy as np
 from sandbox.measure.forecast.chains import chain_warnings
 from sandbox.measure.forecast.entries import entry_warnings
 from sandbox.measure.forecast.events import event_warnings
+from sandbox.measure.forecast.joint_starts import joint_start_warnings
 from sandbox.measure.forecast.kicks import kick_warnings
 from sandbox.measure.forecast.laid import Laid, laid
 from sandbox.measure.forecast.orbits import orbit_warnings
@@ -254,6 +255,7 @@ FORECASTS: dict[str, Forecast] = {
     "iterations": Forecast(lambda s: _iterations(s.settings, s.meet), frozenset({"pymunk"})),
     "rounding": Forecast(lambda s: _rounding(s.scene, s.settings, s.meet)),
     "kicks": Forecast(lambda s: kick_warnings(s.scene, s.settings, s.meet)),
+    "joints": Forecast(lambda s: joint_start_warnings(s.scene)),
     "springs": Forecast(lambda s: spring_warnings(s.scene, s.settings)),
     "dampers": Forecast(lambda s: damper_warnings(s.scene, s.settings), frozenset({"reference"})),
     "orbits": Forecast(lambda s: orbit_warnings(s.scene, s.settings, s.meet)),

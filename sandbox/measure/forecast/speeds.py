@@ -261,5 +261,7 @@ def _kicked(meet: Meetings) -> float:
             # v = e v/(1 + f v) + k, that is f v² + (1 − e − k f) v − k = 0
             half = 0.5 * (1.0 - e - kick.speed * f)
             root = half + math.sqrt(half * half + f * kick.speed)
-            fastest = max(fastest, kick.speed / root if root > 0.0 else kick.speed)
+            # and, where k adds to the approach, v = e (v + k)/(1 + f (v + k)): the same equation for v + k
+            met = kick.speed / root if root > 0.0 else (1.0 + (kick.adds_to == "approach")) * kick.speed
+            fastest = max(fastest, met - kick.speed if kick.adds_to == "approach" else met)
     return fastest

@@ -102,6 +102,7 @@ class Taking:
         try:
             show.session.recording().save(outfile.temporary)
             self._tell(f"session: {outfile.place()}", "info")
+            show.session.note_saved()
         except (CaptureError, OSError) as error:
             outfile.discard()
             self._tell(f"the session cannot be saved: {error}", "error")

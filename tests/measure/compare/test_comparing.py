@@ -35,6 +35,7 @@ KEYS = [
     "matched_contacts",
     "missed_contacts",
     "phantom_contacts",
+    "contacts_after_divergence",
     "max_contact_delay",
     "trusted_until",
     "seconds",
@@ -97,7 +98,17 @@ def test_bounce_is_matched_with_its_delay() -> None:
 
 def test_row_has_exactly_the_keys_promised() -> None:
     document = compare(BOUNCE, ["pymunk"]).document("bounce")
-    promised = ["scene", "title", "truth", "truth_about", "trusted_until", "duration", "tolerance", "engines"]
+    promised = [
+        "scene",
+        "title",
+        "truth",
+        "truth_about",
+        "truth_confirmed_by",
+        "trusted_until",
+        "duration",
+        "tolerance",
+        "engines",
+    ]
     assert list(document) == promised
     assert list(document["engines"][0]) == KEYS
     assert (document["scene"], document["title"]) == ("bounce", "Bounce")
@@ -255,7 +266,7 @@ def test_truth_that_is_known_is_not_sought_again(monkeypatch: pytest.MonkeyPatch
     def sought(*_: Any) -> None:
         raise AssertionError("the truth is known")
 
-    monkeypatch.setattr("sandbox.measure.compare.comparing.truth_of", sought)
+    monkeypatch.setattr("sandbox.measure.compare.comparing.seek_truth", sought)
     monkeypatch.setattr("sandbox.measure.tradeoff.weighing.truth_of", sought)
     judged = compare(BOUNCE, ("pymunk",), truth=known)
     assert judged.best is known

@@ -10,7 +10,7 @@ from sandbox.measure.compare.closed import solved
 from sandbox.measure.compare.comparing import compare, usual_tolerance
 from sandbox.measure.compare.drift import energy_drift, momentum_drift
 from sandbox.measure.compare.gaps import gap
-from sandbox.measure.compare.horizon import NUDGE, nudged
+from sandbox.measure.compare.horizon import NUDGE, perturb
 from sandbox.measure.compare.refined import refined
 from sandbox.measure.compare.why import knobs
 from sandbox.measure.run import run
@@ -116,7 +116,7 @@ def test_gaps_are_those_of_turned_boxes() -> None:
 
 def test_nudge_moves_a_box_and_leaves_its_joints() -> None:
     scene = loads(PENDULUM.replace("[[ball]]", "[[box]]").replace("radius = 0.1", "size = [0.2, 0.2]"))
-    other = nudged(scene)
+    other = perturb(scene)
     assert other is not None
     assert np.hypot(*(other.bodies.position - scene.bodies.position)[0]) == pytest.approx(NUDGE, rel=1e-3)  # 1 + 1e-12
     assert other.links.figures.tolist() == scene.links.figures.tolist()

@@ -54,6 +54,7 @@ def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[Window]:
     with window_on(TOY, tmp_path, (1000, 640)) as opened:
+        opened.stage.start_game()
         yield opened
 
 

@@ -26,9 +26,16 @@ def no_rail(shot: Shot) -> list[str]:
     return ["no ball came to a cushion after the touch"] if shot.first and not shot.driven else []
 
 
+def from_behind(shot: Shot) -> list[str]:
+    """Return the foul of a cue ball in hand that was played at a ball behind the head string (WPA 6.11)."""
+    if not shot.stayed_behind:
+        return []
+    return [f"{named_first(shot)} behind the head string, which the cue ball had not crossed"]
+
+
 def standard(shot: Shot, targets: frozenset[str]) -> tuple[str, ...]:
     """Return the standard fouls of a shot."""
-    return (*scratch(shot), *wrong_ball(shot, targets), *no_rail(shot))
+    return (*scratch(shot), *wrong_ball(shot, targets), *from_behind(shot), *no_rail(shot))
 
 
 def broke(shot: Shot) -> bool:

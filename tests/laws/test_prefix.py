@@ -1,0 +1,160 @@
+"""Prefix: a shorter run is the beginning of a longer one, bit for bit, and a session replays to its own state."""
+
+from pathlib import Path
+
+import pytest
+
+from sandbox.action import Impulse, Spawn
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal
+from sandbox.engines.registry import ENGINES
+from sandbox.engines.relay import Relay, start
+from sandbox.measure.replay import rerun
+from sandbox.play.running.session import Session
+from sandbox.recording import Recording
+from sandbox.scene.discs import Ball
+from sandbox.scene.file import load, loads
+from sandbox.scene.model import Scene
+from sandbox.scene.shipped import find, shipped
+from sandbox.scene.solids import Box
+
+LONG = 1000.0
+"""s; far longer than any scene runs by itself"""
+
+STEPS = 40
+"""So many suffice for the bodies that lie on something from the start; more are made of the scenes that fall first."""
+
+FALLING_FIRST = {"benchmark/pile": 120, "joints/ragdoll_stairs": 240}
+
+MANY_EVENTS = {("benchmark/pile", "exact")}
+"""Which engine takes seconds over which scene, and then gives up."""
+
+CASES = [
+    pytest.param(scene.name, engine, marks=pytest.mark.slow if (scene.name, engine) in MANY_EVENTS else ())
+    for scene in shipped()
+    for engine in ENGINES
+]
+
+
+def lasting(scene: Scene, duration: float) -> Scene:
+    return scene.model_copy(update={"world": scene.world.model_copy(update={"duration": duration})})
+
+
+def states(scene: Scene, engine: str, steps: int) -> list[str]:
+    """Return the hash of each state, and how the run ended if it did."""
+    relay, found = start(scene, engine), []
+    relay.contacts()  # as a run and a session ask for them
+    for _ in range(steps):
+        try:
+            relay.step()
+        except (Divergence, Exhaustion) as end:
+            return [*found, type(end).__name__]
+        found.append(relay.state_hash())
+    return found
+
+
+@pytest.mark.parametrize(("name", "engine"), CASES)
+def test_states_are_the_same_however_long_a_scene_runs(name, engine):
+    scene = load(find(name))
+    steps = FALLING_FIRST.get(name, STEPS)
+    try:
+        short = states(lasting(scene, steps * scene.solver.dt), engine, steps)
+    except Refusal:
+        return  # what an engine refuses it does not run at all
+    assert states(lasting(scene, LONG), engine, steps) == short
+
+
+FLAT = """
+[world]
+duration = 1.0
+[solver]
+dt = 0.01
+[[plane]]
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+"""
+"""An inclined floor with nothing on it."""
+
+
+def replayed(session: Session, path: Path) -> str:
+    """Save a session, read it again, run it anew, and return the hash of the state that it ends in."""
+    recording = session.recording()
+    assert recording.state_hash == session.frame.state_hash()
+    result = rerun(Recording.load(recording.save(path)))
+    assert result.info["status"] == "ok"
+    return str(result.info["state_hash"])
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_session_of_spawned_balls_and_boxes_replays_to_its_own_state(engine, tmp_path):
+    session = Session(loads(FLAT), engine)
+    for k in range(6):
+        x = 0.77 * k - 2.0
+        single = Ball(position=(x, 1.0), radius=0.2) if k % 2 else Box(position=(x, 1.0), size=(0.5, 0.3))
+        session.act(Spawn(time=0.0, **{single.__class__.__name__.lower(): single}))
+        session.advance(16)
+    session.advance(2500)
+    assert session.time > 25.0
+    assert replayed(session, tmp_path / "session.json") == session.frame.state_hash()
+
+
+@pytest.mark.parametrize("name", ["benchmark/incline", "benchmark/pyramid", "joints/ragdoll_stairs"])
+def test_session_that_outlasts_its_scene_replays_to_its_own_state(name, tmp_path):
+    scene = lasting(load(find(name)), 0.1)
+    session = Session(scene, settings=scene.solver.replace(dt=0.05, substeps=1))  # coarse, so that 40 s are few steps
+    session.advance(800)
+    assert session.time > 39.0
+    assert replayed(session, tmp_path / "session.json") == session.frame.state_hash()
+
+
+STRAYING = """
+[world]
+duration = 1.0
+[solver]
+dt = 0.01
+[[plane]]
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+[[ball]]
+name = "rolls"
+position = [0.0, 0.5]
+velocity = [2000.0, 0.0]
+radius = 0.5
+[[ball]]
+name = "rests"
+position = [0.0, 0.5]
+radius = 0.5
+collides = "fixed"
+"""
+"""A ball that leaves the middle by 20 m a step, and one that stays there."""
+
+
+def height(relay: Relay, name: str) -> float:
+    return float(relay.frame().position[relay.bodies.names.index(name), 1])
+
+
+def test_plane_goes_on_under_a_body_that_strays():
+    relay = start(loads(STRAYING))
+    for _ in range(3000):
+        relay.step()
+    assert relay.frame().position[0, 0] > 50e3  # ten times as far as the planes reach at first
+    # Twice the slop of 1 % of a radius; without a plane it would be 4 km deep.
+    assert height(relay, "rolls") == pytest.approx(0.5, abs=0.01)
+    assert height(relay, "rests") == pytest.approx(0.5, abs=0.01)
+
+
+def test_body_can_be_put_where_planes_did_not_reach():
+    relay = start(loads(STRAYING))
+    relay.step()
+    relay.apply(Spawn(time=0.0, ball=Ball(name="far", position=(4e6, 0.5), radius=0.5)))
+    for _ in range(200):
+        relay.step()
+    assert height(relay, "far") == pytest.approx(0.5, abs=0.01)
+
+
+def test_body_that_nothing_can_reach_ends_the_run():
+    relay = start(loads(STRAYING))
+    relay.step()
+    relay.apply(Impulse(time=0.0, body="rolls", impulse=(1e9, 0.0)))
+    with pytest.raises(Divergence, match="half-planes end"):
+        for _ in range(100):
+            relay.step()
