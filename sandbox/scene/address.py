@@ -145,7 +145,7 @@ def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Locat
         if isinstance(here, dict):
             if not last and part not in here:
                 meant = _meant(here, parts[k:])
-                if k > 0 or len(parts) != 2 or meant.startswith(ELEMENT):
+                if k > 0 or len(parts) != 2 or "an element" in meant:
                     raise AddressError(f"{path}: the scene has no {'.'.join(parts[: k + 1])}{meant}")
                 here[part] = {}
             location += (part,)
@@ -223,16 +223,15 @@ def _keys(parts: tuple[str, ...]) -> list[str]:
         return []
 
 
-ELEMENT = "; that is an element"
-
-
 def _meant(document: Any, parts: tuple[str, ...]) -> str:
     """Return a hint for a path whose first part is no table of the scene: an element's name, or nearly a table's."""
     if not isinstance(document, dict):
         return ""
     for kind, elements in document.items():
-        if isinstance(elements, list) and parts[0] in element_names(elements, kind):
-            return f"{ELEMENT}: {'.'.join((kind, quoted(parts[0]), *parts[1:]))}"
+        for name in element_names(elements, kind) if isinstance(elements, list) else ():
+            if name is not None and (parts[0] == name or parts[0].startswith(f"{name}-")):
+                part = "" if parts[0] == name else "part of "
+                return f"; that is {part}an element: {'.'.join((kind, quoted(name), *parts[1:]))}"
     close = difflib.get_close_matches(parts[0], document, n=1)
     return f"; did you mean {'.'.join((*close, *parts[1:]))}?" if close else ""
 

@@ -8,6 +8,7 @@ from sandbox.measure.forecast.warning import Figures, Warning
 from sandbox.measure.joint_error import sizes, starting_errors
 from sandbox.scene.links import WORLD, LinkKind, Links
 from sandbox.scene.model import Scene
+from sandbox.trajectory import BoolArray
 
 LOOSE = 0.01
 """An error below this part of a joint's length is rounding of the figures in a file, which have two or three digits."""
@@ -41,8 +42,8 @@ def joint_start_warnings(scene: Scene) -> Iterator[Warning]:
         name, body = links.names[k], scene.bodies.names[int(links.b[k])]
         x, y = links.anchor_b[k].tolist()
         message = (
-            f"the joint {name!r} holds {body!r} by the point ({x:g}, {y:g}), {np.hypot(x, y):.3g} m from its centre and "
-            f"outside it: {ORDER}; swapped, they would fit"
+            f"the joint {name!r} holds {body!r} by the point ({x:g}, {y:g}), {np.hypot(x, y):.3g} m from its centre "
+            f"and outside it: {ORDER}; swapped, they would fit"
         )
         yield Warning("anchors", message, {"joint": name, "body": body})
 
@@ -59,9 +60,10 @@ def _off(links: Links, k: int, error: float, others: int) -> Warning:
     return Warning("joint_start", message, figures)
 
 
-def _swapped(scene: Scene, links: Links) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _swapped(scene: Scene, links: Links) -> BoolArray:
     """Tell which joints of one body with the world have anchors that would fit in the other order, (J,)."""
     radius = scene.bodies.radius[links.b]
     own, other = np.hypot(*links.anchor_b.T), np.hypot(*links.anchor_a.T)
     stated = np.arange(len(links)) < len(scene.joints)
-    return stated & (links.a == WORLD) & np.isin(links.kind, ANCHORED) & (own > FAR * radius) & (other <= radius)
+    held = stated & (links.a == WORLD) & np.isin(links.kind, ANCHORED)
+    return np.asarray(held & (own > FAR * radius) & (other <= radius))
