@@ -324,7 +324,7 @@ def test_lines_and_cues_tell_what_goes_on() -> None:
     rules, _, _ = played(loads(TEXT), taps("fire"))
     lines = dict(rules.lines())
     assert set(lines) >= {"Red", "▸ Blue", "wind", "gun", "weapon", "last shot"}
-    assert "exactly" in lines["last shot"] or "gone" in lines["last shot"]
+    assert "exact solution" in lines["last shot"] or "gone" in lines["last shot"]
     cues = rules.cues()
     assert list(cues)[:2] == ["turn", "fire"]
     assert "blast" in cues
