@@ -112,7 +112,8 @@ def test_a_straight_wall_in_pieces_is_one_wall_bit_for_bit(
 def test_joints_that_are_nearly_in_line_catch_nothing(engine: str, kind: str, above: float, pieces: int) -> None:
     for thickness in (0.0, 0.1):
         run = sandbox.run(
-            sliding(kind, divided(pieces, 1e-6, pieces % 2 == 0), above=above, thickness=thickness, duration=1.0), engine=engine
+            sliding(kind, divided(pieces, 1e-6, pieces % 2 == 0), above=above, thickness=thickness, duration=1.0),
+            engine=engine,
         )
         assert run.velocity[-1, 0, 0] == pytest.approx(3.0, rel=FLAT_LOSS)
         assert run.position[-1, 0, 0] == pytest.approx(-1.0, abs=3.0 * FLAT_LOSS)  # 3 m of way
