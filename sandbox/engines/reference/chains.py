@@ -2,8 +2,8 @@
 
 Each segment stores how its wall runs on from its ends. A normal that leans over an end, towards where the wall runs on,
 is none that the whole wall would give: the neighbour comes nearer. The contact of a disc is then left to the neighbour.
-So is that of a polygon whose normal is nearer to the neighbour's, and that lies deeper in the face of the segment itself;
-else its contact is found anew on that face, as if the segment were longer.
+So is that of a polygon whose normal is nearer to the neighbour's, and that lies deeper in the segment's own face; else
+its contact is found anew on that face, as if the segment were longer.
 
 Internal edges: Bullet's `btInternalEdgeUtility`, the ghost vertices of Box2D's chain shapes; for discs the rule is that
 of Munk2D's `cpSegmentShapeSetNeighbors`, in the same arithmetic.

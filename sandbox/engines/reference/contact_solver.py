@@ -159,7 +159,7 @@ class ContactSolver:
             return works.work(push, rates, spin(rates))[0]
 
         def kicked_by(push: FloatArray) -> FloatArray:
-            return np.bincount(works.of_contact, push[:, 0] * kicks, len(works.group))
+            return np.asarray(np.bincount(works.of_contact, push[:, 0] * kicks, len(works.group)), np.float64)
 
         given, turnover = works.work(impulse, mean := 0.5 * (start + velocity), spin(mean))
         gains = given - kicked_by(impulse) > ROUNDING * turnover

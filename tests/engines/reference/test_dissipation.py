@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 import sandbox
 from sandbox.engines.account import Cause
 from sandbox.engines.reference.dissipation import largest_shares
+from sandbox.measure.forecast import forecast
 from sandbox.measure.ledger import ledger
 from sandbox.scene.file import from_document
 from sandbox.scene.model import Scene
@@ -46,7 +47,7 @@ def thrown(seed: int, count: int, e: float, mu: float, **solver: object) -> Scen
 
 def kinetic(run: sandbox.Trajectory, scene: Scene) -> np.ndarray:
     mass, moment = scene.bodies.mass, scene.bodies.moment
-    return 0.5 * ((run.velocity**2).sum(axis=2) @ mass + run.angular_velocity**2 @ moment)
+    return np.asarray(0.5 * ((run.velocity**2).sum(axis=2) @ mass + run.angular_velocity**2 @ moment))
 
 
 @given(st.integers(0, 10**6), st.integers(1, 4), st.floats(0, 1), st.floats(0, 2))
@@ -106,6 +107,24 @@ def test_the_ledger_names_what_impacts_create() -> None:
     pymunk, newton, cut = np.array(gains).T
     assert pymunk.max() > 0.05 and newton.max() > 0.05
     assert cut.max() < 1e-12  # rounding
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_check_foretells_what_impacts_create(engine: str) -> None:
+    box = {"position": [0, 1], "size": [0.2447, 0.1003], "velocity": [-1.6, -5.0], "angular_velocity": -12.3}
+    scene = from_document(
+        {
+            "title": "",
+            "world": {"gravity": [0.0, -9.81], "duration": 1.0},
+            "solver": {"dt": 0.002},
+            "plane": [{"point": [0, 0], "normal": [0, 1], "restitution": 0.99, "friction": 1.2}],
+            "box": [{**box, "angle": 1.36}],
+        }
+    )
+    (told,) = [each for each in forecast(scene, engine=engine).warnings if each.kind == "energy"]
+    assert "dissipative" in told.message
+    cut = scene.solver.replace(impact="dissipative")
+    assert not [each for each in forecast(scene, cut, "reference").warnings if each.kind == "energy"]
 
 
 def test_largest_share_is_where_the_work_ends_to_take() -> None:
