@@ -107,7 +107,7 @@ def test_a_ball_that_is_not_hit_changes_no_horizon(by: By) -> None:
     """Law: all that moves is moved by the struck ball, so its nudge says all, whatever else lies on the table."""
     balls = ball("a", 0.3, 0.01), ball("b", 0.6, -0.03)
     alone, beside = floor(*balls, shot(0.0, 5.0)), floor(ball("far", -0.9, 0.4), *balls, shot(0.0, 5.0))
-    found, other = (horizon(scene, by=by, ladder=(1e-6,)) for scene in (alone, beside))
+    found, other = (horizon(scene, nudge=1e-4, by=by, ladder=(1e-4,)) for scene in (alone, beside))
     assert found.parted.time is not None
     assert other.parted == found.parted
     assert other.ladder == found.ladder
