@@ -25,7 +25,7 @@ from sandbox.scene.model import Scene
 @click.option("--quiet", is_flag=True, help="say only what is wrong")
 @click.option("--expand", is_flag=True, help="print the scene file of primitives that a scene stands for")
 def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, quiet: bool, expand: bool) -> int:
-    """Check scenes: faults, what they demand, which engines can run them, what would go wrong."""
+    """Check scenes: faults, the physics they need, the engines that can run them, what would go wrong."""
     if expand:
         if len(scenes) > 1 or as_json:
             raise click.UsageError("--expand prints one scene as TOML; give one, without --json")

@@ -72,7 +72,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Play a shot many times, each a little off as a player's strokes are, and tell what comes of it.
+    """Play a shot many times with a player's errors, and print the odds of each outcome.
 
     SCENE is a file or a shipped one, with a [surface] and a [[shot]]. Errors are standard deviations of normal ones.
     """
