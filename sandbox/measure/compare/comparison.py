@@ -46,7 +46,7 @@ class Row:
     """the sentence that follows from it"""
 
     def count(self, kind: str) -> int | None:
-        """Return how many contacts were `matched`, `missed` or `phantom`."""
+        """Return how many contacts were `matched`, `missed`, `phantom` or `after_divergence`."""
         return None if self.events is None else sum(event.kind == kind for event in self.events)
 
     def document(self, trusted_until: float | None) -> dict[str, Any]:
@@ -64,6 +64,7 @@ class Row:
             "matched_contacts": self.count("matched"),
             "missed_contacts": self.count("missed"),
             "phantom_contacts": self.count("phantom"),
+            "contacts_after_divergence": self.count("after_divergence"),
             "max_contact_delay": max((abs(e.delta_time) for e in pairs if e.delta_time is not None), default=None),
             "trusted_until": trusted_until,
             "seconds": self.seconds,

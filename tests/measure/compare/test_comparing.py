@@ -35,6 +35,7 @@ KEYS = [
     "matched_contacts",
     "missed_contacts",
     "phantom_contacts",
+    "contacts_after_divergence",
     "max_contact_delay",
     "trusted_until",
     "seconds",
