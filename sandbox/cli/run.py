@@ -88,7 +88,7 @@ def command(
     with gathering(faults, "--sweep", (AddressError,)):
         jobs = plan(found, names, overrides, sound, seeds, plays)
     if plays is not None and jobs and not any(job.player == plays for job in jobs):
-        faults.append(Fault("--player", None, "", "nobody plays here: no scene named has a game with rules"))
+        faults.append(Fault("--player", None, "", "no scene given has a game with rules"))
     if not faults:
         with gathering(faults):
             _check_drawing(plot, bodies, jobs)

@@ -42,7 +42,7 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True, max=1.0)
 @click.option(
     "--window", "pots", multiple=True, metavar="BALL:POCKET", help="between which aims a ball falls into a pocket"
 )
-@click.option("--horizon", "foretold", is_flag=True, help="from when on nobody could foretell it")
+@click.option("--horizon", "foretold", is_flag=True, help="the time from which the shot cannot be predicted")
 @click.option("--nudge", type=POSITIVE, default=NUDGE, metavar="X", help="of the horizon, rad or m; by default 1e-9")
 @click.option(
     "--by", type=click.Choice(["aim", "place"]), default="aim", help="what is nudged: the aim, or the ball's place"

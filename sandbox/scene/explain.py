@@ -47,8 +47,8 @@ _RANGES = {"greater_than": "gt", "greater_than_equal": "ge", "less_than": "lt", 
 """The bound that each of pydantic's errors speaks of."""
 
 _LARGE = 1e5
-"""A bound beyond this keeps nonsense away from the engines and is no choice of a person: it is named only to whom
-exceeds it. So is a least positive value below its reciprocal."""
+"""A bound beyond this only keeps nonsense away from the engines: a message names it where it is exceeded, not where the
+other bound is. The same holds for a smallest positive value below its reciprocal."""
 
 _DEGREES = 720
 """What is more than two turns in degrees is not taken for such."""
