@@ -53,8 +53,8 @@ def _off(links: Links, k: int, error: float, others: int) -> Warning:
     """Return the warning for a joint that starts off by an error, m or rad."""
     unit, name = "rad" if links.kind[k] in ANGLES else "m", links.names[k]
     message = (
-        f"the joint {name!r} starts {error:.3g} {unit} away from what it holds{_and_others(others)}; the first steps correct it, "
-        "which adds energy"
+        f"the joint {name!r} starts {error:.3g} {unit} away from what it holds{_and_others(others)}; "
+        "the first steps correct it, which adds energy"
     )
     figures: Figures = {"joint": name, "error": error, "others": others}
     return Warning("joint_start", message, figures)
