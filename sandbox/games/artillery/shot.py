@@ -29,15 +29,22 @@ class Shot(NamedTuple):
 
     @property
     def told(self) -> str:
-        """In words."""
+        """In words: where along x it came down, and how far from the exact solution along x and y."""
+        landed = "gone" if self.place is None else f"landed at {self.place[0]:.2f} m"
         if self.disturbed:
-            return f"{'gone' if self.place is None else f'at {self.place[0]:.2f} m'}; the air changed on its way"
-        if self.place is None:
-            return "gone" if self.exact is None else f"gone; exactly at {self.exact[0]:.2f} m"
+            return f"{landed}; the air changed on its way"
+        if self.place is None and self.exact is None:
+            return landed
         if self.exact is None:
-            return f"at {self.place[0]:.2f} m; exactly, gone"
-        off = length(math.dist(self.place, self.exact))
-        return f"at {self.place[0]:.2f} m, exactly {self.exact[0]:.2f} m: off by {off}"
+            return f"{landed}; exact solution gone"
+        exact = f"{landed}; exact solution {self.exact[0]:.2f} m"
+        if self.place is None:
+            return exact
+        across, up = (length(abs(a - b)) for a, b in zip(self.place, self.exact, strict=True))
+        return f"{exact}, off by {across} in x" + ("" if up == NOTHING else f" and {up} in y")
+
+
+NOTHING = "less than 1 nm"
 
 
 def length(metres: float) -> str:
@@ -45,4 +52,4 @@ def length(metres: float) -> str:
     for least, factor, unit in ((1.0, 1.0, "m"), (1e-3, 1e3, "mm"), (1e-6, 1e6, "µm"), (1e-9, 1e9, "nm")):
         if metres >= least:
             return f"{f'{metres * factor:#.3g}'.rstrip('.')} {unit}" if metres < 100.0 else f"{metres:.0f} m"
-    return "less than 1 nm"
+    return NOTHING
