@@ -37,8 +37,8 @@ def command(
 ) -> int:
     """Check scenes: faults, the physics they need, the engines that can run them, what would go wrong.
 
-    What would go wrong is predicted by formulas, and by a trial run of at most 2,000 substeps: on the engine given, else
-    on pymunk.
+    What would go wrong is predicted by formulas, and by a trial run of at most 2,000 substeps, on the engine given or
+    else on pymunk.
     """
     if expand:
         if len(scenes) > 1 or as_json:
