@@ -37,8 +37,7 @@ def command(
 ) -> int:
     """Check scenes: faults, what they demand, which engines can run them, what would go wrong.
 
-    What would go wrong is foretold by formulas, and by a trial run of at most 10,000 substeps: on the engine given, else
-    on pymunk.
+    Warnings come from formulas and from a trial run of at most 10,000 substeps, on the engine given, else on pymunk.
     """
     if expand:
         if len(scenes) > 1 or as_json:

@@ -16,7 +16,7 @@ from random_scenes import KINDS, document  # noqa: E402, see above
 def row(foretold: bool, happened: bool, formulas: bool = False) -> Observation:
     return Observation(
         "kind", 0, "pymunk", "tunnelling",
-        formulas=formulas, foretold=foretold, half_foretold=formulas, happened=happened, covered=True,
+        formulas=formulas, foretold=foretold, half_foretold=formulas, happened=happened, elsewhere=None, covered=True,
     )  # fmt: skip
 
 
