@@ -72,7 +72,7 @@ class Observation:
     half_foretold: bool
     """by the formulas and a trial run of half the scene at most"""
     elsewhere: bool | None
-    """by the formulas and a trial run on pymunk, as without `--engine`; None on pymunk itself, and where none was made"""
+    """on the reference, by the formulas and a trial run on pymunk, as without `--engine`; None where there was none"""
     covered: bool
     """The trial run covered the whole scene."""
 

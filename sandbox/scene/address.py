@@ -145,6 +145,9 @@ def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Locat
         if isinstance(here, dict):
             if not last and part not in here:
                 meant = _meant(here, parts[k:])
+                if k > 0 and k == len(parts) - 2 and parts[-1].isdecimal() and part in _keys(location):
+                    whole = ".".join(parts[: k + 1])
+                    raise AddressError(f"{path}: the scene does not state {whole}; set it as a whole, {whole}=…")
                 if k > 0 or len(parts) != 2 or "an element" in meant:
                     raise AddressError(f"{path}: the scene has no {'.'.join(parts[: k + 1])}{meant}")
                 here[part] = {}
@@ -213,12 +216,12 @@ def quoted(name: str) -> str:
     return f'"{name}"' if '"' not in name else f"'{name}'"
 
 
-def _keys(parts: tuple[str, ...]) -> list[str]:
-    """Return the keys of a table by its path; none where there is no such table."""
+def _keys(location: Location) -> list[str]:
+    """Return the keys of a table by where it is; none where there is no such table."""
     from sandbox.scene.explain import keys_of, model_at  # only what cannot be followed needs these
 
     try:
-        return keys_of(model_at(parts))
+        return keys_of(model_at(location))
     except (KeyError, StopIteration):
         return []
 
