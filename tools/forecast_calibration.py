@@ -1,6 +1,6 @@
 """Calibration of forecasts: warnings of `sandbox check` against what then happened, on random scenes.
 
-    python tools/forecast_calibration.py [--kinds NAME,…] [--seeds N] [--engines A,B] [--half fit|held-out] [--json]
+    python tools/forecast_calibration.py [--kinds NAME,…] [--seeds N] [--from SEED] [--engines A,B] [--half fit|held-out] [--json]
 
 Every scene of `random_scenes.py` is forecast first, by the formulas alone and with a trial run, and then run in full on
 each engine. Rules of this file, which know nothing of the forecasts, decide what went wrong. Precision is the share of
@@ -198,6 +198,7 @@ def main() -> int:
         "--kinds", metavar="NAME[,NAME]", help=f"which; by default those of the half: {', '.join(KINDS)}"
     )
     parser.add_argument("--seeds", type=int, default=4, metavar="N", help="scenes of each kind")
+    parser.add_argument("--from", type=int, default=0, dest="first", metavar="SEED", help="the first seed, rounded up")
     parser.add_argument("--engines", default="pymunk,reference,exact", metavar="NAME[,NAME]")
     parser.add_argument("--half", choices=("fit", "held-out"), default="held-out")
     parser.add_argument("--json", action="store_true", dest="as_json")
@@ -207,9 +208,10 @@ def main() -> int:
     unknown = [name for name in names if name not in KINDS]
     if unknown:
         parser.error(f"no kind {', '.join(unknown)}")
+    first = arguments.first + (parity - arguments.first) % 2
     rows: list[Observation] = []
     for name in names:
-        for seed in range(parity, 2 * arguments.seeds + parity, 2):
+        for seed in range(first, first + 2 * arguments.seeds, 2):
             rows += observe(name, seed, arguments.engines.split(","))
             print(f"\r\033[K{name} {seed}", end="", file=sys.stderr, flush=True)
     print("\r\033[K", end="", file=sys.stderr)

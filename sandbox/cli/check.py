@@ -37,7 +37,7 @@ def command(
 ) -> int:
     """Check scenes: faults, the physics they need, the engines that can run them, what would go wrong.
 
-    What would go wrong is predicted by formulas, and by a trial run of at most 2,000 substeps, on the engine given or
+    What would go wrong is predicted by formulas, and by a trial run of at most 10,000 substeps, on the engine given or
     else on pymunk.
     """
     if expand:
