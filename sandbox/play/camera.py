@@ -46,7 +46,6 @@ class Camera:
         foot: int = 0,
         turned: bool = False,
         head: int = 0,
-        left: int = 0,
     ) -> Self:
         """Return the camera that shows a box whole.
 
@@ -58,19 +57,17 @@ class Camera:
             foot: px at the bottom that something else covers.
             turned: whether the picture is.
             head: px at the top that something else covers.
-            left: px at the left that something else covers.
         """
-        (west, bottom), (east, top) = box
-        free = max(size[0] - inset - left, size[0] // 3, 1), max(size[1] - head - foot, size[1] // 3, 1)
+        (left, bottom), (right, top) = box
+        free = max(size[0] - inset, size[0] // 3, 1), max(size[1] - head - foot, size[1] // 3, 1)
         room = 1.0 - 2.0 * margin
-        width, height = max(east - west, 1e-9), max(top - bottom, 1e-9)
+        width, height = max(right - left, 1e-9), max(top - bottom, 1e-9)
         if turned:
             width, height = height, width
         scale = min(max(min(free[0] * room / width, free[1] * room / height), FARTHEST), CLOSEST)
-        whole = cls(((west + east) / 2.0, (bottom + top) / 2.0), scale, size, turned)
+        whole = cls(((left + right) / 2.0, (bottom + top) / 2.0), scale, size, turned)
         above = max(min(head, size[1] - free[1]), 0)
-        beside = max(min(left, size[0] - free[0]), 0)
-        return whole.panned((beside + (free[0] - size[0]) / 2.0, above + (free[1] - size[1]) / 2.0))
+        return whole.panned(((free[0] - size[0]) / 2.0, above + (free[1] - size[1]) / 2.0))
 
     def to_screen(self, points: FloatArray) -> FloatArray:
         """Return where points (…, 2), m, lie in the picture, (…, 2) px from its upper left corner."""
@@ -123,6 +120,10 @@ class Camera:
         """Return this camera moved so that what is shown moves by so many pixels."""
         x, y = self._way(by)
         return replace(self, centre=(self.centre[0] - x, self.centre[1] - y))
+
+    def zoomed_to(self, scale: float) -> Self:
+        """Return this camera with another scale, px/m, about the middle of the picture."""
+        return replace(self, scale=min(max(scale, FARTHEST), CLOSEST))
 
     def eased(self, target: Self, elapsed: float) -> Self:
         """Return this camera on its way to another: soon where that is farther away, slowly where it is closer."""

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -21,8 +22,10 @@ from sandbox.scene.model import Scene
 from sandbox.trajectory import FloatArray
 
 TITLE = "sandbox"
-MARGIN, FIELD_MARGIN = 0.06, 0.02
-"""of the picture, left free on each side; beside plates, less"""
+CLOSER = 1.5
+"""A camera that follows all that moves is at most so many times as close as at first."""
+FIELD_MARGIN = 0.02
+"""of what plates leave free, so much is left on each side of a table or the field of a game"""
 BESIDE_BODIES = 12.0
 """radii: what the camera shows at least of where bodies are"""
 
@@ -137,7 +140,9 @@ class Seat:
             chosen = frame.present[:count] & ~bodies.fixed[:count] & np.isfinite(frame.position[:count]).all(axis=1)
             box = around(frame.position[:count][chosen], bodies.radius[:count][chosen])
             if box is not None:
-                self.camera = self.camera.eased(self._fitting(_widened(box, bodies.radius[:count][chosen])), elapsed)
+                target = self._fitting(_widened(box, bodies.radius[:count][chosen]))
+                closest = CLOSER * self._fitting(framing(show.scene, self.stage.reach)).scale
+                self.camera = self.camera.eased(target.zoomed_to(min(target.scale, closest)), elapsed)
         elif self.following < len(frame.position) and frame.present[self.following]:
             place = frame.position[self.following]
             if np.isfinite(place).all():
@@ -158,6 +163,8 @@ class Seat:
             surface = pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
         else:
             surface = pygame.display.set_mode(self._window_size, pygame.RESIZABLE)
+            if surface.get_size() != self._window_size:  # some drivers only leave full screen at first
+                surface = pygame.display.set_mode(self._window_size, pygame.RESIZABLE)
             self._window_size = None
         self.resize(surface)
 
@@ -186,18 +193,19 @@ class Seat:
             (left, bottom), (right, top) = box
             shape = max(right - left, 1e-9), max(top - bottom, 1e-9)
             room = largest_room(shape[::-1] if lies else shape, room, self.desk.taken(self.stage))
-        else:
-            room = pygame.Rect(room.left, room.top + head, room.width, max(room.height - head - foot, 0))
-        inset, foot = size[0] - room.right, size[1] - room.bottom
-        return Camera.fitting(
-            box, size, FIELD_MARGIN if self._has_field else MARGIN, inset, foot, lies, room.top, room.left
-        )
+            camera = replace(Camera.fitting(box, room.size, FIELD_MARGIN, turned=lies), size=size)
+            return camera.panned((room.centerx - size[0] / 2.0, room.centery - size[1] / 2.0))
+        inset = self.desk.panel.width
+        return Camera.fitting(box, size, inset=inset, foot=foot + self.desk.foot, turned=lies, head=head)
 
     @property
     def _has_field(self) -> bool:
-        """Whether the scene states what is seen: a table, or the field of a game."""
+        """Whether all of what is seen counts: a table, the field of a game, or a view that the scene states."""
         show = self.stage.show
-        return show is not None and (show.scene.play.area is not None or show.scene.play.view is not None)
+        if show is None:
+            return False
+        play = show.scene.play
+        return play.area is not None or play.view is not None or play.game is not None
 
     def make_room(self) -> None:
         """Come home again where a plate has grown, with another row or with how the game ended."""
