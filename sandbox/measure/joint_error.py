@@ -50,7 +50,8 @@ def joint_errors(trajectory: Trajectory, scene: Scene) -> FloatArray:
 def starting_errors(scene: Scene) -> FloatArray:
     """Return how far each joint is off as a scene starts, (J,), as `joint_errors` does."""
     bodies, links = scene.bodies, scene.links
-    return _errors(links, bodies.position[None], bodies.angle[None], np.ones((1, len(links)), np.bool_))[0]
+    there = np.ones((1, len(links)), np.bool_)
+    return np.asarray(_errors(links, bodies.position[None], bodies.angle[None], there)[0])
 
 
 def joint_error(trajectory: Trajectory, scene: Scene) -> float | None:

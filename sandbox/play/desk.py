@@ -342,6 +342,9 @@ class Desk:
         )
         if stage.game is not None:
             shown = (*shown, Knob("players", "players", value=stage.game.players, choices=PLAYERS))
+            if stage.game.match.rules.name == "snooker":
+                misses = "on" if stage.game.misses else "off"
+                shown = (*shown, Knob("misses", "foul and a miss", value=misses, choices=("off", "on")))
         toggles = {name: name in self.overlays for name in OVERLAYS}
         if live is not None:
             toggles |= {"ghost": live.company.ghosted, "trust": live.company.trust is not None}
@@ -367,7 +370,7 @@ class Desk:
             if stage.game is not None:
                 stage.messages.tell("aim with the mouse; Space shoots, H lists all keys")
             elif len(told) > MOST:  # more than are seen at once
-                stage.messages.tell(f"{', '.join(keys for keys, _ in told)}: F1 tells what each does")
+                stage.messages.tell(f"{', '.join(keys for keys, _ in told)} (F1: help)")
             else:
                 for keys, what in told:
                     stage.messages.tell(f"{keys}: {what}")

@@ -67,6 +67,8 @@ class Hands:
         if number is None:
             return
         name = live.bodies.names[number]
+        if any(drive.body == name for drive in live.scene.drives):
+            raise ActionError(f"{name} cannot be dragged; its key moves it (H: help)")
         self._moving, self._hand = paused, self._spot
         if paused:
             self._grip = _turned(self._offset, float(live.frame.angle[number]) - self._angle)

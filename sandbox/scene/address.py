@@ -145,7 +145,10 @@ def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Locat
         if isinstance(here, dict):
             if not last and part not in here:
                 meant = _meant(here, parts[k:])
-                if k > 0 or len(parts) != 2 or meant.startswith(ELEMENT):
+                if k > 0 and k == len(parts) - 2 and parts[-1].isdecimal() and part in _keys(location):
+                    whole = ".".join(parts[: k + 1])
+                    raise AddressError(f"{path}: the scene does not state {whole}; set it as a whole, {whole}=…")
+                if k > 0 or len(parts) != 2 or "an element" in meant:
                     raise AddressError(f"{path}: the scene has no {'.'.join(parts[: k + 1])}{meant}")
                 here[part] = {}
             location += (part,)
@@ -213,17 +216,14 @@ def quoted(name: str) -> str:
     return f'"{name}"' if '"' not in name else f"'{name}'"
 
 
-def _keys(parts: tuple[str, ...]) -> list[str]:
-    """Return the keys of a table by its path; none where there is no such table."""
+def _keys(location: Location) -> list[str]:
+    """Return the keys of a table by where it is; none where there is no such table."""
     from sandbox.scene.explain import keys_of, model_at  # only what cannot be followed needs these
 
     try:
-        return keys_of(model_at(parts))
+        return keys_of(model_at(location))
     except (KeyError, StopIteration):
         return []
-
-
-ELEMENT = "; that is an element"
 
 
 def _meant(document: Any, parts: tuple[str, ...]) -> str:
@@ -231,8 +231,10 @@ def _meant(document: Any, parts: tuple[str, ...]) -> str:
     if not isinstance(document, dict):
         return ""
     for kind, elements in document.items():
-        if isinstance(elements, list) and parts[0] in element_names(elements, kind):
-            return f"{ELEMENT}: {'.'.join((kind, quoted(parts[0]), *parts[1:]))}"
+        for name in element_names(elements, kind) if isinstance(elements, list) else ():
+            if name is not None and (parts[0] == name or parts[0].startswith(f"{name}-")):
+                part = "" if parts[0] == name else "part of "
+                return f"; that is {part}an element: {'.'.join((kind, quoted(name), *parts[1:]))}"
     close = difflib.get_close_matches(parts[0], document, n=1)
     return f"; did you mean {'.'.join((*close, *parts[1:]))}?" if close else ""
 

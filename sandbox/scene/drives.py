@@ -28,6 +28,7 @@ class Driven(Part):
     """What all drives have."""
 
     name: Name | None = None
+    """without one it is called by its kind and its place in the file, such as `joint-1`"""
     body: Name
     """a single body, which stands still as the scene starts"""
     key: DriveKey | None = None

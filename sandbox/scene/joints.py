@@ -21,6 +21,7 @@ class Joined(Part):
     """What all joints have."""
 
     name: Name | None = None
+    """without one it is called by its kind and its place in the file, such as `joint-1`"""
     between: Annotated[tuple[Name, ...], Field(min_length=1, max_length=2)]
     """one body, held by the world, or two"""
     collide: bool = False
@@ -61,6 +62,7 @@ class Slide(Anchored):
 
     kind: Literal["slide"]
     least: Distance = 0.0
+    """the smallest distance, m"""
     most: Distance
     """m"""
 
@@ -80,6 +82,7 @@ class RotaryLimit(Joined):
 
     kind: Literal["rotary_limit"]
     least: Turned
+    """the smallest angle, rad"""
     most: Turned
     """rad"""
 
@@ -99,6 +102,7 @@ class Gear(Joined):
 
     kind: Literal["gear"]
     ratio: Annotated[float, Field(ge=-1e6, le=1e6)]
+    """angle₁ / angle₂"""
     phase: Turned | None = None
     """rad; without, as the two start"""
 

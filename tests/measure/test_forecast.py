@@ -116,10 +116,13 @@ def test_bodies_that_nothing_bounds_have_no_safe_step() -> None:
     ball = '[[ball]]\nname = "b"\nposition = [3, 0]\nradius = 0.1\n[[post]]\nposition = [0, 0]\nradius = 0.2\n'
     sun = "[[attraction]]\ntoward = [0, 0]\nstrength = 10.0\n"
     assert largest_safe_dt(loads(ball)) == math.inf
-    assert largest_safe_dt(loads(ball + sun)) is None
+    assert largest_safe_dt(loads(ball + sun.replace("[0, 0]", "[0, 1]"))) is None
+    # Where a post stands in its place: v² = 2·s·(1/0.2 − 1/3).
+    onto = math.sqrt(2 * 10.0 * (1 / 0.2 - 1 / 3.0))
+    assert largest_safe_dt(loads(ball + sun)) == pytest.approx(0.3 / onto, rel=1e-12)  # roundings
     soft = loads(ball + sun + "softening = 0.1\n")
-    # From 3 m to the centre by energy: v² = 2·(s/ε)·atan(3/ε).
-    fastest = math.sqrt(2 * 100.0 * math.atan(30.0))
+    # From 3 m to the post by energy: v² = 2·(s/ε)·(atan(3/ε) − atan(0.2/ε)).
+    fastest = math.sqrt(2 * 100.0 * (math.atan(30.0) - math.atan(2.0)))
     assert largest_safe_dt(soft) == pytest.approx(0.3 / fastest, rel=1e-12)  # roundings
     wound = ball + '[[joint]]\nkind = "spring"\nbetween = ["b"]\nrest_length = 1.0\nstiffness = 200.0\n'
     # ½·200·2² J in 1 kg

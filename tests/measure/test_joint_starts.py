@@ -30,12 +30,12 @@ BOTH = 'between = ["bob", "other"]\n'
 @pytest.mark.parametrize("kind", ["rod", "spring", "slide", "pivot"])
 def test_swapped_anchors_of_one_body_are_warned_of_and_the_right_order_is_not(kind: str) -> None:
     more = {"spring": "stiffness = 10\n", "slide": "most = 5\n"}.get(kind, "")
-    right = "anchors = [[0, 0.2], [0, 9.2]]"
-    wrong = "anchors = [[0, 9.2], [0, 0.2]]"
+    high = 9.2 if kind == "pivot" else 10  # a pivot's two points are one
+    right, wrong = f"anchors = [[0, 0.2], [0, {high}]]", f"anchors = [[0, {high}], [0, 0.2]]"
     assert found(f'kind = "{kind}"\n{ONE}{more}{right}') == []
     (warning,) = found(f'kind = "{kind}"\n{ONE}{more}{wrong}')
-    assert (warning.kind, warning.figures) == ("anchors", {"joint": "joint-1", "body": "bob"})
-    assert "9.2 m from its centre" in warning.message
+    assert (warning.kind, warning.figures) == ("anchors", {"joint": "joint-1", "body": "bob", "others": 0})
+    assert f"{high} m from its centre" in warning.message
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from sandbox.engines.native.kicks import Kicks, kicks_of
 from sandbox.engines.native.population import Population
 from sandbox.engines.native.states import State
 from sandbox.engines.native.strides import meant, worked
+from sandbox.engines.native.tension import spring_forces
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Scene
 from sandbox.scene.potential import Potential
@@ -69,9 +70,10 @@ class Books:
             p.meeting.drives.seat(now.position, now.velocity, now.angle, now.spin)
         velocity, spin = self._mean(before, now, counts)
         meant(axles, before, now, velocity, spin)
-        kicks = kicks_of(p, before.velocity, counts, p.h * share)
-        kicks.twisted[~self._turnable()] = 0.0
         held = p.meeting.tethers.held
+        drawn = spring_forces(held.springs, whole.position, whole.angle) if len(held.springs) else None
+        kicks = kicks_of(p, before.velocity, counts, drawn, p.h * share)
+        kicks.twisted[~self._turnable()] = 0.0
         hauls = springs(p.meeting.tethers, whole.position, whole.angle, p.h) if held else ((), ())
         stiff, damped = (tuple(each.times(share) for each in some) for some in hauls)
         points = p.meeting.encounters.points().times(share)

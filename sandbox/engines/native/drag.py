@@ -1,4 +1,10 @@
-"""Drag: air resistance as the acceleration of one explicit step."""
+"""Drag: air resistance as the acceleration of one explicit step.
+
+In a drag of κ a force F adds φ·(F/m)·h to the velocity of a mass m, φ = (1 − e^(−κh))/(κh), and not (F/m)·h: whatever
+forces balance, springs, thrusts and attraction among them, they balance exactly at any h, and so does drag with them.
+Spin is not dragged, and torques act as they are. Where a joint turns a force into a torque, as on a lever that hangs in
+a rotary spring, the two are φ apart.
+"""
 
 import numpy as np
 
@@ -17,16 +23,27 @@ def acceleration(world: World, velocity: FloatArray, push: FloatArray | None, h:
     Args:
         world: gravity, wind and drag.
         velocity: (N, 2) m/s.
-        push: (N, 2) m/s² of steady forces, or None.
+        push: (N, 2) m/s² of other forces, or None.
         h: substep, s.
     """
     relative = velocity - np.asarray(world.wind)
-    rate = world.linear_drag + world.quadratic_drag * np.hypot(relative[:, 0], relative[:, 1])
+    rate = rates(world, velocity)
     share = mean_share(rate, h)
     total = np.asarray(world.gravity) - rate[:, None] * relative
     if push is not None:
         total += push
     return np.asarray(total * share[:, None])
+
+
+def is_dragged(world: World) -> bool:
+    """Tell whether there is any drag."""
+    return world.linear_drag > 0 or world.quadratic_drag > 0
+
+
+def rates(world: World, velocity: FloatArray) -> FloatArray:
+    """Return κ, the rates of drag at velocities (N, 2) m/s, (N,) 1/s."""
+    relative = velocity - np.asarray(world.wind)
+    return np.asarray(world.linear_drag + world.quadratic_drag * np.hypot(relative[:, 0], relative[:, 1]))
 
 
 def mean_share(rate: FloatArray, h: float) -> FloatArray:

@@ -20,6 +20,9 @@ class Field:
     """What acts on the bodies of a scene from afar and from within."""
 
     def __init__(self, scene: Scene) -> None:
+        self.shares: dict[str, float] = {}
+        """what share of the field's accelerations acts on each body in the coming substep: in drag less than all. The
+        velocities that it follows from cannot be read at the kick: springs have changed them by then."""
         self.time = 0.0
         """s, when the substep at hand began"""
         self._began = scene.began
@@ -47,6 +50,11 @@ class Field:
     def attracts(self) -> bool:
         """Something attracts."""
         return bool(self._places or self._bodies)
+
+    @property
+    def kicks(self) -> bool:
+        """Some body may be kicked."""
+        return self.attracts or bool(self._thrusts)
 
     def thrusted(self, name: str) -> bool:
         """Tell whether a body carries a thrust."""
@@ -81,6 +89,9 @@ class Field:
                 body.torque += torque
             if self.told is not None:
                 self.told[name] = (*pull, *push, torque)
+            if self.shares:
+                share = self.shares[name]
+                ax, ay = ax * share, ay * share
             pymunk.Body.update_velocity(body, (gravity[0] + ax, gravity[1] + ay), damping, dt)
 
         body.velocity_func = kick

@@ -10,7 +10,7 @@ import numpy as np
 
 from sandbox.engines.kernel import COMPILED
 from sandbox.engines.limits import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.native.drag import acceleration, mean_share
+from sandbox.engines.native.drag import acceleration, is_dragged, mean_share, rates
 from sandbox.engines.native.field import Field
 from sandbox.engines.native.flight import calm, drift, fall, runs_of, tile_of, turn
 from sandbox.scene.bodies import Bodies
@@ -92,7 +92,7 @@ class FreeFlight:
         world = self.world
         self._pushed = any(force.any() for force, _ in self._steady.values())
         self._twisted = any(torque for _, torque in self._steady.values())
-        self._dragged = world.linear_drag > 0 or world.quadratic_drag > 0
+        self._dragged = is_dragged(world)
         self.turns = bool(self._spin[self.numbers].any()) or self._twisted
         self._kick = tile_of((np.asarray(world.gravity) + 0.0) * self._h)
         if self._dragged and self._compiled:
@@ -213,7 +213,9 @@ class FreeFlight:
         if self._dragged:
             push = None if force is None else force * inverse
             kick = (mass * acceleration(self.world, velocity, push, self._h)) * inverse
-            return (kick if self._field is None else self._field.at(position) + kick) * self._h
+            if self._field is not None:
+                kick += self._field.at(position) * mean_share(rates(self.world, velocity), self._h)[:, None]
+            return kick * self._h
         gravity = np.asarray(self.world.gravity)
         pull = gravity if self._field is None else gravity + self._field.at(position)
         return (pull + (np.zeros(2) if force is None else force * inverse)) * self._h

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.engines.native.drag import acceleration
+from sandbox.engines.native.drag import acceleration, is_dragged
 from sandbox.engines.native.population import Population
 from sandbox.trajectory import BoolArray, FloatArray
 
@@ -19,27 +19,30 @@ class Kicks(NamedTuple):
     twisted: FloatArray
     """(N,) by steady torques and thrusts, N·m·s"""
     dragged: FloatArray
-    """(N, 2) by the air"""
+    """(N, 2) by the air, and what it keeps other forces from giving"""
 
 
-def kicks_of(population: Population, before: FloatArray, counts: BoolArray, h: float) -> Kicks:
+def kicks_of(
+    population: Population, before: FloatArray, counts: BoolArray, springs: FloatArray | None, h: float
+) -> Kicks:
     """Return the kicks of the last substep.
 
     Args:
         population: as it is after it.
         before: velocities at its beginning, (N, 2) m/s.
         counts: (N,) whose kicks are wanted; those of others are 0.
+        springs: (N, 2) N, which drag makes act by less; None is none.
         h: how much of the substep there was, s.
     """
     bodies, world = population.bodies, population.scene.world
     mass = np.where(counts, bodies.mass, 0.0)[:, None]
     pushed, torque = _steady(population)
+    pull, thrust, twist = _field(population)
     dragged = np.zeros_like(before)
-    if world.linear_drag > 0 or world.quadratic_drag > 0:
-        push = pushed / bodies.mass[:, None]
+    if is_dragged(world):
+        push = (pushed + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + pull
         given = acceleration(world, before, push, population.h) - np.asarray(world.gravity) - push
         dragged = mass * given * h
-    pull, thrust, twist = _field(population)
     driven = np.where(counts[:, None], pushed + thrust, 0.0)
     twisted = np.where(counts, torque + twist, 0.0)
     return Kicks(mass * (np.asarray(world.gravity) + pull) * h, driven * h, twisted * h, dragged)

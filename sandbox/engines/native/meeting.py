@@ -6,6 +6,7 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.limits import BEYOND, FARTHEST
+from sandbox.engines.native.drag import is_dragged, mean_share, rates
 from sandbox.engines.native.drives import Drives
 from sandbox.engines.native.encounters import Encounters
 from sandbox.engines.native.field import Field
@@ -21,10 +22,11 @@ from sandbox.engines.native.space import (
     new_space,
 )
 from sandbox.engines.native.steady import Steady
+from sandbox.engines.native.tension import spring_forces
 from sandbox.engines.native.tethers import Tethers
 from sandbox.engines.touching import NOTHING, ComplexArray, Touching
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.links import Links
+from sandbox.scene.links import WORLD, Links
 from sandbox.scene.meetings import Meetings
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -43,7 +45,7 @@ class MeetingBodies(Members):
             skin: the share of its radius by which each lone disc is larger in the space than it is.
         """
         self._scene, self._settings, self._skin = scene, settings, skin
-        self._h, self._dragged = settings.h, scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
+        self._h, self._dragged = settings.h, is_dragged(scene.world)
         super().__init__(new_space(scene, settings))
         self._reader = Reader(self._space)
         self._setter = SurfaceSetter(self._space, settings.h)
@@ -221,7 +223,8 @@ class MeetingBodies(Members):
         if self._ground.reshape(self._scene, scene):
             self._single = False  # who leant on what was there before is remembered no more, and no listing tells
         self._scene = scene
-        self._dragged = scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
+        self._dragged = is_dragged(scene.world)
+        self.field.shares.clear()
         self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
         self._touches, self._noted = meet.touches, meet.noted
         self._setter.renew(meet, jointed_surfaces(scene, self._surface_of_fixed))
@@ -243,7 +246,7 @@ class MeetingBodies(Members):
             return
         self.field.time = time
         if self._dragged:
-            self.steady.apply_with_drag(self._members, self._reader, self._read(), self._scene.world, self._h)
+            self._apply_drag(*self._read())
         else:
             self.steady.apply(self._members)
         if self._setter.gates.walls:
@@ -255,6 +258,30 @@ class MeetingBodies(Members):
         else:
             self._space.step(self._h)
         self._state = None
+
+    def _apply_drag(self, numbers: IntArray, state: FloatArray) -> None:
+        """Set the forces of the coming substep on bodies (R,) of a state (R, 6), where there is drag."""
+        world, springs = self._scene.world, self._springs(numbers, state)
+        self.steady.apply_with_drag(self._members, self._reader, (numbers, state), springs, world, self._h)
+        if self.field.kicks:
+            shares = mean_share(rates(world, state[:, 3:5]), self._h).tolist()
+            self.field.shares = {self._name_of[n]: each for n, each in zip(numbers.tolist(), shares, strict=True)}
+
+    def _springs(self, numbers: IntArray, state: FloatArray) -> FloatArray | None:
+        """Return the forces, N, that springs will give to bodies (R,) of a state (R, 6), in the coming substep.
+
+        pymunk evaluates springs after positions have moved by the old velocities. None where there are no springs.
+        """
+        links = self.tethers.held.springs
+        if not len(links):
+            return None
+        position, angle = np.zeros((len(self._touches), 2)), np.zeros(len(self._touches))
+        position[numbers] = state[:, 0:2] + state[:, 3:5] * self._h
+        angle[numbers] = state[:, 2] + state[:, 5] * self._h
+        for number in np.setdiff1d(np.concatenate((links.a, links.b)), [WORLD, *numbers]).tolist():  # fixed bodies
+            body = self._members[number].body
+            position[number], angle[number] = body.position, body.angle
+        return spring_forces(links, position, angle)[numbers]
 
     def drive(self, velocity: FloatArray) -> None:
         """Let all bodies of the space go by velocities (N, 2), m/s, for the next step."""

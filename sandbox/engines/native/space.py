@@ -13,6 +13,7 @@ import pymunk
 
 from sandbox.engines.fixtures import wall_segments
 from sandbox.engines.native.coefficients import factors, wrong_pairs
+from sandbox.engines.native.drag import is_dragged
 from sandbox.engines.native.gates import Gates
 from sandbox.engines.native.laws import Laws
 from sandbox.scene.bodies import Bodies
@@ -50,8 +51,7 @@ def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
 
 def gravity_of(scene: Scene) -> tuple[float, float]:
     """Return the gravity that the space itself applies: with drag none, the drag's force holds it then."""
-    dragged = scene.world.linear_drag > 0 or scene.world.quadratic_drag > 0
-    return (0.0, 0.0) if dragged else scene.world.gravity
+    return (0.0, 0.0) if is_dragged(scene.world) else scene.world.gravity
 
 
 @cache
@@ -161,9 +161,8 @@ class SurfaceSetter:
             *wrong_pairs(surfaces.friction, touching, self._friction),
             *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
         }
-        if meet.solids:
-            wrong |= {(a, b) for a, b in _pairs(touching) if a in jointed or b in jointed}
-        self.laws.renew(surfaces, wrong)
+        mended = {(a, b) for a, b in _pairs(touching) if meet.solids and (a in jointed or b in jointed)}
+        self.laws.renew(surfaces, wrong, mended)
         if surfaces.one_way.any():
             self.gates.renew(surfaces, touching)
 

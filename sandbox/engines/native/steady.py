@@ -81,14 +81,21 @@ class Steady:
                 lib.cpBodySetTorque(record, torque)
 
     def apply_with_drag(
-        self, members: Mapping[int, Member], reader: Reader, state: tuple[IntArray, FloatArray], world: World, h: float
+        self,
+        members: Mapping[int, Member],
+        reader: Reader,
+        state: tuple[IntArray, FloatArray],
+        springs: FloatArray | None,
+        world: World,
+        h: float,
     ) -> None:
         """Set forces and torques for the next step of h, s, where all bodies are dragged.
 
         Args:
             members: by number.
             reader: of the space, which takes forces on all bodies at once.
-            state: their numbers, and position, angle, velocity, spin.
+            state: their numbers (R,), and position, angle, velocity, spin.
+            springs: (R, 2) N, which pymunk itself will add in that step, or None. In drag they have to act by less.
             world: gives drag and wind.
             h: of the step.
         """
@@ -99,7 +106,11 @@ class Steady:
         for row, number in enumerate(numbers.tolist()):
             if number in self._of and mass[row]:
                 push[row] = self._of[number][0] * (1.0 / mass[row])
-        reader.push(mass * acceleration(world, figures[:, 3:5], push, h))
+        if springs is None:
+            reader.push(mass * acceleration(world, figures[:, 3:5], push, h))
+        else:
+            pull = np.divide(springs, mass, out=np.zeros_like(springs), where=mass > 0.0)
+            reader.push(mass * (acceleration(world, figures[:, 3:5], push + pull, h) - pull))
         self._twist(members)
 
     def _twist(self, members: Mapping[int, Member]) -> None:

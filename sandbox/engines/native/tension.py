@@ -28,6 +28,27 @@ def tension(
     return np.asarray(np.abs(stiffness * (length - rest) + damping * rate))
 
 
+def spring_forces(links: Links, position: FloatArray, angle: FloatArray) -> FloatArray:
+    """Return the forces (N, 2), N, that springs exert on bodies by their stiffness alone.
+
+    Args:
+        links: K springs.
+        position: (N, 2) m.
+        angle: (N,) rad.
+    """
+    still = np.zeros_like(position), angle, np.zeros_like(angle)
+    place_a, _ = _end(links.a, links.anchor_a, position, *still)
+    place_b, _ = _end(links.b, links.anchor_b, position, *still)
+    way = place_b - place_a
+    length = np.hypot(way[:, 0], way[:, 1])
+    rest, stiffness, _ = links.figures.T
+    force = way * np.divide(stiffness * (rest - length), length, out=np.zeros_like(length), where=length > 0.0)[:, None]
+    total = np.zeros((len(position) + 1, 2))  # the last is the world's: −1
+    np.add.at(total, links.b, force)
+    np.subtract.at(total, links.a, force)
+    return total[:-1]
+
+
 def torsion(links: Links, angle: FloatArray, spin: FloatArray) -> FloatArray:
     """Return the size of the torque of rotary springs, (K,) N·m."""
     moves = links.a >= 0

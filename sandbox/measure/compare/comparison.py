@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
-from sandbox.measure.compare.alignment import Event
+from sandbox.measure.compare.alignment import Event, Kind
 from sandbox.measure.compare.errors import Score
 from sandbox.measure.compare.truth import Truth
 from sandbox.measure.compare.why import Knob
@@ -45,8 +45,14 @@ class Row:
     verdict: str | None = None
     """the sentence that follows from it"""
 
+    def __repr__(self) -> str:
+        """Name engine and status, the largest error and how many contacts there are of each kind."""
+        error = "unknown" if self.score.max_position is None else f"{self.score.max_position:.3g} m"
+        counts = ", ".join(f"{kind} {sum(e.kind == kind for e in self.events or ())}" for kind in get_args(Kind))
+        return f"<Row {self.engine}: {self.status}, max error {error}, contacts: {counts}>"
+
     def count(self, kind: str) -> int | None:
-        """Return how many contacts were `matched`, `missed` or `phantom`."""
+        """Return how many contacts were `matched`, `missed`, `phantom` or `after_divergence`."""
         return None if self.events is None else sum(event.kind == kind for event in self.events)
 
     def document(self, trusted_until: float | None) -> dict[str, Any]:
@@ -64,6 +70,7 @@ class Row:
             "matched_contacts": self.count("matched"),
             "missed_contacts": self.count("missed"),
             "phantom_contacts": self.count("phantom"),
+            "contacts_after_divergence": self.count("after_divergence"),
             "max_contact_delay": max((abs(e.delta_time) for e in pairs if e.delta_time is not None), default=None),
             "trusted_until": trusted_until,
             "seconds": self.seconds,
@@ -97,6 +104,16 @@ class Comparison:
     """the run of each engine that has one"""
     doubt: str | None = None
     """why there is no truth"""
+
+    def __repr__(self) -> str:
+        """Name the scene and the truth, and the largest error of each engine."""
+        off = (
+            f"{row.engine} {row.status}"
+            if row.score.max_position is None
+            else f"{row.engine} {row.score.max_position:.3g} m"
+            for row in self.rows
+        )
+        return f"<Comparison {self.scene.title!r}: {self.sentence()}; max error: {', '.join(off)}>"
 
     @property
     def truth(self) -> str | None:

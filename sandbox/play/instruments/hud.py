@@ -76,7 +76,7 @@ def _speed(status: Status) -> list[Row]:
     still = status.paused or status.ended is not None
     apart = not still and math.isfinite(real) and abs(real - asked) > APART * abs(asked)
     if apart:
-        return [Row(f"speed {percent(asked)}, really {percent(real)}", ORANGE, rank=4)]
+        return [Row(f"speed {percent(asked)}, running at {percent(real)}", ORANGE, rank=4)]
     return [] if asked == 1 else [Row(f"speed {percent(asked)}", rank=5)]
 
 
@@ -86,8 +86,8 @@ def _doubts(status: Status) -> list[Row]:
     if status.trust == "trusted":
         found.append(Row("predictable", GREEN, "disc", rank=6))
     elif status.trust == "lost":
-        since = "" if status.horizon is None else f" since {clock(status.horizon)}"
-        found.append(Row(f"past the horizon{since}", WARNING, "triangle", rank=3))
+        since = "" if status.horizon is None else f" (since {clock(status.horizon)})"
+        found.append(Row(f"no longer predictable{since}", WARNING, "triangle", rank=3))
     if status.ghost is not None:
         away = "" if status.distance is None else f": {figure(status.distance, 'm')} away"
         found.append(Row(f"ghost {status.ghost}{away}", INK, "ring", rank=6))
