@@ -35,10 +35,10 @@ def command(
     quiet: bool,
     expand: bool,
 ) -> int:
-    """Check scenes: faults, what they demand, which engines can run them, what would go wrong.
+    """Check scenes: faults, the physics they need, the engines that can run them, what would go wrong.
 
-    What would go wrong is foretold by formulas, and by a trial run of at most 2,000 substeps: on the engine given, else
-    on pymunk.
+    What would go wrong is predicted by formulas, and by a trial run of at most 10,000 substeps, on the engine given or
+    else on pymunk.
     """
     if expand:
         if len(scenes) > 1 or as_json:

@@ -50,7 +50,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Play frames of billiards between bots, and tell the score.
+    """Play frames of billiards between bots, and print the score.
 
     SCENE is a table: a file, or the name of a shipped one. Players take the first shot in turn.
     """

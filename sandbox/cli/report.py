@@ -98,7 +98,7 @@ def command(
                         names,
                         effort=effort,
                         time_limit=time_limit,
-                        truth=found.best,
+                        truth=found.best or found.doubt,
                         runs=found.trajectories,
                     )
             except (TooLargeError, SceneError) as error:

@@ -108,7 +108,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding((pygame.K_g,), 0, Command.GHOST, "ghost of the reference", "G", _SCENE),
     Binding((pygame.K_t,), 0, Command.TRUST, "trust light", "T", _SCENE),
     Binding((pygame.K_HOME,), 0, Command.HOME, "fit the scene; again: the bodies", "Home", _VIEW),
-    Binding((pygame.K_f,), 0, Command.FOLLOW, "follow the picked body, or all that moves", "F", _VIEW),
+    Binding((pygame.K_f,), 0, Command.FOLLOW, "follow the selected body, or all that moves", "F", _VIEW),
     Binding((pygame.K_F11,), 0, Command.FULL_SCREEN, "full screen", "F11", _VIEW),
     Binding((pygame.K_TAB,), 0, Command.PANEL, "hide the panel, show it", "Tab", _VIEW),
     Binding((pygame.K_b,), 0, Command.ADD_BALL, "add a ball at the cursor", "B", _BODIES),

@@ -118,7 +118,7 @@ def test_script_plays(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[s
 def test_player_where_nobody_plays_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     plain = written(tmp_path, TOY.replace('game = "landing"', ""), "plain.toml")
     status, _, err = lines_of(capfd, "run", plain, "--player", "none")
-    assert (status, err) == (2, ["--player: nobody plays here: no scene named has a game with rules"])
+    assert (status, err) == (2, ["--player: no scene given has a game with rules"])
 
 
 @pytest.mark.parametrize(

@@ -274,7 +274,7 @@ def test_interrupt_while_the_truth_is_sought_is_one_line(
     def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sandbox.measure.tradeoff.weighing.truth_of", interrupted)
+    monkeypatch.setattr("sandbox.measure.tradeoff.weighing.seek_truth", interrupted)
     assert call(["tradeoff", written(tmp_path)]) == 130
     out, err = capfd.readouterr()
     assert (out, err.splitlines()[-1]) == ("", "interrupted")

@@ -144,7 +144,7 @@ class ArtilleryRules:
         told.append(("gun", f"{tank.name} is thinking" if self.thinking else gun))
         told.append(("weapon", f"{weapon.name}, ${weapon.cost:,}" if weapon.cost else weapon.name))
         if self.shots:
-            told.append(("last shot", self.shots[-1].told))
+            told.append(("last shot", self.shots[-1].brief.replace("exact solution", "exact")))
         return told
 
     def gauges(self) -> Sequence[tuple[str, float]]:

@@ -30,18 +30,21 @@ class Shot(NamedTuple):
     @property
     def told(self) -> str:
         """In words: where along x it came down, and how far from the exact solution along x and y."""
-        landed = "gone" if self.place is None else f"landed at {self.place[0]:.2f} m"
+        return self.brief if self.place is None else f"landed at {self.brief}"
+
+    @property
+    def brief(self) -> str:
+        """The same in fewer words."""
+        landed = "gone" if self.place is None else f"{self.place[0]:.2f} m"
         if self.disturbed:
             return f"{landed}; the air changed on its way"
-        if self.place is None and self.exact is None:
-            return landed
         if self.exact is None:
-            return f"{landed}; exact solution gone"
-        exact = f"{landed}; exact solution {self.exact[0]:.2f} m"
+            return landed if self.place is None else f"{landed}, exact solution gone"
+        exact = f"{landed}, exact solution {self.exact[0]:.2f} m"
         if self.place is None:
             return exact
         across, up = (length(abs(a - b)) for a, b in zip(self.place, self.exact, strict=True))
-        return f"{exact}, off by {across} in x" + ("" if up == NOTHING else f" and {up} in y")
+        return f"{exact} (Δx {across}" + (")" if up == NOTHING else f", Δy {up})")
 
 
 NOTHING = "less than 1 nm"

@@ -32,7 +32,7 @@ from sandbox.scene.settings import Settings
 from sandbox.scene.starts import height_above
 from sandbox.trajectory import Trajectory
 
-MOST_SUBSTEPS, MOST_BODY_SUBSTEPS = 2_000, 60_000
+MOST_SUBSTEPS, MOST_BODY_SUBSTEPS = 10_000, 60_000
 """Of a trial run; the second is substeps times bodies."""
 FEWEST_SUBSTEPS = 20
 """A shorter trial run tells nothing, and is left out."""

@@ -15,8 +15,12 @@ LONGER = 1.01
 """So many times a frame a step may last, such as 0.0167 s at 60 a second, and nobody sees."""
 
 NOISE = 1.5
-"""Times within this factor of the least count as equal, and counted work decides: the least of 5 repeats in turns varied
-by up to 30 % between runs on a loaded machine, and the answer must not depend on that."""
+"""Times within this factor of the least count as equal, and counted work decides. The least of 5 repeats in turns
+varied by 2 to 7 % in 8 measurements of 8 settings on a machine at a load of 5; the rest is room for more load."""
+
+ALIKE = 1.05
+"""Counted works within this factor of the least count as equal too, and the setting that changes less is taken: the
+weights of the counters are no better than that."""
 
 Again = Callable[[Point], float]
 """Runs a point on fresh seeds and returns the worst error, infinite where a run fails."""
@@ -39,9 +43,15 @@ def by_cost(points: Sequence[Point]) -> list[Point]:
     """
     timed = sorted((p for p in points if p.repeats), key=lambda each: each.cost or 0.0)
     close = [p for p in timed if (p.cost or 0.0) <= NOISE * (timed[0].cost or 0.0)]
-    rest = timed[len(close) :]
-    others = [p for p in points if not p.repeats]
-    return [*sorted(close, key=_counted), *rest, *sorted(others, key=_counted)]
+    others = sorted((p for p in points if not p.repeats), key=_counted)
+    return [*_by_work(close), *timed[len(close) :], *others]
+
+
+def _by_work(points: Sequence[Point]) -> list[Point]:
+    """Return points by counted work; first those that are alike in it, by what they change and their error."""
+    ordered = sorted(points, key=_counted)
+    alike = [p for p in ordered if _counted(p) <= ALIKE * _counted(ordered[0])]
+    return [*sorted(alike, key=lambda p: (len(p.changes), p.error or 0.0)), *ordered[len(alike) :]]
 
 
 def closest(points: Sequence[Point], aim: Aim, fresh: Sequence[int], again: Again) -> Pick | None:

@@ -1,4 +1,4 @@
-"""Trial: one variant, run for its error and its counted cost. Its time on this machine is measured apart (`cost.py`)."""
+"""Trial: one variant, run for its error and its counted cost. Its time here is measured apart (`cost.py`)."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -43,6 +43,8 @@ class Tradeoff:
 
     scene: Scene
     best: Truth | None
+    doubt: str | None
+    """why there is no truth"""
     metric: Metric
     metric_reason: str
     """why it is this one, as a clause"""
@@ -135,7 +137,7 @@ class Tradeoff:
             "scene": self.scene.title if scene is None else scene,
             "title": self.scene.title,
             "truth": self.truth,
-            "truth_about": None if self.best is None else self.best.about,
+            "truth_about": self.doubt if self.best is None else self.best.about,
             "trusted_until": None if self.best is None else self.best.trusted_until,
             "duration": self.scene.world.duration,
             "metric": self.metric.name,

@@ -13,7 +13,7 @@ from typing import Any
 from sandbox.engines.registry import ENGINES, engine_named
 from sandbox.measure.compare.comparing import usual_tolerance
 from sandbox.measure.compare.patience import working
-from sandbox.measure.compare.truth import Truth, truth_of
+from sandbox.measure.compare.truth import Truth, seek_truth
 from sandbox.measure.recorder import require_memory
 from sandbox.measure.seeds import is_random, seeded
 from sandbox.measure.told import Told, nobody
@@ -70,7 +70,7 @@ def tradeoff(
     time_limit: float | None = None,
     repeats: int = REPEATS,
     most: int = POINTS,
-    truth: Truth | None = None,
+    truth: Truth | str | None = None,
     runs: Mapping[str, Trajectory] = MappingProxyType({}),
     told: Told | None = None,
     **settings: Any,
@@ -92,7 +92,8 @@ def tradeoff(
         time_limit: s after which nothing more is tried; what is tried then depends on the machine.
         repeats: how often what is near the front is timed.
         most: how many settings are tried.
-        truth: of this scene and its frames, as close as the tolerance asks for, where it is known already.
+        truth: of this scene and its frames, as close as the tolerance asks for, or why there is none, where it was
+            sought already.
         runs: by engine, runs of this scene with its own settings, where they were made already.
         told: called with what is being done.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
@@ -146,6 +147,7 @@ def tradeoff(
         return Tradeoff(
             scene=scene,
             best=judges[0].truth,
+            doubt=judges[0].doubt,
             metric=aim.metric,
             metric_reason=aim.reason,
             zoom=judges[0].zoom,
@@ -214,16 +216,17 @@ def _judges(
     close: float,
     seeds: Sequence[int],
     zoom: float | None,
-    known: Truth | None = None,
+    known: Truth | str | None = None,
 ) -> list[Judge]:
     """Return a judge for each seed; the truth of the scene's own may be known."""
     found: list[Judge] = []
     for seed in seeds:
         same = seed == scene.world.seed
         own = scene if same else seeded(scene, seed)
-        truth = known if same and known is not None else truth_of(own, base, close)
+        sought = known if same and known is not None else seek_truth(own, base, close)
+        truth, doubt = (sought, None) if isinstance(sought, Truth) else (None, sought)
         zoom = zoom_of(own, truth) if zoom is None else zoom  # the first one's for all: pixels are pixels
-        found.append(Judge(own, truth, zoom))
+        found.append(Judge(own, truth, zoom, doubt))
     return found
 
 

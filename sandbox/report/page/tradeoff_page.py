@@ -65,7 +65,8 @@ def metric_of(document: Document) -> str:
 def truth_of(document: Document) -> str:
     """Say what errors are measured against."""
     if not document.get("truth"):
-        return "There is no truth to measure errors against."
+        why = f": {document['truth_about']}" if document.get("truth_about") else ""
+        return f"There is no truth to measure errors against{why}."
     about = f" ({document['truth_about']})" if document.get("truth_about") else ""
     until = document.get("trusted_until")
     trusted = "" if until is None else f", trusted until {number(until, 4)} s"

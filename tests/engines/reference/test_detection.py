@@ -12,6 +12,7 @@ from sandbox.action import ActionError, Spawn
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.reference.detection import DETECTIONS
 from sandbox.engines.reference.detection.resting import MOST_IMPACTS
+from sandbox.measure.run import run
 from sandbox.scene.model import Box
 
 UNSEEING, SEEING = ["discrete", "bisect"], ["swept", "shrink"]
@@ -45,6 +46,21 @@ def test_swept_finds_it_along_the_straight_line_of_the_step(height, dt):
     # A chord misses the parabola by g·h²/8 at most, passed at this speed
     most = 9.81 * dt * dt / 8 / (9.81 * (landing - dt))
     assert abs(simulation.contacts().time[0] - landing) <= most * 1.01 + 1e-9
+
+
+def test_bounces_are_as_right_as_the_readme_says():
+    """By bisection to rounding; by the chord of each step to second order, since it passes the parabola by g·h²/8."""
+    scene = shipped("tutorial/bounce")
+    truth = run(scene, "exact").position
+
+    def error(detection, substeps):
+        found = run(scene, "reference", integrator="velocity_verlet", detection=detection, substeps=substeps)
+        return float(np.abs(found.position - truth).max())
+
+    assert error("bisect", 1) < 2e-11  # m; measured 1.1e-11: 1e-9 of a step at some 10 m/s
+    coarse, fine = error("swept", 1), error("swept", 2)
+    assert 2e-6 < coarse < 4e-6  # m; measured 3.1e-6
+    assert math.log2(coarse / fine) == pytest.approx(2.0, abs=0.2)  # measured 1.99
 
 
 def test_the_tutorials_fast_ball_is_met_within_its_first_step():

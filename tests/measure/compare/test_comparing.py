@@ -316,3 +316,13 @@ def test_truth_that_is_known_is_not_sought_again(monkeypatch: pytest.MonkeyPatch
     assert judged.best is known
     weighed = sandbox.tradeoff(BOUNCE, ("pymunk",), truth=known, most=1, repeats=1)
     assert weighed.points[0].error == judged.rows[0].score.max_position
+
+
+def test_what_a_notebook_shows_is_short() -> None:
+    comparison = compare(load(find("gas"), ["world.duration=1.0"]), ["pymunk"], why=True)
+    run, (row,) = comparison.trajectories["pymunk"], comparison.rows
+    for value in (comparison, comparison.best, row, run, run.at([0])):
+        assert len(repr(value)) < 1000
+    assert "pymunk" in repr(comparison)
+    assert "225 bodies" in repr(run)
+    assert "missed 0" in repr(row)

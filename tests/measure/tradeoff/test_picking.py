@@ -68,6 +68,14 @@ def test_times_within_the_noise_are_decided_by_counted_work() -> None:
     assert picked(10.0, 16.0, 20.0) == 3.0
 
 
+def test_of_settings_alike_in_time_and_work_the_one_that_changes_less_is_taken() -> None:
+    plain = point_of(10.4, 0.001, counted=10.4, substeps=2)
+    points = [point_of(10.0, 0.002, counted=10.0, substeps=2, half_kick=True), plain]
+    found = cheapest(points, AIM, (), never)
+    assert found is not None
+    assert found.point is plain
+
+
 def test_noise_of_the_clock_does_not_change_the_answer() -> None:
     noise = Random(1)
     for _ in range(200):

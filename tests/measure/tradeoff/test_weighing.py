@@ -19,7 +19,7 @@ from sandbox.measure.tradeoff import weighing as module
 from sandbox.measure.tradeoff.aim import UnknownMetricError
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.measure.tradeoff.picking import NOISE, called
+from sandbox.measure.tradeoff.picking import ALIKE, NOISE, called
 from sandbox.measure.tradeoff.point import Point
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
@@ -76,7 +76,7 @@ def test_pick_keeps_to_the_tolerance_when_run_on_its_own() -> None:
     able = [p for p in found.points if p.repeats and (p.error or 0.0) <= 4e-3]
     least = min(p.cost or 0.0 for p in able)
     close = [p for p in able if (p.cost or 0.0) <= NOISE * least]
-    assert point.counted == min(p.counted or 0.0 for p in close)
+    assert (point.counted or 0.0) <= ALIKE * min(p.counted or 0.0 for p in close)
 
 
 def test_pick_of_a_random_scene_keeps_to_the_tolerance_on_seeds_that_nobody_used() -> None:
@@ -230,6 +230,15 @@ def test_metric_and_its_reason_are_stated() -> None:
     assert weighed(scene_of(DROP), most=1, metric="energy").metric_reason == "it was asked for"
 
 
+def test_where_two_methods_contradict_each_other_an_invariant_is_the_metric_and_the_reason_is_stated() -> None:
+    why = "reference, dt halved 8 times; pymunk contradicts it from 0 s on"
+    found = weighed(scene_of(DROP), most=2, truth=why)
+    assert (found.best, found.truth, found.metric.name) == (None, None, "penetration")
+    assert found.metric_reason == f"no truth is known ({why}), and bodies can touch"
+    assert found.document()["truth_about"] == why
+    assert f"because no truth is known ({why})" in found.error_about
+
+
 def test_metric_in_pixels_scales_with_the_zoom() -> None:
     scene = scene_of(DROP)
     small, large = (weighed(scene, metric="pixels", zoom=zoom, most=1).points[0].error for zoom in (10.0, 1000.0))
@@ -259,13 +268,13 @@ def test_metric_in_pixels_scales_with_the_zoom() -> None:
 def test_senseless_figure_is_refused_before_anything_is_run(
     wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "truth_of", None)
+    monkeypatch.setattr(module, "seek_truth", None)
     with pytest.raises(ValueError, match=r"at least|positive"):
         tradeoff(scene_of(DROP), **wrong)
 
 
 def test_unknown_names_are_refused_before_anything_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "truth_of", None)
+    monkeypatch.setattr(module, "seek_truth", None)
     with pytest.raises(UnknownMetricError, match="metrics: max_position"):
         tradeoff(scene_of(DROP), metric="beauty")
     with pytest.raises(UnknownEngineError, match="engines: pymunk"):

@@ -65,6 +65,7 @@ def weighed(points: tuple[Point, ...], **more: Any) -> Tradeoff:
     scene = loads(SCENE, "hostile.toml")
     rest = {
         "best": None,
+        "doubt": None,
         "metric": METRICS["max_position"],
         "metric_reason": "the truth is trusted to the end",
         "zoom": 100.0,
