@@ -2,7 +2,7 @@
 
     import sandbox
 
-    scene = sandbox.load("scenes/tutorial/bounce.toml")
+    scene = sandbox.load("bounce")  # or a file
     run = sandbox.run(scene, engine="pymunk", dt=0.001)
     print(run.status, run.position[-1], run.missed_contacts)
 

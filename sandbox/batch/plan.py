@@ -147,6 +147,8 @@ def parse_sweep(text: str) -> tuple[str, list[Any]]:
     parts = values.split(":")
     if len(parts) in (3, 4) and not values.startswith(('"', "'", "[")):
         return key, list(_range(text, parts))
+    if len(parts) > 4 and all(_is_number(part) for part in parts[:-1]):
+        raise AddressError(f"{text!r}: a range is LOW:HIGH:N or LOW:HIGH:N:log")
     if len(parts) == 2 and all(_is_number(part) for part in parts):
         raise AddressError(f"{text!r}: a range needs a count: {key}={values}:N, such as {key}={values}:10")
     found = [parse_value(value) for value in _split(values)]

@@ -31,6 +31,7 @@ TABLES = "8-ball, 9-ball, snooker or three-cushion"
 @click.option("--seed", type=click.IntRange(0, 2**31), metavar="N", help="of the first frame; by default the scene's")
 @click.option("--frames", type=click.IntRange(1, 100_000), default=1, metavar="N", help="each with the next seed")
 @click.option("--distance", type=click.IntRange(1, 10_000), metavar="N", help="points to be made, in carom")
+@click.option("--misses", is_flag=True, help="with the foul and a miss, in snooker")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="keep each frame as a session to replay")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
@@ -43,12 +44,13 @@ def command(
     seed: int | None,
     frames: int,
     distance: int | None,
+    misses: bool,
     overrides: tuple[str, ...],
     out: Path | None,
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Play frames of billiards between bots, and tell the score.
+    """Play frames of billiards between bots, and print the score.
 
     SCENE is a table: a file, or the name of a shipped one. Players take the first shot in turn.
     """
@@ -59,7 +61,7 @@ def command(
     with gathering(faults, "--players", (GameError,)):
         count = len(bots_in(players))
     found: list[Scene] = []
-    terms: dict[str, Any] = {} if distance is None else {"distance": distance}
+    terms: dict[str, Any] = ({} if distance is None else {"distance": distance}) | ({"misses": True} if misses else {})
     with gathering(faults):
         require_folder(out)
         path = path_of(scene)

@@ -40,14 +40,14 @@ from sandbox.scene.faults import Fault, SceneError
 @click.option(
     "--player",
     metavar="WHO",
-    help="of a game: random, skilled, none, or a script file",
+    help="who plays a game: random, skilled, none, or a script file",
 )
-@click.option("--workers", type=click.IntRange(1, 256), default=1, metavar="N", help="how many runs at once")
+@click.option("--workers", type=click.IntRange(1, 256), default=1, metavar="N", help="run so many at the same time")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="store every run in a folder, once")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw the run: .png, .svg or .pdf")
 @click.option("--body", "bodies", multiple=True, metavar="NAME", help="which bodies to draw")
 @click.option("--audit/--no-audit", default=True, help="count the contacts that the engine misses")
-@click.option("--ledger", "ledger", is_flag=True, help="tell where energy went, by cause")
+@click.option("--ledger", "ledger", is_flag=True, help="account for energy, by cause")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 @click.option("--quiet", is_flag=True, help="no table, no progress")
 def command(
@@ -88,7 +88,7 @@ def command(
     with gathering(faults, "--sweep", (AddressError,)):
         jobs = plan(found, names, overrides, sound, seeds, plays)
     if plays is not None and jobs and not any(job.player == plays for job in jobs):
-        faults.append(Fault("--player", None, "", "nobody plays here: no scene named has a game with rules"))
+        faults.append(Fault("--player", None, "", "no scene given has a game with rules"))
     if not faults:
         with gathering(faults):
             _check_drawing(plot, bodies, jobs)

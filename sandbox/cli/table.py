@@ -4,6 +4,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+STEP = ("dt", "substeps")
+"""Settings that share a column."""
+
 Row = dict[str, Any]
 """A run as `--json` tells of it."""
 
@@ -22,7 +25,8 @@ def print_runs(rows: Sequence[Row]) -> None:
 
     swept = [key for key in rows[0]["set"] if key != "world.seed" and not key.startswith("solver.")]
     swept = [key for key in swept if len({str(row["set"][key]) for row in rows}) > 1]
-    differing = [key for key in rows[0]["settings"] if key != "dt" and _differs(rows, key)]
+    differing = [key for key in rows[0]["settings"] if key not in STEP and _differs(rows, key)]
+    substeps = any(row["settings"]["substeps"] > 1 for row in rows)
     seeds = len({row["seed"] for row in rows}) > 1
     scenes = len({row["scene"] for row in rows}) > 1
 
@@ -31,7 +35,7 @@ def print_runs(rows: Sequence[Row]) -> None:
     if scenes:
         table.add_column("scene", overflow="fold", min_width=SHORTEST_NAME)
     table.add_column("engine", no_wrap=True)
-    for head in ("dt", *swept, *differing, *(["seed"] if seeds else [])):
+    for head in ("dt × substeps" if substeps else "dt", *swept, *differing, *(["seed"] if seeds else [])):
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("status", no_wrap=True)
     joined = any(row["joint_error"] is not None for row in rows)
@@ -55,7 +59,7 @@ def print_runs(rows: Sequence[Row]) -> None:
         table.add_row(
             *([Text(row["scene"])] if scenes else []),
             row["engine"],
-            f"{row['settings']['dt']:.4g}",
+            f"{row['settings']['dt']:.4g}" + (f" × {row['settings']['substeps']}" if substeps else ""),
             *(_setting(row["set"][key]) for key in swept),
             *(_setting(row["settings"][key]) for key in differing),
             *([str(row["seed"])] if seeds else []),

@@ -300,6 +300,10 @@ class Stage:
         if key == "players" and players is not None:
             self.seat(players)
             return
+        if key == "misses":
+            self._seats.misses = value == "on"
+            self.restart()
+            return
 
         def turn(live: Live) -> None:
             for action in turned(live, key, value, self.hands.picked_of(live)):

@@ -47,8 +47,8 @@ _RANGES = {"greater_than": "gt", "greater_than_equal": "ge", "less_than": "lt", 
 """The bound that each of pydantic's errors speaks of."""
 
 _LARGE = 1e5
-"""A bound beyond this keeps nonsense away from the engines and is no choice of a person: it is named only to whom
-exceeds it. So is a least positive value below its reciprocal."""
+"""A bound beyond this only keeps nonsense away from the engines: a message names it where it is exceeded, not where the
+other bound is. The same holds for a smallest positive value below its reciprocal."""
 
 _DEGREES = 720
 """What is more than two turns in degrees is not taken for such."""
@@ -86,7 +86,7 @@ def explain(details: Any) -> tuple[Location, str]:
     elif location[:1] == ("joint",) and location[-1] == "between":
         expected = 'the name of one body or of two, such as ["a", "b"]'
     elif kind in ("too_short", "too_long") and location[-1] != "points":
-        expected = f"an array of {context.get('max_length', context.get('min_length'))}"
+        expected = f"an array of {_length(tuple(details['loc']), context)}"
     elif kind in _RANGES:
         expected = _range(tuple(details["loc"]), _RANGES[kind], context, value)
     elif kind in _EXPECTED:
@@ -109,6 +109,15 @@ def _too_few(details: Any) -> str:
     return f"must be an array of {wanted}, has {has}"
 
 
+def _length(location: Location, context: Any) -> str:
+    """Return how many values an array must have, of which pydantic names one bound."""
+    for each in _bounds(location):
+        low, high = each.get("min_length"), each.get("max_length")
+        if low != high and context.get("min_length", low) == low and context.get("max_length", high) == high:
+            return f"{low} or {high}" if low is not None and high == low + 1 else f"{low or 0} to {high}"
+    return str(context.get("max_length", context.get("min_length")))
+
+
 def _range(location: Location, violated: str, context: Any, value: float) -> str:
     """Return in words which numbers are allowed at a location, of which one bound was `violated`.
 
@@ -129,8 +138,12 @@ def _range(location: Location, violated: str, context: Any, value: float) -> str
     return words[violated].format(bound)
 
 
+_KEYS = ("ge", "gt", "le", "lt", "min_length", "max_length")
+"""The bounds of a value, as pydantic calls them."""
+
+
 def _bounds(location: Location) -> Iterator[dict[str, float]]:
-    """Yield the bounds that a field states, of itself and of what its values are made of: `ge`, `gt`, `le`, `lt`."""
+    """Yield the bounds that a field states, of itself and of what its values are made of, by their `_KEYS`."""
     field = _field_at(location)
     if field is not None:
         yield from _bounds_in(field.annotation, field.metadata)
@@ -140,7 +153,7 @@ def _bounds_in(annotation: Any, metadata: Any = ()) -> Iterator[dict[str, float]
     if get_origin(annotation) is Annotated:
         annotation, *more = get_args(annotation)
         metadata = [each for one in more for each in getattr(one, "metadata", [one])]
-    found = {key: getattr(each, key) for each in metadata for key in ("ge", "gt", "le", "lt") if hasattr(each, key)}
+    found = {key: getattr(each, key) for each in metadata for key in _KEYS if hasattr(each, key)}
     if found:
         yield found
     for inner in get_args(annotation):
@@ -216,7 +229,7 @@ def _known_keys(location: Location) -> str:
         if key in keys_of(model_at((table,))):
             return f"did you mean {table}.{key}?"
     if len(location) == 1:
-        homes = [table for table in _tables() if key in keys_of(model_at((table, 0)))]
+        homes = [table for table in list_tables() if key in keys_of(model_at((table, 0)))]
         if homes:
             some = ", ".join(f"[[{table}]]" for table in homes[:3])
             return f"it is a key of {some}{' and others' if len(homes) > 3 else ''}, and stands below such a heading"
@@ -228,7 +241,7 @@ _COMMON_TABLES = ("solver", "world")
 """The tables that every scene has: a key of theirs may be looked for in any other."""
 
 
-def _tables() -> list[str]:
+def list_tables() -> list[str]:
     """Return the tables of which a scene may have many, those of bodies first."""
     lists = [str(field.alias) for field in Scene.model_fields.values() if field.alias is not None]
     return sorted(lists, key=lambda table: table not in Scene().kinds)

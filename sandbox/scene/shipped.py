@@ -70,8 +70,8 @@ def find(text: str) -> Path:
 def scenes_in(text: str) -> tuple[str, ...]:
     """Return the names of the scenes of a folder, sorted: on the disk, or a shipped one, such as `tutorial`.
 
-    A TOML file without any key of a scene is none; one that cannot be read is left to whom reads it. What is a file or
-    a shipped scene's name is no folder, and has none.
+    A TOML file without any key of a scene is left out; one that cannot be parsed is kept, and reported.
+    The result is empty where the text is a file or the name of a shipped scene.
     """
     if _is_file(text) or _shipped_as(text):
         return ()

@@ -18,12 +18,16 @@ BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
         ("run bounce --set dt=0.01", 2, "dt (set): unknown key; did you mean solver.dt?"),
         ("run bounce --set gravity=[0,1]", 2, "did you mean world.gravity?"),
         ("run bounce --set ball.radius=1", 2, "name an element, such as ball.ball.radius, or all by ball.*.radius"),
+        ("run double_pendulum --set joint.length=3", 2, "such as joint.upper rod.length, or all by joint.*.length"),
+        ("run bounce --set scatter.count=3", 2, "scatter.count: the scene has no [[scatter]]"),
         ("run bounce --set ball.bal.radius=1", 2, "no element 'bal'; did you mean 'ball'?"),
         ("run bounce --set ground.restitution=1", 2, "that is an element: plane.ground.restitution"),
         ("run bounce --set wrold.bounds.x.y=1", 2, "did you mean world.bounds.x.y?"),
         ("run bounce --set radius=1", 2, "it is a key of [[ball]]"),
         ("run bounce --sweep solver.dt=1e-3:1e-2", 2, "a range needs a count: solver.dt=1e-3:1e-2:N"),
         ("run bounce --sweep solver.substeps=1:4", 2, "a range needs a count"),
+        ("run bounce --sweep solver.dt=1:2:3:4:5", 2, "a range is LOW:HIGH:N or LOW:HIGH:N:log"),
+        ("run bounce --set ball.ball.velocity.0=3", 2, "set it as a whole, ball.ball.velocity=…"),
         # engines
         ("run bounce --set solver.integrator=rk4", 1, "these could: reference; add --engine reference"),
         ("play bounce --set solver.integrator=rk4", 1, "these could: reference; add --engine reference"),
@@ -63,6 +67,11 @@ def test_mistake_is_answered_in_one_line_with_what_would_be_right(
 @pytest.mark.parametrize(
     ("text", "place", "words"),
     [
+        (
+            "[[pinball.wall]]\npoints = [[0, 0], [1, 1, 1, 1]]\n",
+            ":2: pinball.wall[0].points[1]",
+            "an array of 2 or 3, is",
+        ),
         (SLINGSHOT, ":3: pinball.slingshot[0].points", "a slingshot has 3 corners"),
         ('[solver]\nengine = "box2d"\n' + BALL, ":2: solver.engine", "the command line does, by --engine NAME"),
         ("dt = 0.1\n" + BALL, ":1: dt", "did you mean solver.dt?"),

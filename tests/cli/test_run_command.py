@@ -356,3 +356,11 @@ def test_session_with_something_changed_has_nothing_to_compare_with(
     _, document, _ = json_of(capfd, "run", written(tmp_path))
     assert "replayed" not in document["runs"][0]
     assert len(document["runs"][0]["state_hash"]) > 0
+
+
+def test_table_shows_substeps_beside_dt(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = lines_of(capfd, "run", written(tmp_path), "--set", "solver.substeps=4")
+    assert out[1].split()[:4] == ["engine", "dt", "×", "substeps"]
+    assert out[2].split()[1:4] == ["0.01", "×", "4"]
+    _, out, _ = lines_of(capfd, "run", written(tmp_path))
+    assert out[1].split()[:3] == ["engine", "dt", "status"]

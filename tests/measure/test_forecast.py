@@ -116,10 +116,13 @@ def test_bodies_that_nothing_bounds_have_no_safe_step() -> None:
     ball = '[[ball]]\nname = "b"\nposition = [3, 0]\nradius = 0.1\n[[post]]\nposition = [0, 0]\nradius = 0.2\n'
     sun = "[[attraction]]\ntoward = [0, 0]\nstrength = 10.0\n"
     assert largest_safe_dt(loads(ball)) == math.inf
-    assert largest_safe_dt(loads(ball + sun)) is None
+    assert largest_safe_dt(loads(ball + sun.replace("[0, 0]", "[0, 1]"))) is None
+    # Where a post stands in its place: v² = 2·s·(1/0.2 − 1/3).
+    onto = math.sqrt(2 * 10.0 * (1 / 0.2 - 1 / 3.0))
+    assert largest_safe_dt(loads(ball + sun)) == pytest.approx(0.3 / onto, rel=1e-12)  # roundings
     soft = loads(ball + sun + "softening = 0.1\n")
-    # From 3 m to the centre by energy: v² = 2·(s/ε)·atan(3/ε).
-    fastest = math.sqrt(2 * 100.0 * math.atan(30.0))
+    # From 3 m to the post by energy: v² = 2·(s/ε)·(atan(3/ε) − atan(0.2/ε)).
+    fastest = math.sqrt(2 * 100.0 * (math.atan(30.0) - math.atan(2.0)))
     assert largest_safe_dt(soft) == pytest.approx(0.3 / fastest, rel=1e-12)  # roundings
     wound = ball + '[[joint]]\nkind = "spring"\nbetween = ["b"]\nrest_length = 1.0\nstiffness = 200.0\n'
     # ½·200·2² J in 1 kg
@@ -527,3 +530,19 @@ def test_notes_tell_of_concave_outlines_and_of_what_an_audit_counts() -> None:
     (audit,) = [note for note in notes(scene) if note.kind == "audit"]
     assert audit.figures["bodies"] == 3
     assert notes(loads("[[ball]]\nposition = [0, 0]\nradius = 1\n")) == []
+
+
+def test_flight_of_first_order_is_noted_with_its_error() -> None:
+    scene = loads(
+        "[world]\ngravity = [0, -10]\nduration = 2.0\n[solver]\ndt = 0.08\n[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n"
+        "[[ball]]\nname = 'b'\nposition = [0, 20.5]\nradius = 0.5\n"
+    )
+    (note,) = [each for each in notes(scene) if each.kind == "flight"]
+    assert note.figures == {"body": "b", "error": pytest.approx(0.5 * 10 * 0.08 * 2.0, rel=1e-12)}  # a root's rounding
+    flown = loads(
+        "[world]\ngravity = [0, -10]\nduration = 2.0\n[solver]\ndt = 0.08\n[[ball]]\nposition = [0, 0]\nradius = 1\n"
+    )
+    off = run(flown, audit=False).position[-1, 0, 1] + 0.5 * 10 * 2.0**2
+    assert off == pytest.approx(float(note.figures["error"]), rel=1e-9)  # explicit Euler: exactly g·h·t/2
+    exact = scene.model_copy(update={"solver": scene.solver.replace(integrator="velocity_verlet", detection="bisect")})
+    assert "flight" not in [each.kind for each in notes(exact)]

@@ -1,4 +1,4 @@
-"""Forecasts at the ends of the schema's ranges: every scene that the format accepts gets an answer of finite figures."""
+"""Forecasts at the ends of the schema's ranges: every scene gets an answer, of finite figures."""
 
 import math
 from typing import Any

@@ -34,7 +34,7 @@ def test_swapped_anchors_of_one_body_are_warned_of_and_the_right_order_is_not(ki
     right, wrong = f"anchors = [[0, 0.2], [0, {high}]]", f"anchors = [[0, {high}], [0, 0.2]]"
     assert found(f'kind = "{kind}"\n{ONE}{more}{right}') == []
     (warning,) = found(f'kind = "{kind}"\n{ONE}{more}{wrong}')
-    assert (warning.kind, warning.figures) == ("anchors", {"joint": "joint-1", "body": "bob"})
+    assert (warning.kind, warning.figures) == ("anchors", {"joint": "joint-1", "body": "bob", "others": 0})
     assert f"{high} m from its centre" in warning.message
 
 

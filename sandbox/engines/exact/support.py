@@ -57,7 +57,7 @@ from sandbox.engines.exact.corner import corner
 from sandbox.engines.exact.hold import REST_TIME, keep, release
 from sandbox.engines.exact.impact import note, strike
 from sandbox.engines.exact.log import add_impulse, open_rest, open_row
-from sandbox.engines.exact.predict import parallel
+from sandbox.engines.exact.predict import PARALLEL, parallel
 from sandbox.engines.exact.roots import NOISE
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.engines.rebound import compiled_kick_gain, compiled_kicked, compiled_rebound
@@ -222,6 +222,8 @@ def slip_ends(arena: Arena, i: int) -> None:
 def pass_edge(arena: Arena, i: int) -> None:
     """Let a ball that has come to the end of a flat roll on to the next, or leave."""
     state, flats, f = arena.state, arena.flats, arena.tags[i, SUPPORT]
+    # Over a joint that falls off, its centre comes to the end of the one flat before it is over the next.
+    beside = TOUCH + PARALLEL * state[i, RADIUS]
     for g in range(len(flats)):
         if g == f or not parallel(flats, f, g):
             continue
@@ -231,8 +233,8 @@ def pass_edge(arena: Arena, i: int) -> None:
         foot, v = x * flats[g, UX] + y * flats[g, UY], state[i, VX] * flats[g, UX] + state[i, VY] * flats[g, UY]
         if v == 0.0:
             v = state[i, AX] * flats[g, UX] + state[i, AY] * flats[g, UY]
-        if (v > 0.0 and -TOUCH <= foot < flats[g, LENGTH] - TOUCH) or (
-            v < 0.0 and TOUCH < foot <= flats[g, LENGTH] + TOUCH
+        if (v > 0.0 and -beside <= foot < flats[g, LENGTH] - beside) or (
+            v < 0.0 and beside < foot <= flats[g, LENGTH] + beside
         ):
             arena.tags[i, SUPPORT] = g
             if arena.flat_tags[g, THING] != arena.flat_tags[f, THING]:

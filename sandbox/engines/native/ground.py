@@ -86,7 +86,7 @@ class Ground:
             self._setter.laws.stretches |= dict(zip(shapes, parts, strict=True))
         if isinstance(thing, Wall):
             joints = {shape: part for shape, part in zip(shapes, wall_segments(thing), strict=True) if any(part.joints)}
-            self._setter.laws.joints |= joints
+            self._setter.gates.joints |= joints
         if isinstance(thing, Wall) and thing.one_way:
             self._setter.gates.walls.update(shapes)
         return shapes
@@ -104,7 +104,7 @@ class Ground:
             self._space.remove(*shapes)
             for shape in shapes:
                 self._setter.laws.stretches.pop(shape, None)
-                self._setter.laws.joints.pop(shape, None)
+                self._setter.gates.joints.pop(shape, None)
                 self._setter.gates.walls.discard(shape)
             shapes[:] = self._shapes(new, body, np.zeros(2), self.reach)  # a wall is as long as it is
             for k in shuffled(len(shapes)):

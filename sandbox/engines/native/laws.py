@@ -6,12 +6,11 @@ neither kicked nor told anything new.
 """
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pymunk
 
-from sandbox.engines.fixtures import WallSegment
 from sandbox.engines.native.approach import closing_speed
 from sandbox.engines.native.chains import smooth
 from sandbox.engines.native.gates import Gates
@@ -23,9 +22,6 @@ from sandbox.trajectory import FloatArray
 
 Stretches = dict[pymunk.Shape, tuple[float, float]]
 """At which shares of its whole wall each segment of one that kicks begins and ends."""
-
-Joints = dict[pymunk.Shape, WallSegment]
-"""The segments of walls that run on beyond an end of theirs."""
 
 
 @dataclass
@@ -67,30 +63,41 @@ class Laws:
     space: pymunk.Space
     gates: Gates
     stretches: Stretches = field(default_factory=dict)
-    joints: Joints = field(default_factory=dict)
     told: dict[int, Given] | None = None
     """what kicked in the last substep, by the addresses of arbiters; where a dict is put here"""
     _known: dict[tuple[int, int], list[Law]] = field(default_factory=dict)
 
-    def renew(self, surfaces: Surfaces, wrong: set[tuple[int, int]]) -> None:
-        """Let those pairs (a ≤ b) be told their coefficients, and no others any more."""
+    def renew(self, surfaces: Surfaces, wrong: set[tuple[int, int]], jointed: set[tuple[int, int]]) -> None:
+        """State the coefficients of those pairs (a ≤ b) at each contact, and of no others any more.
+
+        Args:
+            surfaces: all.
+            wrong: pairs that factors cannot serve.
+            jointed: pairs of polygons and walls of several segments, whose contacts are mended.
+        """
         for known in self._known.values():
             known.clear()
-        for a, b in sorted(wrong):
+        for a, b in sorted(wrong | jointed):
             kick = surfaces.surfaces[a].kick or surfaces.surfaces[b].kick
             restitution, friction = float(surfaces.restitution[a, b]), float(surfaces.friction[a, b])
             known = self._known.setdefault((a, b), [])
             known.append(Law(restitution, friction, float(surfaces.falloff[a, b]), kick))
             self.space.on_collision(a + 1, b + 1, pre_solve=self._tell, data=known)
+            if (a, b) in jointed and not (surfaces.one_way[a] or surfaces.one_way[b]):  # whose `begin` is the gates'
+                self.space.on_collision(a + 1, b + 1, begin=self._smooth)
+
+    def _smooth(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
+        smooth(arbiter, self.gates.joints)  # before what a contact begins with is read, along its normal
 
     def _tell(self, arbiter: pymunk.Arbiter, _: pymunk.Space, known: list[Law]) -> None:
         if not known:
             return
-        if not arbiter.process_collision:
-            self.gates.passed(arbiter)
-            return
-        if self.joints:
-            smooth(arbiter, self.joints)
+        if self.gates.walls:
+            self.gates.note(arbiter)
+            if not arbiter.process_collision:
+                return
+        if self.gates.joints:
+            smooth(arbiter, self.gates.joints)
         law = known[0]
         arbiter.restitution, arbiter.friction = law.restitution, law.friction
         if law.steady:

@@ -57,7 +57,7 @@ def is_covered(
     """
     along_x, along_y = bx - ax, by - ay
     length2 = along_x * along_x + along_y * along_y
-    if length2 == 0.0:
+    if length2 == 0.0 or (x == ax and y == ay) or (x == bx and y == by):
         return False
     share = (along_x * (x - ax) + along_y * (y - ay)) / length2
     if share <= 0.0:

@@ -36,12 +36,12 @@ PAUSE, THINKS = 1.5, 1.0
 """s between two stones, and that a team that plays by itself holds its broom before it delivers"""
 
 CONTROLS = (
-    Control("left", "hold the broom further to the left", ("left",), "left -leftx"),
-    Control("right", "hold it further to the right", ("right",), "right +leftx"),
+    Control("left", "move the broom left", ("left",), "left -leftx"),
+    Control("right", "move the broom right", ("right",), "right +leftx"),
     Control("harder", "more weight", ("up",), "up -lefty"),
     Control("softer", "less weight", ("down",), "down +lefty"),
-    Control("turn", "let it turn the other way", ("t",), "y"),
-    Control("throw", "let it go", ("space",), "a"),
+    Control("turn", "reverse the turn", ("t",), "y"),
+    Control("throw", "release", ("space",), "a"),
     Control("sweep", "sweep: further and straighter", ("s", "left shift"), "b rt"),
 )
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
-from sandbox.measure.compare.alignment import Event
+from sandbox.measure.compare.alignment import Event, Kind
 from sandbox.measure.compare.errors import Score
 from sandbox.measure.compare.truth import Truth
 from sandbox.measure.compare.why import Knob
@@ -44,6 +44,12 @@ class Row:
     """what one knob at a time does to the error"""
     verdict: str | None = None
     """the sentence that follows from it"""
+
+    def __repr__(self) -> str:
+        """Name engine and status, the largest error and how many contacts there are of each kind."""
+        error = "unknown" if self.score.max_position is None else f"{self.score.max_position:.3g} m"
+        counts = ", ".join(f"{kind} {sum(e.kind == kind for e in self.events or ())}" for kind in get_args(Kind))
+        return f"<Row {self.engine}: {self.status}, max error {error}, contacts: {counts}>"
 
     def count(self, kind: str) -> int | None:
         """Return how many contacts were `matched`, `missed`, `phantom` or `after_divergence`."""
@@ -99,6 +105,16 @@ class Comparison:
     doubt: str | None = None
     """why there is no truth"""
 
+    def __repr__(self) -> str:
+        """Name the scene and the truth, and the largest error of each engine."""
+        off = (
+            f"{row.engine} {row.status}"
+            if row.score.max_position is None
+            else f"{row.engine} {row.score.max_position:.3g} m"
+            for row in self.rows
+        )
+        return f"<Comparison {self.scene.title!r}: {self.sentence()}; max error: {', '.join(off)}>"
+
     @property
     def truth(self) -> str | None:
         """`closed_form`, `exact` or `refined`."""
@@ -112,7 +128,7 @@ class Comparison:
     def sentence(self) -> str:
         """Say what the truth is, and how far it goes."""
         if self.best is None:
-            return f"truth: none; {self.doubt}"
+            return f"truth: none: {self.doubt}"
         whole = self.scene.world.duration
         name = self.best.kind.replace("_", " ")
         until = f"trusted until {self.best.trusted_until:.4g} s of {whole:.4g} s"

@@ -1,20 +1,17 @@
 """Horizon: until when a run can be predicted, measured by a second run whose start differs by 1e-12 m in every body."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from sandbox.measure.compare.errors import errors
-from sandbox.measure.compare.gaps import bounding_gaps, gap
+from sandbox.measure.compare.gaps import Pair, close_pairs, gap
 from sandbox.measure.joint_error import HOLDING
-from sandbox.scene.bodies import Bodies
 from sandbox.scene.driven import driven_in
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Scene
-from sandbox.scene.near import near_pairs
-from sandbox.trajectory import BoolArray, FloatArray, IntArray, Trajectory
+from sandbox.trajectory import FloatArray, IntArray, Trajectory
 
 NUDGE = 1e-12
 """m"""
@@ -24,8 +21,6 @@ TOUCH = 1e-9
 """m: gaps and overlaps no larger than this count as touching; larger ones stay what they are if moved by 1e-12 m."""
 PARALLEL = 1e-6
 """Sine of the angle up to which two contact normals count as parallel: their numerical derivative has seven digits."""
-
-Edge = tuple[int, int]
 
 
 def perturb(scene: Scene, amount: float = NUDGE, seed: int = 0) -> Scene | None:
@@ -90,45 +85,19 @@ def perturb(scene: Scene, amount: float = NUDGE, seed: int = 0) -> Scene | None:
     return scene.placed(replace(bodies, position=position, velocity=velocity, angle=angle), scene.began)
 
 
-def touching_pairs(scene: Scene, touch: float = TOUCH) -> list[tuple[Edge, FloatArray]]:
+def touching_pairs(scene: Scene, touch: float = TOUCH) -> list[tuple[Pair, FloatArray]]:
     """Return which pairs touch at the start of a scene, and a normal of each, (2,).
 
     Args:
         scene: whose bodies and fixed things; numbered as in `Contacts`. Of a pair, one can move.
         touch: m; a gap or an overlap of no more is a touch.
     """
-    bodies = scene.bodies
-    still = bodies.fixed | driven_in(scene, bodies)
-    meeting = meetings(scene).touches | bodies.fixed
-    pairs = [(i, j) for i, j in _near(bodies, meeting, touch) if not (still[i] and still[j])]
-    pairs = [pair for pair in pairs if bodies.round[[*pair]].all() or abs(_gap(scene, pair)) <= touch]
-    movable = np.flatnonzero(~still & meeting)
-    for k, thing in enumerate(scene.fixed):
-        clear = bounding_gaps(bodies, thing)
-        near = [(number, -1 - k) for number in movable[clear[movable] <= touch].tolist()]
-        pairs += [p for p in near if abs(clear[p[0]] if bodies.round[p[0]] else _gap(scene, p)) <= touch]
+    still = scene.bodies.fixed | driven_in(scene, scene.bodies)
+    pairs = [pair for pair, clear in close_pairs(scene, touch) if clear >= -touch]
     return [((i, j), _normal(scene, j if still[i] else i, (i, j))) for i, j in pairs]
 
 
-def _near(bodies: Bodies, meeting: BoolArray, touch: float) -> Iterator[Edge]:
-    """Yield the pairs of bodies whose bounding discs touch or overlap; of two balls only those that touch."""
-    chosen = np.flatnonzero(meeting)
-    if len(chosen) < 2:
-        return
-    position, radius, is_ball = bodies.position, bodies.radius, bodies.round
-    for a, b in near_pairs(position[chosen], (2.0 * float(radius[chosen].max()) + touch) * (1.0 + 1e-9)):  # rounding
-        i, j = chosen[np.minimum(a, b)], chosen[np.maximum(a, b)]
-        apart = np.hypot(*(position[j] - position[i]).T) - radius[i] - radius[j]
-        close = (apart <= touch) & ~((apart < -touch) & is_ball[i] & is_ball[j])
-        yield from zip(i[close].tolist(), j[close].tolist(), strict=True)
-
-
-def _gap(scene: Scene, pair: Edge) -> float:
-    bodies = scene.bodies
-    return float(gap(scene, bodies, bodies.position[None], bodies.angle[None], pair)[0])
-
-
-def _normal(scene: Scene, number: int, pair: Edge) -> FloatArray:
+def _normal(scene: Scene, number: int, pair: Pair) -> FloatArray:
     """Return the direction in which the gap of a pair grows as one of its bodies moves, (2,), of length 1."""
     bodies = scene.bodies
     place = bodies.position[number]
@@ -144,7 +113,7 @@ def _normal(scene: Scene, number: int, pair: Edge) -> FloatArray:
     return slope / length if length > 0.0 else np.zeros(2)
 
 
-def _groups(count: int, edges: list[Edge]) -> IntArray:
+def _groups(count: int, edges: list[Pair]) -> IntArray:
     """Return for each of `count` bodies the lowest number among those it is connected with."""
     parent = list(range(count))
 

@@ -7,7 +7,6 @@ the answer itself: what its own last halving has changed tells how far it still 
 
 import math
 from collections.abc import Iterator
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.drift import momentum_drift
 from sandbox.measure.compare.errors import Errors, errors
-from sandbox.measure.compare.patience import TookTooLongError, patient_run
+from sandbox.measure.compare.patience import TookTooLongError, patient_run, working
 from sandbox.measure.compare.refined import Refined, half, preferences
 from sandbox.measure.energy import energies
 from sandbox.measure.recorder import frame_count
@@ -25,9 +24,9 @@ from sandbox.scene.settings import Settings
 from sandbox.trajectory import FloatArray, Trajectory
 
 SHARE = 0.5
-"""Of the work of the answer, what one witness may take, if three runs do not take more already."""
-PATIENCE = 10.0
-"""s that one witness may take."""
+"""Of the work of the answer, what one witness may take, if three runs do not take more; all may take twice that."""
+PATIENCE = 20.0
+"""s that all witnesses may take."""
 CLOSE = 10.0
 """Tolerances: a witness whose last halving changes more than that has not converged, and confirms nothing."""
 CONVERGES = 2.0
@@ -39,7 +38,7 @@ IMPACT = 2.0
 RUNS = 3
 """The fewest runs from which a witness may contradict: two halvings, as one alone may change little by chance."""
 GROWTH = 0.01
-"""The share of the largest kinetic energy so far by which energy may grow without a source; likewise momentum."""
+"""The share of the largest kinetic energy by which energy may grow without a source; likewise momentum."""
 
 METHODS: tuple[dict[str, object], ...] = (
     {"integrator": "semi_implicit_euler", "detection": "shrink"},
@@ -95,19 +94,25 @@ def confirmed(scene: Scene, found: Refined, settings: Settings, tolerance: float
     else:
         limit = ""
     best: Confirmation | None = None
+    end, work = working() + PATIENCE, 0
     for name, wanted in _witnesses(scene, found, settings):
-        testimony = _testimony(scene, name, wanted, found, tolerance, until)
+        if best is not None and work >= 2.0 * SHARE * found.work:
+            break
+        testimony, took = _testimony(scene, name, wanted, found, tolerance, until, end)
+        work += took
         if testimony is None:
             continue
         by = _method(scene, name, wanted, found)
         if testimony.until >= until:
             return Confirmation(until, by, limit)
         if testimony.contradicts:
-            what = f"{by} comes to another answer, {testimony.apart:.2g} m away"
+            what = f"{found.engine} and {by} converge to different answers, {testimony.apart:.2g} m apart"
             return Confirmation(testimony.until, by if testimony.until > 0.0 else None, what)
         if best is None or testimony.until > best.until:
-            best = Confirmation(testimony.until, by, f"{by} confirms no more, and has not converged")
-    return best or Confirmation(0.0, None, "no second method can run the scene to confirm it")
+            best = Confirmation(testimony.until, by, f"{by} has not converged and confirms no more")
+    return best or Confirmation(
+        0.0, None, "no second engine or method can run the scene and confirm what the first one says"
+    )
 
 
 def _witnesses(scene: Scene, found: Refined, settings: Settings) -> Iterator[tuple[str, Settings]]:
@@ -149,10 +154,12 @@ def _method(scene: Scene, name: str, wanted: Settings, found: Refined) -> str:
 
 
 def _testimony(
-    scene: Scene, engine: str, settings: Settings, found: Refined, tolerance: float, until: float
-) -> _Testimony | None:
-    """Refine a witness until it agrees, contradicts, or has worked enough; None where it does not get to its end."""
-    began = perf_counter()
+    scene: Scene, engine: str, settings: Settings, found: Refined, tolerance: float, until: float, end: float
+) -> tuple[_Testimony | None, int]:
+    """Refine a witness until it agrees, contradicts, has worked enough, or its time ends; return also its work.
+
+    None where it does not get to its end.
+    """
     moving = ~scene.bodies.fixed
     each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
     allowed, work = max(SHARE * found.work, (2**RUNS - 1) * each), 0
@@ -162,7 +169,7 @@ def _testimony(
     testimony: _Testimony | None = None
     while work + each <= allowed:
         try:
-            run = patient_run(scene, engine, settings, PATIENCE - (perf_counter() - began), audit=True)
+            run = patient_run(scene, engine, settings, end - working(), audit=True)
         except TookTooLongError:
             break
         if run.status != "ok":
@@ -180,13 +187,13 @@ def _testimony(
                 break
             changed.append(step)
         elif not (away.position[away.time <= until] > tolerance).any() and not len(run.missed_time):
-            return _Testimony(until, False, 0.0)
+            return _Testimony(until, False, 0.0), work + each
         coarse, work, each = run, work + each, 2 * each
         finer = half(settings)
         if finer is None:
             break
         settings = finer
-    return testimony
+    return testimony, work
 
 
 def _heard(
@@ -224,17 +231,17 @@ def _lawful_until(scene: Scene, run: Trajectory, tolerance: float) -> tuple[floa
     end = scene.world.duration
     drift = momentum_drift(run, scene)
     if drift is not None and abs(drift) > GROWTH:
-        return 0.0, f"its momentum changes by {abs(drift):.2g} of all there is, without a cause"
+        return 0.0, f"the momentum in {run.info['engine']} changes by {abs(drift):.1%} without a cause"
     if demands(scene) & SOURCES or (scene.bodies.born > scene.began).any():
         return end, ""
     energy = energies(run, scene)
     kept = run.time < np.nanmin(run.retired_time, initial=np.inf)  # what is retired takes its energy along
     weight = float(np.where(scene.bodies.fixed, 0.0, scene.bodies.mass).sum()) * math.hypot(*scene.world.gravity)
-    allowed = GROWTH * np.maximum.accumulate(energy.kinetic) + weight * tolerance
+    allowed = GROWTH * float(energy.kinetic.max(initial=0.0)) + weight * tolerance
     grown = energy.total - np.minimum.accumulate(energy.total)
     broken = np.flatnonzero((grown > allowed) & kept)
     if not len(broken):
         return end, ""
     first = int(broken[0])
     until = float(run.time[first - 1]) if first else 0.0
-    return until, f"its energy grows by {float(grown[first]):.2g} J without a source"
+    return until, f"the energy in {run.info['engine']} grows by {float(grown[first]):.2g} J without a source"

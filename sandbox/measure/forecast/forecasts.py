@@ -12,6 +12,7 @@ from sandbox.measure.forecast.events import event_warnings
 from sandbox.measure.forecast.joint_starts import joint_start_warnings
 from sandbox.measure.forecast.kicks import kick_warnings
 from sandbox.measure.forecast.laid import Laid, laid
+from sandbox.measure.forecast.orbits import orbit_warnings
 from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, Passage, farther, meet_each_other, passages
 from sandbox.measure.forecast.speeds import Speeds
 from sandbox.measure.forecast.springs import damper_warnings, spring_warnings
@@ -133,6 +134,8 @@ def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Wa
             "odds": odds,
             "safe_dt": safe,
         }
+        if passage.struck:
+            figures["struck"] = True
         yield Warning("tunnelling", message, figures)
 
 
@@ -147,21 +150,27 @@ def _depth(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning
     bodies, speeds = scene.bodies, Speeds(scene, meet)
     layers = reach(scene, bodies)
     movers = meet.touches & ~bodies.fixed & (bodies.thin > 0.0)
+    found: dict[tuple[str, float], tuple[str, float, int]] = {}
     for plane, name in zip(scene.fixed, scene.fixed_names, strict=False):
         able = np.flatnonzero(movers & (layers & mask_of(plane.layers, scene.layers) != 0))
         if not isinstance(plane, Plane) or not len(able):
             continue
         speed = speeds.toward(plane)[able]
         k = int(np.argmax(speed / bodies.thin[able]))
-        half, way = float(bodies.thin[able[k]]), float(speed[k]) * settings.h
+        key = bodies.names[able[k]], float(speed[k])
+        first, half, count = found.get(key, (name, float(bodies.thin[able[k]]), -1))
+        found[key] = first, half, count + 1
+    for (body, top), (name, half, others) in found.items():
+        way = top * settings.h
         if way <= half * (1.0 + ROUNDING):
             continue
-        body, safe = bodies.names[able[k]], settings.dt * half / way
+        safe = settings.dt * half / way
+        more = f" and {others:,} other{'s' if others > 1 else ''} like it" if others else ""
         message = (
-            f"{body!r} can meet {name!r} at up to {speed[k]:.4g} m/s and be {way:.3g} m deep in it when the contact is "
-            f"found; dt <= {at_most(safe)} s keeps that below its half width, {half:.3g} m"
+            f"{body!r} can meet {name!r}{more} at up to {top:.4g} m/s and be {way:.3g} m deep in it when the contact "
+            f"is found; dt <= {at_most(safe)} s keeps that below its half width, {half:.3g} m"
         )
-        figures: Figures = {"ball": body, "thing": name, "speed": float(speed[k]), "depth": way, "safe_dt": safe}
+        figures: Figures = {"ball": body, "thing": name, "speed": top, "depth": way, "safe_dt": safe}
         yield Warning("depth", message, figures)
 
 
@@ -249,6 +258,7 @@ FORECASTS: dict[str, Forecast] = {
     "joints": Forecast(lambda s: joint_start_warnings(s.scene)),
     "springs": Forecast(lambda s: spring_warnings(s.scene, s.settings)),
     "dampers": Forecast(lambda s: damper_warnings(s.scene, s.settings), frozenset({"reference"})),
+    "orbits": Forecast(lambda s: orbit_warnings(s.scene, s.settings, s.meet)),
     "chains": Forecast(lambda s: chain_warnings(s.scene, s.settings)),
     "stretch": Forecast(lambda s: stretch_warnings(s.scene, s.settings)),
     "stacks": Forecast(lambda s: stack_warnings(s.scene, s.settings, s.close)),

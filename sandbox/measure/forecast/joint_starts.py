@@ -1,4 +1,4 @@
-"""Joints at the start: those that the first step would have to pull together, and anchors in the wrong order."""
+"""Joints at the start: warnings of joints with an initial error, and of anchors in the wrong order."""
 
 from collections.abc import Iterator
 
@@ -14,7 +14,7 @@ LOOSE = 0.01
 """An error below this part of a joint's length is rounding of the figures in a file, which have two or three digits."""
 
 FAR = 2.0
-"""An anchor beyond this many radii of its own body is held by nothing of it: a lever without mass, or a mistake."""
+"""An anchor farther than this many radii from its body's centre is a lever without mass, or a mistake."""
 
 ANGLES = (LinkKind.ROTARY_LIMIT, LinkKind.GEAR)
 ANCHORED = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.SPRING)
@@ -23,10 +23,10 @@ ORDER = "of a joint with one body, the first of its `anchors` is in the body's f
 
 
 def joint_start_warnings(scene: Scene) -> Iterator[Warning]:
-    """Yield a warning for the joint that starts farthest from what it holds, and for each with swapped anchors.
+    """Yield a warning for the joint with the largest initial error, and one for the first joint with swapped anchors.
 
-    A joint is taken for swapped where it holds one body by a point far outside it, its other anchor would be within
-    the body, and the joint does not start satisfied in a way that only the given order explains.
+    Anchors count as swapped where a joint with one body holds it by a point far outside it while the other anchor would
+    lie within the body; not so of a pivot that starts satisfied, since the other order would violate it.
     """
     links = scene.links
     if not len(links):
@@ -38,26 +38,30 @@ def joint_start_warnings(scene: Scene) -> Iterator[Warning]:
     if off.any():
         worst = int(np.argmax(np.where(off, shares, 0.0)))
         yield _off(links, worst, float(errors[worst]), int(off.sum()) - 1)
-    for k in np.flatnonzero(swapped).tolist():
+    if swapped.any():
+        k, others = int(np.argmax(swapped)), int(swapped.sum()) - 1
         name, body = links.names[k], scene.bodies.names[int(links.b[k])]
         x, y = links.anchor_b[k].tolist()
         message = (
             f"the joint {name!r} holds {body!r} by the point ({x:g}, {y:g}), {np.hypot(x, y):.3g} m from its centre "
-            f"and outside it: {ORDER}; swapped, they would fit"
+            f"and outside it: {ORDER}; swapped, they would fit{_and_others(others)}"
         )
-        yield Warning("anchors", message, {"joint": name, "body": body})
+        yield Warning("anchors", message, {"joint": name, "body": body, "others": others})
 
 
 def _off(links: Links, k: int, error: float, others: int) -> Warning:
     """Return the warning for a joint that starts off by an error, m or rad."""
     unit, name = "rad" if links.kind[k] in ANGLES else "m", links.names[k]
-    more = f" (and {others:,} other{'s' if others > 1 else ''} by less)" if others else ""
     message = (
-        f"the joint {name!r} starts {error:.3g} {unit} away from what it holds{more}; the first steps correct it, "
-        "fast and with energy from nowhere"
+        f"the joint {name!r} starts {error:.3g} {unit} away from what it holds{_and_others(others)}; "
+        "the first steps correct it, which adds energy"
     )
     figures: Figures = {"joint": name, "error": error, "others": others}
     return Warning("joint_start", message, figures)
+
+
+def _and_others(count: int) -> str:
+    return f" (and {count:,} other{'s' if count > 1 else ''} too)" if count else ""
 
 
 def _swapped(scene: Scene, links: Links) -> BoolArray:

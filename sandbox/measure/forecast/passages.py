@@ -86,8 +86,8 @@ ALIKE = 1.1
 def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
     """Return for each thing, and for bodies among themselves, which bodies can pass it, each at its own speed.
 
-    Bodies about as fast for their size are one passage, which has the figures of the worst of them. Where impacts by others can make a body faster than any is by itself,
-    the worst such passage is added.
+    Bodies about as fast for their size are one passage, which has the figures of the worst of them. Where impacts by
+    others can make a body faster than any is by itself, the worst such passage is added.
     """
     meet = meetings(scene) if meet is None else meet
     bodies = scene.bodies

@@ -10,7 +10,7 @@ from sandbox.measure.forecast.held import farthest_fall
 from sandbox.measure.forecast.warning import ROUNDING
 from sandbox.scene.forces import Attraction
 from sandbox.scene.links import LinkKind
-from sandbox.scene.meetings import Meetings
+from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Plane, Post, Scene, Wall
 from sandbox.scene.near import FloatArray
 from sandbox.scene.part import MAX_SPEED
@@ -32,7 +32,7 @@ class Speeds:
     def unknown(self) -> tuple[str, ...]:
         """What makes bodies faster by an amount that no formula here bounds."""
         scene, found = self.scene, []
-        if any(_is_steep(each) for each in scene.attractions):
+        if any(self._is_steep(each) for each in scene.attractions):
             found.append("attraction without softening")
         if scene.drives:
             found.append("drives")
@@ -66,13 +66,8 @@ class Speeds:
             held[springs.a[springs.a >= 0]] = True
             squared += np.where(held, 2.0 * float(stored[0]) / bodies.mass, 0.0)
         for each in scene.attractions:
-            if each.strength == 0.0 or _is_steep(each):
-                continue
-            place = bodies.position[bodies.names.index(each.toward)] if isinstance(each.toward, str) else each.toward
-            away = np.hypot(*(bodies.position - np.asarray(place)).T)
-            angle = np.arctan(away / each.softening)
-            fall = angle if each.strength > 0.0 else 0.5 * math.pi - angle  # drawn in, or driven away for ever
-            squared += 2.0 * abs(each.strength) / each.softening * fall
+            if each.strength != 0.0 and not self._is_steep(each):
+                squared += 2.0 * abs(each.strength) * self._fallen(each)
         return np.asarray(squared)
 
     @cached_property
@@ -118,9 +113,11 @@ class Speeds:
 
     def toward(self, thing: Plane | Wall | Post) -> FloatArray:
         """Return how fast each body can be, by its own start, fall and forces, where it touches a fixed thing, (N,)."""
-        if self.gravity == 0.0 or isinstance(thing, Plane):
-            return self.own
         bodies = self.scene.bodies
+        if isinstance(thing, Plane):
+            return self._across(thing)
+        if self.gravity == 0.0:
+            return self.own
         if isinstance(thing, Wall):
             depths, half = np.asarray(thing.points) @ self.down, 0.5 * thing.thickness
         else:
@@ -131,6 +128,20 @@ class Speeds:
         on_top = level & (depth + bodies.core <= float(depths.max()) - half)
         drop = np.where(on_top, float(depths.max()) - half - bodies.core - depth, lowest + bodies.radius - depth)
         return np.minimum(self.own, self._moved(self._after(drop)))
+
+    def _across(self, plane: Plane) -> FloatArray:
+        """Return how fast each body can be where it touches a plane, (N,) m/s.
+
+        Where nothing else can turn its flight, only the component across the plane counts.
+        """
+        scene, bodies = self.scene, self.scene.bodies
+        others = len(scene.links) or self.meet.mutual or scene.attractions or scene.thrusts or scene.drives
+        if len(scene.fixed) > 1 or others or any(scene.world.wind):
+            return self.own
+        normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+        pull = max(0.0, -float(np.asarray(scene.world.gravity) @ normal))
+        height = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
+        return np.minimum(self.own, self._moved(np.sqrt(np.square(bodies.velocity @ normal) + 2.0 * pull * height)))
 
     @cached_property
     def struck(self) -> FloatArray:
@@ -158,6 +169,39 @@ class Speeds:
             speed[movers] = np.maximum(speed[movers], fastest[of_body])
         return np.where(speed > own * (1.0 + ROUNDING), speed, 0.0)
 
+    def core(self, attraction: Attraction) -> float:
+        """Return how near its centre bodies can get at most, m: to what is solid there."""
+        scene, bodies = self.scene, self.scene.bodies
+        if isinstance(attraction.toward, str):
+            core = float(bodies.core[bodies.names.index(attraction.toward)])
+            return core if self.meet.mutual else 0.0
+        posts = (
+            post for post in scene.posts if post.solid and math.dist(post.position, attraction.toward) < post.radius
+        )
+        cores = [post.radius - math.dist(post.position, attraction.toward) for post in posts]
+        fixed = bodies.fixed & (bodies.core > 0.0)
+        away = np.hypot(*(bodies.position - np.asarray(attraction.toward)).T)
+        cores += (bodies.core - away)[fixed].tolist() if self.meet.mutual else []
+        return max(0.0, *cores, 0.0)
+
+    def _fallen(self, attraction: Attraction) -> FloatArray:
+        """Return the integral of 1/(r² + ε²) over each body's way to the centre, or far away from it, (N,) 1/m."""
+        bodies, soft, near = self.scene.bodies, attraction.softening, self.core(attraction)
+        toward = attraction.toward
+        place = bodies.position[bodies.names.index(toward)] if isinstance(toward, str) else np.asarray(toward)
+        away = np.maximum(np.hypot(*(bodies.position - place).T), near)
+        drawn = attraction.strength > 0.0
+        if soft == 0.0:
+            with np.errstate(divide="ignore"):
+                return np.asarray(1.0 / near - 1.0 / away if drawn else 1.0 / away)
+        angle = np.arctan(away / soft)
+        return np.asarray((angle - math.atan(near / soft) if drawn else 0.5 * math.pi - angle) / soft)
+
+    def _is_steep(self, attraction: Attraction) -> bool:
+        """Return whether an attraction can make bodies faster than anything may be: nothing bounds the way to it."""
+        near = max(attraction.softening, self.core(attraction))
+        return abs(attraction.strength) >= near * MAX_SPEED**2 and attraction.strength != 0.0
+
     def _after(self, drop: FloatArray) -> FloatArray:
         """Return the speeds after a drop, or 0 where it cannot rise so high, (N,) m/s."""
         return np.asarray(np.sqrt(np.maximum(self.squared + 2.0 * self.gravity * drop, 0.0)))
@@ -165,10 +209,19 @@ class Speeds:
     def _moved(self, speed: FloatArray) -> FloatArray:
         """Return speeds with what thrusts and wind add; 0 for fixed bodies."""
         world, bodies = self.scene.world, self.scene.bodies
-        speed = speed + self.thrust
         if world.linear_drag or world.quadratic_drag:
+            if not len(self.scene.links) and not self.scene.attractions:
+                speed = np.minimum(speed, np.maximum(self.start, self._terminal))
             speed = speed + math.hypot(*world.wind)
+        speed = speed + self.thrust
         return np.where(bodies.fixed, 0.0, speed)
+
+    @property
+    def _terminal(self) -> float:
+        """The speed, m/s, through the air at which drag balances gravity."""
+        linear, quadratic = self.scene.world.linear_drag, self.scene.world.quadratic_drag
+        by_linear = self.gravity / linear if linear > 0.0 else math.inf
+        return min(by_linear, math.sqrt(self.gravity / quadratic) if quadratic > 0.0 else math.inf)
 
     def _fall(self) -> FloatArray:
         """Return how far each body can fall, (N,) m, until what holds it is taut or nothing is left to meet."""
@@ -186,15 +239,15 @@ class Speeds:
         return np.minimum(held, lowest - depth + bodies.radius) if math.isfinite(lowest) else held
 
 
+def unknown_speeds(scene: Scene) -> tuple[str, ...]:
+    """Return what makes bodies of a scene faster by an amount that no formula bounds."""
+    return Speeds(scene, meetings(scene)).unknown
+
+
 def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
     """Return about how fast each body can get, (N,) m/s: an upper bound where `Speeds.bounded`."""
     speeds = Speeds(scene, meet)
     return np.maximum(speeds.own, speeds.struck)
-
-
-def _is_steep(attraction: Attraction) -> bool:
-    """Return whether an attraction can make bodies faster than anything may be: its centre bounds nothing."""
-    return abs(attraction.strength) >= attraction.softening * MAX_SPEED**2 and attraction.strength != 0.0
 
 
 def _kicked(meet: Meetings) -> float:

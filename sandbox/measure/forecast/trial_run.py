@@ -10,7 +10,7 @@ saw is added to what the formulas say.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,10 +19,11 @@ from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES, start
 from sandbox.measure.energy import energies
 from sandbox.measure.forecast.events import event_warning
-from sandbox.measure.forecast.forecasts import EVENT_DRIVEN, warnings
+from sandbox.measure.forecast.forecasts import warnings
 from sandbox.measure.forecast.laid import laid
+from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY
 from sandbox.measure.forecast.stacks import UNEQUAL
-from sandbox.measure.forecast.warning import Figures, Warning, at_most
+from sandbox.measure.forecast.warning import Figure, Figures, Warning, at_most
 from sandbox.measure.run import run
 from sandbox.scene.links import LinkKind
 from sandbox.scene.meetings import meetings
@@ -31,7 +32,7 @@ from sandbox.scene.settings import Settings
 from sandbox.scene.starts import height_above
 from sandbox.trajectory import Trajectory
 
-MOST_SUBSTEPS, MOST_BODY_SUBSTEPS = 2_000, 60_000
+MOST_SUBSTEPS, MOST_BODY_SUBSTEPS = 10_000, 60_000
 """Of a trial run; the second is substeps times bodies."""
 FEWEST_SUBSTEPS = 20
 """A shorter trial run tells nothing, and is left out."""
@@ -55,7 +56,10 @@ position correction and explicit Euler in free fall add is less at usual steps."
 NAMES_BODIES = frozenset({"tunnelling", "depth"})
 """Kinds of which a trial run names each body at risk, with its own speed, and the formulas only bounds."""
 
-REFUTABLE = frozenset({"tunnelling", "depth", "chain", "mass_ratio", "stack", "spring", "iterations", "energy"})
+FASTER = 2.0
+"""How many times faster than in the first part of a scene impacts may make bodies in the rest."""
+
+REFUTABLE = frozenset({"tunnelling", "depth", "chain", "mass_ratio", "stack", "spring", "iterations", "orbit"})
 """Kinds of warnings that a trial run to the end of the scene confirms or refutes on its engine."""
 
 
@@ -84,6 +88,19 @@ class Trial:
     def until(self) -> float:
         """Its duration, s."""
         return self.scene.world.duration
+
+    def may_pass(self, foretold: Warning) -> bool:
+        """Return whether a body may tunnel later, as far as a part of the scene tells.
+
+        Formulas bound what impacts by others can do far above what they do: such a speed counts only where bodies were
+        seen to get as fast, to within a factor of `FASTER`.
+        """
+        if not foretold.figures.get("struck"):
+            return True
+        velocity = self.run.velocity
+        fastest = float(np.nanmax(np.hypot(velocity[..., 0], velocity[..., 1])))
+        reach = float(foretold.figures["safe_dt"]) / self.settings.substeps * float(foretold.figures["speed"])
+        return FASTER * fastest * self.settings.h > reach
 
     def findings(self) -> Iterator[Warning]:
         """Yield a warning for all that went wrong."""
@@ -151,6 +168,7 @@ class Trial:
                 f"{run.time[frame]:.3g} s of {self.said}, before the contact is found"
             )
             figures: Figures = {"ball": body, "thing": name, "depth": float(depth[frame, k]), "speed": speed}
+            figures["time"] = float(run.time[frame])
             yield Warning("depth", message, figures)
 
     def _torn(self) -> Iterator[Warning]:
@@ -195,7 +213,8 @@ class Trial:
 def gained(run: Trajectory, scene: Scene) -> float:
     """Return the most by which energy exceeded that of the start, as a share of what is at stake; 0 where work is done.
 
-    At stake is the kinetic energy of the start, and what gravity, springs and attraction gave or took since.
+    At stake is the kinetic energy of the start, and what gravity, springs and attraction gave or took since; at
+    least what lifts each body by its own width.
     """
     links = scene.links
     if scene.thrusts or scene.drives or any(scene.world.wind) or len(links.of(LinkKind.MOTOR)):
@@ -207,13 +226,19 @@ def gained(run: Trajectory, scene: Scene) -> float:
     with np.errstate(over="ignore", invalid="ignore"):
         gain = float(np.nanmax(total - total[0]))
         stake = float(every.kinetic[0]) + float(np.nanmax(np.abs(every.potential - every.potential[0])))
+        moves = ~scene.bodies.fixed
+        lift = math.hypot(*scene.world.gravity) * float((scene.bodies.mass * 2.0 * scene.bodies.thin)[moves].sum())
+        stake = max(stake, lift)
     if not math.isfinite(gain):
         return math.inf
     return gain / stake if stake > 0.0 else 0.0
 
 
-def try_out(scene: Scene, settings: Settings, engine: str) -> Trial | None:
-    """Run the first part of a scene; None where an engine refuses it, or it would be too short to tell anything."""
+def try_out(scene: Scene, settings: Settings, engine: str, cover: float = 1.0) -> Trial | None:
+    """Run the first part of a scene, at most a share `cover` of it.
+
+    None where an engine refuses it, or the part would be too short to tell anything.
+    """
     chosen = ENGINES[engine]
     if chosen.missing(scene, settings) or not len(scene.bodies):
         return None
@@ -221,8 +246,9 @@ def try_out(scene: Scene, settings: Settings, engine: str) -> Trial | None:
     needed = math.ceil(scene.world.duration / settings.dt) * settings.substeps
     if most < min(FEWEST_SUBSTEPS, needed):
         return None
+    most = min(most, math.ceil(cover * needed)) if cover < 1.0 else most
     steps = max(1, most // settings.substeps)
-    whole = needed <= most or engine in EVENT_DRIVEN
+    whole = needed <= most
     duration = scene.world.duration if whole else steps * settings.dt
     part = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": duration})})
     frames = duration / settings.dt
@@ -236,10 +262,12 @@ def try_out(scene: Scene, settings: Settings, engine: str) -> Trial | None:
     return Trial(part, chosen.resolve(scene, settings), done, whole)
 
 
-def try_exact(scene: Scene, settings: Settings) -> tuple[float, bool] | None:
-    """Run a scene on `exact` until `MOST_EVENTS` events; return the largest rate of events, 1/s, and if all was run.
+def try_exact(scene: Scene, settings: Settings, cover: float = 1.0) -> tuple[float, float, bool] | None:
+    """Run a scene on `exact` until `MOST_EVENTS` events.
 
-    None where it refuses the scene. The rate is inf where it gave up.
+    Returns:
+        The largest rate of events, 1/s, inf where it gave up; how long it ran, s, and whether that was all of the
+        scene. None where it refuses the scene.
     """
     if ENGINES["exact"].missing(scene, settings):
         return None
@@ -247,16 +275,17 @@ def try_exact(scene: Scene, settings: Settings) -> tuple[float, bool] | None:
     rate, before, window = 0.0, 0, max(1, math.ceil(WINDOW / settings.dt))
     try:
         steps = math.ceil(scene.world.duration / settings.dt)
-        for step in range(1, min(steps, MOST_EXACT_STEPS) + 1):
+        most = min(MOST_EXACT_STEPS, math.ceil(cover * steps))
+        for step in range(1, min(steps, most) + 1):
             simulation.step()
             events = int(simulation.work["events"])
             if step % window == 0:
                 rate, before = max(rate, (events - before) / (window * settings.dt)), events
             if events > MOST_EVENTS:
-                return max(rate, (events - before) / (((step - 1) % window + 1) * settings.dt)), False
-        return rate, steps <= MOST_EXACT_STEPS
+                return max(rate, (events - before) / (((step - 1) % window + 1) * settings.dt)), simulation.time, False
+        return rate, simulation.time, steps <= most
     except Exhaustion:
-        return math.inf, False
+        return math.inf, simulation.time, False
     finally:
         simulation.close()
 
@@ -267,9 +296,26 @@ class Answer(NamedTuple):
     warnings: list[Warning]
     refuted: list[Warning]
     """notes: what formulas warn of and a trial run of the whole scene did not show"""
+    tried: "Tried | None"
+    """the trial run; None where there was none"""
+
+    @property
+    def covered(self) -> bool:
+        """Whether a trial run covered the whole scene."""
+        return self.tried is not None and self.tried.whole
 
 
-def forecast(scene: Scene, settings: Settings | None = None, engine: str | None = None) -> Answer:
+class Tried(NamedTuple):
+    """Where and how long a scene was tried out."""
+
+    engine: str
+    duration: float
+    """s"""
+    whole: bool
+    """It was all of the scene."""
+
+
+def forecast(scene: Scene, settings: Settings | None = None, engine: str | None = None, cover: float = 1.0) -> Answer:
     """Return what would go wrong in a run, by formulas and by a trial run.
 
     Args:
@@ -277,40 +323,76 @@ def forecast(scene: Scene, settings: Settings | None = None, engine: str | None 
         settings: without, the scene's own.
         engine: where it is to run; without, every engine's formulas count, and the trial run is on the first engine
             that takes steps and does not refuse the scene.
+        cover: the share of the scene that a trial run may cover at most; 0 for none.
     """
     settings = scene.solver if settings is None else settings
     told = warnings(scene, settings, engine)
+    if engine is None and ENGINES["exact"].missing(scene, settings):
+        told = [each for each in told if each.kind != "event_rate"]
+    if cover <= 0.0:
+        return Answer(told, [], None)
     if engine == "exact":
-        return Answer(_with_events(told, scene, settings), [])
+        return _with_events(told, scene, settings, cover)
     names = [engine] if engine is not None else [name for name in STEPPING if name in ENGINES]
-    trial = next((each for name in names if (each := try_out(scene, settings, name)) is not None), None)
+    if engine is None and scene.surface is not None:
+        names = []  # a floor is a compiled kernel on every engine, and the first use of that takes half a minute
+    trial = next((done for name in names if (done := try_out(scene, settings, name, cover)) is not None), None)
     if trial is None:
-        return Answer(told, [])
-    found = list(trial.findings())
+        return Answer(told, [], None)
     concerned = warnings(scene, settings, trial.engine) if engine is None else told
-    kinds = {FAMILY.get(each.kind, each.kind) for each in found}
-    named = {(each.figures["ball"], each.figures["thing"]) for each in found if each.kind in NAMES_BODIES}
-    kept, refuted = [], []
+    merged = _merged(told, concerned, trial)
+    return Answer(*merged, Tried(trial.engine, trial.until, trial.whole))
+
+
+def _merged(told: list[Warning], concerned: list[Warning], trial: Trial) -> tuple[list[Warning], list[Warning]]:
+    """Return what remains of the formulas' warnings with what a trial run found, and what that refutes, as notes.
+
+    Args:
+        told: by the formulas.
+        concerned: those of them that concern the engine of the trial run.
+        trial: the trial run.
+    """
+    found = list(trial.findings())
+    if any(each.kind == "diverged" for each in found):
+        return [*told, *found], []
+    families = {FAMILY.get(each.kind, each.kind) for each in found}
+    seen = {_whom(each, trial): each for each in reversed(found) if each.kind in NAMES_BODIES}
+    kept: list[Warning] = []
+    refuted: list[Warning] = []
     for each in told:
-        family = FAMILY.get(each.kind, each.kind)
-        if each.kind not in REFUTABLE or each not in concerned or "diverged" in kinds:
+        if each.kind not in REFUTABLE or each not in concerned:
             kept.append(each)
-        elif each.kind in NAMES_BODIES and (trial.whole or (each.figures["ball"], each.figures["thing"]) in named):
-            if family not in kinds:
-                refuted.append(each)
-        elif trial.whole and family not in kinds:
-            refuted.append(each)
+        elif each.kind not in NAMES_BODIES:
+            is_refuted = trial.whole and FAMILY.get(each.kind, each.kind) not in families
+            (refuted if is_refuted else kept).append(each)
+        elif (where := (each.kind, each.figures["ball"], each.figures["thing"])) in seen:
+            time = seen.pop(where).figures["time"]
+            kept.append(replace(each, figures={**each.figures, "seen_at": time}))
         else:
-            kept.append(each)
+            (refuted if trial.whole or not trial.may_pass(each) else kept).append(each)
     spoken = {FAMILY.get(each.kind, each.kind) for each in kept if each.kind not in NAMES_BODIES}
-    kept += [each for each in found if FAMILY.get(each.kind, each.kind) not in spoken]
-    return Answer(kept, [_note(each, trial) for each in refuted])
+    unforeseen = [
+        each
+        for each in found
+        if (_whom(each, trial) in seen if each.kind in NAMES_BODIES else FAMILY.get(each.kind, each.kind) not in spoken)
+    ]
+    return [*kept, *unforeseen], [_note(each, trial) for each in refuted]
+
+
+def _whom(found: Warning, trial: Trial) -> tuple[str, Figure, Figure]:
+    """Return the kind of a finding, the body at risk, and what it passes as formulas call it."""
+    thing = found.figures.get("thing", "")
+    if thing in trial.scene.bodies.names:
+        number = trial.scene.bodies.names.index(str(thing))
+        movers = trial.scene.bodies.round[~trial.scene.bodies.fixed]
+        thing = thing if trial.scene.bodies.fixed[number] else ANOTHER if movers.all() else ANOTHER_BODY
+    return found.kind, found.figures.get("ball", ""), thing
 
 
 STEPPING = ("pymunk", "reference")
 """Engines that a trial run takes where none is asked about, in this order."""
 
-FAMILY = {"mass_ratio": "stack", "energy": "iterations"}
+FAMILY = {"mass_ratio": "stack", "energy": "iterations", "orbit": "iterations"}
 """Kinds between which a trial run does not tell: it sees that a stack falls, or that energy grows."""
 
 
@@ -319,13 +401,14 @@ def _note(refuted: Warning, trial: Trial) -> Warning:
     return Warning(refuted.kind, message, refuted.figures)
 
 
-def _with_events(told: list[Warning], scene: Scene, settings: Settings) -> list[Warning]:
+def _with_events(told: list[Warning], scene: Scene, settings: Settings, cover: float) -> Answer:
     """Return the warnings with what a trial run on `exact` says of the rate of events."""
-    tried = try_exact(scene, settings) if len(scene.bodies) else None
+    tried = try_exact(scene, settings, cover) if len(scene.bodies) else None
     if tried is None:
-        return told
-    rate, whole = tried
+        return Answer(told, [], None)
+    rate, duration, whole = tried
+    done = Tried("exact", duration, whole)
     others = [each for each in told if each.kind != "event_rate"]
     if (warning := event_warning(rate, len(scene.bodies))) is not None:
-        return [*others, warning]
-    return others if whole else told
+        return Answer([*others, warning], [], done)
+    return Answer(others if whole else told, [], done)

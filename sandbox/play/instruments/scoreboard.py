@@ -8,7 +8,8 @@ import pygame
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Decision
 from sandbox.games.billiards.rules.eight_ball import EightBallState
-from sandbox.play.billiards.game import Game
+from sandbox.games.billiards.rules.verdict import renamed
+from sandbox.play.billiards.game import BOT, Game
 from sandbox.play.billiards.person import Person
 from sandbox.play.drawing.palette import FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY, Colour, hex_colour
 from sandbox.play.drawing.table.coats import IVORY, Coat, coat_of
@@ -31,32 +32,45 @@ class Drawn(NamedTuple):
     """where the decisions are that can be clicked"""
 
 
-def draw_scoreboard(surface: pygame.Surface, person: Person, free: pygame.Rect, left: int, unit: float) -> Drawn:
-    """Draw it at the top of what is free, or where that is too narrow, at the bottom.
+class Laid(NamedTuple):
+    """Where a scoreboard lies, and what it says."""
+
+    rect: pygame.Rect
+    lines: tuple[str, ...]
+    """what happened, and what is to be done"""
+
+
+def lay_scoreboard(person: Person, free: pygame.Rect, left: int, unit: float, aside: int = 0) -> Laid:
+    """Lay it at the top of what is free, or where that is too narrow, at the bottom.
 
     Args:
-        surface: the picture.
         person: who plays.
         free: px, what it may cover.
         left: px, what else covers the top.
         unit: px of a pixel at 1080 lines.
+        aside: px at the right that something else covers at the bottom.
     """
     size, pad, margin = 13.0 * unit, round(9 * unit), round(10 * unit)
     right = free.right - round(RIGHT * unit)
     above = right - left >= NARROWEST * unit
     if not above:
-        left, right = free.left + margin, free.right - margin
+        left, right = free.left + margin, free.right - max(margin, aside)
     width = min(right - left, round(WIDEST * unit))
-    game = person.game
-    match, line = game.match, round(1.5 * size)
-    told = _told(person)
-    choices = _choices(person)
-    down = _down(match)
-    lines = wrapped(told, size, width - 2 * pad - 1.3 * size, 2)
-    rows = 1 + len(lines) + bool(down) + bool(choices)
-    rect = pygame.Rect((left + right - width) // 2, free.top + margin, width, rows * line + 2 * pad)
+    lines = wrapped(status_line(person), size, width - 2 * pad - 1.3 * size, 2)
+    rows = 1 + len(lines) + bool(_down(person.game.match)) + bool(_choices(person))
+    rect = pygame.Rect((left + right - width) // 2, free.top + margin, width, rows * round(1.5 * size) + 2 * pad)
     if not above:
         rect.bottomleft = left, free.bottom - margin
+    return Laid(rect, lines)
+
+
+def draw_scoreboard(
+    surface: pygame.Surface, person: Person, free: pygame.Rect, left: int, unit: float, aside: int = 0
+) -> Drawn:
+    """Draw it where it is laid; as `lay_scoreboard`."""
+    rect, lines = lay_scoreboard(person, free, left, unit, aside)
+    size, pad, game, match = 13.0 * unit, round(9 * unit), person.game, person.game.match
+    line, choices, down = round(1.5 * size), _choices(person), _down(match)
     plate(surface, rect, 8 * unit)
     y = rect.top + pad + line / 2
     _players(surface, game, rect, y, size)
@@ -82,7 +96,7 @@ def _players(surface: pygame.Surface, game: Game, rect: pygame.Rect, y: float, s
         if on:
             marked = pygame.Rect(round(left - 0.3 * size), round(y - 0.75 * size), round(cell), round(1.5 * size))
             pygame.draw.rect(surface, PANEL_RAISED, marked, border_radius=round(0.4 * size))
-        name = "bot" if game.players == "bot" and player == 1 else f"player {player + 1}"
+        name = game.names[player]
         if state.players == 1:
             name = "free play" if match.rules.name == "free" else match.rules.name
         group = ""
@@ -97,19 +111,19 @@ def _players(surface: pygame.Surface, game: Game, rect: pygame.Rect, y: float, s
             write(surface, score, (left + cell - 0.9 * size, y), size, INK, "midright", bold=True, mono=True)
 
 
-def _told(person: Person) -> str:
+def status_line(person: Person) -> str:
     """Return the line about what happened and what is to be done."""
     game, match = person.game, person.game.match
     if not game.resting:
-        return "the balls roll"
+        return "balls rolling"
+    before = renamed("; ".join(match.messages), game.names)
     if match.over:
-        return f"{'; '.join(match.messages) or 'the frame is over'} (R begins another)"
-    who = "bot" if game.players == "bot" and match.turn == 1 else f"player {match.turn + 1}"
-    before = "; ".join(match.messages)
-    if game.opponent is not None and match.turn == 1:
-        now = f"{who} {'thinks' if game.opponent.thinking else 'takes aim'}"
+        return f"{before or 'the frame is over'}; press R for a new frame"
+    who = game.names[match.turn]
+    if game.opponent is not None and match.turn == BOT:
+        now = f"{who} is {'thinking' if game.bot_is_thinking else 'aiming'}"
     elif person.carried is not None:
-        now = "click where the cue ball is to lie"
+        now = "click to place the cue ball"
     elif match.choices.needed and game.call.pocket is None:
         now = f"{who}: click the pocket of the {match.choices.balls[0] if match.choices.balls else 'ball'}"
     elif match.state.in_hand is not None and match.rules.name != "free":

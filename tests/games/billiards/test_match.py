@@ -92,7 +92,7 @@ def test_ball_frozen_to_a_cushion_is_driven_there_only_by_leaving_it(along: floa
     speed = 0.55 if along == 0.0 else 3.0  # so gently that nothing comes to another cushion
     after = shot(now, Stroke(aim=float(aim), speed=speed))
     assert after.verdict is not None
-    assert after.verdict.fouls == (() if fair else ("no ball came to a cushion after the touch",))
+    assert after.verdict.fouls == (() if fair else ("no rail after contact",))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ DRIVEN = 4
 
 def scratch(shot: Shot) -> list[str]:
     """Return the foul of a cue ball that fell (WPA 6.1)."""
-    return ["the cue ball fell"] if shot.scratched else []
+    return ["scratch"] if shot.scratched else []
 
 
 def wrong_ball(shot: Shot, targets: frozenset[str]) -> list[str]:
@@ -23,7 +23,7 @@ def wrong_ball(shot: Shot, targets: frozenset[str]) -> list[str]:
 
 def no_rail(shot: Shot) -> list[str]:
     """Return the foul of a touch after which no ball fell or came to a cushion (WPA 6.3)."""
-    return ["no ball came to a cushion after the touch"] if shot.first and not shot.driven else []
+    return ["no rail after contact"] if shot.first and not shot.driven else []
 
 
 def from_behind(shot: Shot) -> list[str]:
