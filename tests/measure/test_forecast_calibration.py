@@ -53,6 +53,7 @@ def test_what_happened_is_judged_apart_from_what_was_foretold() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)  # 84 scenes, each run five to seven times
 def test_warnings_on_the_held_out_half_are_right() -> None:
     kinds, parity = halves()["held-out"]
     rows = [
