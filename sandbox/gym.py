@@ -20,7 +20,7 @@ try:
     import gymnasium
     from gymnasium import spaces
 except ImportError:
-    raise ImportError("sandbox.gym needs gymnasium: pip install 'sandbox2d[gym]'") from None
+    raise ImportError("sandbox.gym needs gymnasium: pip install -e '.[gym]'") from None
 
 from sandbox.action import ActionError
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
@@ -32,7 +32,6 @@ from sandbox.measure.seeds import seeded
 from sandbox.recording import Recording
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
 from sandbox.trajectory import FloatArray
 
 GAMES = {
@@ -93,7 +92,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             Refusal: the engine lacks something that the scene needs.
             ValueError: there is no such engine, body or mode, or `every` is no whole number from 1 on.
         """
-        self.scene = scene if isinstance(scene, Scene) else load(find(str(scene)))
+        self.scene = scene if isinstance(scene, Scene) else load(scene)
         self.engine, self.every, self.render_mode = engine, _steps(every), render_mode
         rules = required_rules(self.scene)
         self.controls = rules.controls

@@ -93,7 +93,7 @@ class Recording:
         try:
             document = json.loads(text)
             if not isinstance(document, Mapping) or document.get("format") != FORMAT:
-                raise ValueError(f"no recording of format {FORMAT}")
+                raise ValueError(_no_session(document))
             duration = _part(document, "duration", (int, float))
             if not 0 <= duration <= MAX_DURATION:
                 raise ValueError(f"a `duration` is 0 to {MAX_DURATION:g} s")
@@ -113,7 +113,7 @@ class Recording:
             faults = [Fault(file, None, ".".join(("settings", *map(str, e["loc"]))), e["msg"]) for e in error.errors()]
             raise SceneError(faults) from None
         except (ValueError, RecursionError) as error:
-            raise SceneError([Fault(file, None, "", f"cannot be read: {error}")]) from None
+            raise SceneError([Fault(file, None, "", f"cannot be read as a session: {error}")]) from None
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -127,6 +127,19 @@ class Recording:
         except (OSError, ValueError) as error:
             raise SceneError([Fault(str(path), None, "", f"cannot be read: {error}")]) from None
         return cls.from_json(text, str(path))
+
+
+def _no_session(document: Any) -> str:
+    """Say what a JSON document is that is no session."""
+    made = {"runs": "run", "engines": "compare", "points": "tradeoff", "cells": "extremes", "$schema": "schema"}
+    if isinstance(document, Mapping) and "format" not in document:
+        for key, command in made.items():
+            if key in document:
+                return f"it is the output of `sandbox {command}{'' if command == 'schema' else ' --json'}`"
+        return "it has no `format`; the window records sessions (Ctrl+S)"
+    if isinstance(document, Mapping):
+        return f"its format is {document['format']!r}, and this program reads format {FORMAT}"
+    return "it is no JSON object; the window records sessions (Ctrl+S)"
 
 
 def _part(document: Mapping[str, Any], key: str, kind: type | tuple[type, ...], without: Any = ...) -> Any:

@@ -131,6 +131,10 @@ class Contacts:
         rows = order[first][kept]
         return type(self)(self.time[rows], self.pair[rows], self.point[rows], self.normal[rows], impulse[kept])
 
+    def __repr__(self) -> str:
+        """Count them."""
+        return f"<Contacts: {len(self):,}>"
+
     def some(self, which: BoolArray) -> Self:
         """Return some of them, (C,)."""
         vectors = (self.point[which], self.normal[which], self.impulse[which])
@@ -195,6 +199,15 @@ class Trajectory:
     seconds, work, energy_start, energy_end, joint_error (the largest, as a part of a length; None without joints),
     broken (how many joints), audited, state_hash (of the end), versions; causes (names, where an account was
     kept)."""
+
+    def __repr__(self) -> str:
+        """Name scene, engine and status, and count what the arrays hold."""
+        title, engine = self.info.get("scene", {}).get("title", ""), self.info.get("engine")
+        about = " ".join(part for part in (repr(title) if title else "", f"on {engine}" if engine else "") if part)
+        end = f" to {self.time[-1]:g} s" if len(self.time) else ""
+        bodies = f"{len(self.names):,} {'body' if len(self.names) == 1 else 'bodies'}"
+        counts = f"{bodies}, {len(self.time):,} frames{end}, {len(self.contact_time):,} contacts"
+        return f"<Trajectory{about and ' ' + about}: {self.info.get('status', 'unknown')}, {counts}>"
 
     @property
     def status(self) -> str:

@@ -282,4 +282,4 @@ def test_gymnasium_is_imported_only_when_asked_for() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
     code = "import sys; sys.modules['gymnasium'] = None\ntry:\n import sandbox.gym\nexcept ImportError as e: print(e)"
     told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
-    assert told == "sandbox.gym needs gymnasium: pip install 'sandbox2d[gym]'\n"
+    assert told == "sandbox.gym needs gymnasium: pip install -e '.[gym]'\n"

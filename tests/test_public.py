@@ -2,24 +2,63 @@
 
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 import sandbox
+from sandbox.action import Action
 
+ACTIONS = [
+    "Drive",
+    "Force",
+    "Impulse",
+    "Launch",
+    "Move",
+    "Pull",
+    "Remove",
+    "Reshape",
+    "SetParameter",
+    "Spawn",
+    "Strike",
+    "Switch",
+    "Throttle",
+    "Toggle",
+]
 NAMES = [
     "ENGINES",
+    "ActionError",
+    "Ball",
+    "Box",
+    "Capsule",
+    "Compound",
     "Contacts",
+    "Drive",
     "Fault",
+    "Force",
     "Frame",
+    "Impulse",
+    "Launch",
+    "Move",
+    "Polygon",
+    "Pull",
     "Recording",
+    "Remove",
+    "Reshape",
     "Scene",
     "SceneError",
+    "SetParameter",
     "Settings",
+    "Spawn",
     "Spread",
+    "Strike",
     "Stroke",
+    "Switch",
     "Table",
+    "Throttle",
+    "Toggle",
     "Trajectory",
     "compare",
     "demands",
@@ -51,6 +90,42 @@ def test_name_is_importable_and_documented(name: str) -> None:
     if name != "ENGINES":
         assert value.__name__ == name
         assert value.__doc__
+
+
+def test_signatures_name_the_fields() -> None:
+    names = [*ACTIONS, "Ball", "Settings", "Stroke"]
+    code = f"import inspect, sandbox\nfor n in {names}: print(*inspect.signature(getattr(sandbox, n)).parameters)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    fields = [[field.alias or key for key, field in getattr(sandbox, n).model_fields.items()] for n in names]
+    assert [line.split() for line in done.stdout.splitlines()] == fields
+
+
+def test_every_kind_of_action_is_public() -> None:
+    (union, _) = get_args(Action)
+    assert sorted(kind.__name__ for kind in get_args(union)) == ACTIONS
+
+
+def test_version_is_that_of_the_package() -> None:
+    assert sandbox.__version__ == version("sandbox2d")
+
+
+def test_actions_are_done_in_a_run_and_one_that_cannot_be_ends_it() -> None:
+    scene = sandbox.loads(TEXT)
+    kick = sandbox.Impulse(time=0.0, body="a", impulse=(1.0, 0.0))
+    ball = sandbox.Ball(name="b", position=(5.0, 0.0), radius=1.0)
+    done = sandbox.run(scene, actions=[kick, sandbox.Spawn(time=0.05, ball=ball)])
+    assert (done.status, done.names.tolist()) == ("ok", ["a", "b"])
+    assert done.velocity[-1, 0].tolist() == [2.0, 0.0]  # 1 m/s, and 1 N·s on 1 kg
+    failed = sandbox.run(scene, actions=[sandbox.Remove(time=0.0, body="nobody")])
+    assert failed.status == "failed"
+    assert "no body is named 'nobody'" in str(failed.reason)
+
+
+def test_shipped_scene_is_loaded_by_name_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert sandbox.load("bounce") == sandbox.load("tutorial/bounce")
+    with pytest.raises(sandbox.SceneError, match="did you mean tutorial/bounce"):
+        sandbox.load("bounc")
 
 
 def test_star_brings_all_of_them() -> None:

@@ -9,7 +9,7 @@ from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError, run_id
 from sandbox.engines.registry import engine_named
 from sandbox.interrupt import heeded, uninterrupted
-from sandbox.measure.collisions import collisions
+from sandbox.measure.collisions import collisions, first_collision
 from sandbox.measure.finite import finite
 from sandbox.measure.ledger import ledger_of
 from sandbox.measure.run import Progress, run
@@ -79,6 +79,7 @@ class Outcome:
             "joint_error": finite(info.get("joint_error")),
             "broken_joints": info.get("broken", 0),
             "contacts": collisions(run),
+            "first_contact": first_collision(run),
             "missed_contacts": run.missed_contacts,
             "retired": {
                 str(name): time for name, time in zip(run.names, run.retired_time.tolist(), strict=True) if time == time

@@ -33,7 +33,7 @@ class Job:
     engine: str
     actions: tuple[Any, ...] = ()
     point: tuple[tuple[str, Any], ...] = ()
-    """the swept keys and this run's values"""
+    """the keys that were set or swept, and this run's values"""
     recorded: bool = False
     """It is a session that was played before."""
     state_hash: str | None = None
@@ -75,9 +75,10 @@ def plan(
     seeding: list[tuple[tuple[str, Any], ...]] = [()]
     if seeds is not None:
         seeding = [(("world.seed", seed),) for seed in range(1, seeds + 1)]
-    if math.prod(len(axis) for axis in (*axes, seeding)) > MOST_POINTS:
+    if math.prod(len(axis) for axis in axes) * len(seeding) > MOST_POINTS:
         raise AddressError(f"the sweeps multiply to more than {MOST_POINTS:,} runs")
     jobs: list[Job] = []
+    set_values = [_assignment(override) for override in overrides]
     faults: dict[Fault, None] = {}
     for label, path in scenes:
         for point in product(*axes):
@@ -100,11 +101,20 @@ def plan(
                     same = not (overrides or where)
                     known, score = (played.state_hash, played.score) if same else (None, None)
                     recorded = _is_recording(path)
-                    job = Job(label, played.scene, engine, played.actions, where, recorded, known, plays, score, alike)
+                    values = (*set_values, *where)
+                    job = Job(label, played.scene, engine, played.actions, values, recorded, known, plays, score, alike)
                     jobs.append(job)
     if faults:
         raise SceneError(tuple(faults))
     return jobs
+
+
+def _assignment(override: Override) -> tuple[str, Any]:
+    """Return the key and value of what is set; one that cannot be read is left to `load`, which says why."""
+    try:
+        return parse_assignment(override) if isinstance(override, str) else override
+    except AddressError:
+        return str(override), None
 
 
 def _read(path: str, overrides: Sequence[Override]) -> Recording:
@@ -152,10 +162,22 @@ def parse_sweep(text: str) -> tuple[str, list[Any]]:
     parts = values.split(":")
     if len(parts) in (3, 4) and not values.startswith(('"', "'", "[")):
         return key, list(_range(text, parts))
+    if len(parts) > 4 and all(_is_number(part) for part in parts[:-1]):
+        raise AddressError(f"{text!r}: a range is LOW:HIGH:N or LOW:HIGH:N:log")
+    if len(parts) == 2 and all(_is_number(part) for part in parts):
+        raise AddressError(f"{text!r}: a range needs a count: {key}={values}:N, such as {key}={values}:10")
     found = [parse_value(value) for value in _split(values)]
     if not values or "" in found:
         raise AddressError(f"{text!r}: a value is missing; KEY=A,B,C or KEY=LOW:HIGH:N or KEY=LOW:HIGH:N:log")
     return key, found
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _range(text: str, parts: list[str]) -> Iterator[float]:

@@ -3,17 +3,17 @@
 import math
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import click
 
-from sandbox.cli.reading import fault_rows, path_of, print_json
-from sandbox.engines.registry import ENGINES
+from sandbox.cli.reading import fault_rows, path_of, print_json, refused, scenes_of
+from sandbox.engines.registry import ENGINES, UnknownEngineError, engine_named
 from sandbox.games.registry import fitting_rules
-from sandbox.measure.forecast import at_most, largest_safe_dt, notes, warnings
+from sandbox.measure.forecast import FAILED, Answer, at_most, forecast, largest_safe_dt, notes, unknown_speeds
 from sandbox.scene.demands import JOINTS, Item, bill
-from sandbox.scene.faults import SceneError
+from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import dumps, load
 from sandbox.scene.model import Scene
 
@@ -21,32 +21,58 @@ from sandbox.scene.model import Scene
 @click.command(name="check")
 @click.argument("scenes", nargs=-1, required=True)
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene first")
+@click.option("--engine", metavar="NAME", help="warn of what concerns this engine, and try the scene out on it")
+@click.option("--no-trial", is_flag=True, help="formulas only: do not try the scene out by a short run")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 @click.option("--quiet", is_flag=True, help="say only what is wrong")
 @click.option("--expand", is_flag=True, help="print the scene file of primitives that a scene stands for")
-def command(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool, quiet: bool, expand: bool) -> int:
-    """Check scenes: faults, what they demand, which engines can run them, what would go wrong."""
+def command(
+    scenes: tuple[str, ...],
+    overrides: tuple[str, ...],
+    engine: str | None,
+    no_trial: bool,
+    as_json: bool,
+    quiet: bool,
+    expand: bool,
+) -> int:
+    """Check scenes: faults, the physics they need, the engines that can run them, what would go wrong.
+
+    What would go wrong is predicted by formulas, and by a trial run of at most 10,000 substeps, on the engine given or
+    else on pymunk.
+    """
     if expand:
         if len(scenes) > 1 or as_json:
             raise click.UsageError("--expand prints one scene as TOML; give one, without --json")
         return _expand(scenes[0], overrides)
+    if engine is not None:
+        try:
+            engine_named(engine)
+        except UnknownEngineError as error:
+            return refused([Fault("--engine", None, "", str(error))], as_json)
     documents = []
     status = 0
-    for name in scenes:
+    for name in scenes_of(scenes):
         try:
             scene = load(path_of(name), overrides)
             rules = fitting_rules(scene, path_of(name))
+            document, items = _checked(name, scene, engine, 0.0 if no_trial else 1.0)
         except SceneError as error:
             status = 2
-            documents.append(_faulty(name, error))
+            documents.append(_faulty(name, error.faults))
             if not as_json:
                 click.echo(str(error), err=True)
             continue
-        document, items = _checked(name, scene)
+        except Exception as error:  # noqa: BLE001, one scene's failure must not cost the answers of the others
+            message = f"check failed with {type(error).__name__}: {error}; please report this scene"
+            documents.append(_faulty(name, [fault := Fault(name, None, "", message)]))
+            status = max(status, 1)
+            click.echo(str(fault), err=True)
+            continue
         if rules is not None:
             document["game"] = {"name": scene.play.game, "controls": [each._asdict() for each in rules.controls]}
         documents.append(document)
-        if not any(engine["ok"] for engine in document["engines"].values()):
+        able = [each["ok"] for known, each in document["engines"].items() if engine in (None, known)]
+        if not any(able) or any(warning["kind"] == FAILED for warning in document["warnings"]):
             status = max(status, 1)
         if not as_json:
             _print(name, scene, document, items, quiet)
@@ -65,19 +91,19 @@ def _expand(name: str, overrides: tuple[str, ...]) -> int:
     return 0
 
 
-def _faulty(name: str, error: SceneError) -> dict[str, Any]:
-    faults = fault_rows(error.faults)
+def _faulty(name: str, faults: Sequence[Fault]) -> dict[str, Any]:
     empty: dict[str, Any] = {"demands": [], "engines": {}, "warnings": [], "notes": []}
-    return {"scene": name, "title": None, "ok": False, "faults": faults, **empty}
+    return {"scene": name, "title": None, "ok": False, "faults": fault_rows(faults), **empty}
 
 
-def _checked(name: str, scene: Scene) -> tuple[dict[str, Any], tuple[Item, ...]]:
+def _checked(name: str, scene: Scene, engine: str | None, cover: float) -> tuple[dict[str, Any], tuple[Item, ...]]:
     items = bill(scene)
     engines = {}
-    for engine in ENGINES.values():
-        missing = engine.missing(scene, scene.solver)
-        engines[engine.name] = {"ok": not missing, "missing": list(missing)}
+    for each in ENGINES.values():
+        missing = each.missing(scene, scene.solver)
+        engines[each.name] = {"ok": not missing, "missing": list(missing)}
     safe = largest_safe_dt(scene)
+    answer = forecast(scene, engine=engine, cover=cover)
     document = {
         "scene": name,
         "title": scene.title,
@@ -86,11 +112,21 @@ def _checked(name: str, scene: Scene) -> tuple[dict[str, Any], tuple[Item, ...]]
         "demands": [str(item.demand) for item in items if item.on],
         "bill": [{"demand": str(item.demand), "on": item.on, "why": item.why} for item in items],
         "engines": engines,
-        "safe_dt": safe if math.isfinite(safe) else None,
-        "warnings": [{"kind": w.kind, "message": w.message, **w.figures} for w in warnings(scene)],
-        "notes": [{"kind": n.kind, "message": n.message, **n.figures} for n in notes(scene)],
+        "step": {"dt": scene.solver.dt, "substeps": scene.solver.substeps},
+        "safe_dt": safe if safe is not None and math.isfinite(safe) else None,
+        "safe_dt_known": safe is not None,
+        "trial": _trial(answer),
+        "warnings": [{"kind": w.kind, "message": w.message, **w.figures} for w in answer.warnings],
+        "notes": [{"kind": n.kind, "message": n.message, **n.figures} for n in (*notes(scene), *answer.refuted)],
     }
     return document, items
+
+
+def _trial(answer: Answer) -> dict[str, Any] | None:
+    """Return the engine and the length of a trial run, None where there was none."""
+    if answer.tried is None:
+        return None
+    return {"engine": answer.tried.engine, "duration": answer.tried.duration, "whole": answer.tried.whole}
 
 
 def _print(name: str, scene: Scene, document: dict[str, Any], items: tuple[Item, ...], quiet: bool) -> None:
@@ -101,9 +137,14 @@ def _print(name: str, scene: Scene, document: dict[str, Any], items: tuple[Item,
             click.echo(f"  {mark}  {what:<14} {why}")
         for engine, verdict in document["engines"].items():
             _tell(f"engine {engine}: {'; '.join(verdict['missing']) or 'models all of it'}")
-        safe = document["safe_dt"]
+        safe, step = document["safe_dt"], scene.solver
         say = "at any dt nothing can tunnel" if safe is None else f"nothing can tunnel up to dt = {at_most(safe)} s"
-        _tell(f"{say}; the scene's is {scene.solver.dt:g} s")
+        if not document["safe_dt_known"]:
+            say = f"up to which dt nothing can tunnel is unknown: {', '.join(unknown_speeds(scene))} may add any speed"
+        own = f"dt × substeps is {step.dt:g} s × {step.substeps}, a step every {step.h:g} s"
+        _tell(f"{say}; the scene's {own if step.substeps > 1 else f'is {step.dt:g} s'}")
+        if (trial := document["trial"]) is not None and not trial["whole"]:
+            _tell(f"tried out on {trial['engine']} for {trial['duration']:.3g} s of {scene.world.duration:g} s")
         if "game" in document:
             keys = (f"{each['name']} ({' or '.join(each['keys'])})" for each in document["game"]["controls"])
             _tell(f"game {document['game']['name']}: {', '.join(keys)}")

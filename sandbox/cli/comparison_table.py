@@ -13,6 +13,21 @@ MOST_NAMED = 5
 """Missed and phantom contacts that are named of each engine; `--json` has more."""
 
 
+NO_EFFECT = 1e-6
+"""A change that alters the error by no more than this fraction has none."""
+HEADS = (
+    "max error, m", "rms error, m", "max error, m/s", "diverges, s", "energy", "momentum", "contacts", "missed",
+    "phantom", "after", "seconds",
+)  # fmt: skip
+LEGEND = (
+    "error: the largest, and the root mean square, of all bodies' distances from the truth while that is trusted",
+    "diverges: when a distance first exceeds the tolerance; energy, momentum: change without a cause, as a fraction",
+    "contacts: also in the truth; missed: in the truth alone; phantom: in this run alone; "
+    "after: either, once a body has diverged",
+)
+"""What the heads mean."""
+
+
 def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bool) -> None:
     """Print the truth, a line for each engine, and below what there is to say of each.
 
@@ -30,9 +45,7 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
     table.add_column("engine", no_wrap=True)
     table.add_column("dt", justify="right", no_wrap=True)
     table.add_column("status", no_wrap=True)
-    for head in ("max error, m", "rms, m", "max, m/s", "diverges, s", "energy", "momentum", "contacts", "missed"):
-        table.add_column(head, justify="right", no_wrap=True)
-    for head in ("phantom", "seconds"):
+    for head in HEADS:
         table.add_column(head, justify="right", no_wrap=True)
     for row in comparison.rows:
         table.add_row(
@@ -45,7 +58,7 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
             _divergence(row),
             _share(row.energy_drift),
             _share(row.momentum_drift),
-            *(_count(row.count(kind)) for kind in ("matched", "missed", "phantom")),
+            *(_count(row.count(kind)) for kind in ("matched", "missed", "phantom", "after_divergence")),
             _figure(row.seconds),
         )
     console = Console(width=None if sys.stdout.isatty() else WIDE)
@@ -58,7 +71,7 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
 
 
 def _below(comparison: Comparison, why: bool, refusals: bool) -> list[str]:
-    lines = []
+    lines = [*LEGEND] if any(row.status != "refused" for row in comparison.rows) else []
     if any(row.energy_against == "start" and row.energy_drift for row in comparison.rows):
         lines.append("energy: the change from the start, losses that are right included; the truth ends before the run")
     for row in comparison.rows:
@@ -80,18 +93,25 @@ def _named(events: Sequence[Event]) -> str:
 
 
 def _explained(row: Row) -> list[str]:
-    """Return the verdict, the knobs that were turned, and those that the engine refuses."""
+    """Return the verdict, a table of the changes that matter, and those that do not or that the engine refuses."""
     if row.verdict is None:
         return [f"{row.engine}: nothing to explain"]
-    turned = [f"{knob.knob} {_value(knob.value)}: ×{knob.ratio:.3g}" for knob in row.why if knob.ratio is not None]
-    failed = [f"{k.knob} {_value(k.value)}: {k.status}" for k in row.why if k.ratio is None and k.status != "refused"]
-    refused = [f"{knob.knob} {_value(knob.value)}" for knob in row.why if knob.status == "refused"]
-    lines = [row.verdict, f"  {', '.join([*turned, *failed])}"]
-    return [*lines, f"  refused: {', '.join(refused)}"] if refused else lines
-
-
-def _value(value: float | str) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    found = sorted((knob for knob in row.why if knob.ratio is not None), key=lambda knob: knob.ratio or 0.0)
+    idle = [knob for knob in found if abs((knob.ratio or 0.0) - 1.0) < NO_EFFECT]
+    heads = ("change", "max error, m", "of the error")
+    cells = [heads, *((k.label, _figure(k.max_position_error), f"×{k.ratio:.3g}") for k in found if k not in idle)]
+    wide = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = [row.verdict]
+    lines += [f"  {a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in cells] if len(cells) > 1 else []
+    for what, some in (
+        ("no effect", idle),
+        ("failed", [knob for knob in row.why if knob.ratio is None and knob.status != "refused"]),
+        ("refused", [knob for knob in row.why if knob.status == "refused"]),
+    ):
+        if some:
+            named = (f"{knob.label} ({knob.status})" if what == "failed" else knob.label for knob in some)
+            lines.append(f"  {what}: {', '.join(named)}")
+    return lines
 
 
 def _divergence(row: Row) -> str:

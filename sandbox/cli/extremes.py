@@ -57,7 +57,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Drive every engine to its extremes, one axis at a time and two at once, and tell where it breaks.
+    """Drive every engine to its extremes, one axis at a time and two at once, and report where it breaks.
 
     Each cell runs in a process of its own, with limits of time and memory: nothing takes the run down.
     """

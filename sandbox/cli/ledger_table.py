@@ -40,7 +40,7 @@ def print_ledgers(rows: Sequence[Row]) -> None:
         console.print()
         console.print(table)
     if kept:
-        console.print(Text("%: of the most energy that was in motion, or that one cause brought or took", style="dim"))
+        console.print(Text("%: of the largest kinetic energy or the largest entry, whichever is greater", style="dim"))
 
 
 def _abreast(rows: Sequence[Row]) -> Iterator[list[Row]]:

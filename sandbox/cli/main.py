@@ -1,5 +1,6 @@
 """`sandbox …`: the commands, each loaded only when it is called."""
 
+import difflib
 import gc
 import importlib
 import os
@@ -12,14 +13,14 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 # Else pydantic searches every installed package for plugins, 20 ms of each command.
 
 COMMANDS = {
-    "run": "run scenes headless and tell how they went",
+    "run": "run scenes headless and print the results",
     "play": "the window: play a scene, or pick one",
     "compare": "one scene on several engines, against the best known truth",
     "tradeoff": "error against cost over engines and settings, and the setting to take",
-    "shots": "how likely a billiard shot is, what it hangs on, until when it can be foretold",
+    "shots": "success odds, sensitivity and predictability horizon of a billiard shot",
     "extremes": "how far each engine and setting goes before it breaks",
     "report": "one page over many scenes: errors, costs, replays",
-    "check": "check scenes: faults, what they demand, who can run them, what would go wrong",
+    "check": "check scenes: faults, the physics they need, the engines that can run them, what would go wrong",
     "scenes": "list the scenes that ship",
     "engines": "list the engines",
     "schema": "print the JSON Schema of a scene file",
@@ -51,10 +52,38 @@ class Commands(click.Group):
                 gc.enable()
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command of the first argument; of one that is none, say which was likely meant.
+
+        Raises:
+            click.UsageError: there is no such command.
+        """
+        name = args[0]
+        if name in COMMANDS or name.startswith("-"):
+            return super().resolve_command(ctx, args)
+        close = difflib.get_close_matches(name, COMMANDS, n=1)
+        if close:
+            raise click.UsageError(f"no command {name!r}; did you mean {close[0]!r}?", ctx)
+        if _is_scene(name):
+            raise click.UsageError(f"{name!r} is a scene; `sandbox run {name}` or `sandbox play {name}`", ctx)
+        raise click.UsageError(f"no command {name!r}; commands: {', '.join(COMMANDS)}", ctx)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List the commands without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
+
+
+def _is_scene(text: str) -> bool:
+    from sandbox.scene.shipped import UnknownSceneError, find  # only what is no command needs it
+
+    try:
+        find(text)
+    except UnknownSceneError:
+        return False
+    return True
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from sandbox.cli.naming import plural, with_other_engine
 from sandbox.cli.output import make_folder, require_folder
 from sandbox.cli.reading import gathering, path_of, print_json, refused
 from sandbox.engines.contract import Refusal
@@ -18,6 +19,9 @@ from sandbox.scene.faults import Fault
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
 
+TABLES = "8-ball, 9-ball, snooker or three-cushion"
+"""Scenes to name where another is none."""
+
 
 @click.command(name="match")
 @click.argument("scene")
@@ -27,6 +31,7 @@ from sandbox.scene.model import Scene
 @click.option("--seed", type=click.IntRange(0, 2**31), metavar="N", help="of the first frame; by default the scene's")
 @click.option("--frames", type=click.IntRange(1, 100_000), default=1, metavar="N", help="each with the next seed")
 @click.option("--distance", type=click.IntRange(1, 10_000), metavar="N", help="points to be made, in carom")
+@click.option("--misses", is_flag=True, help="with the foul and a miss, in snooker")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="keep each frame as a session to replay")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
@@ -39,12 +44,13 @@ def command(
     seed: int | None,
     frames: int,
     distance: int | None,
+    misses: bool,
     overrides: tuple[str, ...],
     out: Path | None,
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Play frames of billiards between bots, and tell the score.
+    """Play frames of billiards between bots, and print the score.
 
     SCENE is a table: a file, or the name of a shipped one. Players take the first shot in turn.
     """
@@ -55,13 +61,15 @@ def command(
     with gathering(faults, "--players", (GameError,)):
         count = len(bots_in(players))
     found: list[Scene] = []
-    terms: dict[str, Any] = {} if distance is None else {"distance": distance}
+    terms: dict[str, Any] = ({} if distance is None else {"distance": distance}) | ({"misses": True} if misses else {})
     with gathering(faults):
         require_folder(out)
         path = path_of(scene)
         found = [load(path, overrides)]
         begin = found[0].world.seed if seed is None else seed
-    if found:
+    if found and found[0].surface is None:
+        faults.append(Fault(scene, None, "", f"is not a billiard table: it has no [surface]; such as {TABLES}"))
+    elif found:
         with gathering(faults, scene, (GameError,)):
             Match.begin(found[0], game, count, **terms)
     if not faults and out is not None:
@@ -71,7 +79,7 @@ def command(
         return refused(faults, as_json, frames=[])
     missing = engine_named(engine).missing(found[0], found[0].solver)
     if missing:
-        click.echo(f"{scene}: {Refusal(engine, missing, able(found[0]))}", err=True)
+        click.echo(f"{scene}: {Refusal(engine, missing, able(found[0]))}{with_other_engine(found[0])}", err=True)
         return 1
 
     names, wins, rows, status = [each.strip() for each in players.split(",")], [0] * count, list[dict[str, Any]](), 0
@@ -116,5 +124,6 @@ def _told(number: int, frame: Frame, seats: list[int], names: list[str]) -> str:
         who = seats[state.winner]
         ends = f"player {who + 1} ({names[who]}) wins"
     scores = " : ".join(str(state.scores[seats.index(who)]) for who in range(len(seats)))
-    fouls = sum(bool(turn.fouls) for turn in frame.turns)
-    return f"frame {number}: {ends}, {scores}; {len(frame.shots)} shots, {fouls} fouls, {frame.session.duration:.0f} s"
+    shots = plural(len(frame.shots), "shot")
+    fouls = plural(sum(bool(turn.fouls) for turn in frame.turns), "foul")
+    return f"frame {number}: {ends}, {scores}; {shots}, {fouls}, {frame.session.duration:.0f} s"

@@ -12,7 +12,7 @@ from sandbox.measure.compare.minimise import Minimised, minimise
 from sandbox.measure.compare.patience import TookTooLongError
 from sandbox.measure.told import Told
 from sandbox.scene.faults import Fault
-from sandbox.scene.file import dumps
+from sandbox.scene.file import dumps, loads
 from sandbox.whole import whole
 
 
@@ -70,10 +70,12 @@ def minimised(scene: str, comparison: Comparison, names: Sequence[str] | None, p
     if found.parting is None:
         reason = f"{asked} agree within {comparison.tolerance:.2g} m for as long as that can be told"
         return _nothing(scene, comparison, reason, found.runs)
-    document = _document(found, path)
+    document, text = _document(found, path), _text(scene, found, asked, path)
+    if asked.of(loads(text)) is None:
+        return _nothing(scene, comparison, "the scene that was found does not show it again", found.runs)
     try:
         with whole(path) as temporary:
-            temporary.write_text(_text(scene, found, asked, path), encoding="utf-8")
+            temporary.write_text(text, encoding="utf-8")
     except OSError as error:
         message = f"{path}: {error.strerror or error}"
         return Answer(2, f"--minimise: {message}", {**document, "path": None, "error": message})

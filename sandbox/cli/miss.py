@@ -42,7 +42,7 @@ ANGLE = Figure(0.0, 180.0, min_open=True, max_open=True)
 def command(
     scene: str, overrides: tuple[str, ...], speed: float, angle: float, dts: tuple[float, ...], as_json: bool
 ) -> int:
-    """Fly a shot over level ground in a scene's air, on every engine, and tell how far off each comes down."""
+    """Fly a shot over level ground in a scene's air on every engine, and print how far off each lands."""
     from sandbox.games.artillery.miss import STEPS, miss_table  # the engines, which help needs none of
 
     try:

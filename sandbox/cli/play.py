@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from sandbox.cli.naming import with_other_engine
 from sandbox.cli.reading import gathering, path_of, refused
 from sandbox.cli.showing import show_stage, window_options
 from sandbox.engines.contract import Refusal
@@ -33,7 +34,7 @@ def command(scene: str | None, engine: str | None, overrides: tuple[str, ...], *
             first = engine or usual(found)
             missing = engine_named(first).missing(found, found.solver) if not faults else ()
             if missing:
-                click.echo(f"{scene}: {Refusal(first, missing, able(found))}", err=True)
+                click.echo(f"{scene}: {Refusal(first, missing, able(found))}{with_other_engine(found)}", err=True)
                 return 1
         elif overrides:
             raise SceneError([Fault("--set", None, "", "sets values of a scene; name the scene too")])

@@ -8,7 +8,12 @@ from typing import Any
 import click
 
 from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.shipped import UnknownSceneError, find
+from sandbox.scene.shipped import UnknownSceneError, find, scenes_in
+
+
+def scenes_of(names: Sequence[str]) -> list[str]:
+    """Return the names of scenes that a user gave, in place of each folder the files of its scenes."""
+    return [scene for name in names for scene in scenes_in(name) or (name,)]
 
 
 def paths_of(names: Sequence[str]) -> list[tuple[str, str]]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from sandbox.cli.naming import engines_in
-from sandbox.cli.reading import gathering, path_of, print_json, refused
+from sandbox.cli.reading import gathering, path_of, print_json, refused, scenes_of
 from sandbox.interrupt import uninterrupted
 from sandbox.measure.compare import compare
 from sandbox.measure.recorder import TooLargeError
@@ -19,7 +19,8 @@ from sandbox.scene.shipped import shipped
 
 USUAL = "benchmark/"
 """Shipped scenes whose names begin so are reported where none is named."""
-PATIENCE = 5.0
+EFFORT = 3.0
+"""Counted work of the search for a trade-off in each scene, about seconds of computing."""
 NAME = "report.html"
 """Of the page, where a folder is given."""
 
@@ -29,11 +30,20 @@ NAME = "report.html"
 @click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="which engine(s); by default all")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of every scene")
 @click.option(
-    "--patience",
+    "--effort",
     type=click.FloatRange(min=0.0),
-    default=PATIENCE,
+    default=EFFORT,
+    metavar="N",
+    help=f"counted work of the search for a trade-off in each scene, about seconds of computing, by default {EFFORT:g};"
+    " 0 leaves it out",
+)
+@click.option(
+    "--time-limit",
+    "--patience",
+    "time_limit",
+    type=click.FloatRange(min=0.0, min_open=True),
     metavar="S",
-    help=f"s that the search for a trade-off may take in each scene, by default {PATIENCE:g}; 0 leaves it out",
+    help="s after which a scene's search ends; what it tries then depends on the machine; by default none",
 )
 @click.option("--why", is_flag=True, help="say of each engine that is off which knob matters; takes many times as long")
 @click.option(
@@ -45,7 +55,8 @@ def command(
     scenes: tuple[str, ...],
     engines: str | None,
     overrides: tuple[str, ...],
-    patience: float,
+    effort: float,
+    time_limit: float | None,
     why: bool,
     out: Path,
     as_json: bool,
@@ -55,11 +66,12 @@ def command(
     faults: list[Fault] = []
     names = engines_in(engines, faults)
     read: list[tuple[str, Scene]] = []
-    for name in scenes or [scene.name for scene in shipped() if scene.name.startswith(USUAL)]:
+    for name in scenes_of(scenes) or [scene.name for scene in shipped() if scene.name.startswith(USUAL)]:
         with gathering(faults):
             read.append((name, load(path_of(name), overrides)))
-    if not math.isfinite(patience):
-        faults.append(Fault("--patience", None, "", f"{patience} s; it is finite"))
+    for flag, figure in (("--effort", effort), ("--time-limit", time_limit)):
+        if figure is not None and not math.isfinite(figure):
+            faults.append(Fault(flag, None, "", f"is {figure:g}; it is finite"))
     if not read and not faults:
         faults.append(Fault("SCENES", None, "", "no benchmark scenes ship here; name some"))
     if not faults:
@@ -79,7 +91,16 @@ def command(
                 click.echo(f"{k + 1}/{len(read)} {name}", err=True)
             try:
                 found = compare(scene, names, why=why)
-                weighed = tradeoff(scene, names, patience=patience, truth=found.best) if patience else None
+                weighed = None
+                if effort:  # the comparison's own runs are its first points, so that the two cannot contradict
+                    weighed = tradeoff(
+                        scene,
+                        names,
+                        effort=effort,
+                        time_limit=time_limit,
+                        truth=found.best or found.doubt,
+                        runs=found.trajectories,
+                    )
             except (TooLargeError, SceneError) as error:
                 status = 1
                 click.echo(f"{name}: {error}", err=True)

@@ -13,9 +13,9 @@ from sandbox.batch.outcome import Outcome, execute
 from sandbox.batch.plan import Job, parse_sweep, plan
 from sandbox.batch.store import Store, StoreError
 from sandbox.cli.ledger_table import print_ledgers
-from sandbox.cli.naming import engines_in
+from sandbox.cli.naming import engines_in, meant_or_known, with_other_engine
 from sandbox.cli.output import require_picture
-from sandbox.cli.reading import gathering, paths_of, print_json, refused
+from sandbox.cli.reading import gathering, paths_of, print_json, refused, scenes_of
 from sandbox.cli.scores_table import print_scores, score_rows
 from sandbox.cli.table import Row, print_runs
 from sandbox.games.player import Player
@@ -42,14 +42,14 @@ from sandbox.scene.faults import Fault, SceneError
 @click.option(
     "--player",
     metavar="WHO",
-    help="of a game: random, skilled, none, or a script file",
+    help="who plays a game: random, skilled, none, or a script file",
 )
-@click.option("--workers", type=click.IntRange(1, 256), default=1, metavar="N", help="how many runs at once")
+@click.option("--workers", type=click.IntRange(1, 256), default=1, metavar="N", help="run so many at the same time")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="store every run in a folder, once")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw the run: .png, .svg or .pdf")
 @click.option("--body", "bodies", multiple=True, metavar="NAME", help="which bodies to draw")
 @click.option("--audit/--no-audit", default=True, help="count the contacts that the engine misses")
-@click.option("--ledger", "ledger", is_flag=True, help="tell where energy went, by cause")
+@click.option("--ledger", "ledger", is_flag=True, help="account for energy, by cause")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 @click.option("--quiet", is_flag=True, help="no table, no progress")
 def command(
@@ -68,14 +68,14 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Run scenes headless and tell how they went.
+    """Run scenes headless and print the results.
 
-    SCENES are files, names of shipped scenes, or sessions that the window has recorded (.json).
+    SCENES are files, folders of files, names of shipped scenes, or sessions that the window has recorded (.json).
     """
     faults: list[Fault] = []
     names = engines_in(engines, faults)
     found: list[tuple[str, str]] = []
-    for scene in scenes:
+    for scene in scenes_of(scenes):
         with gathering(faults):
             found += paths_of([scene])
     sound: list[str] = []
@@ -90,7 +90,7 @@ def command(
     with gathering(faults, "--sweep", (AddressError,)):
         jobs = plan(found, names, overrides, sound, seeds, plays)
     if plays is not None and jobs and not any(job.player == plays for job in jobs):
-        faults.append(Fault("--player", None, "", "nobody plays here: no scene named has a game with rules"))
+        faults.append(Fault("--player", None, "", "no scene given has a game with rules"))
     if not faults:
         with gathering(faults):
             _check_drawing(plot, bodies, jobs)
@@ -122,10 +122,11 @@ def command(
             store.close()
     rows = [made[k] for k in sorted(made)]
 
-    for row in rows:
+    for k, row in sorted(made.items()):
         if row["status"] != "ok":
             status = status or 1
-            click.echo(f"{row['scene']}: {row['status']}: {row['reason']}", err=True)
+            advice = with_other_engine(jobs[k].scene) if row["status"] == "refused" else ""
+            click.echo(f"{row['scene']}: {row['status']}: {row['reason']}{advice}", err=True)
         if row.get("replayed") is False:
             status = status or 1
             what = "state" if row.get("otherwise") is None else f"game, from {row['otherwise']:g} s on,"
@@ -169,9 +170,10 @@ def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) 
             fault("--plot", f"draws one run, but this makes {len(jobs)}")
         with gathering(faults):
             require_picture(plot)
-        unknown = [name for name in bodies if name not in jobs[0].scene.bodies.names]
-        if unknown:
-            fault("--body", f"no body is named {', '.join(map(repr, unknown))}")
+        names = jobs[0].scene.bodies.names
+        for name in bodies:
+            if name not in names:
+                fault("--body", f"no body is named {name!r}; {meant_or_known(name, names)}")
     if faults:
         raise SceneError(faults)
 

@@ -1,13 +1,127 @@
-"""`sandbox schema`: the JSON Schema of a scene file."""
+"""`sandbox schema`: the JSON Schema of a scene file, or the keys of one of its tables."""
+
+import difflib
+import json
+from typing import Any
 
 import click
 
-from sandbox.scene.schema import dumps
+from sandbox.scene.schema import dumps, schema
+
+Node = dict[str, Any]
+"""A JSON Schema."""
 
 
 @click.command(name="schema")
-@click.option("--json", is_flag=True, expose_value=False, help="as it is anyway: the schema is JSON")
-def command() -> int:
-    """Print the JSON Schema of a scene file, for editors."""
-    click.echo(dumps(), nl=False)
+@click.argument("table", required=False)
+@click.option("--json", "as_json", is_flag=True, help="of a table too as JSON Schema; the whole schema is JSON anyway")
+def command(table: str | None, as_json: bool) -> int:
+    """Print the JSON Schema of a scene file, for editors, or the keys of one TABLE, for people.
+
+    TABLE is the name of a table, such as ball, solver, joint, body.box or pinball.bumper.
+    """
+    if table is None:
+        click.echo(dumps(), nl=False)
+        return 0
+    whole = schema()
+    found = _find(whole, table.strip("[]"))
+    if as_json:
+        one = found[0] if len(found) == 1 else {"oneOf": found}
+        click.echo(json.dumps({"$schema": whole["$schema"], **one, "$defs": whole["$defs"]}, ensure_ascii=False))
+        return 0
+    for node in found:
+        _print_table(whole, table, node)
     return 0
+
+
+def _find(whole: Node, path: str) -> list[Node]:
+    """Return the tables that a path leads to: one, or the several kinds of joints or drives.
+
+    Raises:
+        click.UsageError: it leads nowhere.
+    """
+    here = [whole]
+    for part in path.split("."):
+        known = dict.fromkeys(key for node in here for key in node.get("properties", {}))
+        if part not in known:
+            close = difflib.get_close_matches(part, known, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"known here: {', '.join(known)}"
+            raise click.UsageError(f"{path!r}: no key {part!r}; {hint}")
+        inner = (node["properties"][part] for node in here if part in node.get("properties", {}))
+        here = list({node.get("title", ""): node for each in inner for node in _tables(whole, each)}.values())
+        if not here:
+            raise click.UsageError(f"{path!r}: {part!r} is a value, no table")
+    return here
+
+
+def _tables(whole: Node, node: Node) -> list[Node]:
+    """Return the tables that a value may be, or consists of."""
+    if "$ref" in node:
+        node = whole["$defs"][node["$ref"].rpartition("/")[2]]
+    if "properties" in node:
+        return [node]
+    inner = [*node.get("anyOf", ()), *node.get("oneOf", ()), *([node["items"]] if "items" in node else ())]
+    return [table for each in inner for table in _tables(whole, each)]
+
+
+def _print_table(whole: Node, name: str, node: Node) -> None:
+    """Print the keys of a table, a line each: its type and range, its default, and what it is."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    kinds = _kinds(node)
+    about = _line(node.get("description", "").partition("\n\n")[0])
+    click.echo(f"{name}{f', kind {kinds}' if kinds else ''}: {about}".rstrip(": "))
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for head in ("key", "value", "default"):
+        table.add_column(head, no_wrap=head == "key")
+    table.add_column("")
+    for key, each in node["properties"].items():
+        needed = "must be given" if key in node.get("required", ()) else json.dumps(each.get("default"))
+        default = "–" if needed == "null" else needed
+        table.add_row(*map(Text, (key, _value(whole, each), default, _line(each.get("description", "")))))
+    console = Console()
+    if not console.is_terminal:  # then a key is a line
+        console.width = Console(width=10_000).measure(table).maximum
+    console.print(table)
+
+
+LARGE = 1e5
+"""A bound beyond this, or its reciprocal, keeps nonsense away from the engines and is not worth a reader's time."""
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _kinds(node: Node) -> str:
+    kind = node["properties"].get("kind", {})
+    return " or ".join(kind.get("enum", [kind["const"]] if "const" in kind else []))
+
+
+def _value(whole: Node, node: Node) -> str:
+    """Return in words what a value may be."""
+    if "$ref" in node:
+        node = whole["$defs"][node["$ref"].rpartition("/")[2]]
+    if "properties" in node:
+        return "table"
+    if "enum" in node or "const" in node:
+        return " · ".join(map(str, node.get("enum", [node.get("const")])))
+    forms = [*node.get("anyOf", ()), *node.get("oneOf", ())]
+    if forms:
+        return " or ".join(dict.fromkeys(_value(whole, each) for each in forms))
+    if node.get("type") == "array":
+        if "prefixItems" in node:
+            return f"[{', '.join(_value(whole, each) for each in node['prefixItems'])}]"
+        of = _value(whole, node["items"])
+        return "tables" if "table" in of else f"array of {of}"
+    low, high = (node.get(f"{way}imum", node.get(f"exclusive{way.capitalize()}imum")) for way in ("min", "max"))
+    words = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
+    word = words.get(str(node.get("type")), str(node.get("type", "value")))
+    low, high = (None if bound is None or abs(bound) >= LARGE else bound for bound in (low, high))
+    if low is not None and 0 < low < 1 / LARGE:
+        low, word = None, f"{word} > 0"
+    if low is not None:
+        return f"{word} ≥ {low:g}" if high is None else f"{word} {low:g} … {high:g}"
+    return word if high is None else f"{word} ≤ {high:g}"

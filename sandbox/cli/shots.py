@@ -42,7 +42,7 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True, max=1.0)
 @click.option(
     "--window", "pots", multiple=True, metavar="BALL:POCKET", help="between which aims a ball falls into a pocket"
 )
-@click.option("--horizon", "foretold", is_flag=True, help="from when on nobody could foretell it")
+@click.option("--horizon", "foretold", is_flag=True, help="the time from which the shot cannot be predicted")
 @click.option("--nudge", type=POSITIVE, default=NUDGE, metavar="X", help="of the horizon, rad or m; by default 1e-9")
 @click.option(
     "--by", type=click.Choice(["aim", "place"]), default="aim", help="what is nudged: the aim, or the ball's place"
@@ -72,7 +72,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Play a shot many times, each a little off as a player's strokes are, and tell what comes of it.
+    """Play a shot many times with a player's errors, and print the odds of each outcome.
 
     SCENE is a file or a shipped one, with a [surface] and a [[shot]]. Errors are standard deviations of normal ones.
     """

@@ -87,7 +87,7 @@ def show_stage(
     if record is not None and not record.absolute().parent.is_dir():
         click.echo(f"--record: {record}: there is no folder {record.parent}", err=True)
         return 2
-    stage.paused = paused
+    stage.paused, stage.saves_at_end = paused, record is not None
     try:
         window = Window(stage, size=size, film=f".{film}", say=click.echo)
     except NoDisplayError as error:

@@ -8,7 +8,7 @@ from sandbox.recording import Recording
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.trajectory import Trajectory
 
-MOST_NAMED = 20
+MOST_NAMED = 3
 """Ids that one message lists."""
 
 
@@ -72,9 +72,12 @@ def _only_run(folder: Path, text: str) -> Path:
     if not runs:
         message = "holds no run; `sandbox run SCENE --out DIR` stores one"
         raise SceneError([Fault(text, None, "", message)])
-    ids = ", ".join(run.stem for run in runs[:MOST_NAMED])
-    more = f" and {len(runs) - MOST_NAMED:,} more" if len(runs) > MOST_NAMED else ""
-    raise SceneError([Fault(text, None, "", f"holds {len(runs):,} runs; name one as {folder}/<id>: {ids}{more}")])
+    some = ", ".join(str(folder / run.stem) for run in runs[:MOST_NAMED])
+    if len(runs) > MOST_NAMED:
+        from sandbox.batch.store import DATABASE  # 8 ms of sqlite3, for this message alone
+
+        some += f" … the table `runs` of {folder / DATABASE} lists all {len(runs):,} with scene, engine and settings"
+    raise SceneError([Fault(text, None, "", f"holds {len(runs):,} runs; name one, such as {some}")])
 
 
 def _check(run: Trajectory) -> None:

@@ -1,13 +1,16 @@
 """The table that `sandbox run` prints: a row a run, and columns for what differs between them."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
+
+STEP = ("dt", "substeps")
+"""Settings that share a column."""
 
 Row = dict[str, Any]
 """A run as `--json` tells of it."""
 
-WIDE = 200
+WIDE = 240
 """Columns where the output is no terminal: rows are for reading by line then, and must not be folded."""
 
 SHORTEST_NAME = 8
@@ -21,7 +24,9 @@ def print_runs(rows: Sequence[Row]) -> None:
     from rich.text import Text
 
     swept = [key for key in rows[0]["set"] if key != "world.seed" and not key.startswith("solver.")]
-    differing = [key for key in rows[0]["settings"] if key != "dt" and _differs(rows, key)]
+    swept = [key for key in swept if len({str(row["set"][key]) for row in rows}) > 1]
+    differing = [key for key in rows[0]["settings"] if key not in STEP and _differs(rows, key)]
+    substeps = any(row["settings"]["substeps"] > 1 for row in rows)
     seeds = len({row["seed"] for row in rows}) > 1
     scenes = len({row["scene"] for row in rows}) > 1
 
@@ -30,13 +35,14 @@ def print_runs(rows: Sequence[Row]) -> None:
     if scenes:
         table.add_column("scene", overflow="fold", min_width=SHORTEST_NAME)
     table.add_column("engine", no_wrap=True)
-    for head in ("dt", *swept, *differing, *(["seed"] if seeds else [])):
+    for head in ("dt × substeps" if substeps else "dt", *swept, *differing, *(["seed"] if seeds else [])):
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("status", no_wrap=True)
     joined = any(row["joint_error"] is not None for row in rows)
     torn = any(row["broken_joints"] for row in rows)
-    joints = *(("joints off",) if joined else ()), *(("broken",) if torn else ())
-    for head in ("× real", "energy, J", *joints, "contacts", "missed"):
+    joints = *(("joint error",) if joined else ()), *(("broken",) if torn else ())
+    timed = _first_contacts_differ(rows)
+    for head in ("× real time", "energy, J", *joints, *(("first contact, s",) if timed else ()), "contacts", "missed"):
         table.add_column(head, justify="right", no_wrap=True)
     games = any("score" in row for row in rows)
     if games:
@@ -53,7 +59,7 @@ def print_runs(rows: Sequence[Row]) -> None:
         table.add_row(
             *([Text(row["scene"])] if scenes else []),
             row["engine"],
-            f"{row['settings']['dt']:.4g}",
+            f"{row['settings']['dt']:.4g}" + (f" × {row['settings']['substeps']}" if substeps else ""),
             *(_setting(row["set"][key]) for key in swept),
             *(_setting(row["settings"][key]) for key in differing),
             *([str(row["seed"])] if seeds else []),
@@ -62,6 +68,7 @@ def print_runs(rows: Sequence[Row]) -> None:
             "–" if row["energy_start"] is None else f"{_figure(row['energy_start'])} → {_figure(row['energy_end'])}",
             *([_share(row["joint_error"])] if joined else []),
             *([f"{row['broken_joints']:,}"] if torn else []),
+            *([_figure(row["first_contact"], 6)] if timed else []),
             *(("–", "–") if row["status"] == "refused" else (f"{row['contacts']:,}", _missed(row["missed_contacts"]))),
             *((_figure(row.get("score")), Text(_over(row))) if games else ()),
             *([Text(", ".join(f"{ball}: {pocket}" for ball, pocket in row["pocketed"].items()))] if fallen else []),
@@ -73,6 +80,31 @@ def print_runs(rows: Sequence[Row]) -> None:
     if not scenes:
         console.print(Text(rows[0]["scene"]), soft_wrap=True)
     console.print(table)
+    if sys.stdout.isatty():  # for people; a program that reads the table has every row as a line of its own
+        console.print(Text("; ".join(_legend(joined, timed)), style="dim"))
+
+
+def _legend(joined: bool, timed: bool) -> Iterator[str]:
+    """Yield what the columns mean."""
+    yield "× real time: simulated time / computing time"
+    yield "energy: start → end"
+    if joined:
+        yield "joint error: the largest of any joint, as a part of its length"
+    if timed:
+        yield "first contact: when its first collision begins"
+    yield "missed: contacts that the engine passed over"
+
+
+def _first_contacts_differ(rows: Sequence[Row]) -> bool:
+    """Tell whether runs of one scene and seed, which differ in engine or setting, first meet something at other times.
+
+    Where energies and counts are equal, this shows what the setting changes.
+    """
+    times: dict[tuple[str, int], set[float | None]] = {}
+    for row in rows:
+        if row["status"] != "refused":
+            times.setdefault((row["scene"], row["seed"]), set()).add(row["first_contact"])
+    return any(len(each) > 1 for each in times.values())
 
 
 def _over(row: Row) -> str:

@@ -17,7 +17,7 @@ from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.tradeoff.aim import UnknownMetricError, require_aim
 from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.weighed import Tradeoff
-from sandbox.measure.tradeoff.weighing import PATIENCE, POINTS, REPEATS, tradeoff
+from sandbox.measure.tradeoff.weighing import EFFORT, POINTS, REPEATS, tradeoff
 from sandbox.scene.faults import Fault
 from sandbox.scene.file import load
 from sandbox.scene.model import Scene
@@ -39,9 +39,36 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True)
 )
 @click.option("--seeds", type=click.IntRange(1, 1000), default=1, metavar="N", help="errors are the worst of N seeds")
 @click.option("--zoom", type=POSITIVE, metavar="PX", help="pixels a metre, for errors on the screen")
-@click.option("--patience", type=POSITIVE, default=PATIENCE, metavar="S", help="s that the search may take")
-@click.option("--points", type=click.IntRange(1, 100_000), default=POINTS, metavar="N", help="most settings to try")
-@click.option("--repeats", type=click.IntRange(1, 1000), default=REPEATS, metavar="N", help="timings near the front")
+@click.option(
+    "--effort",
+    type=POSITIVE,
+    default=EFFORT,
+    metavar="N",
+    help=f"counted work of the search, about seconds of computing: the same settings are tried on every machine; by "
+    f"default {EFFORT:g}",
+)
+@click.option(
+    "--time-limit",
+    "--patience",
+    "time_limit",
+    type=POSITIVE,
+    metavar="S",
+    help="s after which nothing more is tried; what is tried then depends on the machine; by default none",
+)
+@click.option(
+    "--points",
+    type=click.IntRange(1, 100_000),
+    default=POINTS,
+    metavar="N",
+    help=f"most settings to try; by default {POINTS}",
+)
+@click.option(
+    "--repeats",
+    type=click.IntRange(1, 1000),
+    default=REPEATS,
+    metavar="N",
+    help=f"timings of each setting near the front; by default {REPEATS}",
+)
 @click.option("--write", is_flag=True, help="put the recommended [solver] into the scene file")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write tradeoff.json and a report page")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw it: .png, .svg or .pdf")
@@ -57,7 +84,8 @@ def command(
     fps: float,
     seeds: int,
     zoom: float | None,
-    patience: float,
+    effort: float,
+    time_limit: float | None,
     points: int,
     repeats: int,
     write: bool,
@@ -66,7 +94,12 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Measure error against cost over engines and settings. SCENE is a file or a shipped one."""
+    """Measure error against cost over engines and settings. SCENE is a file or a shipped one.
+
+    The settings that are tried and their errors are the same on every machine. The times are of this machine; where two
+    settings are within its noise, counted work decides which is the cheaper. Exit status 1: no setting that was tried
+    is within the tolerance, or within the budget; the nearest is shown.
+    """
     faults: list[Fault] = []
     names = engines_in(engines, faults)
     with gathering(faults, "--metric", (UnknownMetricError,)):
@@ -78,7 +111,7 @@ def command(
     ):
         with gathering(faults, flag, (ValueError,)):
             require_aim(*figures)
-    for flag, figure in (("--zoom", zoom), ("--patience", patience)):
+    for flag, figure in (("--zoom", zoom), ("--effort", effort), ("--time-limit", time_limit)):
         if figure is not None and not math.isfinite(figure):
             faults.append(Fault(flag, None, "", f"is {figure:g}; it is positive and finite"))
     read: Scene | None = None
@@ -110,7 +143,8 @@ def command(
                 fps=fps,
                 seeds=seeds,
                 zoom=zoom,
-                patience=patience,
+                effort=effort,
+                time_limit=time_limit,
                 repeats=repeats,
                 most=points,
                 told=told,
@@ -125,7 +159,7 @@ def command(
         print_tradeoff(scene, found)
     status = 1 if found.within_tolerance is None or (budget is not None and found.within_budget is None) else 0
     if found.interrupted:
-        click.echo(f"interrupted: {len(found.points)} settings are tried and kept", err=True)
+        click.echo(f"interrupted: the {len(found.points)} settings tried so far are kept", err=True)
         status, write = 130, False
     return max(status, _kept(found, document, path, write, out, plot, quiet or as_json))
 

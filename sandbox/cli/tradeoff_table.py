@@ -1,25 +1,35 @@
-"""The table of `sandbox tradeoff`: the front, what failed, where the error comes from, and the answers."""
+"""The table of `sandbox tradeoff`: each engine's front, what failed, where the error comes from, and the answers."""
 
 import sys
 from collections import Counter
+from collections.abc import Sequence
 
 import click
 
 from sandbox.cli.table import WIDE
 from sandbox.measure.tradeoff.figure import figure
-from sandbox.measure.tradeoff.picking import called, shown
+from sandbox.measure.tradeoff.picking import called, pymunk_lines, shown
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.split import Split
 from sandbox.measure.tradeoff.weighed import Tradeoff
+from sandbox.scene.rewrite import written
 
 NOTHING = 1e-12
 """m"""
 MOST_REASONS = 3
-"""Failures told of by their reason."""
+"""Failures listed with their reason."""
+MOST_ROWS = 8
+"""Rows of one engine's front; where it has more, some that answer no question are left out."""
+LEGEND = {
+    "scene": "the setting in the scene file",
+    "front": "no setting of any engine is both cheaper and more accurate",
+    "cheapest": "the cheapest within the tolerance",
+    "best": "the most accurate within the budget",
+}
 
 
 def print_tradeoff(scene: str, found: Tradeoff) -> None:
-    """Print what the truth is, the front, each engine's split, and the answers.
+    """Print what errors are counted in and why, each engine's front, each engine's split, and the answers.
 
     Args:
         scene: what it is called.
@@ -34,39 +44,64 @@ def print_tradeoff(scene: str, found: Tradeoff) -> None:
     table.add_column("engine", no_wrap=True)
     for head in ("dt", "substeps", "iterations"):
         table.add_column(head, justify="right", no_wrap=True)
-    table.add_column("otherwise", no_wrap=True)
+    table.add_column("other settings", no_wrap=True)
     table.add_column(f"{found.metric.name}{unit}", justify="right", no_wrap=True)
-    for head in ("ms per s", "median"):
+    for head in ("ms/s least", "median"):
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
-    picked = found.within_tolerance.point if found.within_tolerance else None
-    affordable = found.within_budget.point if found.within_budget else None
-    for point in found.pareto:
-        marks = [name for name, one in (("cheapest", picked), ("best", affordable)) if one is point]
-        table.add_row(*_cells(point), Text(" ".join(marks), style="green"))
+    rows = [point for front in found.fronts().values() for point in _thinned(front, found)]
+    shown_already = {id(point) for point in rows}
+    asked = (point for point in found.points if point.status == "ok" and _marks(point, found))
+    rows += [point for point in asked if id(point) not in shown_already]
+    order = list(found.fronts())
+    rows.sort(key=lambda each: (order.index(each.engine), each.cost or 0.0))
+    for point in rows:
+        table.add_row(*_cells(point), Text(" ".join(_marks(point, found)), style="green"))
     console = Console(width=None if sys.stdout.isatty() else WIDE)
     console.width = max(console.width, Console(width=10_000).measure(table).maximum)
-    console.print(Text(f"{scene}: {found.scene.title}" if found.scene.title else scene), soft_wrap=True)
+    name = f"{scene} ({found.scene.title})" if found.scene.title else scene
+    console.print(Text(f"{name}: {found.error_about}"), soft_wrap=True)
     console.print(Text(_about(found)), soft_wrap=True)
-    if found.pareto:
+    if rows:
         console.print(table)
+        click.echo(_legend(rows, found))
     splits = [_split(each) for each in found.splits if each.total >= NOTHING]
-    for line in [*_failures(found), *splits, *found.answers(), *_cheaper(found)]:
+    for line in [*_failures(found), *splits, *found.answers(), *_cheaper(found), *_solver(found)]:
         click.echo(line)
 
 
 def _about(found: Tradeoff) -> str:
-    truth = "none is known" if found.best is None else str(found.truth).replace("_", " ")
-    whole = found.scene.world.duration
-    until = "" if found.best is None else f", trusted until {found.best.trusted_until:.4g} s of {whole:.4g} s"
-    seeds = f", the worst of {len(found.seeds)} seeds" if len(found.seeds) > 1 else ""
-    metric = f"{found.metric.name}: {found.metric.about}{seeds}"
-    tried = f"{len(found.points)} settings tried, {len(found.pareto)} that nothing beats"
-    return f"{metric}; truth: {truth}{until}; {tried}"
+    seeds = f"; each error is the worst of {len(found.seeds)} seeds" if len(found.seeds) > 1 else ""
+    ended = "; the time limit ended the search, so another run may try others" if found.out_of_time else ""
+    count = len(found.points)
+    return f"{count} setting{'s' if count != 1 else ''} tried{seeds}{ended}"
+
+
+def _thinned(front: Sequence[Point], found: Tradeoff) -> list[Point]:
+    """Return at most `MOST_ROWS` of an engine's front, and what answers a question."""
+    asked = [point for point in front if set(_marks(point, found)) - {"front"}]
+    if len(front) <= MOST_ROWS:
+        return list(front)
+    evenly = [front[round(k * (len(front) - 1) / (MOST_ROWS - 1))] for k in range(MOST_ROWS)]
+    return [point for point in front if point in evenly or point in asked]
+
+
+def _marks(point: Point, found: Tradeoff) -> list[str]:
+    picks = {"cheapest": found.within_tolerance, "best": found.within_budget}
+    marks = ["scene"] if point.is_own else []
+    marks += ["front"] if any(point is each for each in found.pareto) else []
+    return marks + [name for name, pick in picks.items() if pick is not None and pick.point is point]
+
+
+def _legend(rows: Sequence[Point], found: Tradeoff) -> str:
+    used = {mark for point in rows for mark in _marks(point, found)}
+    repeats = max(point.repeats for point in rows)
+    times = f"the least and the median of {repeats} timings" if repeats else "of the run that was scored"
+    marks = "".join(f"; {mark}: {meaning}" for mark, meaning in LEGEND.items() if mark in used)
+    return f"ms/s: milliseconds of computing per simulated second on this machine, {times}{marks}"
 
 
 def _cells(point: Point) -> list[str]:
-    assert point.error is not None and point.cost is not None and point.cost_median is not None
     steps = {"dt", "substeps", "iterations"}
     words = ", ".join(
         f"no {key}" if value is None else f"{key} {shown(value)}"
@@ -74,15 +109,14 @@ def _cells(point: Point) -> list[str]:
         if key not in steps
     )
     own = point.settings
+    figures = (("3", point.error), ("4", point.cost), ("4", point.cost_median))
     return [
         point.engine,
         f"{own.dt:.4g}",
         str(own.substeps),
         str(own.iterations),
         words,
-        f"{point.error:.3g}",
-        f"{point.cost:.4g}",
-        f"{point.cost_median:.4g}",
+        *("–" if value is None else f"{value:.{digits}g}" for digits, value in figures),
     ]
 
 
@@ -91,7 +125,7 @@ def _failures(found: Tradeoff) -> list[str]:
     counted = Counter(point.status for point in failed)
     lines = [f"{count} {status}" for status, count in counted.items()]
     told = [f"{called(p)} {p.status}: {p.reason}" for p in failed[:MOST_REASONS]]
-    left = [f"{found.untried} left out, as they would have taken too long"] if found.untried else []
+    left = [f"{found.untried} left out, as they would have cost too much"] if found.untried else []
     summary = ", ".join([*lines, *left])
     return ([summary] if summary else []) + told
 
@@ -104,9 +138,30 @@ def _split(each: Split) -> str:
 
 
 def _part(metres: float) -> str:
-    """Write a part of an error; nobody cares how much rounding it is."""
+    """Write a part of an error; of rounding, that it is nothing."""
     return "nothing" if metres < NOTHING else figure(metres, "m")
 
 
 def _cheaper(found: Tradeoff) -> list[str]:
     return [f"cheaper: {each.sentence}" for each in found.proposals]
+
+
+def _solver(found: Tradeoff) -> list[str]:
+    """Return the recommended `[solver]`, and the lines of Python for the cheapest setting of pymunk."""
+    lines = []
+    if found.within_tolerance is not None:
+        point = found.within_tolerance.point
+        values = [f"{key} = {written(value)}" for key, value in point.changes.items() if value is not None]
+        dropped = [f"# without {key}" for key, value in point.changes.items() if value is None]
+        if values or dropped:
+            block = _indented(["[solver]", *values, *dropped])
+            lines += ["", f"recommended changes in the scene file, run with --engine {point.engine}:", *block]
+    pymunk = found.cheapest_by_engine.get("pymunk")
+    if pymunk is not None:
+        head = "the cheapest setting of pymunk within the tolerance, as lines of a program that uses pymunk:"
+        lines += ["", head, *_indented(pymunk_lines(pymunk.point.settings))]
+    return lines
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"    {line}" for line in lines]

@@ -115,7 +115,7 @@ def _unused(folder: Path) -> bool:
 def tell_if_slow(bodies: int) -> None:
     """Say so where a large scene runs on kernels that are not compiled."""
     if not COMPILED and bodies >= LARGE:
-        say(f"{bodies:,} bodies without compiled kernels will be slow: pip install 'sandbox2d[fast]'")
+        say(f"{bodies:,} bodies without compiled kernels will be slow: pip install -e '.[fast]'")
 
 
 if COMPILED:

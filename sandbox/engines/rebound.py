@@ -1,10 +1,13 @@
-"""Rebound: how fast two things part that meet at a speed, which every engine asks here.
+"""Rebound: the speed at which two bodies part after a hit, one law for every engine.
 
-    parting = e / (1 + f·v) · v + kick,    v the speed of approach along the normal
+    r(v) = e / (1 + f·v) · v,        v the speed of approach along the normal
+    parting = r(v) + kick            a kick that adds to the rebound (bumper)
+    parting = r(v + kick)            a kick that adds to the approach (slingshot)
 
 Restitution falls with speed as in Visual Pinball (`ElasticityWithFalloff`, src/physics/collide.h), whose rubber
-rebounds at 0.8/(1 + 0.3 v) of v m/s. A kick comes on top, once for each hit above its threshold, by what bumpers and
-slingshots do there; a slingshot's is a parabola along its length.
+rebounds at 0.8/(1 + 0.3 v) of v m/s. A kick acts once for each hit above its threshold. The two laws are those of
+`BumperHitCircle::Collide` and `LineSegSlingshot::Collide` (src/physics/collideex.cpp); there a slingshot's kick is a
+parabola along its length.
 """
 
 import math
@@ -23,7 +26,7 @@ def rebound(restitution: float, falloff: float, closing: float) -> float:
 
 
 def kicked(speed: float, threshold: float, middle: bool, share: float, closing: float) -> float:
-    """Return what a kick adds to that, m/s.
+    """Return the speed of a kick at a point of its surface, m/s; 0 below the threshold.
 
     Args:
         speed: of the kick, m/s.
@@ -37,14 +40,29 @@ def kicked(speed: float, threshold: float, middle: bool, share: float, closing: 
     return speed * 4.0 * share * (1.0 - share) if middle else speed
 
 
-compiled_rebound, compiled_kicked = kernel(rebound), kernel(kicked)
-"""The same for kernels; whoever asks for one contact at a time would wait longer for the compiler."""
+def kick_gain(restitution: float, falloff: float, kick: float, to_approach: bool, closing: float) -> float:
+    """Return by how much a kick raises the speed of parting, m/s.
+
+    Args:
+        restitution: of the two surfaces.
+        falloff: of the two surfaces, s/m.
+        kick: speed of the kick, m/s, as `kicked` returns it.
+        to_approach: whether it adds to the approach instead of the rebound.
+        closing: the speed of approach, m/s.
+    """
+    if not to_approach or kick == 0.0:
+        return kick
+    driven = closing + kick
+    return restitution / (1.0 + falloff * driven) * driven - restitution / (1.0 + falloff * closing) * closing
 
 
-def stretches(points: Sequence[Point], closed: bool) -> list[tuple[float, float]]:
+compiled_rebound, compiled_kicked, compiled_kick_gain = kernel(rebound), kernel(kicked), kernel(kick_gain)
+"""The same for kernels; for one contact at a time compiling takes longer than it saves."""
+
+
+def stretches(points: Sequence[Point]) -> list[tuple[float, float]]:
     """Return for each segment of a polyline at which shares of the whole length it begins and ends."""
-    ends = (*points, points[0]) if closed else tuple(points)
-    lengths = [math.dist(a, b) for a, b in pairwise(ends)]
+    lengths = [math.dist(a, b) for a, b in pairwise(points)]
     whole, begin = math.fsum(lengths), 0.0
     found = []
     for length in lengths:

@@ -141,7 +141,7 @@ class Landing:
         if -up > DOWN:
             return f"crashed: {-up:.1f} m/s down, {DOWN:g} at most"
         if abs(aside) > ASIDE:
-            return f"crashed: {abs(aside):.1f} m/s aside, {ASIDE:g} at most"
+            return f"crashed: {abs(aside):.1f} m/s sideways, {ASIDE:g} at most"
         tilt = abs(self._tilt(self._before))
         return (
             f"crashed: tilted by {math.degrees(tilt):.0f}°, {math.degrees(TILT):.0f}° at most" if tilt > TILT else None
@@ -168,7 +168,7 @@ class Landing:
             fuel,
             ("height", f"{max(self._height(self._now), 0.0):.1f} m"),
             ("down", _marked(f"{0.0 - up:.1f} m/s", -up > DOWN)),
-            ("aside", _marked(f"{aside:+.1f} m/s", abs(aside) > ASIDE)),
+            ("sideways", _marked(f"{aside:+.1f} m/s", abs(aside) > ASIDE)),
             ("tilt", _marked(f"{-round(math.degrees(tilt)):+d}°", abs(tilt) > TILT)),
         )
 

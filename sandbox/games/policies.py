@@ -7,6 +7,7 @@ import numpy as np
 
 from sandbox.games.pinball.hand import PinballHand
 from sandbox.games.rules import Control, Policy, Press, Rules, Seen, UnfitError
+from sandbox.scene.curling import CurlingMatch
 from sandbox.scene.model import Scene
 from sandbox.scene.streams import Stream, draws
 
@@ -84,6 +85,25 @@ class Script:
         return [(press.control, press.value) for press in self._presses[begin : self._done]]
 
 
+def _nobody(scene: Scene) -> Policy:
+    """Return the player that presses nothing.
+
+    Raises:
+        UnfitError: the game stands still until a person delivers a stone, or fires.
+    """
+    play = scene.play
+    if play.game == "curling" and (play.curling or CurlingMatch()).people:
+        raise UnfitError(
+            "none delivers no stone for red, so nothing would move; --set play.curling.people=0 lets both teams play "
+            "by themselves, random and a script deliver"
+        )
+    if play.game == "artillery" and scene.artillery is not None:
+        waits = next((player.name for player in scene.artillery.players if player.bot is None), None)
+        if waits is not None:
+            raise UnfitError(f"none fires no gun, so the game would wait for {waits}; random, skilled or a script fire")
+    return Nobody()
+
+
 def _skilled(scene: Scene) -> Policy:
     """Return a player who watches the ball, or aims a gun.
 
@@ -101,7 +121,7 @@ def _skilled(scene: Scene) -> Policy:
 
 POLICIES: dict[str, Callable[[Scene], Policy]] = {
     "random": lambda scene: Chance(scene.world.seed),
-    "none": lambda _: Nobody(),
+    "none": _nobody,
     "skilled": _skilled,
 }
 """Those that need no script, by name."""

@@ -12,6 +12,10 @@ from sandbox.scene.faults import Fault, Lines, SceneError
 from sandbox.scene.model import Scene
 
 
+REAL_TIME = frozenset({"landing", "pinball"})
+"""Games in which time matters from the first step: a window starts them at a key press."""
+
+
 def _artillery(scene: Scene, bodies: Bodies) -> Rules:
     from sandbox.games.artillery.rules import ArtilleryRules  # numpy, and the integrators of an engine
 

@@ -1,4 +1,4 @@
-"""Collisions: which of a run's contacts are some, and not notes of zones; and who could touch whom, frame by frame."""
+"""Collisions: which contacts of a run are not notes of zones, when the first one is, and which bodies can touch."""
 
 import numpy as np
 
@@ -21,6 +21,12 @@ def are_collisions(run: Trajectory) -> BoolArray:
 def collisions(run: Trajectory) -> int:
     """Return how many contacts of a run are collisions."""
     return int(are_collisions(run).sum())
+
+
+def first_collision(run: Trajectory) -> float | None:
+    """Return the time at which the first collision of a run begins, s; None where there is none."""
+    times = run.contact_time[are_collisions(run)]
+    return float(times.min()) if len(times) else None
 
 
 def layers_of_fixed(scene: Scene) -> IntArray:

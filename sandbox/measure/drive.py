@@ -1,7 +1,7 @@
 """Drive: the loop of a run: step, act, keep frames, up to the end or to what ends it before."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain, repeat
 from time import perf_counter
 from typing import NamedTuple
@@ -17,6 +17,9 @@ from sandbox.trajectory import Contacts, Frame
 
 Progress = Callable[[float], None]
 """Called now and then with the share of the run that is done, 0 to 1."""
+
+Watch = Callable[[int, Mapping[str, int]], None]
+"""Called now and then, and at the end, with the steps done and the work counted so far. It may raise to end the run."""
 
 REPORT_EVERY = 0.1  # s
 
@@ -98,6 +101,7 @@ def drive(
     recorder: Recorder,
     progress: Progress | None = None,
     bout: Bout | None = None,
+    watch: Watch | None = None,
 ) -> End:
     """Step to the end.
 
@@ -109,6 +113,7 @@ def drive(
         recorder: keeps the frames.
         progress: who is told how far it is.
         bout: a game that is played on the way; where it stops, so does the run.
+        watch: sees the work as it is counted.
     """
     status, reason, step = "ok", None, 0
     every = sum(stretch.steps for stretch in stretches)
@@ -131,9 +136,12 @@ def drive(
             if recorder.wants(step, last):
                 doing.frame = simulation.frame()
                 recorder.keep(doing.frame, duration if last else simulation.time)
-            if progress is not None and perf_counter() - told > REPORT_EVERY:
+            if (progress is not None or watch is not None) and perf_counter() - told > REPORT_EVERY:
                 told = perf_counter()
-                progress(step / (every + part))
+                if watch is not None:
+                    watch(step, simulation.work)
+                if progress is not None:
+                    progress(step / (every + part))
         if bout is not None and bout.stops:
             recorder.end(simulation.frame())
         elif part > 0.0:
@@ -152,6 +160,8 @@ def drive(
         recorder.keep_as_it_is(simulation.frame())
     except Exhaustion as error:  # within a step: there is no frame of it
         status, reason = "failed", f"at {simulation.time:g} s: {error}"
+    if watch is not None:
+        watch(step, simulation.work)
     if progress is not None:
         progress(1.0)
     return End(status, reason, step, doing.contacts(), doing.done)

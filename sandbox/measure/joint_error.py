@@ -47,6 +47,13 @@ def joint_errors(trajectory: Trajectory, scene: Scene) -> FloatArray:
     return found
 
 
+def starting_errors(scene: Scene) -> FloatArray:
+    """Return how far each joint is off as a scene starts, (J,), as `joint_errors` does."""
+    bodies, links = scene.bodies, scene.links
+    there = np.ones((1, len(links)), np.bool_)
+    return np.asarray(_errors(links, bodies.position[None], bodies.angle[None], there)[0])
+
+
 def joint_error(trajectory: Trajectory, scene: Scene) -> float | None:
     """Return the largest error of any joint in any frame, as a share; None where the scene has no joint that holds.
 

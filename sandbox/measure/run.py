@@ -17,7 +17,7 @@ from sandbox.engines.relay import start
 from sandbox.games.bout import Bout
 from sandbox.interrupt import heeded
 from sandbox.measure.audit import Audit
-from sandbox.measure.drive import Progress, drive
+from sandbox.measure.drive import Progress, Watch, drive
 from sandbox.measure.energy import energies
 from sandbox.measure.joint_error import joint_error
 from sandbox.measure.recorder import Books, Recorder, TooLargeError
@@ -44,6 +44,7 @@ def run(
     account: bool = False,
     progress: Progress | None = None,
     bout: Bout | None = None,
+    watch: Watch | None = None,
     **settings: Any,
 ) -> Trajectory:
     """Run a scene from start to end.
@@ -57,11 +58,12 @@ def run(
         account: keep the account of energy at every frame, which `measure.ledger` reads.
         progress: who is told how far it is.
         bout: a game to be played on the way; the run ends with it. What it did is among the actions of the outcome.
+        watch: sees the work as it is counted; what it raises ends the run without an outcome.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
     Returns:
         What was recorded, also of a run that ended early: its `status` is then `diverged` (the physics left all
-        bounds) or `failed` (an action could not be done, contacts outgrew memory), with the reason; `refused`,
+        bounds) or `failed` (an action could not be done, such as one for a body that is not there; contacts outgrew memory), with the reason; `refused`,
         with no frames, where the engine lacks something.
 
     Raises:
@@ -88,7 +90,7 @@ def run(
     auditor = Auditor(scene, simulation) if audit else None
 
     began, compiled = perf_counter(), COMPILING.seconds
-    end = drive(scene.world.duration, simulation, stretches, actions, recorder, progress, bout)
+    end = drive(scene.world.duration, simulation, stretches, actions, recorder, progress, bout, watch)
     seconds = perf_counter() - began - (auditor.seconds if auditor else 0.0) - (COMPILING.seconds - compiled)
     bodies, work = simulation.bodies, dict(simulation.work)
     state_hash = simulation.state_hash()

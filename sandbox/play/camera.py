@@ -11,6 +11,11 @@ from sandbox.trajectory import FloatArray
 CLOSEST, FARTHEST = 1e12, 1e-14
 """px/m: what double precision can still tell apart, and the widest view of the largest scene"""
 
+PAN, ZOOM_OUT, ZOOM_IN = 0.15, 0.1, 0.8
+"""s in which a camera that follows something has come most of the way"""
+INNER, OUTER = 0.4, 0.8
+"""Parts of what is free in which the followed body moves in the picture, and beyond which it never is."""
+
 Box = tuple[tuple[float, float], tuple[float, float]]
 """Lower-left and upper-right corner, m."""
 
@@ -115,6 +120,28 @@ class Camera:
         """Return this camera moved so that what is shown moves by so many pixels."""
         x, y = self._way(by)
         return replace(self, centre=(self.centre[0] - x, self.centre[1] - y))
+
+    def eased(self, target: Self, elapsed: float) -> Self:
+        """Return this camera on its way to another: soon where that is farther away, slowly where it is closer."""
+        factor = target.scale / self.scale
+        part = 1.0 - math.exp(-elapsed / (ZOOM_OUT if factor < 1.0 else ZOOM_IN))
+        move = 1.0 - math.exp(-elapsed / PAN)
+        x, y = (a + (b - a) * move for a, b in zip(self.centre, target.centre, strict=True))
+        return replace(self, centre=(x, y), scale=self.scale * factor**part)
+
+    def keeping(self, place: FloatArray, free: tuple[float, float, float, float], elapsed: float) -> Self:
+        """Return this camera moved so that a place, m, stays near the middle of what is free, px.
+
+        In the inner part of it the camera rests; from there to the outer part it moves softly, and beyond at once.
+        """
+        moved = self
+        for part, share in ((INNER, 1.0 - math.exp(-elapsed / PAN)), (OUTER, 1.0)):
+            pixel, by = moved.to_screen(place), []
+            for k in range(2):
+                middle, half = (free[k] + free[k + 2]) / 2.0, part * (free[k + 2] - free[k]) / 2.0
+                by.append(float(min(max(pixel[k], middle - half), middle + half) - pixel[k]) * share)
+            moved = moved.panned((by[0], by[1])) if any(by) else moved
+        return moved
 
     def resized(self, size: tuple[int, int]) -> Self:
         """Return this camera for a picture of another size, showing about the same."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from sandbox.play.hands import describe_loss
 from sandbox.play.instruments.knob import Value
 from sandbox.play.keys import Command
 from sandbox.play.mouse import Mouse
@@ -23,15 +24,27 @@ BUTTONS = {
 """What the panel's buttons stand for."""
 
 
+LOSING = {
+    Command.RESTART: "R again restarts",
+    Command.PREVIOUS: "[ again opens the other scene",
+    Command.NEXT: "] again opens the other scene",
+    Command.RELOAD: "Ctrl+L again reloads",
+    Command.QUIT: "Esc again quits",
+}
+"""What ends a session, and how that is confirmed where something hand-made would be lost."""
+
+
 class Commands:
     """One function for each command."""
 
     def __init__(self, seat: Seat, mouse: Mouse) -> None:
         self._seat, self._mouse = seat, mouse
         self._turned: dict[str, Value] = {}  # knobs since the last `settle`, the last turned last
+        self.asked: Command | None = None
+        """what was not done at once, as something would be lost"""
         stage, desk = seat.stage, seat.desk
         self._deeds: dict[Command, Callable[[], object]] = {
-            Command.PAUSE: self._pause,
+            Command.PAUSE: stage.toggle_pause,
             Command.STEP: stage.step,
             Command.BACK: stage.back,
             Command.RESTART: stage.restart,
@@ -56,6 +69,9 @@ class Commands:
             Command.ADD_BALL: lambda: self._add(box=False),
             Command.ADD_BOX: lambda: self._add(box=True),
             Command.QUIT: self._quit,
+            Command.UNDO: stage.bring_back,
+            Command.FOLLOW: seat.toggle_follow,
+            Command.FULL_SCREEN: seat.toggle_full_screen,
         }
         desk.panel.on_button = lambda name: self.do(BUTTONS[name])
         desk.panel.on_toggle = lambda name, _: self.toggle(name)
@@ -64,10 +80,28 @@ class Commands:
     def do(self, command: Command) -> None:
         """Do what a command says, after what came before it."""
         self.settle()
+        if self._asks(command):
+            return
         if command.overlay is not None:
             self._seat.desk.overlays ^= {command.overlay}
         else:
             self._deeds[command]()
+
+    def _asks(self, command: Command) -> bool:
+        """Ask before hand-made changes are lost; return whether that was asked now. Asked twice, it is done."""
+        stage, confirmed = self._seat.stage, command == self.asked
+        self.dismiss()
+        if command not in LOSING or confirmed or (command is Command.QUIT and stage.saves_at_end):
+            return False
+        count = stage.count_unsaved(restart=command is Command.RESTART)
+        if not count:
+            return False
+        self.asked, stage.question = command, describe_loss(count, LOSING[command])
+        return True
+
+    def dismiss(self) -> None:
+        """Take back what was asked."""
+        self.asked = self._seat.stage.question = None
 
     def toggle(self, name: str) -> None:
         """Turn one of the panel's switches."""
@@ -101,11 +135,9 @@ class Commands:
         self._let_go()
         self._seat.desk.toggle_help()
 
-    def _pause(self) -> None:
-        self._seat.stage.paused = not self._seat.stage.paused
-
     def _home(self) -> None:
         """Show the scene as it began; where that is seen already, the bodies where they are now."""
+        self._seat.following = None
         if self._seat.at_home:
             self._seat.find()
         else:

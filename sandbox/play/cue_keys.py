@@ -20,16 +20,16 @@ TOLD = (
     ("Left or Right", "aim finely; Shift: finer"),
     ("Up or Down", "power"),
     ("S (hold)", "stroke: pull back, push through"),
-    ("Left-drag", "draw the cue back, let go"),
+    ("Left-drag", "draw the cue back, release"),
     ("E (hold)", "english: where the tip hits"),
     ("X (hold)", "set the power"),
     ("Space", "shoot"),
     ("G", "cue ball in hand"),
-    ("Z", "take the stroke back"),
+    ("Z", "undo shot"),
     ("Click", "call a ball, or a pocket"),
     ("C", "call a safety"),
-    ("D", "another choice, where there is one"),
-    ("Enter", "take that choice"),
+    ("D", "next choice, if there is one"),
+    ("Enter", "confirm the choice"),
 )
 """as help lists them"""
 

@@ -15,6 +15,7 @@ from sandbox.play.drawing.palette import BACKGROUND, INK
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.facts import told
+from sandbox.play.hands import describe_loss
 from sandbox.play.hosting.host import Host
 from sandbox.play.instruments.graph import EnergyGraph
 from sandbox.play.instruments.honours_panel import HonoursPanel
@@ -61,6 +62,8 @@ class Desk:
         self._size = size
         self._claims: tuple[object, Claims] | None = None
         self._heard: object = None
+        self.out_of_sight = False
+        """none of the bodies that move is in the picture"""
         self._untold = False  # the keys that the scene claims
         self._faults = pygame.Rect(0, 0, 0, 0)  # where they are shown
 
@@ -113,6 +116,11 @@ class Desk:
         """Return the codes of those keys."""
         return frozenset(self.claims(stage).deeds)
 
+    @property
+    def covers(self) -> bool:
+        """Whether help or the picker lies over the scene."""
+        return self.picker is not None or self.manual.open
+
     def open_picker(self, path: Path | None) -> None:
         """Offer the scenes."""
         self.picker = Picker(to_pick(path))
@@ -140,6 +148,10 @@ class Desk:
     def _use(self, event: pygame.event.Event, stage: Stage) -> bool:
         if self.picker is not None and event.type != pygame.QUIT:
             path = self.picker.handle(event)
+            count = stage.count_unsaved()
+            if path is not None and count and self.picker.confirmed != path:
+                self.picker.ask(path, describe_loss(count, "choose it again to open it"))
+                return True
             if path is not None:
                 stage.take(path)
             if path is not None or self.picker.closed:
@@ -159,7 +171,7 @@ class Desk:
                 stage.paused = True
                 show.scrub(time)
             if held and not self._timeline.held:
-                show.settle()
+                stage.compute(show.settle)
             return held or self._timeline.held
         return False
 
@@ -199,7 +211,7 @@ class Desk:
                 self._sounds.cue(cue)
         if stage.game is None:
             self.tools.foot = 0
-        status = self.status(stage, rate, recording)
+        status = replace(self.status(stage, rate, recording), out_of_sight=self._describe_absence(stage))
         self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=foot + self.tools.foot)
         if show is not None and not self.manual.open:
             if stage.gestures is not None:
@@ -216,6 +228,18 @@ class Desk:
             self.panel.draw(surface)
         if self.manual.open:
             self.manual.draw(surface, self.unit, self.claims(stage).told)
+
+    def _describe_absence(self, stage: Stage) -> str | None:
+        """Return what can be done where nothing that moves is seen."""
+        show = stage.show
+        if show is None or not self.out_of_sight:
+            return None
+        moving = show.frame.present[: len(show.bodies)] & ~show.bodies.fixed[: len(show.frame.present)]
+        words = ["Everything is out of view: Home fits it, F follows" if moving.any() else "Nothing is left"]
+        launched = show.scene.play.relaunch
+        if launched is not None and stage.live is not None:
+            words.append(f"Space launches {launched} again")
+        return " · ".join(words)
 
     def _draw_game(self, surface: pygame.Surface, stage: Stage, host: Host, left: int) -> None:
         draw_score(surface, host.shown().board, self._free, left, self.unit)
@@ -260,6 +284,9 @@ class Desk:
         )
         if stage.game is not None:
             shown = (*shown, Knob("players", "players", value=stage.game.players, choices=PLAYERS))
+            if stage.game.match.rules.name == "snooker":
+                misses = "on" if stage.game.misses else "off"
+                shown = (*shown, Knob("misses", "foul and a miss", value=misses, choices=("off", "on")))
         toggles = {name: name in self.overlays for name in OVERLAYS}
         if live is not None:
             toggles |= {"ghost": live.company.ghosted, "trust": live.company.trust is not None}
@@ -285,7 +312,7 @@ class Desk:
             if stage.game is not None:
                 stage.messages.tell("aim with the mouse; Space shoots, H lists all keys")
             elif len(told) > MOST:  # more than are seen at once
-                stage.messages.tell(f"{', '.join(keys for keys, _ in told)}: F1 tells what each does")
+                stage.messages.tell(f"{', '.join(keys for keys, _ in told)} (F1: help)")
             else:
                 for keys, what in told:
                     stage.messages.tell(f"{keys}: {what}")

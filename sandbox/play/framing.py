@@ -2,13 +2,18 @@
 
 import numpy as np
 
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal
+from sandbox.engines.registry import UnknownEngineError, start
 from sandbox.play.camera import Box
 from sandbox.play.drawing.table.cushions import outside
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.links import LinkKind
 from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
 from sandbox.trajectory import BoolArray, FloatArray
 
+LOOK_STEPS, LOOK_WORK = 12_000, 30_000
+"""Steps, and steps times moving bodies, that a look ahead takes at most: about half a second on pymunk."""
 LOOKS = 17
 """Moments of free flight that are looked at."""
 ROLLING = 1.2
@@ -28,10 +33,14 @@ FAR = 20.0
 """Fixed things, and where bodies fly, count up to so many times the size of what is there at the start."""
 
 
-def framing(scene: Scene) -> Box:
+def framing(scene: Scene, reach: Box | None = None) -> Box:
     """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there.
 
     Of a table that is the table; a scene may state its own.
+
+    Args:
+        scene: what is seen.
+        reach: where the bodies are known to come, m; by `look_ahead`, or from a stored run.
     """
     if scene.play.view is not None:
         return scene.play.view
@@ -48,6 +57,9 @@ def framing(scene: Scene) -> Box:
     start = _union([start, *_swings(scene, bodies, start)])
     flown = _union([start, *(_orbits(scene, bodies, start) if scene.attractions else _flight(scene, bodies))])
     met = [(corners.min(axis=0), corners.max(axis=0)) for corners in things]
+    if reach is not None:
+        start = _union([start, (np.asarray(reach[0]), np.asarray(reach[1]))])
+        flown = _union([start, flown])
     near = NEAR * float((flown[1] - flown[0]).max())
     met = [each for each in met if (each[0] <= flown[1] + near).all() and (each[1] >= flown[0] - near).all()]
     low, high = _union([start, *met]) if met else flown
@@ -63,6 +75,47 @@ def framing(scene: Scene) -> Box:
         foot = middle - ((middle - np.asarray(plane.point)) @ normal) * normal
         if np.abs(foot - middle).max() <= FAR * float((high - low).max()):
             low, high = np.minimum(low, foot), np.maximum(high, foot)
+    return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+
+
+def look_ahead(scene: Scene, engine: str, settings: Settings | None = None) -> Box | None:
+    """Return the box in which the moving bodies stay when a scene runs without a hand, by running it.
+
+    The look is bounded by counted work, so that it is the same on every machine: `LOOK_STEPS` steps, and `LOOK_WORK`
+    steps times bodies. It ends early where the scene ends, and where a body flies off `FAR` times the size of what is
+    there at the start. None where nothing moves, the view is stated, or the engine cannot run the scene.
+    """
+    bodies, world, solver = scene.bodies, scene.world, scene.solver if settings is None else settings
+    moving = np.flatnonzero(~bodies.fixed)
+    if scene.play.view is not None or scene.play.area is not None or not len(moving):
+        return None
+    steps = min(round(world.duration / solver.dt), LOOK_STEPS, LOOK_WORK // len(moving))
+    try:
+        simulation = start(scene, engine, settings)
+    except (Refusal, UnknownEngineError):
+        return None
+    found = seen = around(bodies.position[moving], bodies.radius[moving])
+    (left, bottom), (right, top) = framing(scene)
+    farthest = FAR * max(right - left, top - bottom)
+    try:
+        for _ in range(steps):
+            simulation.step()
+            frame = simulation.frame()
+            there = moving[frame.present[moving]]
+            seen = around(frame.position[there], bodies.radius[there])
+            if seen is None or found is None:
+                continue
+            union = _union([found, seen])
+            if not float((union[1] - union[0]).max()) <= farthest:
+                break
+            found = union
+    except (Divergence, Exhaustion):
+        pass
+    finally:
+        simulation.close()
+    if found is None:
+        return None
+    low, high = found
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
 
 

@@ -1,11 +1,12 @@
 """Hands: what pointing, dragging and keys do to the bodies of a session. Places are in the world, m."""
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from sandbox.action import ActionError, Impulse, Move, Pull, Remove, Spawn
+from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, SetParameter, Spawn
 from sandbox.play.hulls import Hull, area_of
 from sandbox.play.picking import picked
 from sandbox.play.running.live import Live
@@ -66,6 +67,8 @@ class Hands:
         if number is None:
             return
         name = live.bodies.names[number]
+        if any(drive.body == name for drive in live.scene.drives):
+            raise ActionError(f"{name} cannot be dragged; its key moves it (H: help)")
         self._moving, self._hand = paused, self._spot
         if paused:
             self._grip = _turned(self._offset, float(live.frame.angle[number]) - self._angle)
@@ -179,6 +182,37 @@ class Hands:
         if body in live.bodies.names:
             x, y = live.frame.position[live.bodies.names.index(body)].tolist()
             live.act(Move(time=0.0, body=body, position=(x + by[0], y + by[1]), velocity=(0.0, 0.0)))
+
+
+def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -> int:
+    """Count what hands have changed of a scene: bodies added, removed and moved, values set.
+
+    Args:
+        actions: of a session.
+        moved_by_keys: a body whose moves are part of the scene, which gives it the arrow keys.
+    """
+    count, last = 0, ""
+    for action in actions:
+        match action:
+            case Spawn() | Remove():
+                now = ""
+            case Move():
+                now = "" if action.body == moved_by_keys else f"move {action.body}"
+            case SetParameter():
+                now = f"set {action.path}"
+            case _:
+                last = ""
+                continue
+        moved_so = isinstance(action, Move) and not now
+        count += not moved_so and (not now or now != last)  # a drag is many moves
+        last = now
+    return count
+
+
+def describe_loss(count: int, how: str) -> str:
+    """Return the question before so many hand-made changes are lost."""
+    changes = "1 hand-made change" if count == 1 else f"{count:,} hand-made changes"
+    return f"{changes} will be lost: {how}, Ctrl+S saves the session"
 
 
 def _like(bodies: Bodies, number: int, place: Place, box: bool) -> Ball | Box:

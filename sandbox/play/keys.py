@@ -34,6 +34,9 @@ class Command(StrEnum):
     RELOAD = "reload"
     SAVE = "save"
     QUIT = "quit"
+    UNDO = "undo"
+    FOLLOW = "follow"
+    FULL_SCREEN = "full screen"
     TRUST = "trust"
     SOUND = "sound"
     DELETE = "delete"
@@ -75,7 +78,7 @@ class Binding(NamedTuple):
     """again and again while the key is held"""
 
 
-_TIME, _VIEW, _SCENE, _BODIES, _SHOW, _WINDOW = "Time", "View", "Scene", "Bodies", "Show", "Keep and share"
+_TIME, _VIEW, _SCENE, _BODIES, _SHOW, _WINDOW = "Time", "View", "Scene", "Bodies", "Show", "Save and share"
 _CTRL, _SHIFT = pygame.KMOD_CTRL, pygame.KMOD_SHIFT
 _ABOUT_OVERLAYS = (
     "shapes",
@@ -91,7 +94,7 @@ _ABOUT_OVERLAYS = (
 )
 
 BINDINGS: tuple[Binding, ...] = (
-    Binding((pygame.K_p, pygame.K_SPACE), 0, Command.PAUSE, "pause, go on", "P or Space", _TIME),
+    Binding((pygame.K_p, pygame.K_SPACE), 0, Command.PAUSE, "pause / resume", "P or Space", _TIME),
     Binding((pygame.K_o, pygame.K_PERIOD), 0, Command.STEP, "one step", "O or .", _TIME, ".", True),
     Binding((pygame.K_COMMA,), 0, Command.BACK, "one step back", ",", _TIME, ",", True),
     Binding((pygame.K_r, pygame.K_BACKSPACE), 0, Command.RESTART, "restart", "R or Backspace", _TIME),
@@ -105,11 +108,14 @@ BINDINGS: tuple[Binding, ...] = (
     Binding((pygame.K_g,), 0, Command.GHOST, "ghost of the reference", "G", _SCENE),
     Binding((pygame.K_t,), 0, Command.TRUST, "trust light", "T", _SCENE),
     Binding((pygame.K_HOME,), 0, Command.HOME, "fit the scene; again: the bodies", "Home", _VIEW),
+    Binding((pygame.K_f,), 0, Command.FOLLOW, "follow the selected body, or all that moves", "F", _VIEW),
+    Binding((pygame.K_F11,), 0, Command.FULL_SCREEN, "full screen", "F11", _VIEW),
     Binding((pygame.K_TAB,), 0, Command.PANEL, "hide the panel, show it", "Tab", _VIEW),
     Binding((pygame.K_b,), 0, Command.ADD_BALL, "add a ball at the cursor", "B", _BODIES),
     Binding((pygame.K_b,), _SHIFT, Command.ADD_BOX, "add a box at the cursor", "Shift+B", _BODIES),
-    Binding((pygame.K_n,), 0, Command.NUDGE, "nudge the picked body", "N", _BODIES),
-    Binding((pygame.K_DELETE,), 0, Command.DELETE, "remove the picked body", "Delete", _BODIES),
+    Binding((pygame.K_n,), 0, Command.NUDGE, "nudge the selected body", "N", _BODIES),
+    Binding((pygame.K_DELETE,), 0, Command.DELETE, "remove the selected body", "Delete", _BODIES),
+    Binding((pygame.K_z,), _CTRL, Command.UNDO, "bring back what was replaced", "Ctrl+Z", _BODIES),
     *(
         Binding((pygame.K_0 + int(digit),), 0, Command(name), about, digit, _SHOW, digit)
         for digit, name, about in zip("1234567890", OVERLAYS, _ABOUT_OVERLAYS, strict=True)

@@ -39,6 +39,8 @@ class Mouse:
             notches = getattr(event, "precise_y", 0.0) or float(event.y)
             seat.camera = seat.camera.zoomed(NOTCH**notches, pygame.mouse.get_pos())
             seat.at_home = False
+            if seat.following == "all":
+                seat.following = None
         elif event.type == pygame.MOUSEBUTTONDOWN:
             self.place = event.pos
             if event.button in (2, 3):
@@ -95,7 +97,7 @@ class Mouse:
             self._aim(event.pos if before is None else before, event.pos)
         if self._panning:
             seat.camera = seat.camera.panned(event.rel)
-            seat.at_home = False
+            seat.at_home, seat.following = False, None
             return
         stage = seat.stage
         if self._pressed is not None and math.dist(self._pressed, event.pos) > SLACK * seat.desk.unit:

@@ -2,17 +2,25 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pygame
 
 from sandbox.play.camera import Box, Camera
 from sandbox.play.desk import Desk
+from sandbox.play.drawing.picture import Picture
 from sandbox.play.footage.taking import Taking
-from sandbox.play.framing import around, framing, lies_down
+from sandbox.play.framing import Corners, around, framing, lies_down
+from sandbox.play.instruments.thumbnail import frame_in_flight
+from sandbox.play.sight import Sight
 from sandbox.play.stage import Stage
+from sandbox.scene.model import Scene
+from sandbox.trajectory import FloatArray
 
 TITLE = "sandbox"
+BESIDE_BODIES = 12.0
+"""radii: what the camera shows at least of where bodies are"""
 
 
 class Seat:
@@ -37,6 +45,9 @@ class Seat:
         self.camera = Camera((0.0, 0.0), 100.0, surface.get_size())
         self.at_home = True
         """whether the camera is where Home puts it; a new scene is then seen whole"""
+        self.following: int | Literal["all"] | None = None
+        """number of the body that the camera follows, or all that move"""
+        self._window_size: tuple[int, int] | None = None  # before it filled the screen
         self._covered = (0, 0)  # px at the top and bottom that the score panel took as it came home
         self.leaving: int | None = None
         """the exit status, once the window is to close"""
@@ -48,10 +59,12 @@ class Seat:
 
     def renew(self, same: bool) -> None:
         """Look at what is on now; the same scene as before is seen from where it was seen."""
+        show = self.stage.show
+        if not same:
+            self.following = None if show is None else _steered(show.scene)
         if self.at_home:
             self.home()
         self.desk.renew(same)
-        show = self.stage.show
         pygame.display.set_caption(f"{show.scene.title or self.name} - {TITLE}" if show is not None else TITLE)
 
     @property
@@ -62,12 +75,86 @@ class Seat:
         show = self.stage.show
         return (show.scene.title if show is not None else "") or "scene"
 
+    def preview(self) -> pygame.Surface | None:
+        """Return a picture of the scene that is being opened, as it will begin; None where none is."""
+        scene = self.stage.opening
+        if scene is None or (self.stage.show is not None and self.stage.show.scene is scene):
+            return None
+        size = self.surface.get_size()
+        made = pygame.Surface(size, 0, self.surface)
+        free = size[0] - self.desk.panel.width, size[1] - self.desk.foot
+        turned = lies_down(scene, free)
+        camera = Camera.fitting(framing(scene), size, inset=self.desk.panel.width, foot=self.desk.foot, turned=turned)
+        Picture().draw(made, camera, Sight(scene, scene.bodies, frame_in_flight(scene)), unit=self.desk.unit)
+        return made
+
     def home(self) -> None:
         """Show the scene whole."""
         self.at_home = True
         show = self.stage.show
         if show is not None:
-            self._fit(framing(show.scene))
+            self._fit(framing(show.scene, self.stage.reach))
+
+    @property
+    def loses_sight(self) -> bool:
+        """Whether none of the bodies that move is in the picture."""
+        show = self.stage.show
+        if show is None:
+            return False
+        frame, bodies = show.drawn, show.bodies
+        count = min(len(bodies), len(frame.position))
+        moving = frame.present[:count] & ~bodies.fixed[:count]
+        seen = moving & self.camera.in_sight(frame.position[:count], bodies.radius[:count])
+        return bool((~bodies.fixed).any()) and not seen.any()
+
+    def toggle_follow(self) -> None:
+        """Let the camera follow the picked body, or all that move; or let it stay where it is."""
+        show, messages = self.stage.show, self.stage.messages
+        if show is None:
+            return
+        if self.following is not None:
+            self.following = None
+            messages.tell("the camera stays here; Home fits the scene")
+            return
+        picked = self.stage.hands.picked
+        self.following, self.at_home = "all" if picked is None else picked, False
+        name = "all that moves" if picked is None else show.bodies.names[picked]
+        messages.tell(f"the camera follows {name}; F ends this")
+
+    def follow(self, elapsed: float) -> None:
+        """Move the camera after what it follows, by so much real time, s."""
+        show = self.stage.show
+        if show is None or self.following is None:
+            return
+        frame, bodies = show.drawn, show.bodies
+        if self.following == "all":
+            count = min(len(bodies), len(frame.position))
+            chosen = frame.present[:count] & ~bodies.fixed[:count] & np.isfinite(frame.position[:count]).all(axis=1)
+            box = around(frame.position[:count][chosen], bodies.radius[:count][chosen])
+            if box is not None:
+                self.camera = self.camera.eased(self._fitting(_widened(box, bodies.radius[:count][chosen])), elapsed)
+        elif self.following < len(frame.position) and frame.present[self.following]:
+            place = frame.position[self.following]
+            if np.isfinite(place).all():
+                before, self.camera = self.camera, self.camera.keeping(place, self._free, elapsed)
+                self.at_home &= before == self.camera
+
+    @property
+    def _free(self) -> tuple[float, float, float, float]:
+        """What nothing covers: left, top, right and bottom, px."""
+        width, height = self.surface.get_size()
+        head, foot = self.desk.covered(self.stage)
+        return 0.0, float(head), float(width - self.desk.panel.width), float(height - foot - self.desk.foot)
+
+    def toggle_full_screen(self) -> None:
+        """Fill the screen, or go back to the window as it was."""
+        if self._window_size is None:
+            self._window_size = self.surface.get_size()
+            surface = pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
+        else:
+            surface = pygame.display.set_mode(self._window_size, pygame.RESIZABLE)
+            self._window_size = None
+        self.resize(surface)
 
     def find(self) -> None:
         """Show the bodies where they are now."""
@@ -78,18 +165,21 @@ class Seat:
         there = frame.present & np.isfinite(frame.position).all(axis=1)
         box = around(frame.position[there], show.bodies.radius[: len(there)][there])
         if box is not None:
-            low, high = ((float(corner[0]), float(corner[1])) for corner in box)
-            self._fit((low, high))
+            self._fit(_widened(box, show.bodies.radius[: len(there)][there]))
             self.at_home = False
 
     def _fit(self, box: Box) -> None:
         """Show a box whole, beside what the panels and the timeline cover."""
+        self.camera = self._fitting(box)
+
+    def _fitting(self, box: Box) -> Camera:
+        """Return the camera that shows a box whole."""
         size, inset = self.surface.get_size(), self.desk.panel.width
         self._covered = head, foot = self.desk.covered(self.stage)
         foot += self.desk.foot
         show = self.stage.show
         lies = show is not None and lies_down(show.scene, (size[0] - inset, size[1] - foot))
-        self.camera = Camera.fitting(box, size, inset=inset, foot=foot, turned=lies, head=head)
+        return Camera.fitting(box, size, inset=inset, foot=foot, turned=lies, head=head)
 
     def make_room(self) -> None:
         """Come home again where the score panel has grown, with another row or with how the game ended."""
@@ -104,3 +194,18 @@ class Seat:
         self.camera = self.camera.resized(surface.get_size())
         if self.at_home:
             self.home()
+
+
+def _steered(scene: Scene) -> int | None:
+    """Return the number of the body that thrusts on keys move, where the scene states no view: it may go anywhere."""
+    names = [thrust.body for thrust in scene.thrusts if thrust.key is not None]
+    return scene.bodies.names.index(names[0]) if names and scene.play.view is None else None
+
+
+def _widened(box: Corners, radius: FloatArray) -> Box:
+    """Return a box that is at least some bodies wide: of one body, its surroundings are seen too."""
+    low, high = box
+    least = BESIDE_BODIES * float(np.median(radius))
+    grown = np.maximum(least - (high - low), 0.0) / 2.0
+    low, high = low - grown, high + grown
+    return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))

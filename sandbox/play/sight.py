@@ -102,6 +102,14 @@ class Status:
     time: float
     """s, simulated"""
     paused: bool = False
+    waits_for_start: bool = False
+    """a real-time game that no key has started yet"""
+    question: str | None = None
+    """what is asked before something is lost"""
+    out_of_sight: str | None = None
+    """what can be done where nothing that moves is in the picture"""
+    unfocused: bool = False
+    """another window has the keyboard, and time stands still"""
     ended: str | None = None
     """why nothing comes after this moment"""
     replay: bool = False

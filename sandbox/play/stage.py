@@ -8,19 +8,24 @@ from pathlib import Path
 
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.registry import ENGINES, USUAL, engine_named, usual
+from sandbox.games.registry import REAL_TIME
 from sandbox.play.billiards.game import PLAYERS, Game, Players
 from sandbox.play.billiards.gestures import Gestures
 from sandbox.play.billiards.seats import Seats
-from sandbox.play.hands import Hands
+from sandbox.play.camera import Box
+from sandbox.play.framing import look_ahead
+from sandbox.play.hands import Hands, count_changes
 from sandbox.play.hosting.host import Host, hosted
 from sandbox.play.instruments.knob import Value
 from sandbox.play.knobs import turned
 from sandbox.play.messages import Messages
-from sandbox.play.running.beginning import begun
+from sandbox.play.running.beginning import begun, played_again
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 from sandbox.play.shelf import neighbour
 from sandbox.play.wishes import Wishes
+from sandbox.play.worker import Compute, compute_here
+from sandbox.recording import Recording
 from sandbox.scene.faults import Fault, SceneError
 from sandbox.scene.file import Override, load
 from sandbox.scene.model import Scene
@@ -43,12 +48,29 @@ class Stage:
         """
         self.show: Live | Stored | None = None
         self.path: Path | None = None
+        self.reach: Box | None = None
+        """where the bodies come without a hand, m, as far as that is known"""
         self.file: Scene | None = None
         """the scene as its file has it"""
         self._seats = Seats()
         self.host: Host | None = None
         """of the game with rules that is on"""
         self._paused = False
+        self.waits_for_start = False
+        """a real-time game has been opened, and no key has started it yet"""
+        self.covered = False
+        """help or the picker covers the scene; time stands still meanwhile"""
+        self.unfocused = False
+        """another window has the keyboard; time stands still meanwhile"""
+        self.compute: Compute = compute_here
+        """calls all that may have to compile; the window lets it run beside itself"""
+        self.question: str | None = None
+        """what is asked before hand-made changes are lost"""
+        self.saves_at_end = False
+        """the session is saved when the window closes"""
+        self._lost: Recording | None = None  # what Ctrl+Z brings back
+        self.opening: Scene | None = None
+        """the scene whose session is being started"""
         self.hands = Hands()
         self.messages = Messages()
         self.faults: tuple[str, ...] = ()
@@ -111,13 +133,19 @@ class Stage:
         if self.show is not None:
             self.show.close()
         self.show, self.path, self.file = show, path, file
+        if isinstance(show, Stored):
+            self.reach = show.film.box
+        elif again is not None and not same:
+            self.reach = None
         self._again, self._tried = again, None
         self.hands.forget()
-        self.faults = ()
+        self.faults, self.question, self._lost = (), None, None
+        if not same:
+            self.waits_for_start = again is None and self.host is not None and file.play.game in REAL_TIME
         if isinstance(show, Live):
             # What rules and hands do next, no twin can tell.
             self._wishes.begin(show.company, trusting=len(show.bodies) <= FEW and self.host is None)
-            self._seats.take(show, file, self.messages.tell)
+            self.compute(lambda: self._seats.take(show, file, self.messages.tell))
         self.on_new(same)
 
     def seat(self, players: Players) -> None:
@@ -138,7 +166,14 @@ class Stage:
     def _start(
         self, scene: Scene, path: Path | None, file: Scene, engine: str, settings: Settings | None, same: bool
     ) -> bool:
-        live = begun(scene, engine, settings, self.messages)
+        self.opening = scene
+        try:
+            live = self.compute(lambda: begun(scene, engine, settings, self.messages))
+            if live is not None and not same:
+                started = live
+                self.reach = self.compute(lambda: look_ahead(started.scene, started.engine, settings))
+        finally:
+            self.opening = None
         if live is not None:
             self.put_on(live, path, file, same)
         return live is not None
@@ -148,14 +183,43 @@ class Stage:
         if isinstance(self.show, Stored):
             self.show.scrub(self.show.begin)
         elif self._again is not None and self.file is not None:
-            self.put_on(self._again(), self.path, self.file, same=True, again=self._again)
+            self.put_on(self.compute(self._again), self.path, self.file, same=True, again=self._again)
         elif self.show is not None and self.file is not None:
             try:
                 scene = self._wishes.as_turned(self.file)
             except SceneError as error:
                 self.messages.tell(str(error), "error")
                 return
+            made, before = self.count_unsaved(restart=True), self.live
+            lost = before.session.recording() if made and before is not None and before.busy is None else None
             self._start(scene, self.path, self.file, self.show.engine, self.show.session.wanted, same=True)
+            self._lost = lost
+
+    def count_unsaved(self, restart: bool = False) -> int:
+        """Return how many hand-made changes would be lost; those of a game are its own.
+
+        Args:
+            restart: by a restart, which keeps the values that were set.
+        """
+        live = self.live
+        if live is None or self.host is not None or self.game is not None:
+            return 0
+        kept = SetParameter if restart else ()
+        actions = [action for action in live.session.unsaved if not isinstance(action, kept)]
+        return count_changes(actions, live.scene.play.arrows)
+
+    def bring_back(self) -> None:
+        """Go back to the session as it was before a restart, or before something later was replaced."""
+        live = self.live
+        lost = self._lost
+        if live is not None and live.session.replaced is not None:
+            lost = live.session.replaced.recording
+        if lost is None or live is None or self.file is None:
+            self.messages.tell("there is nothing to bring back", "warning")
+            return
+        known = lost
+        self.put_on(self.compute(lambda: played_again(known)), self.path, self.file, same=True)
+        self.messages.tell("the session is back as it was")
 
     def reload(self) -> None:
         """Read the scene's file again, and start it at 0."""
@@ -188,14 +252,16 @@ class Stage:
         if self.live is None:
             self._tell_why_not("has no ghost; replay it with --engine")
             return
-        self._wishes.toggle_ghost(self.live.company)
+        company = self.live.company
+        self.compute(lambda: self._wishes.toggle_ghost(company))
 
     def toggle_trust(self) -> None:
         """Begin to watch a twin from here, or end it."""
         if self.live is None:
             self._tell_why_not("has no twin; `sandbox play` plays its scene")
             return
-        self._wishes.toggle_trust(self.live.company)
+        company = self.live.company
+        self.compute(lambda: self._wishes.toggle_trust(company))
 
     def next_engine(self) -> None:
         """Go on with the next engine that can, from the same state; who cannot says why."""
@@ -210,10 +276,11 @@ class Stage:
 
     def switch(self, engine: str) -> bool:
         """Go on with an engine; return whether it could."""
-        if not isinstance(self.show, Live) or engine == self.show.engine:
+        live = self.live
+        if live is None or engine == live.engine:
             return False
         try:
-            note = self.show.switch(engine)
+            note = self.compute(lambda: live.switch(engine))
         except ActionError as error:
             self.messages.tell(str(error), "warning")
             return False
@@ -232,6 +299,10 @@ class Stage:
         players = next((each for each in PLAYERS if each == value), None)
         if key == "players" and players is not None:
             self.seat(players)
+            return
+        if key == "misses":
+            self._seats.misses = value == "on"
+            self.restart()
             return
 
         def turn(live: Live) -> None:
@@ -253,7 +324,7 @@ class Stage:
             self._tell_why_not("cannot be changed; `sandbox play` plays its scene")
             return False
         try:
-            deed(live)
+            self.compute(lambda: deed(live))
         except ActionError as error:
             self.messages.tell(str(error), "warning")
             return False
@@ -261,32 +332,45 @@ class Stage:
 
     def go_on(self, elapsed: float) -> None:
         """Let real time pass, s."""
-        if self.show is None:
+        show = self.show
+        if show is None:
             return
         game, still = self.game, self._seats.waits and not self.hands.holding
-        self.show.go_on(elapsed, self.paused or still)
+        stands = self.paused or self.waits_for_start or self.covered or self.unfocused or still
+        self.compute(lambda: show.go_on(elapsed, stands))
         if game is not None:
             self.act(lambda _: game.go_on(elapsed))
             self.messages.take(game.notes)
         if self.host is not None:
             self.messages.take(self.host.notes())
-        if isinstance(self.show, Live) and self.show.wants_pause:
-            self.paused, self.show.wants_pause = True, False
-        elif isinstance(self.show, Stored) and self.show.at_end:
+        if isinstance(show, Live) and show.wants_pause:
+            self.paused, show.wants_pause = True, False
+        elif isinstance(show, Stored) and show.at_end:
             self.paused = True
-        self.messages.take(self.show.notes)
+        self.messages.take(show.notes)
+
+    def start_game(self) -> None:
+        """Let the time of a real-time game begin."""
+        self.waits_for_start = self.paused = False
+
+    def toggle_pause(self) -> None:
+        """Pause, or resume; a game that has not begun begins."""
+        if self.waits_for_start:
+            self.start_game()
+        else:
+            self.paused = not self.paused
 
     def step(self) -> None:
         """Make one step; a running scene pauses."""
-        self.paused = True
+        self.paused, self.waits_for_start = True, False
         if self.show is not None:
-            self.show.step()
+            self.compute(self.show.step)
 
     def back(self) -> None:
         """Go one step back; a running scene pauses."""
-        self.paused = True
+        self.paused, self.waits_for_start = True, False
         if self.show is not None:
-            self.show.back()
+            self.compute(self.show.back)
 
     def slower(self) -> None:
         """Go one rung slower."""

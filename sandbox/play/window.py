@@ -22,9 +22,38 @@ from sandbox.play.mouse import Mouse
 from sandbox.play.screen import close_screen, open_screen, unit
 from sandbox.play.seat import TITLE, Seat
 from sandbox.play.stage import Stage
+from sandbox.play.worker import Wait, Worker
 
 RATE = 60
 """pictures a second, at most"""
+WAIT_RATE = 20
+"""pictures a second while something compiles"""
+
+MODIFIERS = frozenset(
+    {
+        pygame.K_LCTRL,
+        pygame.K_RCTRL,
+        pygame.K_LSHIFT,
+        pygame.K_RSHIFT,
+        pygame.K_LALT,
+        pygame.K_RALT,
+        pygame.K_LMETA,
+        pygame.K_RMETA,
+    }
+)
+"""Keys that ask for nothing by themselves."""
+
+PRESSES = frozenset(
+    {
+        pygame.KEYDOWN,
+        pygame.TEXTINPUT,
+        pygame.MOUSEBUTTONDOWN,
+        pygame.MOUSEWHEEL,
+        pygame.JOYBUTTONDOWN,
+        pygame.JOYHATMOTION,
+    }
+)
+"""What hands do while they wait for the scene; it is not meant for what comes then."""
 
 
 class Window(Seat):
@@ -60,7 +89,9 @@ class Window(Seat):
         self.commands = Commands(self, self.mouse)
         self._clock = pygame.time.Clock()
         stage.on_new = self.renew
-        COMPILING.on_begin = self._show_wait
+        self._worker = Worker(self._wait)
+        stage.compute = self._worker.compute
+        COMPILING.on_begin = self._note_compiling
         if stage.show is not None:
             self.renew(False)
 
@@ -79,21 +110,53 @@ class Window(Seat):
         self.commands.settle()
         if self.leaving is not None:
             return
+        self.stage.covered = self.desk.covers or self.stage.question is not None
         compiled = COMPILING.seconds
         self.stage.go_on(elapsed)
         if COMPILING.seconds > compiled:
             self._clock.tick()  # that time was not the scene's
+        self.follow(elapsed)
         self.draw()
+        if COMPILING.seconds > compiled:
+            pygame.event.get(tuple(PRESSES))
         pygame.display.flip()
         self.taking.roll(self.surface, elapsed)
 
     def draw(self) -> None:
         """Draw what is on, and what surrounds it."""
         self.make_room()
+        self.desk.out_of_sight = self.loses_sight
         self.desk.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
 
-    def _show_wait(self, what: str) -> None:
-        """Say what the next picture has to wait for; it takes no events in. What others wait for keeps none waiting."""
+    def _wait(self, done: Callable[[float], bool]) -> None:
+        """Stay alive until a job of the worker is done: show what is waited for, and close at Esc and the cross.
+
+        What compiles takes seconds: keys and buttons that were pressed meanwhile are dropped. Other events come later.
+        """
+        wait, later = Wait(self._worker), []
+        behind = self.preview() or self.surface.copy()
+        while not done(1.0 / WAIT_RATE):
+            surface = pygame.display.get_surface() or self.surface
+            surface.blit(behind, (0, 0))
+            self.desk.draw_wait(surface, wait.told())
+            pygame.display.flip()
+            for event in pygame.event.get():
+                escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
+                asks = not self.stage.saves_at_end and self.stage.count_unsaved() > 0
+                if (escape or event.type == pygame.QUIT) and not asks:
+                    self.leaving = 0
+                later.append(event)
+            if self.leaving is not None:
+                pygame.display.iconify()
+        for event in later:
+            if not (wait.compiled and event.type in PRESSES):
+                pygame.event.post(event)
+        if wait.compiled:
+            self._clock.tick()
+
+    def _note_compiling(self, what: str) -> None:
+        """Take note that a kernel is being compiled. What other threads wait for keeps none waiting."""
+        self._worker.note_compiling(what)
         if threading.current_thread() is not threading.main_thread():
             return
         self.desk.draw_wait(self.surface, what)
@@ -103,12 +166,20 @@ class Window(Seat):
     def take(self, event: pygame.event.Event) -> None:
         """Take one event in."""
         if event.type == pygame.QUIT:
-            self.leaving = 0
+            self.commands.do(Command.QUIT)
+        elif event.type == pygame.WINDOWFOCUSLOST:
+            self.stage.unfocused = True
+        elif event.type in (pygame.WINDOWFOCUSGAINED, pygame.KEYDOWN, pygame.MOUSEBUTTONDOWN):
+            self.stage.unfocused = False
         elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
             self._resize()
+        if self._starts(event):
+            self.stage.start_game()
+            return
         for error in self._gamepads.take(event, self.stage.host, lambda: self.commands.do(Command.PAUSE)):
             self.stage.messages.tell(str(error), "warning")
         command = self._keyboard.command(event, self.desk.claimed(self.stage))
+        self._dismiss(event, command)
         self._let_go(event)
         if self.desk.handle(event, self.stage):
             return
@@ -117,12 +188,33 @@ class Window(Seat):
         elif event.type == pygame.KEYDOWN:
             claims = self.desk.claims(self.stage)
             deed = claims.deed(event.key, self._keyboard.again)
-            if deed is not None and not event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
+            waits = self.stage.waits_for_start
+            if deed is not None and not waits and not event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
                 self.stage.act(deed)
                 if event.key in claims.releases:
                     self._held[event.key] = claims.releases[event.key]
         else:
             self.mouse.take(event)
+
+    def _dismiss(self, event: pygame.event.Event, command: Command | None) -> None:
+        """Take back a question that is answered by doing something else; the panel may ask and confirm as well."""
+        asked = self.commands.asked
+        if asked is None:
+            return
+        if event.type == pygame.KEYDOWN:
+            other = command != asked and event.key not in MODIFIERS and not self._keyboard.again
+        else:
+            left = self.surface.get_width() - self.desk.panel.width
+            other = event.type == pygame.MOUSEBUTTONDOWN and event.pos[0] < left
+        if other:
+            self.commands.dismiss()
+
+    def _starts(self, event: pygame.event.Event) -> bool:
+        """Tell whether an event starts the game that waits for it: Space, or any button of a gamepad."""
+        if not self.stage.waits_for_start or self.desk.covers or self.stage.faults:
+            return False
+        space = event.type == pygame.KEYDOWN and event.key == pygame.K_SPACE
+        return space or event.type == pygame.JOYBUTTONDOWN
 
     def _let_go(self, event: pygame.event.Event) -> None:
         """Do what the release of a claimed key asks for, also where the release itself will go elsewhere."""
@@ -163,4 +255,5 @@ class Window(Seat):
         self.taking.end_film()
         self.desk.close()
         self.stage.close()
+        self._worker.close()
         close_screen()

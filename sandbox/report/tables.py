@@ -22,7 +22,7 @@ CONTACTS = ("time", "a", "b", "point_x", "point_y", "normal_x", "normal_y", "imp
 """Columns of contacts, SI units; `a` and `b` are names."""
 CHUNK = 1 << 16
 """Rows that are worked on at once, about 10 MB."""
-NEEDS_PARQUET = 'parquet needs the `parquet` extra: pip install "sandbox2d[parquet]"; a csv needs nothing more'
+NEEDS_PARQUET = 'parquet needs the `parquet` extra: pip install -e ".[parquet]"; a csv needs nothing more'
 
 Column = npt.NDArray[Any] | tuple[npt.NDArray[np.int64], list[str]]
 """Values, or for words the numbers of those that all rows share."""

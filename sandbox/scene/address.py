@@ -2,17 +2,20 @@
 
 `solver.dt` · `world.gravity` · `ball.cue.velocity` · `ball.0.radius` · `ball."8 ball".mass` · `ball.*.restitution` ·
 `pinball.bumper.*.speed`.
-An element of a list is named by its `name`, or by its number from 0; `*` means every one, where none is called so.
+An element of a list is named by its `name`, by its number from 0, or, without a name, by what messages and tables call
+it: `joint.joint-1.stiffness` is of the first joint. `*` means every one, where none is called so.
 Numbers may stand in brackets, as faults write them: `drive[0].rate`, `ball.cue.velocity[1]`. A name that ends so itself
 is quoted.
 """
 
 import copy
+import difflib
 import re
 import tomllib
 from typing import Any
 
 from sandbox.scene.faults import Location
+from sandbox.scene.model import default_name
 
 EVERY = "*"
 
@@ -124,7 +127,7 @@ def _followed(here: Any, parts: tuple[str, ...]) -> tuple[Any, Location]:
         key: str | int = part
         if isinstance(here, list):
             try:
-                key = index_of(here, part, "")
+                key = index_of(here, parts[: len(location) + 1], "")
             except AddressError:
                 return None, ()
         elif not isinstance(here, dict) or part not in here:
@@ -141,8 +144,12 @@ def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Locat
         last = k == len(parts) - 1
         if isinstance(here, dict):
             if not last and part not in here:
-                if k > 0 or len(parts) != 2:
-                    raise AddressError(f"{path}: the scene has no {'.'.join(parts[: k + 1])}")
+                meant = _meant(here, parts[k:])
+                if k > 0 and k == len(parts) - 2 and parts[-1].isdecimal() and part in _keys(location):
+                    whole = ".".join(parts[: k + 1])
+                    raise AddressError(f"{path}: the scene does not state {whole}; set it as a whole, {whole}=…")
+                if k > 0 or len(parts) != 2 or "an element" in meant:
+                    raise AddressError(f"{path}: the scene has no {'.'.join(parts[: k + 1])}{meant}")
                 here[part] = {}
             location += (part,)
             if last:
@@ -150,7 +157,7 @@ def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Locat
             else:
                 here = here[part]
         elif isinstance(here, list):
-            index = index_of(here, part, path)
+            index = index_of(here, parts[: k + 1], path)
             location += (index,)
             if last:
                 here[index] = value
@@ -161,16 +168,75 @@ def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Locat
     return location
 
 
-def index_of(elements: list[Any], part: str, path: str) -> int:
-    """Return the index of a list's element, by its name or by its number."""
-    names = _names(elements)
+def index_of(elements: list[Any], parts: tuple[str, ...], path: str) -> int:
+    """Return the index of a list's element, which the last part of a path names, or numbers."""
+    part, kind = parts[-1], next((each for each in reversed(parts[:-1]) if not each.isdecimal()), "")
+    names = element_names(elements, kind)
     if part in names:
-        return next(k for k, e in enumerate(elements) if isinstance(e, dict) and e.get("name") == part)
+        return names.index(part)
     if part.isdecimal() and len(part) < 10 and int(part) < len(elements):
         return int(part)
-    known = ", ".join(str(n) for n in names[:10] if n is not None)
-    numbers = f"0 to {len(elements) - 1}" if elements else "none"
-    raise AddressError(f"{path}: no element {part!r}; names: {known or 'none'}; numbers: {numbers}")
+    before = ".".join(parts[:-1])
+    if any(isinstance(e, dict) and part in e for e in elements) or part in _keys(parts[:-1]):
+        rest = path[len(before) :].lstrip(".")
+        named = f"{before}.{quoted(names[0] or '0')}.{rest}, or " if elements else ""
+        raise AddressError(f"{path}: {before} is a list; name an element, such as {named}all by {before}.*.{rest}")
+    some = [name for name in names if name is not None]
+    maker = next((name for name in some if part.startswith(f"{name}-")), None)
+    if maker is not None:
+        raise AddressError(
+            f"{path}: {part!r} is laid out by {before}.{quoted(maker)}, which has the keys for all of it"
+        )
+    close = difflib.get_close_matches(part, some, n=1)
+    if close:
+        raise AddressError(f"{path}: no element {part!r}; did you mean {close[0]!r}?")
+    known = f"names: {', '.join(some[:10])}; " if some else ""
+    numbers = "none" if not elements else "0" if len(elements) == 1 else f"0 to {len(elements) - 1}"
+    raise AddressError(f"{path}: no element {part!r}; {known}numbers: {numbers}")
+
+
+def element_names(elements: list[Any], kind: str) -> list[str | None]:
+    """Return what each element of a list is called: its name or, without, its kind and place; None of what has none.
+
+    Of two of one name only the first is called so.
+    """
+    names: list[str | None] = []
+    stated = {e["name"] for e in elements if isinstance(e, dict) and isinstance(e.get("name"), str)}
+    for k, element in enumerate(elements):
+        name = element.get("name", default_name(kind, k)) if isinstance(element, dict) else None
+        is_free = isinstance(name, str) and name not in names and ("name" in element or name not in stated)
+        names.append(name if is_free else None)
+    return names
+
+
+def quoted(name: str) -> str:
+    """Write a name as a part of a path, in quotes where it needs them."""
+    if re.fullmatch(r"[^\s.\"'\[\]=]+", name):
+        return name
+    return f'"{name}"' if '"' not in name else f"'{name}'"
+
+
+def _keys(location: Location) -> list[str]:
+    """Return the keys of a table by where it is; none where there is no such table."""
+    from sandbox.scene.explain import keys_of, model_at  # only what cannot be followed needs these
+
+    try:
+        return keys_of(model_at(location))
+    except (KeyError, StopIteration):
+        return []
+
+
+def _meant(document: Any, parts: tuple[str, ...]) -> str:
+    """Return a hint for a path whose first part is no table of the scene: an element's name, or nearly a table's."""
+    if not isinstance(document, dict):
+        return ""
+    for kind, elements in document.items():
+        for name in element_names(elements, kind) if isinstance(elements, list) else ():
+            if name is not None and (parts[0] == name or parts[0].startswith(f"{name}-")):
+                part = "" if parts[0] == name else "part of "
+                return f"; that is {part}an element: {'.'.join((kind, quoted(name), *parts[1:]))}"
+    close = difflib.get_close_matches(parts[0], document, n=1)
+    return f"; did you mean {'.'.join((*close, *parts[1:]))}?" if close else ""
 
 
 def _names(elements: list[Any]) -> list[Any]:

@@ -42,6 +42,7 @@ class Shot(Stroke):
     name: Name | None = None
     """one without a name is called by its kind and its place in the file"""
     ball: Name = "cue"
+    """name of the ball that is struck"""
 
 
 def miscues(stroke: Stroke) -> bool:

@@ -16,6 +16,7 @@ class Disc(Mover):
     """What the balls of a scene and of its generators have in common: a uniform disc, I = ½ m r²."""
 
     radius: Radius
+    """of the disc, m"""
 
 
 class Ball(Disc, Single):
@@ -31,12 +32,15 @@ class Grid(Disc):
     origin: Point
     """centre of the lower left ball, m"""
     columns: Count
+    """balls in each row"""
     rows: Count = 1
+    """how many rows"""
     spacing: tuple[Coordinate, Coordinate]
     """from centre to centre, m"""
     jitter: Annotated[float, Field(ge=0, le=1e9)] = 0.0
     """Each coordinate is moved by up to ± this, m."""
     velocity: Velocity = (0.0, 0.0)
+    """of every ball, m/s"""
     velocity_jitter: Annotated[float, Field(ge=0, le=1e12)] = 0.0
     """Each component is changed by up to ± this, m/s."""
 
@@ -45,9 +49,13 @@ class Scatter(Disc):
     """Balls placed at random in a box, none overlapping another of the same scatter if they collide."""
 
     count: Count
+    """how many balls"""
     lower: Point
+    """lower left corner of the box, m"""
     upper: Point
+    """upper right corner of the box, m"""
     velocity: Velocity = (0.0, 0.0)
+    """of every ball, m/s"""
     velocity_jitter: Annotated[float, Field(ge=0, le=1e12)] = 0.0
     """Each component is changed by up to ± this, m/s."""
 
@@ -56,12 +64,17 @@ class Emitter(Disc):
     """Particles that leave one point with random velocities, such as a firework."""
 
     position: Point
+    """of the point that they leave, m"""
     count: Count
+    """how many particles"""
     velocity_min: Velocity
+    """the least of each component, m/s"""
     velocity_max: Velocity
     """Each component is uniform between the two, m/s."""
     radius: Radius = 0.05
+    """of each particle, m"""
     collides: Collides = "none"
+    """what they can meet: `all`, `fixed` (planes, walls, posts and fixed bodies alone) or `none`"""
     lifetime: Lifetime | None = None
     """s, after which a particle is gone; None for ever"""
     lifetime_jitter: Annotated[float, Field(ge=0, le=1e10)] = 0.0

@@ -57,7 +57,7 @@ def change_value(scene: Scene, path: str, value: Any) -> Scene:
         names = [{} if each.name is None else {"name": each.name} for each in part if hasattr(each, "name")]
         names = names or [{} for _ in part]
         every = rest[0] == EVERY and {"name": EVERY} not in names
-        those = range(len(part)) if every else [index_of(names, rest[0], path)]
+        those = range(len(part)) if every else [index_of(names, (heading, rest[0]), path)]
         elements = list(part)
         for k in those:
             elements[k] = _with(elements[k], rest[1:], path, value)

@@ -28,6 +28,7 @@ class Driven(Part):
     """What all drives have."""
 
     name: Name | None = None
+    """without one it is called by its kind and its place in the file, such as `joint-1`"""
     body: Name
     """a single body, which stands still as the scene starts"""
     key: DriveKey | None = None
@@ -38,8 +39,9 @@ class TorqueDrive(Driven):
     """Turns a body about a hinge from one stop to another by a torque, and back by a weaker one: a flipper.
 
     What it meets pushes it about, as heavy as it is. At level 0 the wanted torque is `-return_ratio * torque`, else
-    `level * torque`; the torque goes there by `torque / ramp` a second. It starts without any, so that the first stroke
-    need not overcome what draws the body back.
+    `level * torque`; the torque goes there by `torque / ramp` a second. It starts at 0, so that the first stroke need
+    not overcome the torque that draws the body back. Within `hold_within` of the end the wanted torque, either way, is
+    multiplied by b + hold_ratio (1 − b), b = (d / hold_within)⁴, d the angle that is left.
     """
 
     kind: Literal["torque"]
@@ -54,9 +56,9 @@ class TorqueDrive(Driven):
     return_ratio: Share = 0.1
     """the part of the torque that draws it back at level 0"""
     hold_ratio: Share = 1.0
-    """the part of a driving torque that acts near the end"""
+    """the part of the wanted torque that is left at the end"""
     hold_within: Annotated[float, Field(ge=0, le=1e9)] = 0.0
-    """rad from the end"""
+    """rad from the end, within which the wanted torque falls off to that part"""
     bounce: Share = 0.0
     """the part of its speed with which it is thrown back from a stop"""
     moment: Moment | None = None

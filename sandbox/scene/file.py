@@ -18,6 +18,7 @@ from sandbox.scene.crosscheck import crosscheck
 from sandbox.scene.document import read_model, to_document
 from sandbox.scene.faults import Fault, Lines, Location, SceneError, path_of
 from sandbox.scene.model import Scene
+from sandbox.scene.shipped import UnknownSceneError, find
 
 MAX_BYTES = 256 * 2**20
 
@@ -31,13 +32,17 @@ def load(path: str | Path, overrides: Iterable[Override] = ()) -> Scene:
     """Read a scene file.
 
     Args:
-        path: the file.
+        path: the file, or the name of a scene that ships, such as `bounce` or `tutorial/bounce`.
         overrides: values to set before the scene is checked.
 
     Raises:
         SceneError: with every fault found. Nothing is partly loaded.
     """
-    return loads(_read(path), str(path), overrides)
+    try:
+        file = find(str(path))
+    except UnknownSceneError as error:
+        raise SceneError([Fault(str(path), None, "", str(error))]) from None
+    return loads(_read(file), str(file), overrides)
 
 
 def loads(text: str, file: str = "<scene>", overrides: Iterable[Override] = ()) -> Scene:

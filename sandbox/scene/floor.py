@@ -63,5 +63,8 @@ class Pocket(Part):
     name: Name | None = None
     """one without a name is called by its kind and its place in the file"""
     position: Point
+    """of its centre, m"""
     radius: Radius
+    """m: it captures a ball whose centre is nearer than this"""
     colour: Colour | None = None
+    """in the window, `#rrggbb`"""

@@ -17,6 +17,7 @@ class Attraction(Part):
     """Draws every moving body towards a place or a body: a = strength / (r² + softening²), as the sun does."""
 
     name: Name | None = None
+    """without one it is called by its kind and its place in the file, such as `joint-1`"""
     toward: Point | Name
     """a place, m, or a body's name; a body that moves is drawn back as strongly"""
     strength: Annotated[float, Field(ge=-1e30, le=1e30)]
@@ -29,7 +30,9 @@ class Thrust(Part):
     """A force that a body carries along, such as a spaceship's engine: it turns with the body."""
 
     name: Name | None = None
+    """without one it is called by its kind and its place in the file, such as `joint-1`"""
     body: Name
+    """name of the body that carries it"""
     force: tuple[Newton, Newton]
     """N, in the body's own frame"""
     point: Point = (0.0, 0.0)

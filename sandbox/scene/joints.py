@@ -21,6 +21,7 @@ class Joined(Part):
     """What all joints have."""
 
     name: Name | None = None
+    """without one it is called by its kind and its place in the file, such as `joint-1`"""
     between: Annotated[tuple[Name, ...], Field(min_length=1, max_length=2)]
     """one body, held by the world, or two"""
     collide: bool = False
@@ -33,7 +34,8 @@ class Anchored(Joined):
     """A joint that holds each body in one point."""
 
     anchors: tuple[Point, Point] = ((0.0, 0.0), (0.0, 0.0))
-    """where it holds each, in the body's own frame, from its position; of the world, a place in it"""
+    """the two points that it holds, m, in the order of `between`: each in the frame of its body, from the body's
+    position. With one body the first is the body's, and the second is a place in the world"""
 
 
 class Rod(Anchored):
@@ -51,7 +53,8 @@ class Pivot(Joined):
     at: Point | None = None
     """where, in the world as it starts"""
     anchors: tuple[Point, Point] | None = None
-    """or where in each body's own frame, from its position"""
+    """or where in each body's own frame, from its position, m, in the order of `between`; with one body the first is
+    the body's, and the second is a place in the world"""
 
 
 class Slide(Anchored):
@@ -59,6 +62,7 @@ class Slide(Anchored):
 
     kind: Literal["slide"]
     least: Distance = 0.0
+    """the smallest distance, m"""
     most: Distance
     """m"""
 
@@ -78,6 +82,7 @@ class RotaryLimit(Joined):
 
     kind: Literal["rotary_limit"]
     least: Turned
+    """the smallest angle, rad"""
     most: Turned
     """rad"""
 
@@ -97,6 +102,7 @@ class Gear(Joined):
 
     kind: Literal["gear"]
     ratio: Annotated[float, Field(ge=-1e6, le=1e6)]
+    """angle₁ / angle₂"""
     phase: Turned | None = None
     """rad; without, as the two start"""
 

@@ -1,4 +1,4 @@
-"""Kick: what a surface adds to whoever hits it hard enough, as bumpers and slingshots do."""
+"""Kick: speed that a surface adds to bodies that hit it hard enough, as bumpers and slingshots do."""
 
 from typing import Annotated, Literal
 
@@ -11,11 +11,14 @@ LEAST_THRESHOLD = 1e-3
 
 
 class Kick(Part):
-    """A hit that closes faster than `threshold` leaves faster by `speed`, along the normal, than it would rebound."""
+    """Adds `speed` along the normal to a hit that closes faster than `threshold`."""
 
     speed: Annotated[float, Field(ge=0, le=1e6)]
-    """m/s, in the middle where that is told apart"""
+    """m/s; with the profile `middle`, in the middle"""
     threshold: Annotated[float, Field(ge=LEAST_THRESHOLD, le=1e12)] = 0.05
     """m/s, of the approach along the normal"""
     profile: Literal["even", "middle"] = "even"
     """`even`: alike everywhere; `middle`: by 4 s (1 − s) along the length of a wall, s from 0 to 1"""
+    adds_to: Literal["rebound", "approach"] = "rebound"
+    """`rebound`: the body bounces, then gains the speed, as at a bumper; `approach`: the speed is added to the
+    approach, and the body bounces with the sum, as at a slingshot"""

@@ -13,9 +13,11 @@ class Marking(Part):
     """A disc, a ring, a polygon or a line, drawn below everything else, in the order of the file."""
 
     colour: Colour
+    """`#rrggbb`"""
     position: Point | None = None
     """of the centre of a disc or ring"""
     radius: Radius | None = None
+    """of a disc or ring, m"""
     points: Annotated[tuple[Point, ...], Field(max_length=10_000)] = ()
     """of a line, or the corners of a polygon"""
     filled: bool = True

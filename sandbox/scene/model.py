@@ -51,6 +51,7 @@ class Scene(Part):
     """A whole scene file."""
 
     title: Annotated[str, StringConstraints(max_length=200)] = ""
+    """Name of the scene, shown above it."""
     about: Annotated[str, StringConstraints(max_length=2000)] = ""
     """What to look for."""
     world: World = Field(default_factory=World)
@@ -86,9 +87,12 @@ class Scene(Part):
     cloths: tuple[Cloth, ...] = Field((), alias="cloth")
     ragdolls: tuple[Ragdoll, ...] = Field((), alias="ragdoll")
     joints: tuple[Joint, ...] = Field((), alias="joint")
+    """Holds one body to the world, or two together: rod, pivot, slide, groove, rotary_limit, motor, gear, spring,
+    rotary_spring."""
     attractions: tuple[Attraction, ...] = Field((), alias="attraction")
     thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
     drives: tuple[Drive, ...] = Field((), alias="drive")
+    """Moves a body to and fro: torque, stroke or plunger."""
     shots: tuple[Shot, ...] = Field((), alias="shot")
 
     @cached_property

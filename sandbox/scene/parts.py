@@ -22,6 +22,7 @@ class PlayPart(Part):
     name: Name
     """of the body, fixed thing, zone or drive"""
     role: Role
+    """what it is to the rules, such as a bumper or a drain"""
     group: Name | None = None
     """whom it belongs to: a bank, a set of lanes, a ramp; of a flipper the side, `left` or `right`"""
     step: Annotated[int, Field(ge=0, le=1000)] = 0

@@ -28,6 +28,7 @@ class Ragdoll(Mover):
     mass: Annotated[float, Field(ge=1e-9, le=1e30)] | None = None
     """of all of it, kg; without, 75"""
     facing: Literal["right", "left"] = "right"
+    """which way its front is"""
     velocity: Velocity = (0.0, 0.0)
     """m/s"""
 

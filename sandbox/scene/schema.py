@@ -1,8 +1,10 @@
 """Schema: the JSON Schema of a scene file, from the model, so that editors complete and check one."""
 
+import inspect
 import json
-from typing import Any
+from typing import Any, get_args
 
+from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
@@ -46,8 +48,30 @@ class _Generator(GenerateJsonSchema):
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         result = super().model_schema(schema)
-        descriptions = docstrings(schema["cls"])
+        descriptions = described(schema["cls"])
         for name, field in schema["cls"].model_fields.items():
             if name in descriptions:
                 result["properties"][field.alias or name]["description"] = descriptions[name]
         return result
+
+
+def described(model: type[BaseModel]) -> dict[str, str]:
+    """Return what each field of a model is: its docstring or, of a table, the first line of that table's own.
+
+    Of the `kind` of a joint or drive it is the first line of what that kind is.
+    """
+    found = docstrings(model)
+    for name, field in model.model_fields.items():
+        if name not in found:
+            table = model if name == "kind" else _table_in(field.annotation)
+            if table is not None:
+                found[name] = inspect.cleandoc(table.__doc__ or "").partition("\n")[0]
+    return found
+
+
+def _table_in(annotation: Any) -> type[BaseModel] | None:
+    """Return the model that a field holds, one or many of; None where it is a value, or one of several models."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    found = [table for table in map(_table_in, get_args(annotation)) if table is not None]
+    return found[0] if len(found) == 1 else None

@@ -42,9 +42,13 @@ class Settings(Part):
     half_kick: bool = False
     """Start half a kick ahead (v + g·h/2), so that uniformly accelerated free motion is exact."""
     integrator: Integrator | None = None
+    """How free motion is integrated; pymunk has explicit_euler alone."""
     detection: Detection | None = None
+    """How contacts are found: at the end of a step, by bisection, by a time of impact, or with shorter steps."""
     response: Response | None = None
+    """How contacts are resolved: by impulses, or by penalty springs."""
     broad_phase: BroadPhase | None = None
+    """How candidate pairs are found; the result is the same, the cost is not."""
     joints: Joints | None = None
     """How joints are held: velocities put right by impulses, or positions, by relaxation or with compliance (XPBD),
     or both (RATTLE)."""

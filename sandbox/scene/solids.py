@@ -31,6 +31,7 @@ class Capsule(Single):
     length: Length
     """between the centres of the half discs, m"""
     radius: Radius
+    """of its round ends, m"""
 
 
 class Polygon(Single):
@@ -50,31 +51,37 @@ class Attached(Surfaced):
     position: Point = (0.0, 0.0)
     """as seen from the body's position, m"""
     angle: Angle = 0.0
+    """in the frame of the body, rad"""
 
 
 class BallPart(Attached):
     """A disc that is part of a body."""
 
     radius: Radius
+    """of the disc, m"""
 
 
 class BoxPart(Attached):
     """A rectangle that is part of a body."""
 
     size: tuple[Length, Length]
+    """width and height, m"""
 
 
 class CapsulePart(Attached):
     """A capsule that is part of a body."""
 
     length: Length
+    """between the centres of its round ends, m"""
     radius: Radius
+    """of its round ends, m"""
 
 
 class PolygonPart(Attached):
     """A polygon that is part of a body."""
 
     points: Outline
+    """corners of the outline, in the frame of the part, m"""
 
 
 AnyPart = BallPart | BoxPart | CapsulePart | PolygonPart

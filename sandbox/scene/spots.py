@@ -21,4 +21,6 @@ class Spot(Part):
     """A point with a name: `head`, `foot` and `centre` of a table, in snooker the colours' own."""
 
     name: Name
+    """by which rules speak of it"""
     position: Point
+    """where it is, m"""

@@ -22,6 +22,7 @@ class Stack(Mover):
     columns: Count
     """boxes in the bottom row; 1 for a tower"""
     rows: Count
+    """how many rows"""
     fewer: Annotated[int, Field(ge=0, le=MAX_BODIES)] = 0
     """how many boxes each row has fewer than the one below: 0 for a wall, 1 for a pyramid"""
     gap: Gap = 0.0

@@ -31,6 +31,7 @@ class Wall(Surfaced):
     """A polyline with round ends, solid on both sides."""
 
     points: Course
+    """its corners, m"""
     thickness: Annotated[float, Field(ge=0, le=1e9)] = 0.0
     """full thickness, m"""
     closed: bool = False
@@ -40,6 +41,7 @@ class Wall(Surfaced):
     height: Height | None = None
     """of the nose above a floor, m"""
     kick: Kick | None = None
+    """throws what hits it, as a slingshot does"""
     one_way: bool = False
     """Solid only for what comes from the left of its direction, first to last point; from the right all pass."""
     solid: bool = True
@@ -50,11 +52,14 @@ class Post(Surfaced):
     """A fixed circle."""
 
     position: Point
+    """of its centre, m"""
     radius: Radius
+    """of the circle, m"""
     layers: Layers = (GROUND,)
     """on which it is solid"""
     height: Height | None = None
     """of the nose above a floor, m"""
     kick: Kick | None = None
+    """throws what hits it, as a bumper does"""
     solid: bool = True
     """whether anything meets it; an action can change that"""

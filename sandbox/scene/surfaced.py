@@ -31,11 +31,15 @@ class Surfaced(Part):
     name: Name | None = None
     """one without a name is called by its kind and its place in the file"""
     material: Name | None = None
+    """name of a [[material]], which states what is not stated here"""
     restitution: Restitution | None = None
+    """e: speed of separation / speed of approach, 0 to 1; where both sides of a contact state one they multiply"""
     restitution_falloff: Falloff | None = None
     """s/m: how restitution falls with the speed of approach, e(v) = e / (1 + f·v); the sides of a contact add theirs"""
     friction: Friction | None = None
+    """Coulomb friction μ; where both sides of a contact state one they multiply"""
     colour: Colour | None = None
+    """in the window, `#rrggbb`"""
 
 
 class Mover(Surfaced):
@@ -46,9 +50,11 @@ class Mover(Surfaced):
     density: Density | None = None
     """kg/m²"""
     angle: Annotated[float, Field(ge=-1e12, le=1e12)] = 0.0
+    """at the start, rad, counter-clockwise"""
     angular_velocity: AngularVelocity = 0.0
     """rad/s"""
     collides: Collides = "all"
+    """what it can meet: `all`, `fixed` (planes, walls, posts and fixed bodies alone) or `none`"""
     layer: Name = GROUND
     """where it starts: it meets what shares its layer"""
 
@@ -57,6 +63,7 @@ class Single(Mover):
     """One body."""
 
     position: Point
+    """m, of the origin of its own frame: of balls, boxes and capsules their centre"""
     velocity: Velocity = (0.0, 0.0)
     """of the centre of mass, m/s"""
     fixed: bool = False

@@ -25,7 +25,9 @@ class Ties(Part):
     """The bodies that hold the ends of a rope."""
 
     start: Name | None = None
+    """name of the body that holds the first end"""
     end: Name | None = None
+    """name of the body that holds the last end"""
 
 
 class Woven(Mover):
@@ -51,6 +53,7 @@ class Rope(Woven):
     kind: Literal["rods", "springs", "planks"] = "rods"
     """what joins its nodes; or planks, joined by pivots"""
     start: Point
+    """its first end, m"""
     end: Point
     """m"""
     links: Count
@@ -79,7 +82,9 @@ class Cloth(Woven):
     corner: Point
     """the upper left node, m"""
     columns: Count
+    """nodes in each row"""
     rows: Count
+    """rows of nodes"""
     spacing: tuple[Length, Length]
     """between columns and between rows, m"""
     shear: Stiffness | None = None

@@ -41,6 +41,7 @@ class Zone(Part):
     position: Point | None = None
     """of a circle's centre, m"""
     radius: Radius | None = None
+    """of a circle, m"""
     points: Annotated[tuple[Point, ...], Field(min_length=2, max_length=1000)] | None = None
     """corners of a polygon, or the middle line of a strip, m"""
     thickness: Width | None = None
@@ -52,6 +53,7 @@ class Zone(Part):
     gravity: tuple[Acceleration, Acceleration] | None = None
     """m/s², instead of the world's, of whom is inside and on one of its layers; where several are, of the last"""
     colour: Colour | None = None
+    """in the window, `#rrggbb`"""
 
 
 def notes(pair: "IntArray", scene: "Scene") -> "BoolArray":

@@ -5,9 +5,14 @@ from pathlib import Path
 import pytest
 from calling import DROP, FAULTY, json_of, lines_of, written
 
+from sandbox.cli import check
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.forecast import FAILED, Warning
+from sandbox.measure.forecast.forecasts import FORECASTS, Forecast
+from sandbox.measure.run import run
 from sandbox.scene.demands import JOINTS, Demand
 from sandbox.scene.file import load, loads
+from sandbox.scene.model import Scene
 
 
 def test_json_of_a_sound_scene_has_every_key(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -31,7 +36,7 @@ def test_json_of_a_faulty_scene_tells_every_fault_with_its_place(
     assert (document["demands"], document["engines"], document["warnings"]) == ([], {}, [])
     assert all(set(fault) == {"file", "line", "path", "message"} for fault in document["faults"])
     told = [(fault["file"], fault["line"], fault["path"]) for fault in document["faults"]]
-    assert told == [(scene, 3, "ball.a.position[1]"), (scene, 4, "ball.a.radius")]
+    assert told == [(scene, 3, "ball.a.position"), (scene, 4, "ball.a.radius")]
     status, out, lines = lines_of(capfd, "check", scene)
     assert (status, out) == (2, [])
     assert lines == [f"{scene}:{f['line']}: {f['path']}: {f['message']}" for f in document["faults"]]
@@ -103,6 +108,96 @@ def test_quiet_tells_only_what_is_wrong(tmp_path: Path, capfd: pytest.CaptureFix
     status, out, err = lines_of(capfd, "check", "bullet", "--quiet")
     assert (status, len(out), err) == (0, 1, [])
     assert out[0].startswith("bullet: warning: 'bullet' can close on 'wall' at up to 100 m/s, 0.1 m a substep")
+
+
+def test_each_of_three_bullets_is_named_with_its_own_speed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    text = '[world]\nduration = 1.0\n[[wall]]\nname = "w"\npoints = [[1, -9], [1, 9]]\nthickness = 0.02\n'
+    for k, (name, speed) in enumerate((("slow", 9.0), ("middle", 25.0), ("fast", 60.0))):
+        text += f'[[ball]]\nname = "{name}"\nposition = [0, {k}]\nvelocity = [{speed}, 0]\nradius = 0.1\n'
+    _, document, _ = json_of(capfd, "check", written(tmp_path, text), "--no-trial")
+    found = [(w["ball"], w["speed"]) for w in document["warnings"] if w["thing"] == "w"]
+    assert found == [("fast", 60.0), ("middle", 25.0)]
+    _, document, _ = json_of(capfd, "check", written(tmp_path, text))
+    assert document["trial"] == {"engine": "pymunk", "duration": 1.0, "whole": True}
+    passed = [(w["ball"], w["thing"]) for w in document["warnings"] if "seen_at" in w]
+    result = run(load(written(tmp_path, text)))
+    assert passed == [(result.names[a], "w") for a, _ in result.missed_pair.tolist()]
+    assert len(passed) > 0
+
+
+def test_fast_ball_is_foretold_to_end_deep_in_the_plane(capfd: pytest.CaptureFixture[str]) -> None:
+    _, document, _ = json_of(capfd, "check", "tutorial/fast_ball")
+    (warning,) = document["warnings"]
+    assert (warning["kind"], warning["ball"], warning["thing"], warning["speed"]) == ("depth", "ball", "ground", 100.0)
+    assert warning["safe_dt"] == pytest.approx(0.005, rel=1e-12)  # a quotient
+    bisecting = ("--set", "solver.detection=bisect", "--set", "solver.integrator=velocity_verlet")
+    _, document, _ = json_of(capfd, "check", "tutorial/fast_ball", *bisecting)
+    assert document["warnings"] == []
+
+
+def test_pixels_are_noted(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    pixels = "[world]\ngravity = [0, 981]\n[[ball]]\nposition = [100, 100]\nradius = 20\n"
+    _, document, _ = json_of(capfd, "check", written(tmp_path, pixels))
+    assert [note["kind"] for note in document["notes"]] == ["pixels"]
+    metres = pixels.replace("981", "-9.81").replace("20", "0.2")
+    _, document, _ = json_of(capfd, "check", written(tmp_path, metres, "metres.toml"))
+    assert document["notes"] == []
+
+
+def test_substeps_of_a_preset_are_shown(capfd: pytest.CaptureFixture[str]) -> None:
+    _, document, _ = json_of(capfd, "check", "9-ball")
+    assert document["step"] == {"dt": 0.01, "substeps": 10}
+    _, out, _ = lines_of(capfd, "check", "9-ball")
+    assert any("dt × substeps is 0.01 s × 10, a step every 0.001 s" in line for line in out)
+
+
+def test_speed_that_nothing_bounds_is_unknown(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    text = DROP + "[[attraction]]\ntoward = [3, 3]\nstrength = 1.0\n"
+    _, document, _ = json_of(capfd, "check", written(tmp_path, text))
+    assert (document["safe_dt"], document["safe_dt_known"]) == (None, False)
+    _, out, _ = lines_of(capfd, "check", written(tmp_path, text))
+    assert any("unknown: attraction without softening" in line for line in out)
+
+
+def test_trial_run_is_on_the_engine_asked_about(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    for engine in ("pymunk", "reference"):
+        _, document, _ = json_of(capfd, "check", scene, "--engine", engine)
+        assert document["trial"]["engine"] == engine
+    _, document, _ = json_of(capfd, "check", scene, "--no-trial")
+    assert document["trial"] is None
+    status, _, err = lines_of(capfd, "check", scene, "--engine", "none")
+    assert (status, len(err)) == (2, 1)
+
+
+def test_failure_in_one_scene_costs_no_other_its_answer(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good, bad = written(tmp_path), written(tmp_path, DROP.replace("Drop", "Bad"), "bad.toml")
+    whole = check.bill
+
+    def broken(scene: Scene) -> object:
+        if scene.title == "Bad":
+            raise OverflowError("math range error")
+        return whole(scene)
+
+    monkeypatch.setattr(check, "bill", broken)
+    status, document, err = json_of(capfd, "check", bad, good)
+    assert (status, [each["ok"] for each in document["scenes"]]) == (1, [False, True])
+    assert "OverflowError: math range error" in document["scenes"][0]["faults"][0]["message"]
+    assert len(err) == 1
+
+
+def test_failure_of_one_forecast_costs_no_other_its_answer(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(situation: object) -> list[Warning]:
+        raise ZeroDivisionError("float division by zero")
+
+    monkeypatch.setitem(FORECASTS, "springs", Forecast(broken))
+    status, document, _ = json_of(capfd, "check", "bullet")
+    assert (status, [w["kind"] for w in document["warnings"]]) == (1, ["tunnelling", FAILED])
+    assert document["warnings"][1]["forecast"] == "springs"
 
 
 def test_note_is_told_of_a_concave_outline(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

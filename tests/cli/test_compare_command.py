@@ -46,12 +46,22 @@ def test_table_says_the_truth_first(tmp_path: Path, capfd: pytest.CaptureFixture
     assert out[3].split()[:3] == ["pymunk", "0.01", "ok"]
 
 
-def test_why_tells_verdict_knobs_and_refusals(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_heads_are_explained_below_the_table(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = lines_of(capfd, "compare", written(tmp_path), "--engines", "pymunk")
+    below = "\n".join(out[4:])
+    for word in ("error:", "diverges:", "energy,", "momentum:", "contacts:", "missed:", "phantom:", "after:"):
+        assert word in below
+
+
+def test_why_prints_a_table_of_changes_and_the_refusals(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     status, out, _ = lines_of(capfd, "compare", written(tmp_path), "--engine", "pymunk", "--why")
     assert status == 0
-    assert out[4].startswith("pymunk: ")
-    assert "slop 0: ×" in out[5]
-    assert "integrator rk4" in out[6]
+    begin = next(k for k, line in enumerate(out) if line.startswith("pymunk: largest gain by "))
+    assert out[begin + 1].split("  ")[1] == "change"
+    assert out[begin + 1].rstrip().endswith("of the error")
+    changes = [line.split("  ")[1] for line in out[begin + 2 :]]
+    assert "half_kick = True" in changes
+    assert any(line.startswith("  refused: ") and "integrator = rk4" in line for line in out)
 
 
 def test_missed_contact_is_named(capfd: pytest.CaptureFixture[str]) -> None:

@@ -212,7 +212,7 @@ def test_folder_of_several_runs_lists_them(stored: Path, tmp_path: Path, capfd: 
     ids = sorted(path.stem for path in stored.glob("*.npz"))
     status, out, err = lines_of(capfd, "export", str(stored), "--to", str(tmp_path / "a.csv"))
     assert (status, out) == (2, [])
-    assert err == [f"{stored}: holds {len(ids)} runs; name one as {stored}/<id>: {', '.join(ids)}"]
+    assert err == [f"{stored}: holds {len(ids)} runs; name one, such as {', '.join(f'{stored}/{id}' for id in ids)}"]
 
 
 def test_all_faults_are_told_at_once_and_nothing_is_written(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -282,8 +282,8 @@ def test_fault_is_one_line_that_says_what_is_right(
         (b"", "neither a stored run (.npz) nor a recording (.json)"),
         (b'title = "A scene"', "neither a stored run (.npz) nor a recording (.json)"),
         (b"PK\x03\x04damaged", "is no stored run: "),
-        (b"{}", "cannot be read: no recording of format 1"),
-        (b'{"format": 1, "scene": {}}', "cannot be read: "),
+        (b"{}", "cannot be read as a session: it has no `format`"),
+        (b'{"format": 1, "scene": {}}', "cannot be read as a session: "),
     ],
 )
 def test_what_is_no_run_is_told(
@@ -339,8 +339,8 @@ def test_missing_extras_are_named_before_the_work(
     words = [f"--to={tmp_path}/a{suffix}" for suffix in (".csv", ".parquet", ".mp4")]
     status, _, err = lines_of(capfd, "export", str(stored), *words)
     assert (status, len(err)) == (2, 2)
-    assert 'pip install "sandbox2d[parquet]"' in err[0]
-    assert 'pip install "sandbox2d[video]"' in err[1]
+    assert 'pip install -e ".[parquet]"' in err[0]
+    assert 'pip install -e ".[video]"' in err[1]
     assert not (tmp_path / "a.csv").exists()
 
 

@@ -118,7 +118,22 @@ def test_script_plays(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[s
 def test_player_where_nobody_plays_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     plain = written(tmp_path, TOY.replace('game = "landing"', ""), "plain.toml")
     status, _, err = lines_of(capfd, "run", plain, "--player", "none")
-    assert (status, err) == (2, ["--player: nobody plays here: no scene named has a game with rules"])
+    assert (status, err) == (2, ["--player: no scene given has a game with rules"])
+
+
+@pytest.mark.parametrize(
+    ("name", "missing"), [("curling", "play.curling.people=0"), ("duel", "the game would wait for ")]
+)
+def test_game_that_would_stand_still_is_refused(name: str, missing: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "run", name, "--player", "none")
+    assert (status, out) == (2, [])
+    assert err[0].startswith("--player: none ")
+    assert missing in err[0]
+
+
+def test_game_of_bots_alone_needs_no_player(capfd: pytest.CaptureFixture[str]) -> None:
+    alone = ("--set", "play.curling.people=0", "--set", "world.duration=1")
+    assert lines_of(capfd, "run", "curling", "--player", "none", *alone)[0] == 0
 
 
 def test_session_is_played_again_with_its_score(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

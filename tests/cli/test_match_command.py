@@ -5,6 +5,9 @@ from pathlib import Path
 import pytest
 from calling import json_of, lines_of
 
+from sandbox.games.billiards.frame import Frame
+from sandbox.games.billiards.match import Match
+
 QUICK = ("match", "straight-rail", "--distance", "2", "--players", "bot:0.9,bot:0.8")
 
 
@@ -41,7 +44,25 @@ def test_all_that_is_wrong_is_told_at_once(capfd: pytest.CaptureFixture[str]) ->
     assert (status, "no game 'chess'" in err[0]) == (2, True)
 
 
+def test_misses_are_of_snooker(capfd: pytest.CaptureFixture[str]) -> None:
+    status, _, err = lines_of(capfd, "match", "9-ball", "--misses")
+    assert (status, err) == (2, ["9-ball: 9-ball takes no misses"])
+
+
+def test_snooker_is_played_with_the_miss(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    states = []
+
+    def ended(match: Match, *_: object) -> Frame:
+        states.append(match.state)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sandbox.cli.match.play", ended)
+    for more in ((), ("--misses",)):
+        assert lines_of(capfd, "match", "snooker", *more)[0] == 130
+    assert [state.misses for state in states] == [False, True]
+
+
 def test_scene_without_a_floor_is_no_table(capfd: pytest.CaptureFixture[str]) -> None:
     status, _, err = lines_of(capfd, "match", "bounce")
     assert status == 2
-    assert "no floor" in err[0]
+    assert "is not a billiard table" in err[0]

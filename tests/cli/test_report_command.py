@@ -96,9 +96,26 @@ def test_out_is_asked_for(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> 
     assert "--out" in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("seconds", ["inf", "nan"])
-def test_patience_without_end_is_a_fault(tmp_path: Path, capfd: pytest.CaptureFixture[str], seconds: str) -> None:
-    status, _, err = lines_of(
-        capfd, "report", *scenes(tmp_path), "--patience", seconds, "--out", str(tmp_path / "r.html")
-    )
-    assert (status, err) == (2, [f"--patience: {seconds} s; it is finite"])
+@pytest.mark.parametrize("flag", ["--effort", "--time-limit", "--patience"])
+def test_bound_without_end_is_a_fault(tmp_path: Path, capfd: pytest.CaptureFixture[str], flag: str) -> None:
+    status, _, err = lines_of(capfd, "report", *scenes(tmp_path), flag, "inf", "--out", str(tmp_path / "r.html"))
+    named = flag.replace("patience", "time-limit")
+    assert (status, err) == (2, [f"{named}: is inf; it is finite"])
+
+
+def test_what_a_comparison_found_right_is_an_answer_of_its_tradeoff(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Even a search of no effort has every engine's own setting."""
+    given = written(tmp_path)
+    arguments = ("--effort", "1e-9", "--quiet", "--out", str(tmp_path / "a.html"))
+    status, document, _ = json_of(capfd, "report", given, *arguments)
+    assert status == 0
+    (scene,) = document["scenes"]
+    weighed = scene["tradeoff"]
+    for row in scene["engines"]:
+        (point,) = [p for p in weighed["points"] if p["engine"] == row["engine"] and p["scene_setting"]]
+        assert point["error"] == row["max_position_error"]
+    right = [row["engine"] for row in scene["engines"] if row["max_position_error"] <= weighed["tolerance"]]
+    assert right
+    assert weighed["within_tolerance"]["engine"] in right

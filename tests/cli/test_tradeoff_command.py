@@ -1,5 +1,6 @@
 """`sandbox tradeoff`: what it prints, its JSON, what it writes, its exit status."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ import sandbox
 from sandbox.cli import tradeoff as module
 from sandbox.cli.main import call
 from sandbox.measure.tradeoff.trial import Trial, tried
+from sandbox.measure.tradeoff.weighed import Tradeoff
 from sandbox.scene import rewrite
 
-FEW = ("--engine", "pymunk", "--patience", "60", "--points", "6", "--repeats", "1")
+FEW = ("--engine", "pymunk", "--points", "6", "--repeats", "1")
 """Enough for an answer, and quick."""
 COMMENTED = DROP.replace(
     "[[plane]]", "[solver]  # mine\ndt = 0.02  # coarse\nsubsteps = 1\n\n# below it all\n[[plane]]", 1
@@ -38,12 +40,18 @@ def test_table_has_the_front_and_the_answers(tmp_path: Path, capfd: pytest.Captu
     scene = written(tmp_path)
     status, out, err = lines_of(capfd, "tradeoff", scene, *FEW, "--tolerance", "0.01", "--budget", "4")
     assert (status, err) == (0, [])
-    assert out[0] == f"{scene}: Drop"
-    assert out[1].startswith("max_position: largest distance from the truth; truth: closed form, trusted until 0.5 s")
+    assert out[0].startswith(f"{scene} (Drop): errors are max_position, the largest distance from the truth, because ")
+    assert "closed form" in out[0]
+    assert re.fullmatch("[456] settings tried", out[1])
     assert out[2].split()[:4] == ["engine", "dt", "substeps", "iterations"]
-    answers = [line for line in out if line.startswith(("cheapest setting", "best setting"))]
+    rows = out[3 : next(k for k, line in enumerate(out) if line.startswith("ms/s: "))]
+    assert len([row for row in rows if row.split()[-1] == "scene" or " scene " in row]) == 1
+    assert any("cheapest" in row for row in rows)
+    answers = [line for line in out if line.startswith(("cheapest setting", "most accurate setting"))]
     assert answers[0].startswith("cheapest setting with max_position within 10 mm: pymunk with substeps = ")
-    assert answers[1].startswith("best setting within 4 ms a frame, at 60 frames a second: pymunk")
+    assert answers[1].startswith("most accurate setting within 4 ms a frame, at 60 frames a second: pymunk")
+    assert "    [solver]" in out
+    assert any(line.startswith("    space.iterations = ") for line in out)
 
 
 def test_quiet_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -56,7 +64,7 @@ def test_nothing_within_the_tolerance_is_status_1(tmp_path: Path, capfd: pytest.
     before = Path(scene).read_bytes()
     status, out, err = lines_of(capfd, "tradeoff", scene, *FEW, "--tolerance", "1e-9", "--write")
     assert (status, err) == (1, [])
-    assert any("none of the" in line for line in out)
+    assert any(re.search("none of the . that were tried; the nearest is pymunk with ", line) for line in out)
     assert out[-1].startswith("not written")
     assert Path(scene).read_bytes() == before
 
@@ -65,7 +73,36 @@ def test_nothing_within_the_budget_is_status_1(tmp_path: Path, capfd: pytest.Cap
     status, document, _ = json_of(capfd, "tradeoff", written(tmp_path), *FEW, "--tolerance", "1", "--budget", "1e-9")
     assert status == 1
     assert document["within_budget"] is None
+    assert document["nearest_to_budget"]["cost_ms_per_second"] > 0.0
     assert document["within_tolerance"] is not None
+    assert document["nearest_to_tolerance"] is None
+
+
+def test_patience_is_another_name_of_the_time_limit(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits = []
+    real = module.tradeoff
+
+    def noted(*arguments: Any, **more: Any) -> Tradeoff:
+        limits.append(more["time_limit"])
+        return real(*arguments, **more)
+
+    monkeypatch.setattr(module, "tradeoff", noted)
+    for flag in ((), ("--patience", "50"), ("--time-limit", "50")):
+        lines_of(capfd, "tradeoff", written(tmp_path), *FEW, *flag, "--tolerance", "1")
+    assert limits == [None, 50.0, 50.0]
+
+
+def test_same_command_tries_the_same_settings_and_gives_the_same_errors(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene, found = written(tmp_path), []
+    for _ in range(2):
+        _, document, _ = json_of(capfd, "tradeoff", scene, "--effort", "0.05", "--tolerance", "0.01", "--repeats", "1")
+        kept = ("engine", "settings", "error", "status", "work", "counted_cost_ms_per_second")
+        found.append(([{key: row[key] for key in kept} for row in document["points"]], document["spent"]))
+    assert found[0] == found[1]
 
 
 def test_write_keeps_comments_and_the_file_meets_the_tolerance(
@@ -117,7 +154,15 @@ def test_faults_are_a_line_each_and_all_at_once(
 
 
 @pytest.mark.parametrize(
-    "figure", [("--tolerance", "nan"), ("--budget", "inf"), ("--fps", "inf"), ("--zoom", "nan"), ("--patience", "inf")]
+    "figure",
+    [
+        ("--tolerance", "nan"),
+        ("--budget", "inf"),
+        ("--fps", "inf"),
+        ("--zoom", "nan"),
+        ("--time-limit", "inf"),
+        ("--effort", "inf"),
+    ],
 )
 def test_figure_without_end_is_a_fault(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, figure: tuple[str, str]
@@ -193,7 +238,7 @@ def test_interrupt_keeps_what_was_tried(
     interrupted_after(3, monkeypatch)
     scene = written(tmp_path)
     status, document, err = json_of(capfd, "tradeoff", scene, "--engine", "pymunk", "--tolerance", "1e-3", "--write")
-    assert (status, err) == (130, ["interrupted: 3 settings are tried and kept"])
+    assert (status, err) == (130, ["interrupted: the 3 settings tried so far are kept"])
     assert document["interrupted"]
     assert [row["status"] for row in document["points"]] == ["ok"] * 3
     assert all(row["cost_ms_per_second"] > 0.0 and row["repeats"] == 0 for row in document["points"])
@@ -208,7 +253,7 @@ def test_interrupt_while_it_is_timed_keeps_what_was_tried(
 
     monkeypatch.setattr("sandbox.measure.tradeoff.weighing.costs", interrupted)
     status, document, err = json_of(capfd, "tradeoff", written(tmp_path), *FEW, "--tolerance", "0.01")
-    assert (status, err) == (130, [f"interrupted: {len(document['points'])} settings are tried and kept"])
+    assert (status, err) == (130, [f"interrupted: the {len(document['points'])} settings tried so far are kept"])
     assert document["interrupted"]
     assert document["within_tolerance"]["error"] <= 0.01
 
@@ -220,7 +265,7 @@ def test_interrupt_before_anything_is_tried_is_told(
     assert call(["tradeoff", written(tmp_path), "--engine", "pymunk"]) == 130
     out, err = capfd.readouterr()
     assert "none of the 0 that were tried" in out
-    assert err.splitlines() == ["interrupted: 0 settings are tried and kept"]
+    assert err.splitlines() == ["interrupted: the 0 settings tried so far are kept"]
 
 
 def test_interrupt_while_the_truth_is_sought_is_one_line(
@@ -229,7 +274,7 @@ def test_interrupt_while_the_truth_is_sought_is_one_line(
     def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sandbox.measure.tradeoff.weighing.truth_of", interrupted)
+    monkeypatch.setattr("sandbox.measure.tradeoff.weighing.seek_truth", interrupted)
     assert call(["tradeoff", written(tmp_path)]) == 130
     out, err = capfd.readouterr()
     assert (out, err.splitlines()[-1]) == ("", "interrupted")

@@ -30,6 +30,12 @@ def on_bat(along, gap):
 CASES = {
     # tables, level before, when it is pressed or let go, and when all is over, in ms
     "lies on a bat": ((bat(), {"ball": [ball(*on_bat(0.04, 1e-6), restitution=0.0, friction=0.3)]}), 0.0, 5, 70),
+    "lies on a bat without a hold coil": (
+        (bat(hold_ratio=1.0), {"ball": [ball(*on_bat(0.04, 1e-6), restitution=0.0, friction=0.3)]}),
+        0.0,
+        5,
+        70,
+    ),
     "falls onto a bat": ((bat(), {"ball": [ball(0.045, 0.06, restitution=0.8, friction=0.3)]}), 0.0, 330, 400),
     "meets a stroke": ((bat(), {"ball": [ball(0.045, 0.05, 0.0, -1.0, restitution=0.8, friction=0.3)]}), 0.0, 22, 46),
     "lies on a plunger": ((ROD, {"ball": [ball(0.0, BALL + 1e-5, restitution=0.3)]}), 0.1, 300, 360),
@@ -64,7 +70,9 @@ def test_engines_agree_where_overlap_is_undone_in_first_order():
 
     Pressed by a bat that is ever faster, so that it does in each step. Undone are its ω·h·dω of a step, at 1 kHz.
     """
-    off = [np.abs(outcome("lies on a bat", "reference", n) - outcome("lies on a bat", "pymunk", n)).max() for n in UP]
+    # Without the weaker coil: under that, the substep in which the two part depends on the substeps.
+    case = "lies on a bat without a hold coil"
+    off = [np.abs(outcome(case, "reference", n) - outcome(case, "pymunk", n)).max() for n in UP]
     assert max(off) < 1e-3  # 77 m/s² · (1 ms)², the way that is in question in a step, ·10 /s, by which the bat pulls
     assert off[0] > 1.7 * off[1] > 2.9 * off[2]
 

@@ -29,7 +29,7 @@ SURFACES = {
 }
 """Restitution, its falloff in s/m, friction: of a pinball table, as in Visual Pinball's materials."""
 BUMPER = {"speed": 0.81, "threshold": 0.054}
-SLINGSHOT = {"speed": 2.16, "threshold": 0.2, "profile": "middle"}
+SLINGSHOT = {"speed": 2.16, "threshold": 0.054, "profile": "middle", "adds_to": "approach"}
 R, M = 0.01349, 0.08
 BALL = {"name": "ball", "radius": R, "mass": M}
 FLOOR = [[-1.0, 0.0], [1.0, 0.0]]
@@ -96,9 +96,41 @@ def test_nothing_is_kicked_below_the_threshold(engine: str) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("x", [-0.9, -0.5, 0.0, 0.3])
-def test_slingshot_kicks_most_in_the_middle(engine: str, x: float) -> None:
+@pytest.mark.parametrize("speed", [0.06, 0.5, 1.0, 2.0, 7.0])
+def test_slingshot_drives_the_ball_into_its_rubber_and_books_what_that_gains(
+    engine: str, x: float, speed: float
+) -> None:
+    e, f, _ = SURFACES["rubber"]
+    scene = falling(speed, x, restitution=e, restitution_falloff=f, kick=SLINGSHOT)
+    simulation, velocity = after(scene, engine)
+    s = 0.5 * (x + 1.0)
+    driven = speed + 2.16 * 4 * s * (1 - s)
+    alone, out = (e / (1 + f * v) * v for v in (speed, driven))
+    assert velocity[1] == pytest.approx(out, rel=LAW)
+    assert simulation.account()[Cause.KICKS] == pytest.approx(0.5 * M * (out**2 - alone**2), rel=1e-9)  # rounding
+    closes(simulation, 0.5 * M * speed**2)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("speed", "out"), [(0.5, 1.1835), (1.0, 1.2977), (2.0, 1.4804)])
+def test_slingshot_throws_as_hard_as_visual_pinball(engine: str, speed: float, out: float) -> None:
+    # There 80 units at most, halved in the middle: 40 × 0.05397 = 2.16 m/s onto the approach, then 0.8/(1 + 0.3 v).
+    scene = falling(speed, restitution=0.8, restitution_falloff=0.3, kick=SLINGSHOT)
+    _, velocity = after(scene, engine)
+    assert velocity[1] == pytest.approx(out, abs=5e-5)  # the table's digits
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_kick_onto_the_approach_of_a_surface_without_restitution_gives_nothing(engine: str) -> None:
+    _, velocity = after(falling(2.0, 0.3, kick=SLINGSHOT), engine)
+    assert velocity[1] == pytest.approx(0.0, abs=LAW)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("x", [-0.9, -0.5, 0.0, 0.3])
+def test_kick_onto_the_rebound_is_most_in_the_middle(engine: str, x: float) -> None:
     share = 0.5 * (x + 1.0)
-    _, velocity = after(falling(2.0, x, restitution=0.8, kick=SLINGSHOT), engine)
+    _, velocity = after(falling(2.0, x, restitution=0.8, kick=SLINGSHOT | {"adds_to": "rebound"}), engine)
     assert velocity[1] == pytest.approx(1.6 + 2.16 * 4 * share * (1 - share), rel=LAW)
     assert velocity[1] <= (1.6 + 2.16) * (1 + LAW)
 
@@ -106,16 +138,18 @@ def test_slingshot_kicks_most_in_the_middle(engine: str, x: float) -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_share_counts_along_the_whole_polyline(engine: str) -> None:
     points = [[-1.0, 0.0], [-0.5, 0.0], [1.0, 0.0], [1.0, -2.0]]  # 4 m long; x = 0.25 lies at 1.25 m
-    _, velocity = after(falling(2.0, 0.25, points=points, kick=SLINGSHOT), engine)
+    _, velocity = after(falling(2.0, 0.25, points=points, restitution=0.5, kick=SLINGSHOT), engine)
     share = 1.25 / 4.0
-    assert velocity[1] == pytest.approx(2.16 * 4 * share * (1 - share), rel=LAW)
+    assert velocity[1] == pytest.approx(0.5 * (2.0 + 2.16 * 4 * share * (1 - share)), rel=LAW)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_joint_of_two_segments_kicks_once(engine: str) -> None:
+@pytest.mark.parametrize(("adds_to", "out"), [("rebound", 1.0 + 0.81), ("approach", 0.5 * 2.81)])
+def test_joint_of_two_segments_kicks_once(engine: str, adds_to: str, out: float) -> None:
     points = [[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]]
-    simulation, velocity = after(falling(2.0, 0.0, points=points, restitution=0.5, kick=BUMPER), engine)
-    assert velocity[1] == pytest.approx(1.0 + 0.81, rel=LAW)
+    kick = BUMPER | {"adds_to": adds_to}
+    simulation, velocity = after(falling(2.0, 0.0, points=points, restitution=0.5, kick=kick), engine)
+    assert velocity[1] == pytest.approx(out, rel=LAW)
     closes(simulation, 0.5 * M * 4.0)
 
 
@@ -245,7 +279,7 @@ def test_middle_is_where_a_kick_is_most_and_ends_have_none(speed: float, share: 
 @settings(max_examples=30)
 @given(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), min_size=3, max_size=6, unique=True), st.booleans())
 def test_stretches_follow_each_other_from_nothing_to_the_whole(points: list[tuple[float, float]], closed: bool) -> None:
-    parts = stretches(points, closed)
+    parts = stretches((*points, points[0]) if closed else points)
     assert parts[0][0] == 0.0
     assert parts[-1][1] == pytest.approx(1.0, rel=1e-14)  # sums round
     assert all(a[1] == b[0] for a, b in pairwise(parts))

@@ -174,6 +174,6 @@ def test_panel_tells_what_would_be_a_crash() -> None:
     rules.look(Seen(0.0, relay.frame(), relay.contacts(), ()))
     lines = dict(rules.lines())
     assert lines["fuel"] == "100 %"
-    assert lines["aside"] == "+5.0 m/s !"
+    assert lines["sideways"] == "+5.0 m/s !"
     assert lines["tilt"] == "+0°"
     relay.close()

@@ -77,12 +77,91 @@ def test_balls_among_themselves_pass_by_their_closing_speed_and_both_radii() -> 
         '[[ball]]\nname = "b"\nposition = [9, 0]\nvelocity = [-10, 0]\nradius = 0.3\n'
     )
     (passage,) = passages(scene)
-    # Equal masses: either may come to fly at 30 m/s, so they close at 60 m/s at most.
-    assert (passage.speed, passage.reach) == (60.0, 0.2)
+    # Nothing else is there to turn them round: they close at 40 m/s, and touch at the sum of their own radii.
+    assert (passage.speed, passage.reach) == (40.0, 0.4)
     (warning,) = warnings(scene, scene.solver.replace(dt=0.02))
     assert warning.kind == "tunnelling"
-    assert warning.message.startswith("'a' can close on another ball at up to 60 m/s, 1.2 m a substep, ")
-    assert warning.message.endswith("odds up to 83.3 %; dt <= 0.00333 s would be safe")
+    assert warning.message.startswith("'a' can close on another ball at up to 40 m/s, 0.8 m a substep, ")
+    assert warning.message.endswith("odds up to 50 %; dt <= 0.01 s would be safe")
+
+
+def test_each_body_at_risk_is_named_with_its_own_speed() -> None:
+    text = "[solver]\ndt = 0.01\n[[wall]]\nname = 'w'\npoints = [[1, -9], [1, 9]]\nthickness = 0.02\n"
+    for k, (name, speed) in enumerate({"slow": 9.0, "middle": 25.0, "fast": 60.0}.items()):
+        text += f"[[ball]]\nname = {name!r}\nposition = [0, {k}]\nvelocity = [{speed}, 0]\nradius = 0.1\n"
+    found = [w for w in warnings(loads(text)) if w.figures["thing"] == "w"]
+    assert [(w.figures["ball"], w.figures["speed"]) for w in found] == [("fast", 60.0), ("middle", 25.0)]
+    assert found[0].message.startswith("'fast' can close on 'w' at up to 60 m/s, 0.6 m a substep")
+
+
+def test_floor_drawn_as_a_wall_is_met_at_the_speed_of_the_fall() -> None:
+    scene = loads(
+        "[world]\ngravity = [0, -9.81]\nduration = 20.0\n[[wall]]\nname = 'floor'\npoints = [[-5, 0], [5, 0]]\n"
+        "thickness = 0.1\n[[ball]]\nposition = [0, 1.15]\nradius = 0.1\n"
+    )
+    (passage,) = passages(scene)
+    assert passage.speed == pytest.approx(math.sqrt(2 * 9.81 * 1.0), rel=1e-12)  # roundings of a sum and a root
+    assert warnings(scene) == []
+
+
+def test_ball_below_a_wall_that_it_cannot_reach_is_no_risk() -> None:
+    scene = loads(
+        "[world]\ngravity = [0, -10]\nduration = 9.0\n[solver]\ndt = 0.1\n[[wall]]\npoints = [[-5, 9], [5, 9]]\n"
+        "[[ball]]\nposition = [0, 0]\nvelocity = [0, 10]\nradius = 0.1\n"  # rises by 5 m
+    )
+    assert [passage.speed for passage in passages(scene)] == [0.0]
+
+
+def test_bodies_that_nothing_bounds_have_no_safe_step() -> None:
+    ball = '[[ball]]\nname = "b"\nposition = [3, 0]\nradius = 0.1\n[[post]]\nposition = [0, 0]\nradius = 0.2\n'
+    sun = "[[attraction]]\ntoward = [0, 0]\nstrength = 10.0\n"
+    assert largest_safe_dt(loads(ball)) == math.inf
+    assert largest_safe_dt(loads(ball + sun.replace("[0, 0]", "[0, 1]"))) is None
+    # Where a post stands in its place: v² = 2·s·(1/0.2 − 1/3).
+    onto = math.sqrt(2 * 10.0 * (1 / 0.2 - 1 / 3.0))
+    assert largest_safe_dt(loads(ball + sun)) == pytest.approx(0.3 / onto, rel=1e-12)  # roundings
+    soft = loads(ball + sun + "softening = 0.1\n")
+    # From 3 m to the post by energy: v² = 2·(s/ε)·(atan(3/ε) − atan(0.2/ε)).
+    fastest = math.sqrt(2 * 100.0 * (math.atan(30.0) - math.atan(2.0)))
+    assert largest_safe_dt(soft) == pytest.approx(0.3 / fastest, rel=1e-12)  # roundings
+    wound = ball + '[[joint]]\nkind = "spring"\nbetween = ["b"]\nrest_length = 1.0\nstiffness = 200.0\n'
+    # ½·200·2² J in 1 kg
+    assert largest_safe_dt(loads(wound + "anchors = [[0, 0], [0, 0]]\n")) == pytest.approx(0.3 / math.sqrt(800.0))
+    pushed = '[world]\nduration = 2.0\n[[thrust]]\nbody = "b"\nforce = [5.0, 0]\n'
+    assert largest_safe_dt(loads(pushed + ball)) == pytest.approx(0.3 / 10.0)
+
+
+@pytest.mark.parametrize(
+    ("masses", "expected"), [((4.0, 1.0), 16.0), ((16.0, 4.0, 1.0), 25.6)], ids=["one impact", "two impacts"]
+)
+def test_impacts_from_heavy_to_light_add_up(masses: tuple[float, ...], expected: float) -> None:
+    text = "".join(
+        f"[[ball]]\nposition = [{5 * k}, 0]\nradius = 1\nmass = {mass}\n" + "velocity = [10, 0]\n" * (k == 0)
+        for k, mass in enumerate(masses)
+    )
+    scene = loads(text)
+    assert top_speeds(scene, meetings(scene))[-1] == pytest.approx(expected, rel=1e-12)  # 1.6 times at each impact
+
+
+@pytest.mark.parametrize(("share", "holds"), [(0.95, True), (1.05, False)])
+@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"])
+def test_dampers_too_strong_for_the_step_are_foretold_on_the_reference(
+    integrator: str, share: float, holds: bool
+) -> None:
+    def damped(rate: float) -> Scene:
+        return loads(
+            f"[world]\nduration = 2.0\n[solver]\nintegrator = {integrator!r}\n[[ball]]\nname = 'b'\nradius = 0.1\n"
+            "position = [1.2, 0]\nvelocity = [1, 0]\n[[joint]]\nkind = 'spring'\nbetween = ['b']\nstiffness = 25.0\n"
+            f"anchors = [[0, 0], [0, 0]]\nrest_length = 1.0\ndamping = {rate!r}\n"
+        )
+
+    (warning,) = warnings(damped(1e3), engine="reference")
+    limit = float(warning.figures["limit"])
+    scene = damped(share * limit / 0.01)
+    assert ([w.kind for w in warnings(scene, engine="reference")] == []) == holds
+    assert warnings(scene, engine="pymunk") == []
+    found = run(scene, "reference", audit=False)
+    assert (found.status == "ok" and abs(found.position[-1, 0, 0] - 1.0) < 0.3) == holds
 
 
 def test_posts_planes_and_fixed_balls_have_their_own_depth() -> None:

@@ -53,6 +53,17 @@ def test_body_dragged_while_paused_is_exactly_under_the_hand(engine: str) -> Non
     assert passed(show, 5).frame.position[0].tolist() == [0.25, 0.625]
 
 
+@pytest.mark.parametrize("paused", [True, False])
+def test_driven_body_is_left_to_its_key(paused: bool) -> None:
+    drive = {"kind": "stroke", "body": "a", "pivot": [0, 0], "stops": [0.0, 1.0], "rate": 1.0}
+    show, hands = live(drive=[drive]), Hands()
+    with pytest.raises(ActionError, match=r"^a cannot be dragged; its key moves it"):
+        grasp(hands, show, (0.25, 0.0), 0.0, paused)
+    assert not hands.holding
+    hands.drag(show, (1.0, 1.0))
+    assert show.session.actions == ()
+
+
 def test_fixed_body_can_be_moved_while_paused_and_not_pulled() -> None:
     show, hands = live(), Hands()
     assert grasp(hands, show, (5.0, 0.0), 0.0, paused=True)

@@ -22,6 +22,7 @@ PLAIN = {
     "=": Command.FASTER,
     "e": Command.ENGINE,
     "g": Command.GHOST,
+    "f": Command.FOLLOW,
     "\t": Command.PANEL,
     "h": Command.HELP,
     "\x1b": Command.QUIT,
@@ -47,10 +48,12 @@ WITH_CTRL = {
     "r": Command.RECORD,
     "l": Command.RELOAD,
     "s": Command.SAVE,
+    "z": Command.UNDO,
 }
 NAMED = {
     pygame.K_HOME: Command.HOME,
     pygame.K_F1: Command.HELP,
+    pygame.K_F11: Command.FULL_SCREEN,
     pygame.K_KP_MINUS: Command.SLOWER,
     pygame.K_KP_PLUS: Command.FASTER,
 }

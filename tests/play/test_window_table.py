@@ -10,11 +10,13 @@ import pytest
 from pressing import key, key_up, move, press, release
 
 from sandbox.action import Move, Strike
+from sandbox.games.billiards.rules.snooker import SnookerState
 from sandbox.play.billiards.game import Game
 from sandbox.play.instruments.manual import groups
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
 from sandbox.scene.billiards.tables import INCH
+from sandbox.scene.shipped import find
 
 SIZE = (1000, 620)
 TURN = 1.0 / 60.0
@@ -172,12 +174,21 @@ def test_stroke_works_while_paused_and_goes_on_by_steps(window: Window) -> None:
 
 def test_players_are_chosen_in_the_panel(window: Window) -> None:
     do(window, key(pygame.K_SPACE))
-    window.stage.turn("players", "bot")
+    window.stage.turn("players", "you vs bot")
     game = game_in(window)
-    assert game.players == "bot"
+    assert game.players == "you vs bot"
     assert game.strokes == 0
-    window.stage.turn("players", "alone")
+    window.stage.turn("players", "one player")
     assert game_in(window).match.state.players == 1
+
+
+def test_snooker_may_be_played_with_the_miss(window: Window) -> None:
+    assert window.stage.open(find("snooker"))
+    for value, misses in (("on", True), ("off", False)):
+        window.stage.turn("misses", value)
+        state = game_in(window).match.state
+        assert isinstance(state, SnookerState)
+        assert state.misses is misses
 
 
 def test_window_without_room_draws_the_table_all_the_same(window: Window) -> None:

@@ -111,8 +111,8 @@ def test_value_is_set_where_the_path_leads_and_nowhere_else(path: str, location:
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        ("ball.none.mass", "names: cue, 8 ball, a.b, 0; numbers: 0 to 4"), ("ball.5.mass", "no element '5'"),
-        ("ball.-1.mass", "no element '-1'"), ("wall.x.points", "names: none; numbers: 0 to 0"),
+        ("ball.none.mass", "names: cue, 8 ball, ball-3, a.b, 0; numbers: 0 to 4"), ("ball.5.mass", "no element '5'"),
+        ("ball.-1.mass", "no element '-1'"), ("wall.x.points", "names: wall-1; numbers: 0"),
         ("title.x", "single value"),
         ("world.gravity.2", "no element '2'"), ("world.gravity.0.x", "single value"), ("a.b.c", "no a"),
         ("world.x.y", "no world.x"), ("ball.cue.x.y", "no ball.cue.x"), ("ball." + "9" * 5000, "no element"),

@@ -166,7 +166,7 @@ def test_override_brings_a_preset_or_mends_it() -> None:
         ({"billiards": {"table": "pool-9ft", "game": "snooker"}}, "billiards.game", "not for pool-9ft"),
         ({"billiards": {"table": "snooker-12ft", "rack": "8-ball"}}, "billiards.rack", "'head', 'foot'"),
         ({"billiards": {"game": "8-ball"}}, "billiards.game", "[[play.spot]]"),
-        ({"billiards": {**EIGHT["billiards"], "gap": -1}}, "billiards.gap", "0 or more"),
+        ({"billiards": {**EIGHT["billiards"], "gap": -1}}, "billiards.gap", "must be between 0 and 0.1"),
         ({"billiards": {**EIGHT["billiards"], "place": {"16": [0, 0]}}}, "billiards.place.16", "no ball of the set"),
         ({**EIGHT, "shot": [{**SHOT, "ball": "queue"}]}, "shot.break.ball", "no body is named 'queue'"),
         ({**EIGHT, "play": {"arrows": "9 ball"}}, "play.arrows", "no body"),

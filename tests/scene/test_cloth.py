@@ -107,7 +107,7 @@ def test_pinned_nodes_never_move_and_their_links_to_each_other_are_left_out(pins
         ({"kind": "rods", "stiffness": None}, "damping", "kind is 'rods'"),
         ({"collides": "all", "radius": 0.2}, "radius", "0.125 m at most"),
         ({"columns": 1001, "rows": 1000}, "", "at most 1,000,000"),
-        ({"spacing": [0.0, 1.0]}, "spacing[0]", "1e-09 or more"),
+        ({"spacing": [0.0, 1.0]}, "spacing[0]", "must be greater than 0"),
     ],
 )
 def test_wrong_figure_is_a_fault_that_says_what_would_be_right(cloth: dict[str, Any], key: str, message: str) -> None:

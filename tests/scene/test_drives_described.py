@@ -58,12 +58,12 @@ def test_fault_in_a_figure_names_line_and_range() -> None:
         loads(BAR + '[[drive]]\nkind = "stroke"\nbody = "bar"\npivot = [0, 0]\nstops = [0, 1]\nrate = 0\n')
     (fault,) = caught.value.faults
     assert (fault.line, fault.path) == (10, "drive[0].rate")
-    assert fault.message == "0 is not right here; it should be greater than 0"
+    assert fault.message == "must be greater than 0, is 0"
 
 
 def test_kind_that_no_drive_is_and_key_that_it_lacks() -> None:
     assert faults({"box": [BOX], "drive": [{**STROKE, "kind": "strike"}]}) == [
-        'drive[0].kind: "strike" is not right here; a drive is one of torque, stroke, plunger'
+        'drive[0].kind: is "strike"; a drive is one of torque, stroke, plunger'
     ]
     assert faults({"box": [BOX], "drive": [{**STROKE, "rat": 1}]}) == [
         "drive[0].rat: unknown key; did you mean 'rate'?"

@@ -24,12 +24,16 @@ NONE = {"restitution_falloff": 0}
             "a post has not",
         ),
         ({"post": [{**POST, "kick": {}}]}, "post[0].kick.speed", "is missing"),
-        ({"post": [{**POST, "kick": {"speed": -1}}]}, "post[0].kick.speed", "0 or more"),
-        ({"post": [{**POST, "kick": {"speed": 1, "threshold": 0}}]}, "post[0].kick.threshold", "0.001 or more"),
+        ({"post": [{**POST, "kick": {"speed": -1}}]}, "post[0].kick.speed", "must be at least 0"),
+        (
+            {"post": [{**POST, "kick": {"speed": 1, "threshold": 0}}]},
+            "post[0].kick.threshold",
+            "must be at least 0.001",
+        ),
         ({"post": [{**POST, "one_way": True}]}, "post[0].one_way", "unknown key"),
         ({"wall": [{**WALL, "kick": {"speed": 1, "profile": "ends"}}]}, "wall[0].kick.profile", "one of"),
         ({"wall": [{**WALL, "solid": 1}]}, "wall[0].solid", "true or false"),
-        ({"ball": [{**BALL, "restitution_falloff": -0.1}]}, "ball[0].restitution_falloff", "0 or more"),
+        ({"ball": [{**BALL, "restitution_falloff": -0.1}]}, "ball[0].restitution_falloff", "must be at least 0"),
         ({"surface": {}, "wall": [{**WALL, "solid": False}]}, "wall[0].solid", "not of a cushion"),
         ({"surface": {}, "wall": [{**WALL, "one_way": True}]}, "wall[0].one_way", "not of a cushion"),
         ({"surface": {}, "post": [{**POST, "kick": {"speed": 1}}]}, "post[0].kick", "not of a cushion"),
@@ -93,7 +97,7 @@ def test_warning_where_gravity_alone_makes_a_hit() -> None:
 
 
 def test_forecast_of_speed_counts_kicks_in() -> None:
-    from sandbox.measure.forecast.passages import top_speeds
+    from sandbox.measure.forecast import top_speeds
 
     def fastest(**wall: Any) -> float:
         scene = from_document({"ball": [BALL], "wall": [{**WALL, **wall}], "world": {"duration": 1}})

@@ -199,8 +199,8 @@ def test_overrides_reach_elements_and_what_they_stand_for() -> None:
 @pytest.mark.parametrize(
     ("override", "words"),
     [
-        ("pinball.bumper[9].speed=1", "no element '9'; names: pop; numbers: 0 to"),
-        ("pinball.bumper.pup.speed=1", "no element 'pup'; names: pop"),
+        ("pinball.bumper[9].speed=1", "no element '9'; names: pop; numbers: 0"),
+        ("pinball.bumper.pup.speed=1", "no element 'pup'; did you mean 'pop'?"),
         ("pinball.bumpr.pop.speed=1", "the scene has no pinball.bumpr"),
     ],
 )
@@ -216,7 +216,7 @@ def test_override_of_an_element_that_there_is_not_tells_which_there_are(override
     [
         ({"bumper": [{"position": [0, 0], "radios": 1.0}]}, "pinball.bumper[0].radios", "did you mean 'radius'?"),
         ({"bumpers": []}, "pinball.bumpers", "did you mean 'bumper'?"),
-        ({"slope": 2.0}, "pinball.slope", "1.5 or less"),
+        ({"slope": 2.0}, "pinball.slope", "must be between 0 and 1.5"),
         ({"wall": [{"points": [[0, 0]]}]}, "pinball.wall[0].points", "2 or more"),
         ({"wall": [{"points": [[0, 0], [1]]}]}, "pinball.wall[0].points[1]", "array of 2"),
         ({"wall": [{"name": "w", "points": [[0, 0], [0.1, 0, 9], [1, 1]]}]}, "pinball.wall.w.points[1]", "rounded by"),
@@ -224,7 +224,11 @@ def test_override_of_an_element_that_there_is_not_tells_which_there_are(override
         ({"wall": [{"points": [[0, 0], [1, 0]], "closed": True}]}, "pinball.wall[0].points", "enclose nothing"),
         ({"wall": [{"points": [[0, 0], [1, 0]], "fill": "#000000"}]}, "pinball.wall[0].fill", "a closed line"),
         ({"standup": [{"position": [0, 0], "facing": [0, 0]}]}, "pinball.standup[0].facing", "has no direction"),
-        ({"drops": [{"position": [0, 0], "facing": [1, 0], "count": 0}]}, "pinball.drops[0].count", "1 or more"),
+        (
+            {"drops": [{"position": [0, 0], "facing": [1, 0], "count": 0}]},
+            "pinball.drops[0].count",
+            "must be between 1 and 20",
+        ),
         ({"slingshot": [{"points": [[0, 0], [1, 0], [2, 0]]}]}, "pinball.slingshot[0].points", "three posts"),
         ({"gate": [{"points": [[0, 0], [0, 0]]}]}, "pinball.gate[0].points[1]", "ends of a line"),
         ({"ramp": [{"points": [[0, 0], [0, 0.5]], "width": 0.026}]}, "pinball.ramp[0].width", "more than 0.02698 m"),

@@ -29,7 +29,7 @@ def expect(text: str, wanted: Iterable[str]) -> None:
         ("[solver]\nzzz = 0\n", "solver.zzz"),
         ("[[post]]\nposition = [0, 'x']\nradius = 1\n", "post[0].position[1]"),
         ("[[plane]]\npoint = [0, 0]\nnormal = 3\n", "plane[0].normal"),
-        ("[[plane]]\npoint = [0]\nnormal = [0, 1]\n", "plane[0].point[1]"),
+        ("[[plane]]\npoint = [0]\nnormal = [0, 1]\n", "plane[0].point"),
         ("[[wall]]\npoints = [[0, 0], [0, 'x']]\n", "wall[0].points[1][1]"),
         ("[[wall]]\npoints = [[0, 0]]\n", "wall[0].points"),
         ("[[ball]]\nposition = [5, 5]\nradius = -1\n", "ball[1].radius"),

@@ -1,5 +1,6 @@
 import json
 from collections.abc import Iterator
+from functools import cache
 from typing import Any, get_args
 
 import pytest
@@ -8,6 +9,12 @@ from sandbox.scene.model import Scene
 from sandbox.scene.part import Part
 from sandbox.scene.schema import dumps, schema
 from sandbox.scene.shipped import SCHEMA, folder
+
+
+@cache
+def whole() -> dict[str, Any]:
+    """The schema, made once."""
+    return schema()
 
 
 def objects(value: Any) -> Iterator[dict[str, Any]]:
@@ -34,14 +41,14 @@ def test_committed_schema_is_current() -> None:
 
 
 def test_schema_is_its_text() -> None:
-    assert json.loads(dumps()) == schema()
+    assert json.loads(dumps()) == whole()
     assert dumps().endswith("}\n")
-    assert schema()["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert whole()["$schema"] == "https://json-schema.org/draft/2020-12/schema"
 
 
 @pytest.mark.parametrize("part", list(parts(Scene)), ids=lambda part: part.__name__)
 def test_table_knows_exactly_the_keys_of_its_part(part: type[Part]) -> None:
-    table = schema() if part is Scene else schema()["$defs"][part.__name__]
+    table = whole() if part is Scene else whole()["$defs"][part.__name__]
     fields = {field.alias or name: field for name, field in part.model_fields.items()}
     assert set(table["properties"]) == set(fields)
     assert set(table.get("required", ())) == {key for key, field in fields.items() if field.is_required()}
@@ -49,23 +56,49 @@ def test_table_knows_exactly_the_keys_of_its_part(part: type[Part]) -> None:
 
 
 def test_nothing_may_be_null_for_toml_has_none() -> None:
-    for each in objects(schema()):
+    for each in objects(whole()):
         assert each.get("type") != "null"
         assert None not in each.values()
 
 
 def test_docstrings_below_fields_become_descriptions() -> None:
-    document = schema()
+    document = whole()
     ball = document["$defs"]["Ball"]["properties"]
     assert ball["fixed"]["description"] == "Never moves: infinitely heavy."
     assert ball["mass"]["description"] == "kg; without mass or density, 1"  # written in a class that Ball extends
     assert document["properties"]["about"]["description"] == "What to look for."
-    assert "description" not in document["properties"]["title"]
+    assert document["properties"]["ball"]["description"] == "One ball; on a `[surface]` a sphere, I = ⅖ m r²."
+
+
+def test_every_key_has_a_description() -> None:
+    tables = {"scene": whole(), **whole()["$defs"]}
+    without = [f"{name}.{key}" for name, table in tables.items() for key in table.get("properties", ())
+               if not table["properties"][key].get("description")]  # fmt: skip
+    assert without == []
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "unit"),
+    [
+        ("Ball", "position", "m"), ("Ball", "radius", "m"), ("Ball", "velocity", "m/s"), ("Ball", "angle", "rad"),
+        ("Ball", "angular_velocity", "rad/s"), ("Ball", "mass", "kg"), ("Ball", "density", "kg/m²"),
+        ("World", "gravity", "m/s²"), ("World", "linear_drag", "1/s"), ("Box", "size", "m"), ("Settings", "dt", "s"),
+        ("Spring", "stiffness", "N/m"), ("Motor", "rate", "rad/s"), ("Thrust", "force", "N"), ("Post", "radius", "m"),
+    ],
+)  # fmt: skip
+def test_descriptions_of_quantities_name_their_units(table: str, key: str, unit: str) -> None:
+    words = whole()["$defs"][table]["properties"][key]["description"].replace(",", " ").replace(";", " ").split()
+    assert unit in [word.rstrip(".:") for word in words]
 
 
 def test_ranges_and_defaults_are_those_of_the_model() -> None:
-    tables = schema()["$defs"]
-    assert tables["Ball"]["properties"]["radius"] == {"type": "number", "minimum": 1e-9, "maximum": 1e9}
+    tables = whole()["$defs"]
+    assert tables["Ball"]["properties"]["radius"] == {
+        "description": "of the disc, m",
+        "type": "number",
+        "minimum": 1e-9,
+        "maximum": 1e9,
+    }
     assert tables["Settings"]["properties"]["dt"]["default"] == 0.01
     assert tables["Emitter"]["properties"]["collides"]["default"] == "none"
     assert tables["Emitter"]["properties"]["radius"]["default"] == 0.05

@@ -135,7 +135,7 @@ def test_stated_heights_are_the_ground() -> None:
         (("width = 200.0", "width = 200.0\nheights = [1.0, 2.0]"), "terrain.heights", "leave out `columns`"),
         (('name = "Blue"', 'name = "Red"'), "artillery.player.Red.name", "names are unique"),
         (("[artillery]", "[artillery]\nwind = 5.0"), "artillery.wind", "world.linear_drag"),
-        (("columns = 100", "columns = 1"), "terrain.columns", "2 or more"),
+        (("columns = 100", "columns = 1"), "terrain.columns", "must be between 2 and 5000"),
     ],
 )
 def test_what_is_wrong_is_told(change: tuple[str, str], path: str, told: str) -> None:

@@ -64,7 +64,7 @@ def test_stored_run_cannot_be_changed_and_says_so(drive: Play, tmp_path: Path) -
     for key in ("e", "g", "ctrl+l"):
         window.key(key)
     window.key("ctrl+s")
-    window.wait_for(lambda: "a stored run is stored already" in window.said(), "that it is stored")
+    window.wait_for(lambda: "a stored run is already saved" in window.said(), "that it is stored")
     assert paused(window.shot())
     window.key("Escape")
     assert window.status() == 1

@@ -1,7 +1,7 @@
-"""Glide: a body of one degree of freedom between two stops, for one substep, under accelerations known beforehand.
+"""Glide: a body of one degree of freedom between two stops, under a constant acceleration.
 
-Its path is followed piece by piece: to where another acceleration begins, to a stop, on after being thrown back. Each
-piece is a parabola, so that what a stop does depends on no step.
+Its path is followed piece by piece: to a stop, and on after being thrown back. Each piece is a parabola, so that the
+effect of a stop does not depend on the step.
 """
 
 import math
@@ -10,31 +10,25 @@ PIECES = 16
 """The most pieces of one substep. Being thrown back takes few: each time only a part of the speed is left."""
 
 
-def glide(
-    place: float, speed: float, h: float, far: float, near: float, edge: float, end: float, bounce: float
-) -> tuple[float, float, int]:
+def glide(place: float, speed: float, h: float, rate: float, end: float, bounce: float) -> tuple[float, float, int]:
     """Return place and speed after h, s, and at which stop the body is pressed: −1, 1, or 0 for none.
 
     Args:
         place: from its first stop, 0 to `end`.
         speed: the same a second.
         h: how long, s.
-        far: its acceleration below `edge`.
-        near: beyond that.
-        edge: where the other acceleration begins.
+        rate: its acceleration.
         end: where the last stop is.
         bounce: the part of its speed that a stop throws back. What would be back within half of h is none.
     """
     place, left = min(max(place, 0.0), end), h
     for _ in range(PIECES):
-        beyond = place > edge or (place == edge and (speed > 0.0 or (speed == 0.0 and near > 0.0)))
-        rate, low, high = (near, edge, end) if beyond else (far, 0.0, edge)
-        time, border = _reached(place, speed, rate, low, high)
+        time, border = _reached(place, speed, rate, end)
         if time >= left:
             break
         place, speed, left = border, speed + rate * time, left - time
-        stop = (border == end) - (border == 0.0)
-        if not stop or stop * speed < 0.0:
+        stop = 1 if border == end else -1
+        if stop * speed < 0.0:
             continue
         speed *= -bounce
         if stop * rate < 0.0:
@@ -47,10 +41,10 @@ def glide(
     return min(max(place, 0.0), end), speed + rate * left, 0
 
 
-def _reached(place: float, speed: float, rate: float, low: float, high: float) -> tuple[float, float]:
-    """Return in which time a parabola first leaves a range, s, and at which of its ends; never is inf."""
-    up, down = _rise(high - place, speed, rate), _rise(place - low, -speed, -rate)
-    return (up, high) if up <= down else (down, low)
+def _reached(place: float, speed: float, rate: float, end: float) -> tuple[float, float]:
+    """Return in which time a parabola first leaves the range from 0 to `end`, s, and at which of the two; else inf."""
+    up, down = _rise(end - place, speed, rate), _rise(place, -speed, -rate)
+    return (up, end) if up <= down else (down, 0.0)
 
 
 def _rise(way: float, speed: float, rate: float) -> float:

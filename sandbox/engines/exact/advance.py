@@ -4,11 +4,14 @@ from sandbox.engines.exact.arena import (
     ACCOUNTING,
     AT_INSTANT,
     BALL,
+    BATCH,
+    BATCH_BEFORE,
     BUDGET,
     EDGE,
     EVENTS,
     FLAT,
     HOP,
+    IN_BATCH,
     IN_SECOND,
     INSTANT,
     KNOB,
@@ -38,9 +41,9 @@ from sandbox.engines.exact.support import fly, hit_flat, knocked, pass_edge, set
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.trajectory import FloatArray, IntArray
 
-DONE, PAUSED, FULL, TOO_MANY, TOO_DENSE = range(5)
+DONE, PAUSED, FULL, TOO_MANY, TOO_DENSE, TOO_FAST = range(6)
 """What `advance` returns: up to the time; after `PAUSE` events; the log is full; more events within one second than
-the budget; more within one instant."""
+the budget; more within one instant; two batches of events so close together that the budget will not last."""
 
 PAUSE = 10_000
 """Events after which a kernel lets Python see to signals: a third of a second with 1,000 balls, compiled."""
@@ -50,6 +53,13 @@ MOMENT = 1e-9
 
 PER_BALL = 10_000
 """Events that an instant may have for each ball."""
+
+BATCHES = 8
+"""Batches of events in the budget of one second."""
+
+RUSH = 8.0
+"""How many times the rate of the budget two batches in a row may reach. Of 234 random scenes of 2 to 120 balls, the 116
+that got to their end reached at most 4.9 times that rate, in a fifth of the budget."""
 
 
 @kernel
@@ -121,10 +131,16 @@ def within(counts: IntArray, world: FloatArray, balls: int, t: float) -> int:
         world[INSTANT], counts[AT_INSTANT] = t, 0
     counts[IN_SECOND] += 1
     counts[AT_INSTANT] += 1
+    counts[IN_BATCH] += 1
     if counts[AT_INSTANT] > PER_BALL * (balls + 1):
         return TOO_DENSE
     if counts[IN_SECOND] > counts[BUDGET]:
         return TOO_MANY
+    if counts[IN_BATCH] * BATCHES >= counts[BUDGET]:
+        span = t - world[BATCH_BEFORE]
+        world[BATCH_BEFORE], world[BATCH], counts[IN_BATCH] = world[BATCH], t, 0
+        if span * RUSH * BATCHES < 2.0:
+            return TOO_FAST
     return DONE
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sandbox.engines.fixtures import Fixtures, fixtures_of
+from sandbox.engines.fixtures import Fixtures, fixtures_of, straightened
 from sandbox.engines.rebound import kicked, stretches
 from sandbox.engines.roster import ALL, NOTHING, Roster
 from sandbox.scene.model import Plane, Scene, Wall
@@ -33,14 +33,15 @@ LAST_KIND, LAST_WHO, NEXT_KIND, NEXT_WHO, NEXT_STAMP, STAMP, TAGS = range(6, 13)
 filled first; the log's rows of the two, −1 for none; kind and partner of its last impact; kind and partner of its next
 event, and the partner's stamp when that was predicted; its own stamp: how often its motion has changed."""
 
-PX, PY, NX, NY, UX, UY, LENGTH, HALF, WHOLE, KICK, THRESHOLD, MIDDLE, BEGIN, SPAN = range(14)
+PX, PY, NX, NY, UX, UY, LENGTH, HALF, WHOLE, KICK, THRESHOLD, MIDDLE, BEGIN, SPAN, TO_APPROACH = range(15)
 """Columns of `flats`: a point of the surface, the normal out of it, the direction along it and how far it goes from
 the point, below 0 while it is not solid, so that nothing can be along it; half the thickness of what it is a side of;
 how far it goes when it is solid; the kick, m/s, its threshold, whether that is most in the middle, at which share of
-the whole wall it begins, and how much of it it is."""
+the whole wall it begins, and how much of it it is; whether the kick adds to the approach."""
 
-SOLID, KICKS, ABOVE = range(3, 6)
-"""Columns of `knobs` behind centre and radius: whether it is solid; what it kicks with, m/s, and the threshold."""
+SOLID, KICKS, ABOVE, KNOB_TO_APPROACH = range(3, 7)
+"""Columns of `knobs` behind centre and radius: whether it is solid; the speed of its kick, m/s, and the threshold;
+whether the kick adds to the approach."""
 
 THING, COAT, ENDS = range(3)
 """Columns of `flat_tags` and `knob_tags`: fixed thing, surface, and of flats the two knobs at the ends, −1 for none."""
@@ -50,17 +51,20 @@ RESTITUTION, FRICTION, FALLOFF = range(3)
 
 GX, GY, HOP, NOW, NOW_LATE, SECOND, INSTANT = range(7)
 BY_NORMAL, BY_RUBBING, BY_PHANTOM, BY_KICKS = range(7, 11)
+BATCH, BATCH_BEFORE = range(11, 13)
 """Places of `world`: gravity, m/s²; the speed of a hop, m/s; the time of the last event, s, and what rounding has cut
 off it; the starts of the second and of the instant in which events are being counted; energy that impulses along
-normals and along surfaces took, J, negative, that either gave, and that kicks brought."""
+normals and along surfaces took, J, negative, that either gave, and that kicks brought; when the present batch of
+events and the one before it began, s."""
 
 NONE, SLIP_ENDS, EDGE, FLAT, KNOB, BALL = range(6)
 """Kinds of event, in the order in which those of one ball at one instant happen."""
 
 RECORDING, ROWS, EVENTS, IN_SECOND, AT_INSTANT, WHO, WHAT, WITH, BUDGET, PREDICTIONS, PAIR_TESTS, ACCOUNTING = range(12)
+IN_BATCH = 12
 """Places of `count`: whether contacts are logged, how many rows there are; events so far, in the present second and
 instant; the last event's ball, kind and partner; how many events a second may have; how often a ball looked ahead,
-and at how many others, flats and knobs; whether energy is accounted for."""
+and at how many others, flats and knobs; whether energy is accounted for; events in the present batch."""
 
 HOP_TIME, HOP_MOST = 5e-5, 5e-4
 """s and m/s: what would rest on a ball or on anything round hops instead, with g·HOP_TIME or HOP_MOST if that is less:
@@ -86,7 +90,7 @@ class Arena(NamedTuple):
     surfaces: FloatArray
     """(3, S, S) restitution, friction and falloff, s/m"""
     flats: FloatArray
-    """(F, 14)"""
+    """(F, 15)"""
     flat_tags: IntArray
     """(F, 4)"""
     knobs: FloatArray
@@ -94,9 +98,9 @@ class Arena(NamedTuple):
     knob_tags: IntArray
     """(K, 2)"""
     world: FloatArray
-    """(11,)"""
+    """(13,)"""
     counts: IntArray
-    """(12,)"""
+    """(13,)"""
     log: FloatArray
     """(C, 7) time, point, normal, impulse"""
     log_pair: IntArray
@@ -120,11 +124,12 @@ def arena_of(roster: Roster) -> Arena:
         others=np.empty(0, np.int64),
         surfaces=np.empty((3, 0, 0)),
         **_laid(roster.scene),
-        world=np.zeros(11),
-        counts=np.zeros(12, np.int64),
+        world=np.zeros(13),
+        counts=np.zeros(13, np.int64),
         log=np.empty((0, 7)),
         log_pair=np.empty((0, 2), np.int64),
     )
+    arena.world[BATCH_BEFORE] = -np.inf  # there is none before the first
     return renewed(arena, roster)
 
 
@@ -183,9 +188,10 @@ def _bear(arena: Arena, scene: Scene) -> None:
             continue
         middle, mine = thing.kick.profile == "middle", arena.flat_tags[:, THING] == k
         if isinstance(thing, Wall):
-            parts = np.repeat(stretches(thing.points, thing.closed), 2, axis=0)  # each segment has two sides
+            parts = np.repeat(stretches(straightened(thing)), 2, axis=0)  # each segment has two sides
             flats[mine, BEGIN], flats[mine, SPAN] = parts[:, 0], parts[:, 1] - parts[:, 0]
         flats[mine, KICK], flats[mine, THRESHOLD], flats[mine, MIDDLE] = thing.kick.speed, thing.kick.threshold, middle
+        flats[mine, TO_APPROACH] = to_approach = thing.kick.adds_to == "approach"
         for each in np.flatnonzero(arena.knob_tags[:, THING] == k).tolist():
             share = 0.5
             if middle:
@@ -193,7 +199,7 @@ def _bear(arena: Arena, scene: Scene) -> None:
                 first = arena.flat_tags[ends[0], ENDS] == each
                 share = float(flats[ends[0], BEGIN] + (0.0 if first else flats[ends[0], SPAN]))
             knobs[each, KICKS] = kicked(thing.kick.speed, 0.0, middle, share, 1.0)
-            knobs[each, ABOVE] = thing.kick.threshold
+            knobs[each, ABOVE], knobs[each, KNOB_TO_APPROACH] = thing.kick.threshold, to_approach
 
 
 def _knobs(fixtures: Fixtures) -> tuple[FloatArray, IntArray, dict[tuple[float, float, float, int], int]]:
@@ -203,7 +209,7 @@ def _knobs(fixtures: Fixtures) -> tuple[FloatArray, IntArray, dict[tuple[float, 
         place.setdefault((ax, ay, half, thing), len(place))
         place.setdefault((bx, by, half, thing), len(place))
     rows = np.asarray(list(place), dtype=np.float64).reshape(-1, 4)
-    knobs = np.zeros((len(rows), 6))
+    knobs = np.zeros((len(rows), 7))
     knobs[:, :3], knobs[:, SOLID] = rows[:, :3], 1.0
     return knobs, rows[:, 3].astype(np.int64), place
 
@@ -232,7 +238,7 @@ def _flats(
             knobs.append(pair)
     plain = np.asarray(rows, dtype=np.float64).reshape(-1, 8)
     return (
-        np.column_stack((plain, plain[:, LENGTH], np.zeros((len(plain), 5)))),
+        np.column_stack((plain, plain[:, LENGTH], np.zeros((len(plain), 6)))),
         np.asarray(things, dtype=np.int64),
         np.asarray(knobs, dtype=np.int64).reshape(-1, 2),
     )

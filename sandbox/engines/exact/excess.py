@@ -2,8 +2,21 @@
 
 from collections.abc import Sequence
 
-from sandbox.engines.exact.advance import TOO_DENSE
-from sandbox.engines.exact.arena import AT_INSTANT, BALL, FLAT, IN_SECOND, KNOB, NOW, THING, WHAT, WHO, WITH, Arena
+from sandbox.engines.exact.advance import BATCHES, RUSH, TOO_DENSE, TOO_FAST
+from sandbox.engines.exact.arena import (
+    AT_INSTANT,
+    BALL,
+    BUDGET,
+    FLAT,
+    IN_SECOND,
+    KNOB,
+    NOW,
+    THING,
+    WHAT,
+    WHO,
+    WITH,
+    Arena,
+)
 
 
 def too_many(arena: Arena, names: Sequence[str], fixed_names: Sequence[str], status: int) -> str:
@@ -23,8 +36,14 @@ def too_many(arena: Arena, names: Sequence[str], fixed_names: Sequence[str], sta
     elif kind in (FLAT, KNOB):
         thing = (arena.flat_tags if kind == FLAT else arena.knob_tags)[partner, THING]
         who += f" and {fixed_names[thing]!r}"
-    number, span = (counts[AT_INSTANT], "an instant") if status == TOO_DENSE else (counts[IN_SECOND], "one second")
+    budget = int(counts[BUDGET])
+    if status == TOO_FAST:
+        number, span = 2 * budget // BATCHES, 2.0 / (RUSH * BATCHES)
+        many = f"{number:,} events within {span:.3g} s where {budget:,} a second are allowed"
+    elif status == TOO_DENSE:
+        many = f"more than {int(counts[AT_INSTANT]) - 1:,} events within an instant"
+    else:
+        many = f"more than {int(counts[IN_SECOND]) - 1:,} events within one second"
     return (
-        f"at {float(arena.world[NOW]):.9g} s: more than {int(number) - 1:,} events within {span}, last of {who}; "
-        "engines that step could go on: pymunk, reference"
+        f"at {float(arena.world[NOW]):.9g} s: {many}, last of {who}; engines that step could go on: pymunk, reference"
     )

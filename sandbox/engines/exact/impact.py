@@ -15,6 +15,7 @@ from sandbox.engines.exact.arena import (
     HOP,
     KICKS,
     KNOB,
+    KNOB_TO_APPROACH,
     LAST_KIND,
     LAST_TIME,
     LAST_WHO,
@@ -38,7 +39,7 @@ from sandbox.engines.exact.log import add_impulse, log_rest, open_row
 from sandbox.engines.exact.motion import place, turned
 from sandbox.engines.exact.roots import NOISE
 from sandbox.engines.kernel import bare_kernel as kernel
-from sandbox.engines.rebound import compiled_kicked, compiled_rebound
+from sandbox.engines.rebound import compiled_kick_gain, compiled_kicked, compiled_rebound
 from sandbox.trajectory import FloatArray, IntArray
 
 ALMOST_STILL = 1e-9
@@ -138,6 +139,7 @@ def hit_knob(arena: Arena, i: int, k: int) -> None:
     restitution, falloff = arena.surfaces[RESTITUTION, mine, its], arena.surfaces[FALLOFF, mine, its]
     parting = parting_speed(arena.world[HOP], closing, restitution, falloff, press)
     kick = compiled_kicked(arena.knobs[k, KICKS], arena.knobs[k, ABOVE], False, 0.5, closing)
+    kick = compiled_kick_gain(restitution, falloff, kick, arena.knobs[k, KNOB_TO_APPROACH] != 0.0, closing)
     jx, jy = strike(arena, i, -nx, -ny, parting, kick, arena.surfaces[FRICTION, mine, its])
     r = arena.state[i, RADIUS]
     row = open_row(arena, i, -1 - arena.knob_tags[k, THING], state[i, X] + r * nx, state[i, Y] + r * ny, nx, ny)

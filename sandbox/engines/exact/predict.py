@@ -41,8 +41,9 @@ from sandbox.engines.exact.roots import NOISE, flat_entry
 from sandbox.engines.kernel import bare_kernel as kernel
 from sandbox.trajectory import FloatArray, IntArray
 
-PARALLEL = 1e-12
-"""Flats whose normals differ by less are one: a ball rolls from one on to the other."""
+PARALLEL = 1e-5
+"""Flats whose normals differ by less, rad, are one: a ball rolls from one on to the other. At so flat a joint an impact
+would change its velocity by 1e-5 of it, and rounding would decide whether it is found."""
 
 
 @kernel

@@ -41,6 +41,7 @@ from sandbox.engines.exact.arena import (
     SURFACE,
     THING,
     THRESHOLD,
+    TO_APPROACH,
     UX,
     UY,
     VX,
@@ -56,10 +57,10 @@ from sandbox.engines.exact.corner import corner
 from sandbox.engines.exact.hold import REST_TIME, keep, release
 from sandbox.engines.exact.impact import note, strike
 from sandbox.engines.exact.log import add_impulse, open_rest, open_row
-from sandbox.engines.exact.predict import parallel
+from sandbox.engines.exact.predict import PARALLEL, parallel
 from sandbox.engines.exact.roots import NOISE
 from sandbox.engines.kernel import bare_kernel as kernel
-from sandbox.engines.rebound import compiled_kicked, compiled_rebound
+from sandbox.engines.rebound import compiled_kick_gain, compiled_kicked, compiled_rebound
 from sandbox.trajectory import FloatArray
 
 TICKS = 8.0 * 2.0**-52
@@ -81,10 +82,12 @@ def hit_flat(arena: Arena, i: int, f: int) -> None:
     restitution, friction = arena.surfaces[RESTITUTION, mine, its], arena.surfaces[FRICTION, mine, its]
     closing = max(-(state[i, VX] * nx + state[i, VY] * ny), 0.0)
     press = -(state[i, AX] * nx + state[i, AY] * ny)
-    parting = compiled_rebound(restitution, arena.surfaces[FALLOFF, mine, its], closing)
+    falloff = arena.surfaces[FALLOFF, mine, its]
+    parting = compiled_rebound(restitution, falloff, closing)
     kick = 0.0
     if arena.flats[f, KICK] > 0.0:
         kick = flat_kick(arena.flats, f, state[i, X], state[i, Y], closing)
+        kick = compiled_kick_gain(restitution, falloff, kick, arena.flats[f, TO_APPROACH] != 0.0, closing)
     rests = False
     if press > 0.0 and kick == 0.0:
         hop = 2.0 * parting / press
@@ -106,7 +109,7 @@ def hit_flat(arena: Arena, i: int, f: int) -> None:
 
 @kernel
 def flat_kick(flats: FloatArray, f: int, x: float, y: float, closing: float) -> float:
-    """Return what a flat that is hit from (x, y) kicks with, m/s."""
+    """Return the speed with which a flat that is hit from (x, y) kicks, m/s."""
     share = ((x - flats[f, PX]) * flats[f, UX] + (y - flats[f, PY]) * flats[f, UY]) / flats[f, WHOLE]
     share = flats[f, BEGIN] + flats[f, SPAN] * min(max(share, 0.0), 1.0)
     return compiled_kicked(flats[f, KICK], flats[f, THRESHOLD], flats[f, MIDDLE] != 0.0, share, closing)
@@ -219,6 +222,8 @@ def slip_ends(arena: Arena, i: int) -> None:
 def pass_edge(arena: Arena, i: int) -> None:
     """Let a ball that has come to the end of a flat roll on to the next, or leave."""
     state, flats, f = arena.state, arena.flats, arena.tags[i, SUPPORT]
+    # Over a joint that falls off, its centre comes to the end of the one flat before it is over the next.
+    beside = TOUCH + PARALLEL * state[i, RADIUS]
     for g in range(len(flats)):
         if g == f or not parallel(flats, f, g):
             continue
@@ -228,8 +233,8 @@ def pass_edge(arena: Arena, i: int) -> None:
         foot, v = x * flats[g, UX] + y * flats[g, UY], state[i, VX] * flats[g, UX] + state[i, VY] * flats[g, UY]
         if v == 0.0:
             v = state[i, AX] * flats[g, UX] + state[i, AY] * flats[g, UY]
-        if (v > 0.0 and -TOUCH <= foot < flats[g, LENGTH] - TOUCH) or (
-            v < 0.0 and TOUCH < foot <= flats[g, LENGTH] + TOUCH
+        if (v > 0.0 and -beside <= foot < flats[g, LENGTH] - beside) or (
+            v < 0.0 and beside < foot <= flats[g, LENGTH] + beside
         ):
             arena.tags[i, SUPPORT] = g
             if arena.flat_tags[g, THING] != arena.flat_tags[f, THING]:

@@ -14,7 +14,9 @@ from typing import Any, TypeAlias
 import numpy as np
 import pymunk
 
+from sandbox.engines.fixtures import WallSegment
 from sandbox.engines.native.approach import closing_speed
+from sandbox.engines.native.chains import smooth
 from sandbox.scene.surfaces import Surfaces
 from sandbox.trajectory import BoolArray
 
@@ -29,11 +31,14 @@ class Gates:
         self._space, self._h = space, h
         self.walls: set[pymunk.Shape] = set()
         """the segments of those that let pass"""
+        self.joints: dict[pymunk.Shape, WallSegment] = {}
+        """the segments of all walls that run on beyond an end of theirs"""
         self.tick = 0
         """counts substeps"""
         self._handled: set[tuple[int, int]] = set()
         self._passing: dict[Who, dict[tuple[pymunk.Shape, pymunk.Shape] | None, int]] = {}
         self._last = -1  # the substep in which somebody was passing
+        self._stopped: dict[Who, int] = {}  # the substep in which a wall last stopped a body
         self._goes_on = False
 
     def renew(self, surfaces: Surfaces, touching: BoolArray) -> None:
@@ -56,18 +61,25 @@ class Gates:
         return [who for who, pairs in self._passing.items() if self.tick in pairs.values()]
 
     def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
+        if self.joints:
+            smooth(arbiter, self.joints)
         wall, shape = self._told_apart(arbiter)
         if wall is None:  # surfaces are numbered anew as bodies come
             return
         # Where two segments of a wall join, both are touched: the one goes by what the other has decided.
         passing = self._passing.setdefault(_who(shape, wall), {})
         through = any(last >= self.tick - 1 and pair != (shape, wall) for pair, last in passing.items())
-        arbiter.process_collision = not through and self._keeps(arbiter, wall, shape)
+        held = self._stopped.get(_who(shape, wall), -2) >= self.tick - 1
+        arbiter.process_collision = held or (not through and self._keeps(arbiter, wall, shape))
 
-    def passed(self, arbiter: pymunk.Arbiter) -> None:
-        """Take note that a contact is still being ignored."""
+    def note(self, arbiter: pymunk.Arbiter) -> None:
+        """Take note whether a contact is being ignored, as it was decided when it began."""
         wall, shape = self._told_apart(arbiter)
-        if wall is not None:
+        if wall is None:
+            return
+        if arbiter.process_collision:
+            self._stopped[_who(shape, wall)] = self.tick
+        else:
             self._passing.setdefault(_who(shape, wall), {})[shape, wall] = self._last = self.tick
 
     def _told_apart(self, arbiter: pymunk.Arbiter) -> tuple[pymunk.Shape | None, pymunk.Shape]:

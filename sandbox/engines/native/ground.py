@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pymunk
 
+from sandbox.engines.fixtures import straightened, wall_segments
 from sandbox.engines.limits import FARTHEST, FASTEST
 from sandbox.engines.native.space import LONGEST_REACH, SurfaceSetter, category, fixed_shapes, half_plane_ends, reach_of
 from sandbox.engines.rebound import stretches
@@ -81,8 +82,11 @@ class Ground:
         """Return the shapes of a fixed thing; what they meet, and their surfaces, are yet to be said."""
         shapes = list(fixed_shapes(thing, body, centre, reach))
         if isinstance(thing, Wall) and thing.kick is not None:
-            parts = stretches(thing.points, thing.closed)
+            parts = stretches(straightened(thing))
             self._setter.laws.stretches |= dict(zip(shapes, parts, strict=True))
+        if isinstance(thing, Wall):
+            joints = {shape: part for shape, part in zip(shapes, wall_segments(thing), strict=True) if any(part.joints)}
+            self._setter.gates.joints |= joints
         if isinstance(thing, Wall) and thing.one_way:
             self._setter.gates.walls.update(shapes)
         return shapes
@@ -100,6 +104,7 @@ class Ground:
             self._space.remove(*shapes)
             for shape in shapes:
                 self._setter.laws.stretches.pop(shape, None)
+                self._setter.gates.joints.pop(shape, None)
                 self._setter.gates.walls.discard(shape)
             shapes[:] = self._shapes(new, body, np.zeros(2), self.reach)  # a wall is as long as it is
             for k in shuffled(len(shapes)):
@@ -132,6 +137,12 @@ class Ground:
     def reaches(self, place: FloatArray) -> bool:
         """Tell whether planes can be made to reach a place; they can until there are some."""
         return math.isinf(self.reach) or bool((np.abs(place - self._middle[0:2]) <= LONGEST_REACH).all())
+
+
+def jointed_surfaces(scene: Scene, surface: IntArray) -> set[int]:
+    """Return the surfaces of walls of several segments; `surface` (F,) are those of the fixed things."""
+    walls = zip(scene.walls, surface[len(scene.planes) :].tolist(), strict=False)
+    return {number for wall, number in walls if len(wall.points) > 2}
 
 
 def _filter(thing: Plane | Wall | Post, scene: Scene) -> pymunk.ShapeFilter:

@@ -73,9 +73,10 @@ class Hinge(Axle):
 
     def _move(self) -> None:
         h, law = self._h, self._law
-        self.torque, mean, steady = law.ramped(self.torque, self.level, h)
         self.fall = heaviness(self.mount.hinge, self.angle, self._mass, self._gravity)
-        angle, spin, self.at, press = law.turned(self.angle, self.spin, mean, self.fall, h)
+        angle, spin, self.at, press, self.torque, steady = law.turn(
+            self.angle, self.spin, self.torque, self.level, self.fall, h
+        )
         self._aim(angle, self.spin)
         self.kick = self.moment * (spin - self.spin) / h
         if self.at:

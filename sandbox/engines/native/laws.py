@@ -6,15 +6,16 @@ neither kicked nor told anything new.
 """
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pymunk
 
 from sandbox.engines.native.approach import closing_speed
+from sandbox.engines.native.chains import smooth
 from sandbox.engines.native.gates import Gates
 from sandbox.engines.native.record import address_of
-from sandbox.engines.rebound import kicked, rebound, share_at
+from sandbox.engines.rebound import kick_gain, kicked, rebound, share_at
 from sandbox.scene.kick import Kick
 from sandbox.scene.surfaces import Surfaces
 from sandbox.trajectory import FloatArray
@@ -66,23 +67,37 @@ class Laws:
     """what kicked in the last substep, by the addresses of arbiters; where a dict is put here"""
     _known: dict[tuple[int, int], list[Law]] = field(default_factory=dict)
 
-    def renew(self, surfaces: Surfaces, wrong: set[tuple[int, int]]) -> None:
-        """Let those pairs (a ≤ b) be told their coefficients, and no others any more."""
+    def renew(self, surfaces: Surfaces, wrong: set[tuple[int, int]], jointed: set[tuple[int, int]]) -> None:
+        """State the coefficients of those pairs (a ≤ b) at each contact, and of no others any more.
+
+        Args:
+            surfaces: all.
+            wrong: pairs that factors cannot serve.
+            jointed: pairs of polygons and walls of several segments, whose contacts are mended.
+        """
         for known in self._known.values():
             known.clear()
-        for a, b in sorted(wrong):
+        for a, b in sorted(wrong | jointed):
             kick = surfaces.surfaces[a].kick or surfaces.surfaces[b].kick
             restitution, friction = float(surfaces.restitution[a, b]), float(surfaces.friction[a, b])
             known = self._known.setdefault((a, b), [])
             known.append(Law(restitution, friction, float(surfaces.falloff[a, b]), kick))
             self.space.on_collision(a + 1, b + 1, pre_solve=self._tell, data=known)
+            if (a, b) in jointed and not (surfaces.one_way[a] or surfaces.one_way[b]):  # whose `begin` is the gates'
+                self.space.on_collision(a + 1, b + 1, begin=self._smooth)
+
+    def _smooth(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
+        smooth(arbiter, self.gates.joints)  # before what a contact begins with is read, along its normal
 
     def _tell(self, arbiter: pymunk.Arbiter, _: pymunk.Space, known: list[Law]) -> None:
         if not known:
             return
-        if not arbiter.process_collision:
-            self.gates.passed(arbiter)
-            return
+        if self.gates.walls:
+            self.gates.note(arbiter)
+            if not arbiter.process_collision:
+                return
+        if self.gates.joints:
+            smooth(arbiter, self.gates.joints)
         law = known[0]
         arbiter.restitution, arbiter.friction = law.restitution, law.friction
         if law.steady:
@@ -91,13 +106,16 @@ class Laws:
         if closing <= 0.0:
             return
         alone = rebound(law.restitution, law.falloff, closing)
-        more = 0.0 if law.kick is None else self._kick(law.kick, arbiter, closing)
+        more = 0.0
+        if law.kick is not None:
+            kick, to_approach = self._kick(law.kick, arbiter, closing), law.kick.adds_to == "approach"
+            more = kick_gain(law.restitution, law.falloff, kick, to_approach, closing)
         arbiter.restitution = (alone + more) / closing
         if more and self.told is not None:
             self.told[address_of(arbiter._arbiter)] = Given(closing, alone, more)
 
     def _kick(self, kick: Kick, arbiter: pymunk.Arbiter, closing: float) -> float:
-        """Return what a contact is kicked by, m/s."""
+        """Return the speed with which a contact is kicked, m/s."""
         if closing <= kick.threshold:
             return 0.0
         share, middle = 0.5, kick.profile == "middle"

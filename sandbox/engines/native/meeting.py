@@ -10,7 +10,7 @@ from sandbox.engines.native.drag import is_dragged, mean_share, rates
 from sandbox.engines.native.drives import Drives
 from sandbox.engines.native.encounters import Encounters
 from sandbox.engines.native.field import Field
-from sandbox.engines.native.ground import Ground, shuffled
+from sandbox.engines.native.ground import Ground, jointed_surfaces, shuffled
 from sandbox.engines.native.members import Member, Members
 from sandbox.engines.native.probes import Probes
 from sandbox.engines.native.reader import Reader
@@ -225,7 +225,7 @@ class MeetingBodies(Members):
         self.renew_air(scene)
         self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
         self._touches, self._noted = meet.touches, meet.noted
-        self._setter.renew(meet)
+        self._setter.renew(meet, jointed_surfaces(scene, self._surface_of_fixed))
         for number, (_, own) in self._members.items():
             for piece, shape in own:
                 self._setter.dress(shape, int(self._surface_of[piece]))

@@ -7,11 +7,11 @@ tells by its bodies alone who touched.
 import math
 from collections.abc import Iterator
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 import pymunk
 
+from sandbox.engines.fixtures import wall_segments
 from sandbox.engines.native.coefficients import factors, wrong_pairs
 from sandbox.engines.native.drag import is_dragged
 from sandbox.engines.native.gates import Gates
@@ -86,9 +86,10 @@ def fixed_shapes(
     if isinstance(thing, Plane):
         yield _half_plane(thing, body, centre, reach)
     elif isinstance(thing, Wall):
-        ends = (*thing.points, thing.points[0]) if thing.closed else thing.points
-        for a, b in pairwise(ends):
-            yield pymunk.Segment(body, a, b, thing.thickness / 2.0)
+        for part in wall_segments(thing):
+            segment = pymunk.Segment(body, part.a, part.b, thing.thickness / 2.0)
+            segment.set_neighbors(part.before or part.a, part.after or part.b)
+            yield segment
     else:
         yield pymunk.Circle(body, thing.radius, thing.position)
 
@@ -144,8 +145,13 @@ class SurfaceSetter:
         self._elasticity: list[float] = []
         self._friction: list[float] = []
 
-    def renew(self, meet: Meetings) -> None:
-        """Work out each surface's factors, and laws for the pairs that no factors can serve."""
+    def renew(self, meet: Meetings, jointed: set[int]) -> None:
+        """Work out each surface's factors, and laws for the pairs that no factors can serve.
+
+        Args:
+            meet: what meets what.
+            jointed: surfaces of walls of several segments.
+        """
         surfaces, touching = meet.surfaces, meet.touching
         stated = [(s.restitution, s.friction) for s in surfaces.surfaces]
         self._elasticity = factors(surfaces.restitution, touching, [e for e, _ in stated])
@@ -155,7 +161,8 @@ class SurfaceSetter:
             *wrong_pairs(surfaces.friction, touching, self._friction),
             *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
         }
-        self.laws.renew(surfaces, wrong)
+        mended = {(a, b) for a, b in _pairs(touching) if meet.solids and (a in jointed or b in jointed)}
+        self.laws.renew(surfaces, wrong, mended)
         if surfaces.one_way.any():
             self.gates.renew(surfaces, touching)
 

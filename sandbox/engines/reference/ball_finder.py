@@ -54,7 +54,7 @@ class BallFinder(Finder):
             things = fixtures.planes, fixtures.plane_thing, other
             size = meet_planes(position, radius, self.able, surface, *things, *self._tables, reach, self._out, size)
         if len(near.segments):
-            walls = fixtures.segments, fixtures.segment_thing, other
+            walls = fixtures.segments, fixtures.joints, fixtures.segment_thing, other
             size = meet_segments(
                 near.segments, position, radius, surface, *walls, *self._tables, reach, self._out, size
             )
@@ -75,10 +75,9 @@ class BallFinder(Finder):
             rest = self.sieve.with_planes_apart(rest, self.able)
         near = self.candidates(start, 2.0 * self.farthest(start, end))
         self.work["pair_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
-        planes, segments = roster.fixtures.planes, roster.fixtures.segments
-        share, key = first_touch(
-            start, end, roster.radius, self.able, near.balls, planes, near.segments, segments, rest
-        )  # fmt: skip
+        fixtures = roster.fixtures
+        walls = near.segments, fixtures.segments, fixtures.joints
+        share, key = first_touch(start, end, roster.radius, self.able, near.balls, fixtures.planes, *walls, rest)
         return float(share), int(key)
 
     def only(self, position: FloatArray, key: int) -> Manifolds:

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sandbox.engines.kernel import bare_kernel as kernel
+from sandbox.engines.reference.chains import is_covered
 from sandbox.engines.reference.meeting import FIRST, SECOND, pair_key
 from sandbox.engines.reference.narrow_phase import NARROW_PHASE
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
@@ -127,6 +128,7 @@ def meet_segments(
     radius: FloatArray,
     surface: IntArray,
     segments: FloatArray,
+    joints: FloatArray,
     thing: IntArray,
     thing_surface: IntArray,
     restitution: FloatArray,
@@ -148,7 +150,20 @@ def meet_segments(
             segments[s, 3],
             segments[s, 4],
         )
-        if separation < reach:
+        if separation < reach and not is_covered(
+            position[i, 0],
+            position[i, 1],
+            segments[s, 0],
+            segments[s, 1],
+            segments[s, 2],
+            segments[s, 3],
+            nx,
+            ny,
+            joints[s, 0],
+            joints[s, 1],
+            joints[s, 2],
+            joints[s, 3],
+        ):
             if at < len(out.key):
                 other = thing_surface[thing[s]]
                 out.key[at] = (2 << KIND) + keys[k]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.engines.kernel import kernel
-from sandbox.engines.rebound import compiled_rebound, kicked, share_at, stretches
+from sandbox.engines.rebound import compiled_rebound, kick_gain, kicked, share_at, stretches
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.roster import Roster
 from sandbox.scene.kick import Kick
@@ -53,7 +53,7 @@ class Parting:
             number = -1 - int(contacts.second[k])
             if number in self._kicks:
                 x, y = contacts.point[k].tolist()
-                kick[k] = self._kick(number, (x, y), -float(approach[k]))
+                kick[k] = self._gain(number, (x, y), restitution[k], falloff[k], -float(approach[k]))
         if not kick.any():
             return Bounce(speed, None)
         whole = kick - speed
@@ -63,17 +63,18 @@ class Parting:
         worth[met] = (kick / (whole - approach) * 0.5 * (whole - speed))[met]
         return Bounce(speed - kick, worth)
 
-    def _kick(self, number: int, point: Point, closing: float) -> float:
-        """Return what a fixed thing kicks with that is hit at a point, m/s."""
+    def _gain(self, number: int, point: Point, restitution: float, falloff: float, closing: float) -> float:
+        """Return by how much a fixed thing that is hit at a point raises the speed of parting, m/s."""
         thing = self._kicks[number]
         kick = _kick_of(thing)
         assert kick is not None
         share, middle = 0.5, kick.profile == "middle"
         if middle and isinstance(thing, Wall):
             ends = (*thing.points, thing.points[0]) if thing.closed else thing.points
-            each = zip(ends[:-1], ends[1:], stretches(thing.points, thing.closed), strict=True)
+            each = zip(ends[:-1], ends[1:], stretches(ends), strict=True)
             share = min((_away(a, b, point), share_at(a, b, part, point)) for a, b, part in each)[1]
-        return kicked(kick.speed, kick.threshold, middle, share, closing)
+        speed = kicked(kick.speed, kick.threshold, middle, share, closing)
+        return kick_gain(restitution, falloff, speed, kick.adds_to == "approach", closing)
 
 
 def _kick_of(thing: object) -> Kick | None:

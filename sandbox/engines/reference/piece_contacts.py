@@ -6,6 +6,7 @@ Keys hold the pair and, in the lowest bit, which of its two points: the points o
 from typing import NamedTuple
 
 from sandbox.engines.kernel import bare_kernel as kernel
+from sandbox.engines.reference.chains import is_covered, smooth
 from sandbox.engines.reference.convex import meet_half_plane, meet_pieces
 from sandbox.engines.reference.manifolds import KIND, Manifolds
 from sandbox.engines.reference.meeting import FIRST, SECOND, listed, pair_key
@@ -105,6 +106,7 @@ def meet_fixed_segments(
     keys: IntArray,
     hulls: Hulls,
     position: FloatArray,
+    joints: FloatArray,
     thing: IntArray,
     thing_surface: IntArray,
     look: Look,
@@ -116,9 +118,27 @@ def meet_fixed_segments(
         p, s = keys[k] >> FIRST, keys[k] & SECOND
         q = len(hulls.body) + s
         count = meet_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, look.scratch)
+        if count > 0 and joints[s].any():
+            count = _smoothed(hulls, p, q, joints[s], count, look)
         key, other = (2 << KIND) + 2 * keys[k], thing_surface[thing[s]]
         at = _write(hulls, look, count, key, p, -1 - thing[s], other, position, out, at)
     return at
+
+
+@kernel
+def _smoothed(hulls: Hulls, p: int, q: int, joints: FloatArray, count: int, look: Look) -> int:
+    """Mend the contact of a piece with a segment where the wall runs on from that; return how many points it has."""
+    corner, a, b = hulls.corner, hulls.first[p], hulls.first[q]
+    if hulls.first[p + 1] - a > 1:
+        radii = hulls.radius[p], hulls.radius[q]
+        return smooth(
+            corner, a, hulls.first[p + 1], radii[0], b, radii[1], joints, count, look.reach, look.scratch
+        )  # fmt: skip
+    ax, ay, bx, by = corner[b, 0], corner[b, 1], corner[b + 1, 0], corner[b + 1, 1]
+    nx, ny = look.scratch[0, 0], look.scratch[0, 1]
+    x, y = corner[a, 0], corner[a, 1]
+    covered = is_covered(x, y, ax, ay, bx, by, nx, ny, joints[0], joints[1], joints[2], joints[3])
+    return 0 if covered else count
 
 
 @kernel

@@ -89,7 +89,7 @@ class PieceFinder(Finder):
             things = fixtures.planes, fixtures.plane_thing, roster.fixed_surface
             size = meet_half_planes(hulls, pieces.able, position, *things, look, self._out, size)
         if len(near.segments):
-            walls = fixtures.segment_thing, roster.fixed_surface
+            walls = fixtures.joints, fixtures.segment_thing, roster.fixed_surface
             size = meet_fixed_segments(near.segments, hulls, position, *walls, look, self._out, size)
         return size
 

@@ -243,7 +243,7 @@ class Stage:
         held = self._held(moved, lasting, h)
         struck = np.zeros((clash.size, 2))
         bounce = self._solver.bounce(clash, moved[1])
-        self._solver.solve(clash, bounce.speed, moved[1], struck)
+        self._solver.settle(clash, bounce.speed, moved[1], struck)
         self.books.struck(moved, clash, struck, bounce.worth)
         self._done(moved, lasting.joined(clash), np.concatenate((held, struck)), h)
 

@@ -7,7 +7,8 @@ along never does.
 import math
 
 from sandbox.engines.kernel import bare_kernel as kernel
-from sandbox.engines.reference.manifolds import KIND
+from sandbox.engines.reference.chains import is_covered
+from sandbox.engines.reference.manifolds import KIND, circle_segment
 from sandbox.engines.reference.meeting import FIRST, SECOND, listed, pair_key
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
@@ -87,6 +88,7 @@ def first_touch(
     planes: FloatArray,
     segment_keys: IntArray,
     segments: FloatArray,
+    joints: FloatArray,
     rest: IntArray,
 ) -> tuple[float, int]:
     """Return the share of the way, and the key, of the first touch among candidates; key −1 for none.
@@ -100,6 +102,7 @@ def first_touch(
         planes: (P, 4).
         segment_keys: keys of a ball and a segment.
         segments: (G, 5).
+        joints: (G, 4) how walls run on from their ends.
         rest: keys, ascending, of pairs that are not looked at.
     """
     first, who = NEVER, -1
@@ -127,5 +130,9 @@ def first_touch(
         share = touch_segment(x, y, end[i, 0] - x, end[i, 1] - y, ax, ay, bx, by, radius[i] + segments[s, 4])
         key = (2 << KIND) + segment_keys[k]
         if share < first and not listed(rest, key):
-            first, who = share, key
+            x, y = x + share * (end[i, 0] - x), y + share * (end[i, 1] - y)
+            _, nx, ny = circle_segment(x, y, radius[i], ax, ay, bx, by, segments[s, 4])
+            before_x, before_y, after_x, after_y = joints[s, 0], joints[s, 1], joints[s, 2], joints[s, 3]
+            if not is_covered(x, y, ax, ay, bx, by, nx, ny, before_x, before_y, after_x, after_y):
+                first, who = share, key
     return first, who

@@ -132,18 +132,19 @@ class ArtilleryRules:
         """Return who has what, how the gun is set, and what the last shot came to."""
         told = []
         for tank in self.field.tanks.every:
-            mark = "> " if tank is self.shooter and self._over is None else ""
-            state = f"{tank.health:.0f} %, {tank.points} pt, {tank.money} $"
-            told.append((f"{mark}{tank.name}", state if tank.alive else f"out, {tank.points} pt"))
+            mark = "▸ " if tank is self.shooter and self._over is None else ""
+            points = f"{tank.points:,} point{'' if tank.points == 1 else 's'}"
+            state = f"{tank.health:.0f} %, {points}, ${tank.money:,}" if tank.alive else f"out, {points}"
+            told.append((f"{mark}{tank.name}", state))
         wind = self.world.wind[0]
         side = "to the right" if wind > 0 else "to the left"
         told.append(("wind", f"{abs(wind):.1f} m/s {side}" if wind else "none"))
         tank, weapon = self.shooter, WEAPONS[self.shooter.weapon]
         gun = f"{math.degrees(tank.angle):.1f}°, {tank.power:.1%}, {self.speed(tank):.1f} m/s"
         told.append(("gun", f"{tank.name} is thinking" if self.thinking else gun))
-        told.append(("weapon", f"{weapon.name}, {weapon.cost} $" if weapon.cost else weapon.name))
+        told.append(("weapon", f"{weapon.name}, ${weapon.cost:,}" if weapon.cost else weapon.name))
         if self.shots:
-            told.append(("last shot", self.shots[-1].told))
+            told.append(("last shot", self.shots[-1].brief.replace("exact solution", "exact")))
         return told
 
     def gauges(self) -> Sequence[tuple[str, float]]:

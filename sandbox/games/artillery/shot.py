@@ -29,15 +29,25 @@ class Shot(NamedTuple):
 
     @property
     def told(self) -> str:
-        """In words."""
+        """In words: where along x it came down, and how far from the exact solution along x and y."""
+        return self.brief if self.place is None else f"landed at {self.brief}"
+
+    @property
+    def brief(self) -> str:
+        """The same in fewer words."""
+        landed = "gone" if self.place is None else f"{self.place[0]:.2f} m"
         if self.disturbed:
-            return f"{'gone' if self.place is None else f'at {self.place[0]:.2f} m'}; the air changed on its way"
-        if self.place is None:
-            return "gone" if self.exact is None else f"gone; exactly at {self.exact[0]:.2f} m"
+            return f"{landed}; the air changed on its way"
         if self.exact is None:
-            return f"at {self.place[0]:.2f} m; exactly, gone"
-        off = length(math.dist(self.place, self.exact))
-        return f"at {self.place[0]:.2f} m, exactly {self.exact[0]:.2f} m: off by {off}"
+            return landed if self.place is None else f"{landed}, exact solution gone"
+        exact = f"{landed}, exact solution {self.exact[0]:.2f} m"
+        if self.place is None:
+            return exact
+        across, up = (length(abs(a - b)) for a, b in zip(self.place, self.exact, strict=True))
+        return f"{exact} (Δx {across}" + (")" if up == NOTHING else f", Δy {up})")
+
+
+NOTHING = "less than 1 nm"
 
 
 def length(metres: float) -> str:
@@ -45,4 +55,4 @@ def length(metres: float) -> str:
     for least, factor, unit in ((1.0, 1.0, "m"), (1e-3, 1e3, "mm"), (1e-6, 1e6, "µm"), (1e-9, 1e9, "nm")):
         if metres >= least:
             return f"{f'{metres * factor:#.3g}'.rstrip('.')} {unit}" if metres < 100.0 else f"{metres:.0f} m"
-    return "less than 1 nm"
+    return NOTHING

@@ -5,8 +5,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
+import numpy as np
+
 from sandbox.action import Move, Strike
-from sandbox.games.billiards.layout import Disc, Layout
+from sandbox.games.billiards.layout import TOUCH, Disc, Layout
 from sandbox.games.billiards.lying import lie_of
 from sandbox.games.billiards.needs import require
 from sandbox.games.billiards.placing import nearest, refusal, spread
@@ -160,7 +162,7 @@ class Match:
 
     def happenings(self, contacts: Contacts, began: float = 0.0) -> tuple[Happening, ...]:
         """Return what the rules see of a shot from here, of its contacts, from any engine, and when it began, s."""
-        return happenings_of(self.layout, contacts, began, self.against)
+        return happenings_of(self.layout, contacts, began, self.against, self.cue)
 
     def played(self, contacts: Contacts, position: FloatArray, call: Call | None = None, began: float = 0.0) -> Self:
         """Return what a shot has led to, once every ball is at rest.
@@ -174,7 +176,8 @@ class Match:
         Raises:
             GameError: the frame is over, or the call could not be made.
         """
-        verdict = self.rules.judge(self.state, call or Call(), self.happenings(contacts, began))
+        happenings, stayed = self.happenings(contacts, began), self._stayed_behind(contacts, began)
+        verdict = self.rules.judge(self.state, call or Call(), happenings, stayed)
         rest = tuple((x, y) for x, y in position.tolist())
         after = replace(self, position=rest, before=self.position, shots=self.shots + 1)
         return after._done(verdict)
@@ -233,6 +236,29 @@ class Match:
     def _others(self) -> list[Disc]:
         cue = self.cue
         return [disc for name, disc in self.on_table.items() if name != cue]
+
+    def _stayed_behind(self, contacts: Contacts, began: float) -> bool:
+        """Return whether a cue ball in hand behind the head string first touched a ball there without leaving.
+
+        A ball on the head string is not behind it. A cue ball rolls straight, or nearly so: it can leave and come back
+        only from a cushion beyond the head string.
+        """
+        if self.state.in_hand != "behind the head string":
+            return False
+        cue, layout, first = self.layout.number[self.cue], self.layout, None
+        for k in np.argsort(contacts.time, kind="stable").tolist():
+            time, (a, b) = float(contacts.time[k]), contacts.pair[k].tolist()
+            if time < began or cue not in (a, b):
+                continue
+            if first is not None and time > first:
+                break
+            if b >= 0:
+                first = time
+                if layout.before_head(self.position[b if a == cue else a]) >= -TOUCH:
+                    return False
+            elif first is None and layout.before_head(contacts.point[k].tolist()) > 0.0:
+                return False
+        return first is not None
 
     def _with(self, places: dict[str, Point]) -> tuple[Point, ...]:
         """Return the positions with some balls elsewhere."""

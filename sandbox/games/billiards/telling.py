@@ -8,7 +8,7 @@ from sandbox.scene.part import Point
 from sandbox.trajectory import Contacts
 
 AT_ONCE = 5e-3
-"""s: what touches from the start, and is seen so soon, was never left"""
+"""s after a ball was set in motion: a contact with what it touched at the start, seen so soon, was never left"""
 
 
 def happenings_of(
@@ -16,6 +16,7 @@ def happenings_of(
     contacts: Contacts,
     began: float = 0.0,
     against: frozenset[tuple[int, int]] = frozenset(),
+    cue: str | None = None,
 ) -> tuple[Happening, ...]:
     """Return what happened in a shot.
 
@@ -23,19 +24,41 @@ def happenings_of(
         layout: of the table.
         contacts: of any engine, since the stroke. What began before it is left out.
         began: the time of the stroke, s.
-        against: what touched when the shot began, as `touching_pairs` tells it; it counts once it was left (WPA 8.4).
+        against: what touched when the shot began, as `touching_pairs` returns it; it counts once it was left (WPA 8.4).
+        cue: the ball that was struck.
     """
     names, fixed, solid = layout.names, layout.scene.fixed_names, len(layout.scene.fixed)
+    frozen = any(b < 0 for _, b in against)
+    moved = _set_in_motion(contacts, began, against, None if cue is None else layout.number[cue]) if frozen else {}
     found = []
     for time, (a, b) in zip(contacts.time.tolist(), contacts.pair.tolist(), strict=True):
         since = time - began
-        if since < 0.0 or (since <= AT_ONCE and (a, b) in against):
+        if since < 0.0:
+            continue
+        if (a, b) in against and since <= AT_ONCE + (0.0 if b >= 0 else moved.get(a, math.inf)):
             continue
         if b >= 0:
             found.append(Happening(since, names[a], "ball", names[b]))
         else:
             found.append(Happening(since, names[a], "cushion" if -1 - b < solid else "pocket", fixed[-1 - b]))
     return tuple(found)
+
+
+def _set_in_motion(
+    contacts: Contacts, began: float, against: frozenset[tuple[int, int]], cue: int | None
+) -> dict[int, float]:
+    """Return when each ball was set in motion, s of the shot: itself, or another through balls that touch it."""
+    group: dict[int, set[int]] = {}
+    for a, b in against:
+        if b >= 0:
+            joined = group.get(a, {a}) | group.get(b, {b})
+            group.update(dict.fromkeys(joined, joined))
+    moved = {} if cue is None else dict.fromkeys(group.get(cue, {cue}), 0.0)
+    for time, (a, b) in zip(contacts.time.tolist(), contacts.pair.tolist(), strict=True):
+        if b >= 0 and time >= began and (a, b) not in against:
+            for ball in group.get(a, {a}) | group.get(b, {b}):
+                moved[ball] = min(moved.get(ball, math.inf), time - began)
+    return moved
 
 
 def touching_pairs(layout: Layout, position: tuple[Point, ...]) -> frozenset[tuple[int, int]]:

@@ -36,12 +36,12 @@ PAUSE, THINKS = 1.5, 1.0
 """s between two stones, and that a team that plays by itself holds its broom before it delivers"""
 
 CONTROLS = (
-    Control("left", "hold the broom further to the left", ("left",), "left -leftx"),
-    Control("right", "hold it further to the right", ("right",), "right +leftx"),
+    Control("left", "move the broom left", ("left",), "left -leftx"),
+    Control("right", "move the broom right", ("right",), "right +leftx"),
     Control("harder", "more weight", ("up",), "up -lefty"),
     Control("softer", "less weight", ("down",), "down +lefty"),
-    Control("turn", "let it turn the other way", ("t",), "y"),
-    Control("throw", "let it go", ("space",), "a"),
+    Control("turn", "reverse the turn", ("t",), "y"),
+    Control("throw", "release", ("space",), "a"),
     Control("sweep", "sweep: further and straighter", ("s", "left shift"), "b rt"),
 )
 
@@ -73,7 +73,8 @@ class Curling:
         self._score = Score(match.ends)
         self._places: dict[int, Point] = {}  # of the stones that are in play, by their places in `_names`
         self._before: dict[int, Point] = {}  # as they lay before the last delivery
-        self._struck = False
+        self._hits: set[tuple[int, int]] = set()  # pairs of stones that met since the delivery
+        self._deemed: set[int] = set()  # short of the hog line, but in the free guard zone by the rules
         self._running, self._ready = False, False
         self._broom, self._weight, self._turn = 0.0, 0.0, 1
         self._meant: Delivery | None = None
@@ -135,7 +136,7 @@ class Curling:
         """Bring the next stone to where it is let go; at the beginning of an end, all others to where they wait."""
         moves: list[Action] = []
         if self._score.thrown == 0:
-            self._places = {}
+            self._places, self._deemed = {}, set()
             moves = [self._put(k, waiting(*divmod(k, STONES))) for k in range(2 * STONES)]
         moves.append(self._put(self._current, (RELEASE, 0.0)))
         self._ready, self._meant, self._since, self._weight = True, None, seen.time, 0.0
@@ -165,7 +166,8 @@ class Curling:
         spin = delivery.spin - float(self._frame.angular_velocity[self._numbers[self._current]])
         self._before = dict(self._places)
         self._places[self._current] = (RELEASE, 0.0)
-        self._running, self._ready, self._struck, self._told = True, False, False, ""
+        self._running, self._ready, self._told = True, False, ""
+        self._hits.clear()
         self._cues.append("throw")
         sweeps = self._sweep(True) if "sweep" in self._held and not self._by_itself else ()
         return (
@@ -189,27 +191,32 @@ class Curling:
         return moves if moving else [*moves, *self._judge(seen)]
 
     def _hear(self, seen: Seen, elapsed: float) -> None:
-        """Note whether the delivered stone, or any, has struck another."""
-        stones = set(self._numbers)
+        """Note which stones have struck each other."""
+        stones = {number: k for k, number in enumerate(self._numbers)}
         pairs = seen.contacts.pair[seen.contacts.time > self._time - elapsed].tolist()  # others only touch on
-        if any(stones.issuperset(pair) for pair in pairs):
-            self._struck = True
+        new = {(stones[a], stones[b]) for a, b in pairs if a in stones and b in stones}
+        if new:
+            self._hits |= new
             self._cues.append("hit")
 
     def _judge(self, seen: Seen) -> Sequence[Action]:
         """Judge a shot that has come to rest: hog line, free guard zone; and the end, where that was its last."""
         moves: list[Action] = []
         current, places = self._current, self._places
-        if current in places and short(places[current]) and not self._struck:
+        if current in places and short(places[current]) and not self._hits:
             del places[current]
             moves.append(self._put(current, gone(*divmod(current, STONES))))
             self._told = "short of the hog line"
-        theirs = [k for k in self._before if k // STONES != self._score.team and guards(self._before[k])]
+        zone = {k for k, place in self._before.items() if guards(place)} | self._deemed
+        theirs = [k for k in zone if k // STONES != self._score.team]
         if self._score.thrown < PROTECTED and any(k not in places for k in theirs):
             moves += [self._put(k, place) for k, place in self._before.items()]
             moves.append(self._put(current, gone(*divmod(current, STONES))))
             self._places = dict(self._before)
             self._told = "a guard was taken out too soon"
+        else:
+            met = {k for pair in self._hits if not zone.isdisjoint(pair) for k in pair}
+            self._deemed = {k for k in met | self._deemed if k in places and short(places[k])}
         if "sweep" in self._held:
             moves += self._sweep(False)
         self._running, self._since = False, seen.time

@@ -16,7 +16,7 @@ SELDOM = 0.05
 CONTROLS = (
     Control(LEFT, "raise the left flipper while held; lights of lanes move left", ("left shift", "z"), "lb lt"),
     Control(RIGHT, "raise the right flipper while held; lights of lanes move right", ("right shift", "/"), "rb rt"),
-    Control(PLUNGER, "hold to pull the plunger, let go to shoot", ("enter",), "a +righty", True),
+    Control(PLUNGER, "hold to pull the plunger, release to shoot", ("enter",), "a +righty", True),
     Control("nudge", "jolt the table: balls go up", ("space",), "y up", True, SELDOM),
     Control("nudge left", "jolt the table: balls go left", ("left",), "left", True, SELDOM),
     Control("nudge right", "jolt the table: balls go right", ("right",), "right", True, SELDOM),

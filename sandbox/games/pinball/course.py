@@ -85,12 +85,12 @@ class Course:
             if not now.frame.present[ball]:
                 self.holes.forget(ball)
                 self.trough.lose(ball)
-                yield Say("a ball is gone")
+                yield Say("ball gone")
             elif not self.board.inside(*now.frame.position[ball].tolist()):
                 yield from self.take(ball, now)
                 if not self.nudge.tilted:
                     self.trough.serve(alone=False)
-                yield Say("ball lost: back to the plunger")
+                yield Say("ball returned")
 
     def went_on(self, now: Now) -> Iterator[Effect]:
         """Start the ball's save, end the ball, or begin the next."""

@@ -83,7 +83,7 @@ class Pinball:
         """Why the game is over; None while it goes on."""
         if self.course.phase != "over":
             return None
-        return "all balls were played" if self.course.balls_left else "no ball is left on the table"
+        return "game over" if self.course.balls_left else "game over: no ball left on the table"
 
     def control(self, name: str, value: float) -> Sequence[Action]:
         """Do what a player asks for; a tilted table obeys nobody, but lets go, and its plunger is only a rod.

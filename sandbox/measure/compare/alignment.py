@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from sandbox.measure.compare.errors import divergence_times
 from sandbox.measure.compare.touches import CLOSE, Touch, touches
 from sandbox.scene.model import Scene
 from sandbox.trajectory import Trajectory
@@ -14,7 +15,7 @@ GAP = 5.0
 MARGIN = 2.0
 """Steps before the end within which a contact alone is not judged: its partner may have come too late to be seen."""
 
-Kind = Literal["matched", "missed", "phantom"]
+Kind = Literal["matched", "missed", "phantom", "after_divergence"]
 Choice = Literal["match", "above", "left"]
 
 
@@ -50,15 +51,16 @@ def aligned(
 
     Rows that no fixed step could tell apart are one touch first (`touches`). Within each pair, touches are matched
     in order so that the sum of |Δt| and of `GAP` steps for each one left alone is smallest. Alone in the truth is
-    missed, alone in the run is phantom, with two exceptions: part of a touch that lasts in both is neither, and
-    neither is judged within `MARGIN` steps of the end.
+    missed, alone in the run is phantom, with three exceptions: part of a touch that lasts in both is neither, neither
+    is judged within `MARGIN` steps of the end, and where one of the two bodies was off by more than the tolerance
+    before, both are `after_divergence`: the contact may as well have another time, place or partner then.
 
     Args:
         run: what is judged.
         truth: against what.
         scene: of both.
         dt: the step that they have in common, s.
-        tolerance: two surfaces no farther apart are taken to stay in touch, m.
+        tolerance: of positions, m; two surfaces no farther apart are taken to stay in touch.
         until: contacts count up to here, s.
     """
     beyond = until + 2.0 * GAP * dt
@@ -66,6 +68,7 @@ def aligned(
     cut = until if until < max(run.time[-1], truth.time[-1]) else math.inf
     mine, its = (touches(each, scene, dt, tolerance, beyond) for each in (run, truth))
     found: list[Event] = []
+    parted = divergence_times(run, truth, tolerance)
     for pair in sorted({*mine, *its}):
         names = _name(scene, pair[0]), _name(scene, pair[1])
         right, own = its.get(pair, []), mine.get(pair, [])
@@ -80,7 +83,12 @@ def aligned(
         )
         for kind, those, others, taken in sides:
             alone = [touch for k, touch in enumerate(those) if k not in taken and touch.start <= judged]
-            found += [_single(kind, names, touch, dt) for touch in alone if not _within(touch, others, dt)]
+            followed = min(float(parted[number]) for number in pair if number >= 0)
+            found += [
+                _single(kind, touch.start > followed, names, touch, dt)
+                for touch in alone
+                if not _within(touch, others, dt)
+            ]
     return tuple(sorted(found, key=lambda event: (event.when, event.between)))
 
 
@@ -151,9 +159,11 @@ def _together(names: tuple[str, str], right: Touch, own: Touch, dt: float, cut: 
     )
 
 
-def _single(kind: Literal["missed", "phantom"], names: tuple[str, str], touch: Touch, dt: float) -> Event:
+def _single(
+    kind: Literal["missed", "phantom"], diverged: bool, names: tuple[str, str], touch: Touch, dt: float
+) -> Event:
     time, engine_time = (touch.start, None) if kind == "missed" else (None, touch.start)
-    return Event(kind, names, time, engine_time, lasting=_lasts(touch, dt))
+    return Event("after_divergence" if diverged else kind, names, time, engine_time, lasting=_lasts(touch, dt))
 
 
 def _name(scene: Scene, number: int) -> str:

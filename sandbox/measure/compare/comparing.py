@@ -12,7 +12,7 @@ from sandbox.measure.compare.alignment import aligned
 from sandbox.measure.compare.comparison import Comparison, Row
 from sandbox.measure.compare.drift import energy_drift, momentum_drift
 from sandbox.measure.compare.errors import Score, errors
-from sandbox.measure.compare.truth import Truth, truth_of
+from sandbox.measure.compare.truth import Truth, seek_truth
 from sandbox.measure.compare.why import turned, verdict
 from sandbox.measure.recorder import require_memory
 from sandbox.measure.run import run
@@ -41,8 +41,9 @@ def compare(
 ) -> Comparison:
     """Run a scene on several engines and hold each against the best known truth.
 
-    The truth is the scene's closed form, else `exact`, else a fixed step refined until it agrees with itself.
-    Errors, contacts and divergence count up to `trusted_until`, drifts of energy and momentum over the whole run.
+    The truth is the scene's closed form, else `exact`, else a fixed step refined until it agrees with itself, as far
+    as a second method confirms it. Errors, contacts and divergence count up to `trusted_until`, drifts of energy and
+    momentum over the whole run.
 
     Args:
         scene: what to run.
@@ -70,10 +71,11 @@ def compare(
     # All runs are held at once: the engines', the truth, and while it is sought, two more.
     require_memory(scene, wanted, len(scene.bodies) * (len(names) + 3))
 
-    say = told or nobody
+    say, doubt = told or nobody, None
     if truth is None:
         say("the truth")
-        truth = truth_of(scene, wanted, tolerance)
+        sought = seek_truth(scene, wanted, tolerance)
+        truth, doubt = (sought, None) if isinstance(sought, Truth) else (None, sought)
     rows, runs = [], {}
     for name in names:
         say(name)
@@ -85,7 +87,7 @@ def compare(
         rows.append(row)
         if len(found.time):
             runs[name] = found
-    return Comparison(scene, truth, tolerance, tuple(rows), runs)
+    return Comparison(scene, truth, tolerance, tuple(rows), runs, doubt)
 
 
 def usual_tolerance(scene: Scene) -> float:

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
-from sandbox.measure.compare.alignment import Event
+from sandbox.measure.compare.alignment import Event, Kind
 from sandbox.measure.compare.errors import Score
 from sandbox.measure.compare.truth import Truth
 from sandbox.measure.compare.why import Knob
@@ -45,8 +45,14 @@ class Row:
     verdict: str | None = None
     """the sentence that follows from it"""
 
+    def __repr__(self) -> str:
+        """Name engine and status, the largest error and how many contacts there are of each kind."""
+        error = "unknown" if self.score.max_position is None else f"{self.score.max_position:.3g} m"
+        counts = ", ".join(f"{kind} {sum(e.kind == kind for e in self.events or ())}" for kind in get_args(Kind))
+        return f"<Row {self.engine}: {self.status}, max error {error}, contacts: {counts}>"
+
     def count(self, kind: str) -> int | None:
-        """Return how many contacts were `matched`, `missed` or `phantom`."""
+        """Return how many contacts were `matched`, `missed`, `phantom` or `after_divergence`."""
         return None if self.events is None else sum(event.kind == kind for event in self.events)
 
     def document(self, trusted_until: float | None) -> dict[str, Any]:
@@ -64,6 +70,7 @@ class Row:
             "matched_contacts": self.count("matched"),
             "missed_contacts": self.count("missed"),
             "phantom_contacts": self.count("phantom"),
+            "contacts_after_divergence": self.count("after_divergence"),
             "max_contact_delay": max((abs(e.delta_time) for e in pairs if e.delta_time is not None), default=None),
             "trusted_until": trusted_until,
             "seconds": self.seconds,
@@ -89,12 +96,24 @@ class Comparison:
 
     scene: Scene
     best: Truth | None
-    """None where no engine can run the scene"""
+    """None where nothing is known: no engine can run the scene, or two methods contradict each other"""
     tolerance: float
     """m"""
     rows: tuple[Row, ...]
     trajectories: Mapping[str, Trajectory]
     """the run of each engine that has one"""
+    doubt: str | None = None
+    """why there is no truth"""
+
+    def __repr__(self) -> str:
+        """Name the scene and the truth, and the largest error of each engine."""
+        off = (
+            f"{row.engine} {row.status}"
+            if row.score.max_position is None
+            else f"{row.engine} {row.score.max_position:.3g} m"
+            for row in self.rows
+        )
+        return f"<Comparison {self.scene.title!r}: {self.sentence()}; max error: {', '.join(off)}>"
 
     @property
     def truth(self) -> str | None:
@@ -109,11 +128,7 @@ class Comparison:
     def sentence(self) -> str:
         """Say what the truth is, and how far it goes."""
         if self.best is None:
-            able = any(row.status != "refused" for row in self.rows)
-            why = (
-                "no engine gets to an answer that a finer step confirms" if able else "no engine here can run the scene"
-            )
-            return f"truth: none; {why}"
+            return f"truth: none; {self.doubt}"
         whole = self.scene.world.duration
         name = self.best.kind.replace("_", " ")
         until = f"trusted until {self.best.trusted_until:.4g} s of {whole:.4g} s"
@@ -129,7 +144,8 @@ class Comparison:
             "scene": self.scene.title if scene is None else scene,
             "title": self.scene.title,
             "truth": self.truth,
-            "truth_about": None if self.best is None else self.best.about,
+            "truth_about": self.doubt if self.best is None else self.best.about,
+            "truth_confirmed_by": None if self.best is None else self.best.witness,
             "trusted_until": self.trusted_until,
             "duration": self.scene.world.duration,
             "tolerance": self.tolerance,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.measure.compare.errors import errors
-from sandbox.measure.compare.horizon import agree_until, nudged
+from sandbox.measure.compare.horizon import agree_until, perturb
 from sandbox.measure.compare.patience import patient_run
 from sandbox.measure.compare.runs import common_frames, there
 from sandbox.measure.compare.truth import truth_of
@@ -25,14 +25,16 @@ class Parting(NamedTuple):
     """the one that is farthest off, by name; None where a run has ended before"""
     distance: float
     """m; inf where a run is no longer finite"""
+    bodies: frozenset[str] = frozenset()
+    """all that are farther off than the tolerance then"""
 
 
 class Disagreement:
     """What is asked of every scene that may be smaller: do they still part?
 
-    Of one engine, from the truth, up to its `trusted_until`. Of two, from each other, up to when a nudge of a body by
-    1e-12 m moves anything by more than the tolerance in either: both is a run's `first_divergence`, as `compare` has
-    it. A run that is refused or fails parts from nothing.
+    Of one engine, from the truth, up to its `trusted_until`. Of two, from each other, up to when a perturbation of
+    all bodies by 1e-12 m moves anything by more than the tolerance in either: both is a run's `first_divergence`, as
+    `compare` has it. A run that is refused or fails parts from nothing.
     """
 
     def __init__(self, engines: Sequence[str], tolerance: float) -> None:
@@ -76,7 +78,7 @@ class Disagreement:
             return self._parting(scene, ran(scene, self.engines[0]), truth.trajectory, truth.trusted_until)
         one, other = (ran(scene, engine) for engine in self.engines)
         parting = self._parting(scene, one, other, scene.world.duration)
-        moved = nudged(scene) if parting is not None else None
+        moved = perturb(scene) if parting is not None else None
         if parting is None or moved is None:
             return parting
         for engine, run in zip(self.engines, (one, other), strict=True):
@@ -103,7 +105,8 @@ class Disagreement:
             away = np.hypot(*(one.position[mine[at]] - other.position[its[at]]).T)
         away = np.where(both, np.where(np.isnan(away), np.inf, away), -1.0)
         worst = int(away.argmax())
-        return Parting(first, str(one.names[worst]), float(away[worst]))
+        off = frozenset(map(str, one.names[away > self.tolerance]))
+        return Parting(first, str(one.names[worst]), float(away[worst]), off)
 
 
 def _end(run: Trajectory) -> float:

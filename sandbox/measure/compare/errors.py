@@ -55,6 +55,24 @@ class Errors:
         return float(self.time[above.argmax()]) if above.any() else None
 
 
+def divergence_times(run: Trajectory, truth: Trajectory, tolerance: float) -> FloatArray:
+    """Return the time of the first common frame in which each body is off by more than a tolerance, (N,) s; else inf.
+
+    A body that only one of the two still has counts as off.
+    """
+    mine, its = common_frames(run, truth)
+    found = np.full(len(run.names), np.inf)
+    step = max(1, CHUNK // max(1, len(found)))
+    for begin in range(0, len(mine), step):
+        rows = slice(begin, begin + step)
+        with np.errstate(over="ignore", invalid="ignore"):
+            away = np.hypot(*np.moveaxis(run.position[mine[rows]] - truth.position[its[rows]], 2, 0))
+        off = ~(away <= tolerance) | (there(run, mine[rows]) != there(truth, its[rows]))
+        first = np.where(off.any(axis=0), run.time[mine[rows]][off.argmax(axis=0)], np.inf)
+        found = np.minimum(found, first)
+    return found
+
+
 def errors(run: Trajectory, truth: Trajectory, moving: BoolArray) -> Errors:
     """Return the errors of a run against the truth.
 

@@ -9,9 +9,15 @@ import numpy as np
 from sandbox.measure.distance import hull_distance
 from sandbox.measure.lying import gap_above, pieces_over_time
 from sandbox.scene.bodies import Bodies
+from sandbox.scene.driven import driven_in
+from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Plane, Post, Scene, Wall, Zone
+from sandbox.scene.near import near_pairs
 from sandbox.scene.precinct import pieces_of
-from sandbox.trajectory import FloatArray
+from sandbox.trajectory import BoolArray, FloatArray
+
+Pair = tuple[int, int]
+"""Numbers as in `Contacts`: the second may be −1 − k for the k-th fixed thing."""
 
 
 def gap(scene: Scene, bodies: Bodies, position: FloatArray, angle: FloatArray, pair: tuple[int, int]) -> FloatArray:
@@ -49,6 +55,54 @@ def gap(scene: Scene, bodies: Bodies, position: FloatArray, angle: FloatArray, p
     return gaps
 
 
+def close_pairs(scene: Scene, reach: float = 0.0) -> list[tuple[Pair, float]]:
+    """Return all that can meet, of which one can move, and whose gap at the start is at most `reach`, with that, m.
+
+    A negative gap is an overlap. Pairs are numbered as in `Contacts`.
+    """
+    bodies, meet = scene.bodies, meetings(scene)
+    still = bodies.fixed | driven_in(scene, bodies)
+    meeting = meet.touches | bodies.fixed
+    found = []
+    for i, j in _near(bodies, meeting, reach):
+        if not (still[i] and still[j]) and (bodies.group[i] != bodies.group[j] or bodies.group[i] == 0):
+            found.append(((i, j), _gap(scene, (i, j))))
+    apart = set(map(tuple, scene.links.apart().tolist()))  # joined, and kept from meeting
+    found = [(pair, clear) for pair, clear in found if clear <= reach and pair not in apart]
+    movable = np.flatnonzero(~still & meeting)
+    for k, thing in enumerate(scene.fixed):
+        clear = _bounding_gaps(bodies, thing)
+        near = ((number, -1 - k) for number in movable[clear[movable] <= reach].tolist())
+        exact = ((p, float(clear[p[0]]) if bodies.round[p[0]] else _gap(scene, p)) for p in near)
+        found += [(pair, own) for pair, own in exact if own <= reach]
+    return found
+
+
+def _gap(scene: Scene, pair: Pair) -> float:
+    bodies = scene.bodies
+    return float(gap(scene, bodies, bodies.position[None], bodies.angle[None], pair)[0])
+
+
+def _near(bodies: Bodies, meeting: BoolArray, reach: float) -> Iterator[Pair]:
+    """Yield the pairs whose bounding discs are no farther apart than `reach`."""
+    chosen = np.flatnonzero(meeting)
+    if len(chosen) < 2:
+        return
+    position, radius = bodies.position, bodies.radius
+    for a, b in near_pairs(position[chosen], (2.0 * float(radius[chosen].max()) + reach) * (1.0 + 1e-9)):  # rounding
+        i, j = chosen[np.minimum(a, b)], chosen[np.maximum(a, b)]
+        close = np.hypot(*(position[j] - position[i]).T) - radius[i] - radius[j] <= reach
+        yield from zip(i[close].tolist(), j[close].tolist(), strict=True)
+
+
+def _bounding_gaps(bodies: Bodies, thing: Plane | Wall | Post) -> FloatArray:
+    """Return how far each body's bounding disc is from a fixed thing, (N,) m; of a ball that is its gap."""
+    if isinstance(thing, Plane):
+        normal = np.asarray(thing.normal) / math.hypot(*thing.normal)
+        return np.asarray((bodies.position - np.asarray(thing.point)) @ normal - bodies.radius)
+    return _of_disc(bodies.position, bodies.radius, thing, bodies.position, 0.0)
+
+
 def _from_zone(centre: FloatArray, zone: Zone) -> FloatArray:
     """Return the distance of a centre from a zone, (T,) m: it is noted when it is inside."""
     nearest = np.full(len(centre), np.inf)
@@ -59,7 +113,7 @@ def _from_zone(centre: FloatArray, zone: Zone) -> FloatArray:
 
 
 def _of_disc(
-    centre: FloatArray, radius: float, thing: Wall | Post | None, other: FloatArray, its_radius: float
+    centre: FloatArray, radius: FloatArray | float, thing: Wall | Post | None, other: FloatArray, its_radius: float
 ) -> FloatArray:
     """Return the gap of a disc from another, or from a fixed thing."""
     if thing is None:

@@ -13,10 +13,12 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeGuard
 
 from sandbox.measure.compare.delta import least
 from sandbox.measure.compare.disagreement import Disagreement, Parting
+from sandbox.measure.compare.gaps import close_pairs
+from sandbox.measure.compare.horizon import TOUCH
 from sandbox.measure.compare.patience import TookTooLongError
 from sandbox.measure.compare.simpler import fewer, optional, rounded, shorter, unused, without_keys
 from sandbox.measure.compare.spelled import BONDS, FIXED, Document, Spelled, spelled
@@ -27,7 +29,7 @@ from sandbox.scene.file import dumps, from_document, loads
 from sandbox.scene.model import Scene
 
 MOST_RUNS = 1000
-"""Scenes that are tried, at most; each is run on both engines, and nudged."""
+"""Scenes that are tried, at most; each is run on both engines, and perturbed."""
 PATIENCE = 300.0
 """s that it all may take; what is found by then counts."""
 
@@ -62,8 +64,9 @@ def minimise(
 ) -> Minimised:
     """Make a scene smaller for as long as a disagreement stays.
 
-    The tolerance stays what it was, whatever is left out. A scene that parts sooner than the one given has another
-    disagreement, as when a support is left out and a body falls; it does not count. Even so, what is left need not
+    The tolerance stays what it was, whatever is left out. A scene that parts sooner than the one given, or in which
+    only other bodies part, has another disagreement, as when a support is left out and a body falls; it does not count.
+    Nor does one in which two overlap that did not overlap as deep in the scene given. Even so, what is left need not
     part for the reason that the whole scene did: a larger tolerance asks for a larger disagreement. Ctrl-C ends the
     search, as a bound does; before the scene given has been tried, it passes through.
 
@@ -105,6 +108,7 @@ class Search:
         self._asked, self._most_runs, self._end, self._told = disagreement, most_runs, end, told
         self._given = scene, parting
         self._soonest = SOONEST * parting.time
+        self._overlaps = overlaps(scene)
         self._known: dict[str, tuple[Scene, Parting] | None] = {}
         self._now: Spelled = spelled(scene, whole=True)
 
@@ -146,7 +150,7 @@ class Search:
             scene = from_document(candidate.document)
         except SceneError:  # what is left does not go together
             return None
-        if not len(scene.bodies):
+        if not len(scene.bodies) or self._overlaps_anew(scene):
             return None
         left = self._end - perf_counter()
         if self.runs >= self._most_runs:
@@ -161,7 +165,18 @@ class Search:
             raise _EnoughError("its time is over") from None
         except TooLargeError:
             return None
-        return None if parting is None or parting.time < self._soonest else (scene, parting)
+        return (scene, parting) if self._is_the_same(parting) else None
+
+    def _is_the_same(self, parting: Parting | None) -> TypeGuard[Parting]:
+        """Tell whether a scene parts no sooner than the one given, and one of the same bodies does."""
+        if parting is None or parting.time < self._soonest:
+            return False
+        its = self._given[1].bodies
+        return bool(parting.bodies & its) or parting.bodies == its
+
+    def _overlaps_anew(self, scene: Scene) -> bool:
+        """Tell whether two overlap that did not in the scene given, or deeper."""
+        return any(depth > self._overlaps.get(pair, 0.0) + TOUCH for pair, depth in overlaps(scene).items())
 
     def _take_first(self, candidates: Iterable[Document]) -> bool:
         """Go on with the first that shows the disagreement."""
@@ -210,8 +225,17 @@ class Search:
         """Read what will be written, and try once more; where it does not part again, go back to the scene given."""
         scene = loads(dumps(self.scene))
         parting = self._asked.of(scene)
-        self.scene, self.parting = self._given if parting is None else (scene, parting)
-        return parting is not None
+        if not self._is_the_same(parting) or self._overlaps_anew(scene):
+            self.scene, self.parting = self._given
+            return False
+        self.scene, self.parting = scene, parting
+        return True
+
+
+def overlaps(scene: Scene) -> dict[frozenset[str], float]:
+    """Return how deep each two overlap at the start of a scene, m, by their names."""
+    names = (*scene.bodies.names, *reversed(scene.fixed_names))  # −1 − k counts from the end
+    return {frozenset((names[a], names[b])): -clear for (a, b), clear in close_pairs(scene) if clear < 0.0}
 
 
 def _with(document: Document, kind: str, k: int, key: str, value: Any) -> Document:

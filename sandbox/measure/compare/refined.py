@@ -7,7 +7,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.compare.horizon import agree_until, nudged
+from sandbox.measure.compare.errors import errors
+from sandbox.measure.compare.horizon import agree_until, perturb
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.joint_error import HOLDING
 from sandbox.measure.recorder import frame_count
@@ -29,6 +30,8 @@ AGREE = 0.1
 """The share of the tolerance within which two successive answers agree."""
 ITERATIONS = 20
 """At least; a truth should not hang on a contact solver that stops early."""
+JUMP = 1e-3
+"""The share of the tolerance that two runs are apart at most in the frame before they jump apart."""
 SLOP = 0.01
 """The share of the tolerance that may stay overlapped."""
 
@@ -58,13 +61,17 @@ class Refined:
     """s, within the tolerance itself"""
     about: str
     """why it was refined no further"""
+    horizon: float
+    """s, until when a perturbation changes nothing beyond the tolerance"""
+    work: int
+    """bodies × steps that all runs took together"""
 
 
 def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | None:
     """Halve dt until two successive answers agree within `AGREE` of the tolerance, or the work becomes too much.
 
-    Where a nudge changes the answer from some time on, they need not agree beyond it. An answer in which contacts
-    were missed agrees with nothing from the first of them on.
+    Where a perturbation changes the answer from some time on, they need not agree beyond it. An answer in which
+    contacts were missed agrees with nothing from the first of them on.
 
     The reference is asked first, then every other engine with a step, in the order of the registry; of each, the
     settings in the order of `PREFERENCES`. Where all of these fail, they are asked again with as many substeps as the
@@ -106,19 +113,18 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
             coarse = patient_run(scene, engine, settings, PATIENCE / 5.0)
         if coarse.status != "ok":
             return None
-        # Beyond the time at which a nudge matters, agreement is not to be had, nor of use.
-        other = nudged(scene)
-        enough = scene.world.duration
-        if other is not None:
-            enough = agree_until(coarse, patient_run(other, engine, settings, PATIENCE / 5.0), scene, tolerance)
+        # Beyond the time at which a perturbation matters, agreement is not to be had, nor of use.
+        other = perturb(scene)
+        enough, _ = _horizon(scene, other, engine, settings, coarse, tolerance)
     except TookTooLongError:
         return None
     began = perf_counter()
     work = each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
     agrees, halvings, about = 0.0, 0, "it was halved no further"
+    horizon: float | None = None
     while halvings < HALVINGS:
         each *= 2
-        finer = _half(settings)
+        finer = half(settings)
         if work + each > WORK:
             about = "more halvings would be too much work"
             break
@@ -127,24 +133,50 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
             break
         try:
             fine = patient_run(scene, engine, finer, PATIENCE - (perf_counter() - began), audit=True)
+            if fine.status != "ok":
+                about = f"the next halving {fine.status}: {fine.reason}"
+                break
+            # Two that tunnel through the same wall agree as well.
+            missed = float(np.min(fine.missed_time, initial=np.inf))
+            close = min(agree_until(fine, coarse, scene, AGREE * tolerance), missed)
+            agrees = min(agree_until(fine, coarse, scene, tolerance), missed)
+            coarse, settings, halvings, work = fine, finer, halvings + 1, work + each
+            horizon = None
+            if close >= enough:
+                horizon, jumps = _horizon(scene, other, engine, settings, coarse, tolerance)
+                enough = max(enough, horizon)
+                if close >= enough and not jumps:  # a jump is as high as a step is long: a smaller one makes less of it
+                    about = f"agrees with the halving before within {AGREE * tolerance:.2g} m"
+                    break
         except TookTooLongError:
             about = f"more halvings would take longer than {PATIENCE:g} s"
             break
-        if fine.status != "ok":
-            about = f"the next halving {fine.status}: {fine.reason}"
-            break
-        # Two that tunnel through the same wall agree as well.
-        missed = float(np.min(fine.missed_time, initial=np.inf))
-        close = min(agree_until(fine, coarse, scene, AGREE * tolerance), missed)
-        agrees = min(agree_until(fine, coarse, scene, tolerance), missed)
-        coarse, settings, halvings, work = fine, finer, halvings + 1, work + each
-        if close >= enough:
-            about = f"agrees with the halving before within {AGREE * tolerance:.2g} m"
-            break
-    return Refined(engine, settings, halvings, coarse, agrees, about)
+    try:
+        if horizon is None:
+            horizon, _ = _horizon(scene, other, engine, settings, coarse, tolerance)
+    except TookTooLongError:
+        horizon = min(enough, agrees)
+    return Refined(engine, settings, halvings, coarse, agrees, about, horizon, work)
 
 
-def _half(settings: Settings) -> Settings | None:
+def _horizon(
+    scene: Scene, other: Scene | None, engine: str, settings: Settings, found: Trajectory, tolerance: float
+) -> tuple[float, bool]:
+    """Return until when a run of the scene agrees with one of the perturbed scene, s, and whether they jump apart then.
+
+    They do where the perturbation decides in which step a contact is seen, and grow apart where it is chaos.
+    """
+    if other is None:
+        return scene.world.duration, False
+    again = patient_run(other, engine, settings, PATIENCE)
+    apart = errors(found, again, ~scene.bodies.fixed).position
+    above = np.flatnonzero(apart > tolerance)
+    jumps = bool(len(above)) and bool(apart[: above[0]].max(initial=0.0) < JUMP * tolerance)
+    return agree_until(found, again, scene, tolerance), jumps
+
+
+def half(settings: Settings) -> Settings | None:
+    """Return settings with half the time step, whose frames lie where they did; None where there are none."""
     try:
         return settings.replace(dt=settings.dt / 2.0, record_every=settings.record_every * 2)
     except ValidationError:

@@ -6,9 +6,10 @@ from typing import Literal
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.closed_form import solution
 from sandbox.measure.compare.closed import as_run
-from sandbox.measure.compare.horizon import NUDGE, agree_until, nudged
+from sandbox.measure.compare.horizon import NUDGE, agree_until, perturb
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.compare.refined import refined
+from sandbox.measure.compare.witness import confirmed
 from sandbox.measure.forecast.events import event_warnings
 from sandbox.measure.run import run
 from sandbox.scene.meetings import meetings
@@ -33,7 +34,9 @@ class Truth:
     """where it is from, in a few words"""
     trajectory: Trajectory
     trusted_until: float
-    """s; the last frame at which neither a finer step nor a nudge changes any position by more than the tolerance"""
+    """s; the last frame up to which no finer step, second method or perturbation moves a body beyond the tolerance"""
+    witness: str | None = None
+    """the second method that confirms a refined truth"""
 
 
 def bare(settings: Settings) -> Settings:
@@ -42,15 +45,24 @@ def bare(settings: Settings) -> Settings:
 
 
 def truth_of(scene: Scene, settings: Settings, tolerance: float) -> Truth | None:
+    """Return the best that is known of a scene, or None (`seek_truth`)."""
+    found = seek_truth(scene, settings, tolerance)
+    return found if isinstance(found, Truth) else None
+
+
+def seek_truth(scene: Scene, settings: Settings, tolerance: float) -> Truth | str:
     """Return the first truth there is: closed form, `exact`, or a fixed step refined until it agrees with itself.
 
-    It depends on the scene, on the times of its frames and on the tolerance, never on the engine that is judged.
-    None where no engine can run the scene.
+    A refined answer is the truth only as far as a second method and the conservation laws confirm it (`witness`). It
+    depends on the scene, on the times of its frames and on the tolerance, never on the engine that is judged.
 
     Args:
         scene: of what.
         settings: give dt and which frames are kept.
         tolerance: of positions, m.
+
+    Returns:
+        The truth, or why there is none.
 
     Raises:
         TooLargeError: the frames would not fit into memory.
@@ -75,18 +87,26 @@ def truth_of(scene: Scene, settings: Settings, tolerance: float) -> Truth | None
 
     finest = refined(scene, settings, tolerance)
     if finest is None:
-        return None
-    horizon = _horizon(scene, finest.engine, finest.settings, finest.trajectory, tolerance)
-    until = min(finest.agrees_until, horizon)
+        able = any(not engine.missing(scene, settings) for engine in ENGINES.values())
+        why = "no engine gets to an answer that a finer step confirms" if able else "no engine here can run the scene"
+        return f"{why}{note}"
+    until = min(finest.agrees_until, finest.horizon)
     cause = f"; {finest.about}" if until == finest.agrees_until else _limit(scene, until)
+    confirmation = confirmed(scene, finest, settings, tolerance, until)
+    if confirmation.until < until:
+        until, cause = confirmation.until, f"; {confirmation.about}, so there is no truth after that"
     times = "once" if finest.halvings == 1 else f"{finest.halvings} times"
-    about = f"{finest.engine}, dt halved {times}{cause}{note}"
-    return Truth("refined", about, finest.trajectory, until)
+    method = f"{finest.engine}, dt halved {times}"
+    if confirmation.by is not None and until > 0.0:
+        method = f"{method}, confirmed by {confirmation.by}"
+    if until == 0.0 and scene.world.duration > 0.0:
+        return f"{method}{cause}{note}"
+    return Truth("refined", f"{method}{cause}{note}", finest.trajectory, until, confirmation.by)
 
 
 def _horizon(scene: Scene, engine: str, settings: Settings, found: Trajectory, tolerance: float) -> float:
-    """Return until when a nudge changes nothing beyond the tolerance, s."""
-    other = nudged(scene)
+    """Return until when a perturbation changes nothing beyond the tolerance, s."""
+    other = perturb(scene)
     if other is None:
         return scene.world.duration
     again = run(other, engine, audit=False, **settings.model_dump())
@@ -94,4 +114,5 @@ def _horizon(scene: Scene, engine: str, settings: Settings, found: Trajectory, t
 
 
 def _limit(scene: Scene, until: float) -> str:
-    return f"; moving a body by {NUDGE:g} m changes what comes later" if until < scene.world.duration else ""
+    moved = f"; moving every body by {NUDGE:g} m changes what comes later"
+    return moved if until < scene.world.duration else ""

@@ -1,8 +1,9 @@
-"""Why: which single choice an engine's error hangs on, found by changing one at a time."""
+"""Why: which choice an engine's error depends on, found by changing one at a time, then two."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Any, get_args
 
 from pydantic import ValidationError
@@ -11,17 +12,25 @@ from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.errors import errors
 from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.scene.model import Scene
-from sandbox.scene.settings import Detection, Integrator, Joints, Settings
+from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
 MATTERS = 0.9
-"""A knob that leaves more of the error than this does not explain it."""
+"""A change that leaves more of the error than this does not explain it."""
+SUFFICES = 0.01
+"""Where one change leaves no more of the error than this, no two are tried together."""
+PAIRED = 4
+"""Choices that alone leave least, and are tried two at a time whatever they are."""
 PATIENCE = 30.0
 """s that one rerun may take."""
 ALIKE = 1.01
-"""Knobs whose remaining errors differ by no more than this factor do equally well."""
+"""Changes whose remaining errors differ by no more than this factor do equally well."""
 ROUNDING = 1e-9
-"""A knob that leaves no more of the error than this has removed it."""
+"""A change that leaves no more of the error than this has removed it."""
+FACTOR = 4
+"""By which a count is raised: iterations, substeps, persistence."""
+NOT_TRIED: Mapping[str, str] = {"record_every": "it says which frames are kept; the run is the same"}
+"""Settings that are not changed, and why."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +40,7 @@ class Knob:
     knob: str
     """the setting"""
     value: float | str
-    """what it was changed to"""
+    """what it was changed to; of two, a text that names both"""
     status: str
     """`ok`, `diverged`, `failed`, `refused`, `stopped` where it took too long, `same` where it was that already"""
     reason: str | None
@@ -39,36 +48,63 @@ class Knob:
     """m, up to the same time"""
     ratio: float | None
     """of that to the error before: below 1 is better"""
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    """all settings that differ"""
 
     def document(self) -> dict[str, Any]:
         """Return it as a JSON object."""
-        return dict(vars(self))
+        return {**vars(self), "changes": dict(self.changes)}
+
+    @property
+    def label(self) -> str:
+        """What was changed to what, such as `dt = 0.005`."""
+        return self.knob if " = " in self.knob else f"{self.knob} = {_text(self.value)}"
 
 
-def knobs(settings: Settings, joints: bool = False) -> Iterator[tuple[str, Any, dict[str, Any]]]:
-    """Yield each knob, what it is set to, and the settings that this changes.
+def knobs(settings: Settings) -> Iterator[tuple[str, Any, dict[str, Any]]]:
+    """Yield each setting that an engine has, what it is set to, and the settings that this changes.
+
+    All fields of `Settings` but those of `NOT_TRIED`: of a word every other, of a switch the other, of a count four
+    times as many, of a figure 0 where that is allowed, else half. A setting that is None the engine does not have.
 
     Args:
         settings: as the engine filled them in.
-        joints: the scene has some, so that it matters how they are held.
     """
-    # Every frame that was kept still is.
-    yield "dt", settings.dt / 2.0, {"dt": settings.dt / 2.0, "record_every": settings.record_every * 2}
-    yield "slop", 0.0, {"slop": 0.0}
-    yield "iterations", settings.iterations * 4, {"iterations": settings.iterations * 4}
-    choices = [("integrator", get_args(Integrator)), ("detection", get_args(Detection))]
-    if joints:
-        choices.append(("joints", get_args(Joints)))
-    for name, words in choices:
-        for word in words:
-            if word != getattr(settings, name):
-                yield name, word, {name: word}
+    for name, info in Settings.model_fields.items():
+        value = getattr(settings, name)
+        if name in NOT_TRIED or value is None:
+            continue
+        if name == "dt":  # every frame that was kept still is
+            yield name, value / 2.0, {"dt": value / 2.0, "record_every": settings.record_every * 2}
+        elif isinstance(value, bool):
+            yield name, not value, {name: not value}
+        elif isinstance(value, str):
+            yield from ((name, word, {name: word}) for word in _words(info.annotation) if word != value)
+        else:
+            wanted = (
+                FACTOR * value if isinstance(value, int) else 0.0 if _is_allowed(settings, name, 0.0) else value / 2.0
+            )
+            yield name, wanted, {name: wanted}
+
+
+def _words(annotation: Any) -> tuple[str, ...]:
+    """Return the words of a Literal, or of a Literal or None."""
+    parts = get_args(annotation)
+    return tuple(word for part in parts for word in ((part,) if isinstance(part, str) else _words(part)))
+
+
+def _is_allowed(settings: Settings, name: str, value: float) -> bool:
+    try:
+        settings.replace(**{name: value})
+    except ValidationError:
+        return False
+    return True
 
 
 def turned(
     scene: Scene, engine: str, asked: Settings, truth: Trajectory, until: float, before: float
 ) -> tuple[Knob, ...]:
-    """Rerun an engine with one knob changed at a time.
+    """Rerun an engine with one choice changed at a time, and where none of these suffices, with two.
 
     Args:
         scene: what to run.
@@ -81,48 +117,75 @@ def turned(
     Raises:
         TooLargeError: the frames of a run would not fit into memory.
     """
-    found = []
     filled = ENGINES[engine].resolve(scene, asked)
-    for knob, value, changes in knobs(filled, len(scene.links) > 0):
+
+    def tried(knob: str, value: Any, changes: dict[str, Any]) -> Knob:
         if all(getattr(filled, key) == new for key, new in changes.items()):
-            found.append(Knob(knob, value, "same", "it is so already", before, 1.0))
-            continue
+            return Knob(knob, value, "same", "it is so already", before, 1.0, changes)
         try:
             settings = asked.replace(**changes)
         except ValidationError as error:
-            found.append(Knob(knob, value, "refused", error.errors()[0]["msg"], None, None))
-            continue
+            return Knob(knob, value, "refused", error.errors()[0]["msg"], None, None, changes)
         missing = ENGINES[engine].missing(scene, settings)
         if missing:
-            found.append(Knob(knob, value, "refused", "; ".join(missing), None, None))
-            continue
+            return Knob(knob, value, "refused", "; ".join(missing), None, None, changes)
         try:
             again = patient_run(scene, engine, settings, PATIENCE)
         except TookTooLongError as error:
-            found.append(Knob(knob, value, "stopped", str(error), None, None))
-            continue
+            return Knob(knob, value, "stopped", str(error), None, None, changes)
         after = errors(again, truth, ~scene.bodies.fixed).until(until).max_position
-        if after is None or not math.isfinite(after):
-            found.append(Knob(knob, value, again.status, again.reason, None, None))
-        else:
-            found.append(Knob(knob, value, again.status, again.reason, after, after / before))
-    return tuple(found)
+        known = after is not None and math.isfinite(after)
+        return Knob(
+            knob, value, again.status, again.reason, after if known else None,
+            after / before if known and after is not None else None, changes,
+        )  # fmt: skip
+
+    alone = [tried(*knob) for knob in knobs(filled)]
+    if min(map(_ratio, alone), default=math.inf) <= SUFFICES:
+        return tuple(alone)
+    return (*alone, *(tried(f"{a.label} and {b.label}", "", {**a.changes, **b.changes}) for a, b in _pairs(alone)))
+
+
+def _pairs(tried: Iterable[Knob]) -> Iterator[tuple[Knob, Knob]]:
+    """Yield the changes that are worth a try together: every two methods, and the best of all.
+
+    Two methods may do together what neither does alone, such as flight without an error and the time of an impact. Of
+    values of one choice that leave as much, the first stands for all. Those without any effect are left out, and the
+    step is made smaller in one way.
+    """
+    able = [knob for knob in tried if knob.status == "ok" and knob.ratio is not None and knob.ratio != 1.0]
+    kinds: dict[str, list[Knob]] = {}
+    for knob in able:
+        same = kinds.setdefault(knob.knob, [])
+        if not any(_ratio(each) <= ALIKE * _ratio(knob) and _ratio(knob) <= ALIKE * _ratio(each) for each in same):
+            same.append(knob)
+    methods = [knob for same in kinds.values() for knob in same if isinstance(knob.value, str | bool)]
+    best = sorted((min(same, key=_ratio) for same in kinds.values()), key=_ratio)[:PAIRED]
+    chosen = [*methods, *(knob for knob in best if knob not in methods)]
+    for a, b in combinations(chosen, 2):
+        both = {a.knob, b.knob}
+        together = all(knob in methods for knob in (a, b)) or all(knob in best for knob in (a, b))
+        if together and len(both) == 2 and both != {"dt", "substeps"}:
+            yield a, b
 
 
 def verdict(engine: str, tried: tuple[Knob, ...], before: float) -> str:
-    """Say which knob moves the error most."""
+    """Say which change lowers the error most."""
     usable = [knob for knob in tried if knob.status == "ok" and knob.ratio is not None]
     least = min(map(_ratio, usable), default=math.inf)
     # The first of those that do as well: what they differ by then is rounding.
     best = next((knob for knob in usable if _ratio(knob) <= max(ALIKE * least, ROUNDING)), None)
     if best is None:
-        return f"{engine}: none of the knobs could be tried"
+        return f"{engine}: no other setting could be tried"
     if _ratio(best) > MATTERS:
-        return f"{engine}: no single knob lowers the error of {before:.3g} m by more than {1 - MATTERS:.0%}"
-    value = f"{best.value:.4g}" if isinstance(best.value, float) else str(best.value)
-    left = "to 0" if best.max_position_error == 0.0 else f"to {best.max_position_error:.3g} m (×{best.ratio:.2g})"
-    return f"{engine}: {best.knob} = {value} moves the difference most, from {before:.3g} m {left}"
+        return f"{engine}: no other setting lowers the error of {before:.3g} m by more than {1 - MATTERS:.0%}"
+    left = "0 m" if best.max_position_error == 0.0 else f"{best.max_position_error:.3g} m"
+    return f"{engine}: largest gain by {best.label}: ×{best.ratio:.2g} of the error is left, {left} of {before:.3g} m"
 
 
 def _ratio(knob: Knob) -> float:
     return math.inf if knob.ratio is None else knob.ratio
+
+
+def _text(value: float | str) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sandbox.measure.forecast.passages import top_speeds
+from sandbox.measure.forecast.speeds import top_speeds
 from sandbox.measure.forecast.warning import Figures, Warning, at_most
 from sandbox.scene.demands import FLOOR, demands
 from sandbox.scene.meetings import meetings

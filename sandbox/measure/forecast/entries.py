@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sandbox.measure.forecast.passages import top_speeds
+from sandbox.measure.forecast.speeds import top_speeds
 from sandbox.measure.forecast.warning import ROUNDING, Warning, at_most
 from sandbox.scene.meetings import Meetings, reach
 from sandbox.scene.model import Scene

@@ -57,12 +57,24 @@ def _columns(scene: Scene) -> int:
 
 def event_warnings(scene: Scene, meet: Meetings) -> Iterator[Warning]:
     """Yield a warning where `exact` would give up, as it has more events than it allows."""
-    rate = event_rate(scene, meet)
-    allowed = max(ALLOWED, ALLOWED_EACH * len(scene.bodies))
-    if rate > allowed:
-        message = (
-            f"balls that come to rest on each other hop some {rate:.2g} times a second on `exact`, which allows "
-            f"{allowed:,} events and gives up beyond; pymunk and reference let them lie"
-        )
-        figures: Figures = {"rate": rate, "allowed": allowed}
-        yield Warning("event_rate", message, figures)
+    warning = event_warning(event_rate(scene, meet), len(scene.bodies))
+    if warning is not None:
+        yield warning
+
+
+def event_warning(rate: float, bodies: int) -> Warning | None:
+    """Return a warning where a rate of events, 1/s, is more than `exact` allows for so many bodies."""
+    allowed = max(ALLOWED, ALLOWED_EACH * bodies)
+    if rate <= allowed:
+        return None
+    many = f"{rate:.2g} times a second" if math.isfinite(rate) else "ever more often"
+    message = (
+        f"balls that come to rest on each other hop {many} on `exact`, which allows {allowed:,} events a simulated "
+        "second and stops with an error beyond; pymunk and reference let them lie"
+    )
+    figures: Figures = {"rate": min(rate, MOST_RATE), "allowed": allowed}
+    return Warning("event_rate", message, figures)
+
+
+MOST_RATE = 1e12
+"""Figure that is given for a rate without bound, 1/s."""

@@ -1,5 +1,6 @@
 """Notes: what is worth knowing of a scene and is no warning."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,8 +18,28 @@ MOST_TOLD = 20
 
 
 def notes(scene: Scene) -> list[Warning]:
-    """Return notes: how each concave outline is cut, what an audit cannot count, until when positions can be told."""
-    return [*_outlines(scene), *_audit(scene), *horizon_notes(scene), *break_notes(scene)]
+    """Return notes: units that look like pixels, concave outlines, what an audit cannot count, predictability."""
+    return [*_pixels(scene), *_outlines(scene), *_audit(scene), *horizon_notes(scene), *break_notes(scene)]
+
+
+def _pixels(scene: Scene) -> Iterator[Warning]:
+    """Yield a note where bodies are metres wide, and gravity points up or is far stronger than on any planet."""
+    bodies, (_, upward) = scene.bodies, scene.world.gravity
+    pull, moves = math.hypot(*scene.world.gravity), ~bodies.fixed
+    if not moves.any() or pull == 0.0:
+        return
+    width = 2.0 * float(np.median(bodies.thin[moves]))
+    if width >= WIDE and (pull >= STRONG or upward > 0.0):
+        points = ", and points up, as y does here" if upward > 0.0 else ""
+        message = (
+            f"bodies are {width:.3g} m wide, and gravity is {pull:.4g} m/s²{points}: are these pixels? Lengths are in "
+            "metres, y points up; with, say, 100 pixels a metre, divide lengths, speeds and gravity by 100"
+        )
+        yield Warning("pixels", message, {"width": width, "gravity": pull})
+
+
+WIDE, STRONG = 5.0, 100.0
+"""Median width of bodies, m, and gravity, m/s², from which on figures look like pixels."""
 
 
 def _outlines(scene: Scene) -> Iterator[Warning]:

@@ -7,19 +7,19 @@ width counts, where it is narrowest, for a radius: flying sideways it reaches no
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sandbox.measure.forecast.held import farthest_fall
+from sandbox.measure.forecast.speeds import Speeds
+from sandbox.measure.forecast.warning import ROUNDING
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.meetings import reach as reach_of
 from sandbox.scene.model import Plane, Post, Scene, Wall
-from sandbox.scene.near import BoolArray, FloatArray
+from sandbox.scene.near import BoolArray, FloatArray, IntArray
 from sandbox.scene.part import BACKING
 from sandbox.scene.settings import Settings
-from sandbox.scene.starts import height_above
 from sandbox.scene.zone import mask_of
 
 ANOTHER = "another ball"
@@ -28,7 +28,7 @@ ANOTHER_BODY = "another body"
 
 @dataclass(frozen=True)
 class Passage:
-    """The likeliest way to tunnel: who through what, and from which substep on."""
+    """A way to tunnel: which body through what, and from which substep on."""
 
     ball: str
     thing: str
@@ -36,6 +36,10 @@ class Passage:
     """m/s at which they close, at most"""
     reach: float
     """m, that one substep may cover"""
+    others: int = 0
+    """bodies that need about as short a substep"""
+    struck: bool = False
+    """The speed is one that the body may get by impacts of others; by itself it is slower."""
 
     @property
     def safe_h(self) -> float:
@@ -48,54 +52,142 @@ class Passage:
         return 1.0 - self.reach / way if way > self.reach else 0.0
 
 
-def largest_safe_dt(scene: Scene, settings: Settings | None = None) -> float:
-    """Return the largest dt, s, at which nothing in the scene can tunnel, at its number of substeps; inf if at any."""
+def largest_safe_dt(scene: Scene, settings: Settings | None = None) -> float | None:
+    """Return the largest dt, s, at which nothing in the scene can tunnel, at its number of substeps.
+
+    Infinite if nothing can at any; None where bodies can meet something, and something makes them faster by an amount
+    that no formula bounds.
+    """
     settings = scene.solver if settings is None else settings
-    return min((p.safe_h for p in passages(scene)), default=math.inf) * settings.substeps * farther(settings)
+    meet = meetings(scene)
+    found, times = passages(scene, meet), farther(settings)
+    if found and math.isfinite(times) and Speeds(scene, meet).unknown:
+        return None
+    return min((p.safe_h for p in found), default=math.inf) * settings.substeps * times
 
 
 def farther(settings: Settings) -> float:
     """Return how many times the way that plain looking allows a body may fly in a substep, by the detection: 1 or inf.
 
     `swept` looks along the whole way, and `shrink` cuts it into pieces that are short enough. `bisect` looks only
-    where the substep ends, and there sees nobody who is past the middle already. Measured with a bullet at a wall
+    where the substep ends, and there misses a body that is past the middle already. Measured with a bullet at a wall
     (`sandbox extremes --axes speed`): it passes from v·h of 1.00 times r + w/2 on, with `bisect` too; with the other
     two not at 100 times.
     """
     return math.inf if settings.detection in ("swept", "shrink") else 1.0
 
 
+MOST_EACH = 5
+"""Passages given for one thing: those that need the shortest substeps."""
+ALIKE = 1.1
+"""Ratio of the shortest substeps of two bodies up to which they are one passage."""
+
+
 def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
-    """Return for each thing, and for bodies among themselves, the passage that needs the shortest substep."""
+    """Return for each thing, and for bodies among themselves, which bodies can pass it, each at its own speed.
+
+    Bodies about as fast for their size are one passage, which has the figures of the worst of them. Where impacts by
+    others can make a body faster than any is by itself, the worst such passage is added.
+    """
     meet = meetings(scene) if meet is None else meet
     bodies = scene.bodies
     movers = np.flatnonzero(meet.touches & ~bodies.fixed)
     if not len(movers):
         return []
-    speed, half = top_speeds(scene, meet)[movers], bodies.thin[movers]
-    found = []
+    speeds = Speeds(scene, meet)
+    half, struck = bodies.thin[movers], speeds.struck[movers]
+    found: list[Passage] = []
 
-    def worst(reach: FloatArray, speeds: FloatArray, thing: str) -> None:
-        if not np.isfinite(reach).any():
+    def add(able: BoolArray, reach: FloatArray, speed: FloatArray, thing: str) -> None:
+        rows = np.flatnonzero(able)
+        if not len(rows):
             return
-        with np.errstate(divide="ignore", over="ignore"):  # at rest, or as good as: never
-            k = int(np.argmin(reach / speeds))
-        found.append(Passage(bodies.names[movers[k]], thing, float(speeds[k]), float(reach[k])))
+        own = _groups(bodies.names, movers[rows], reach[rows], speed[rows], thing)
+        found.extend(own)
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # at rest, or as good as: never
+            worst = rows[int(np.argmin(reach[rows] / struck[rows]))]
+        fastest = Passage(bodies.names[movers[worst]], thing, float(struck[worst]), float(reach[worst]), struck=True)
+        if fastest.safe_h < own[0].safe_h * (1.0 - ROUNDING):
+            found.append(fastest)
 
     layers = reach_of(scene, bodies)[movers]
     for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):
-        if not isinstance(thing, Plane) and not thing.solid:
-            continue
-        shares = layers & mask_of(thing.layers, scene.layers) != 0
-        worst(np.where(shares, half + _half_depth(thing), np.inf), speed, name)
-    among = meet_each_other(bodies)[movers]
+        if isinstance(thing, Plane) or thing.solid:
+            shares = layers & mask_of(thing.layers, scene.layers) != 0
+            add(shares, half + _half_depth(thing), speeds.toward(thing)[movers], name)
     fixed = np.flatnonzero(bodies.fixed & meet.touches)
     if meet.mutual and len(fixed):
-        worst(half + float(bodies.thin[fixed].min()), speed, bodies.names[fixed[bodies.thin[fixed].argmin()]])
-    if meet.mutual and int(among.sum()) > 1:
-        another = ANOTHER if bodies.round[movers].all() else ANOTHER_BODY
-        worst(half[among] + float(half[among].min()), speed[among] + float(speed[among].max()), another)
+        thinnest = fixed[bodies.thin[fixed].argmin()]
+        add(
+            np.ones(len(movers), np.bool_),
+            half + float(bodies.thin[thinnest]),
+            speeds.own[movers],
+            bodies.names[thinnest],
+        )
+    among = np.flatnonzero(meet_each_other(bodies)[movers])
+    if meet.mutual and len(among) > 1:
+        found.extend(_mutual(scene, speeds, movers[among]))
     return found
+
+
+def _groups(
+    names: tuple[str, ...], number: IntArray, reach: FloatArray, speed: FloatArray, thing: str
+) -> list[Passage]:
+    """Return a passage for bodies alike, the one that needs the shortest substep first, at most `MOST_EACH`."""
+    with np.errstate(divide="ignore", over="ignore"):  # at rest, or as good as: never
+        order = np.argsort(reach / speed, kind="stable")
+    found: list[Passage] = []
+    for k in order.tolist():
+        each = Passage(names[number[k]], thing, float(speed[k]), float(reach[k]))
+        if found and (each.safe_h <= ALIKE * found[-1].safe_h or not math.isfinite(each.safe_h)):
+            found[-1] = replace(found[-1], others=found[-1].others + 1)
+        elif len(found) == MOST_EACH:
+            break
+        else:
+            found.append(each)
+    return found
+
+
+MOST_CLOSING = 200
+"""Bodies of which every pair is looked at: the fastest and the thinnest."""
+
+
+def _mutual(scene: Scene, speeds: Speeds, number: IntArray) -> list[Passage]:
+    """Return the passages of bodies through each other: the worst for each body, of bodies alike once."""
+    bodies = scene.bodies
+    another = ANOTHER if bodies.round[number].all() else ANOTHER_BODY
+    if len(number) > MOST_CLOSING:
+        with np.errstate(divide="ignore", over="ignore"):
+            order = np.argsort(bodies.thin[number] / speeds.own[number], kind="stable")
+        number = number[order[:MOST_CLOSING]]
+    half, own = bodies.thin[number], speeds.own[number]
+    struck = np.maximum(own, speeds.struck[number])
+    reach = half[:, None] + half
+    two = len(number) == 2 and not scene.fixed and not bodies.fixed.any()
+    closing = own[:, None] + own
+    if two and not len(scene.links) and not (scene.attractions or scene.thrusts or scene.drives):
+        velocity = bodies.velocity[number]
+        closing = np.full((2, 2), float(np.hypot(*(velocity[0] - velocity[1]))))
+    other, _ = _soonest(reach, closing)
+    rows = np.arange(len(number))
+    found = _groups(bodies.names, number, reach[rows, other], closing[rows, other], another)
+    found = [replace(found[0], others=0)] if len(number) == 2 else found
+    closing = struck[:, None] + struck
+    other, safe = _soonest(reach, closing)
+    k = int(safe.argmin())
+    last = other[k]
+    fastest = Passage(bodies.names[number[k]], another, float(closing[k, last]), float(reach[k, last]), struck=True)
+    return [*found, fastest] if not two and fastest.safe_h < found[0].safe_h * (1.0 - ROUNDING) else found
+
+
+def _soonest(reach: FloatArray, closing: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return with which other one each passes in the shortest substep, and that substep, (N,) s."""
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # at rest, or as good as: never
+        safe = np.where(closing > 0.0, reach / closing, np.inf)
+    safe[np.eye(len(safe), dtype=np.bool_)] = np.inf
+    other = safe.argmin(axis=1)
+    other = np.where(other == np.arange(len(safe)), (other + 1) % len(safe), other)  # where all are inf
+    return other, safe.min(axis=1)
 
 
 def meet_each_other(bodies: Bodies) -> BoolArray:
@@ -112,69 +204,3 @@ def _half_depth(thing: Plane | Wall | Post) -> float:
             return thing.thickness / 2.0
         case Post():
             return thing.radius
-
-
-def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
-    """Return about how fast each body can get, (N,) m/s.
-
-    By its own fall: from rest on the speed it starts with, until a level floor below it or the end of the run; in
-    scenes with other bodies than balls, or joints, also the end of what it hangs on, or past all that could stop it.
-    Where balls can meet, any may be hit by the fastest: an equal one takes over its speed, a lighter one gets up to
-    twice it. Who is kicked gets up to the speed at which each hit takes as much as it brings. What springs, motors,
-    attraction, thrusts and drives add is left out.
-    """
-    bodies, world = scene.bodies, scene.world
-    start = np.hypot(*bodies.velocity.T)
-    gravity = math.hypot(*world.gravity)
-    speed = start + gravity * world.duration
-    if gravity > 0:
-        down = np.asarray(world.gravity) / gravity
-        for plane in scene.planes:
-            normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
-            if float(normal @ down) < -1.0 + 1e-12:  # level to rounding: anything else can be slid down for ever
-                drop = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
-                speed = np.where(~meet.touches, speed, np.minimum(speed, np.sqrt(start**2 + 2.0 * gravity * drop)))
-        if len(scene.links) or not bodies.round.all():
-            drop = np.maximum(_fall(scene, down), 0.0)
-            speed = np.minimum(speed, np.sqrt(start**2 + 2.0 * gravity * drop))
-    speed = np.where(bodies.fixed, 0.0, speed)
-    if world.linear_drag or world.quadratic_drag:
-        speed += math.hypot(*world.wind)
-    speed = np.where(meet.touches & ~bodies.fixed, np.maximum(speed, _kicked(meet)), speed)
-    if meet.mutual:
-        movers = ~bodies.fixed & meet.touches
-        heaviest, fastest = float(bodies.mass[movers].max()), float(speed[movers].max())
-        gained = fastest * 2.0 * heaviest / (heaviest + bodies.mass)
-        speed = np.where(movers, np.maximum(speed, gained), speed)
-    return np.asarray(speed)
-
-
-def _kicked(meet: Meetings) -> float:
-    """Return how fast kicks make a body, m/s, that always comes back; by one kick where there is no end."""
-    surfaces, fastest = meet.surfaces, 0.0
-    for b in np.flatnonzero(surfaces.kicks).tolist():
-        kick = surfaces.surfaces[b].kick
-        assert kick is not None
-        for a in np.flatnonzero(meet.touching[b]).tolist():
-            e, f = float(surfaces.restitution[a, b]), float(surfaces.falloff[a, b])
-            # v = e v/(1 + f v) + k, that is f v² + (1 − e − k f) v − k = 0
-            half = 0.5 * (1.0 - e - kick.speed * f)
-            root = half + math.sqrt(half * half + f * kick.speed)
-            fastest = max(fastest, kick.speed / root if root > 0.0 else kick.speed)
-    return fastest
-
-
-def _fall(scene: Scene, down: FloatArray) -> FloatArray:
-    """Return how far each body can fall, (N,) m, until what holds it is taut or nothing is left that it could meet."""
-    bodies = scene.bodies
-    held = farthest_fall(scene, down)
-    if scene.planes:  # what is no level floor goes down for ever
-        return held
-    depth = bodies.position @ down
-    stays = np.where(bodies.fixed, 0.0, held)
-    lowest = float(np.max((depth + stays + bodies.radius)[np.isfinite(stays)], initial=-np.inf))
-    for wall in scene.walls:
-        lowest = max(lowest, float((np.asarray(wall.points) @ down).max()) + wall.thickness / 2.0)
-    for post in scene.posts:
-        lowest = max(lowest, float(np.asarray(post.position) @ down) + post.radius)
-    return np.minimum(held, lowest - depth + bodies.radius) if math.isfinite(lowest) else held

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 ROUNDING = 1e-9
 """Relative: a limit exceeded by less counts as kept."""
 
-Figures = dict[str, float | int | str]
+Figure = float | int | str
+Figures = dict[str, Figure]
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,8 @@ USUAL = {"px": 1.0, "s": 0.05, "": 0.01}
 """Tolerances by unit where none is given; of lengths it is `compare`'s: 1 % of the smallest radius."""
 COUNTED = frozenset({"missed_contacts"})
 """Metrics that count: none is tolerated."""
+AUDITED = frozenset({"missed_contacts", "passes"})
+"""Metrics of which only an audited run has a value."""
 
 
 class UnknownMetricError(ValueError):
@@ -33,7 +35,9 @@ class Aim(NamedTuple):
     fps: float
     """frames a second"""
     step: float = math.inf
-    """s that a step of what is recommended may last: in between, nobody knows how right it is"""
+    """s that a step of what is recommended may last: in between its error is not known"""
+    reason: str = "it was asked for"
+    """why this metric"""
 
     @property
     def hurry(self) -> float | None:
@@ -53,25 +57,35 @@ def metric_named(name: str) -> Metric:
         raise UnknownMetricError(f"no metric {name!r}; metrics: {', '.join(METRICS)}") from None
 
 
-def usual_metric(judge: Judge) -> Metric:
-    """Return what a scene is best scored by where nothing else is asked for.
+def choose_metric(judge: Judge) -> tuple[Metric, str]:
+    """Return the metric that a scene is scored by where none is asked for, and why, as a clause.
 
     The distance from the truth, if it is trusted to the end. Else an invariant: how well joints hold, where there are
-    some; energy, where nothing takes any; the depth of overlaps, where bodies can meet. Where there is none of these,
-    the distance from the truth as far as it is trusted, or at last energy; that too where nothing moves.
+    some; energy, where nothing takes any; how far bodies move that lie still in the truth, as in a stack; the depth of
+    overlaps, where bodies can meet. Where there is none of these, the distance from the truth as far as it is
+    trusted, or at last energy; that too where nothing moves.
     """
-    scene = judge.scene
+    scene, duration = judge.scene, judge.scene.world.duration
     if not judge.moving.any():
-        return METRICS["energy"]
-    if judge.truth is not None and judge.until >= scene.world.duration:
-        return METRICS["max_position"]
+        return METRICS["energy"], "nothing in the scene can move"
+    if judge.truth is not None and judge.until >= duration:
+        kind = judge.truth.kind.replace("_", " ")
+        return METRICS["max_position"], f"the truth ({kind}) is trusted to the end, {duration:.4g} s"
+    if judge.truth is None:
+        doubt = f"no truth is known{f' ({judge.doubt})' if judge.doubt else ''}"
+    else:
+        doubt = f"positions are predictable for {judge.until:.3g} s of {duration:.4g} s only"
     if np.isin(scene.links.kind, HOLDING).any():
-        return METRICS["joint_error"]
+        return METRICS["joint_error"], f"{doubt}, and joints hold bodies together"
     if keeps_energy(scene):
-        return METRICS["energy"]
+        return METRICS["energy"], f"{doubt}, and nothing in the scene takes energy"
+    if judge.still.any():
+        return METRICS["drift"], f"{doubt}, and {int(judge.still.sum())} bodies should lie still"
     if meetings(scene).touches.any():
-        return METRICS["penetration"]
-    return METRICS["energy" if judge.truth is None else "max_position"]
+        return METRICS["penetration"], f"{doubt}, and bodies can touch"
+    if judge.truth is None:
+        return METRICS["energy"], doubt
+    return METRICS["max_position"], f"{doubt}; it is counted up to then"
 
 
 def keeps_energy(scene: Scene) -> bool:
@@ -102,7 +116,7 @@ def require_aim(metric: str | None, tolerance: float | None, budget: float | Non
 
 def aim_at(judge: Judge, metric: str | None, tolerance: float | None, budget: float | None, fps: float) -> Aim:
     """Return what is asked, which makes sense (`require_aim`), with what was left open filled in."""
-    chosen = usual_metric(judge) if metric is None else metric_named(metric)
+    chosen, reason = choose_metric(judge) if metric is None else (metric_named(metric), "it was asked for")
     if tolerance is None:
         tolerance = 0.0 if chosen.name in COUNTED else USUAL.get(chosen.unit, usual_tolerance(judge.scene))
-    return Aim(chosen, tolerance, budget, fps)
+    return Aim(chosen, tolerance, budget, fps, reason=reason)

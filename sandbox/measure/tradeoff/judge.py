@@ -27,6 +27,8 @@ class Judge:
     truth: Truth | None
     zoom: float
     """px/m"""
+    doubt: str | None = None
+    """why there is no truth, where that is known"""
     _last: list[tuple[Trajectory, Errors]] = field(default_factory=list, init=False, repr=False)
 
     @property
@@ -73,10 +75,24 @@ class Judge:
         away = strayed(self.truth.trajectory)
         return np.asarray(self.moving & (away <= STILL * self.scene.bodies.thin))
 
+    @cached_property
+    def standing(self) -> BoolArray:
+        """Which of the bodies that lie still never leave the place where they start in the truth, (N,)."""
+        if not self.still.any():
+            return self.still
+        assert self.truth is not None
+        away = strayed(self.truth.trajectory, since=0.0)
+        return np.asarray(self.still & (away <= STILL * self.scene.bodies.thin))
 
-def strayed(run: Trajectory) -> FloatArray:
-    """Return how far each body gets, in the second half of a run, from where it was in the middle, (N,) m."""
-    half = run.position[run.time >= 0.5 * run.time[-1]]
+
+def strayed(run: Trajectory, since: float = 0.5) -> FloatArray:
+    """Return how far each body gets, in the last part of a run, from where it was at that part's beginning, (N,) m.
+
+    Args:
+        run: which.
+        since: where the part begins, as a fraction of the run's time; usually its second half.
+    """
+    half = run.position[run.time >= since * run.time[-1]]
     # A diverged state is infinitely far off.
     with np.errstate(over="ignore", invalid="ignore"):
         away = np.hypot(*np.moveaxis(half - half[0], 2, 0)).max(axis=0)

@@ -101,10 +101,15 @@ def penetration(run: Trajectory, judge: Judge) -> float | None:
 
 
 def drift(run: Trajectory, judge: Judge) -> float | None:
-    """Return how far any body gets in the second half that lies still then in truth, m. None where none does."""
+    """Return how far any body gets that lies still in the truth, m. None where none does.
+
+    A body that stands still in the truth from the start on, as in a stack, is followed from the start on; one that
+    comes to rest there, through the second half of the run.
+    """
     if not judge.still.any():
         return None
-    return float(strayed(run)[judge.still].max())
+    standing = strayed(run, since=0.0)[judge.standing].max(initial=0.0)
+    return float(max(standing, strayed(run)[judge.still].max()))
 
 
 def missed_contacts(run: Trajectory, _: Judge) -> float | None:
@@ -155,14 +160,14 @@ METRICS: Mapping[str, Metric] = {
         Metric("final_position", "m", "distance from the truth at the end", final_position),
         Metric("rms_position", "m", "root of the mean square distance from the truth", rms_position),
         Metric("pixels", "px", "largest distance from the truth on the screen", pixels),
-        Metric("bounce_height", "m", "how much too high or low it bounces", bounce_height),
-        Metric("energy", "", "drift of energy, as a share of the energy in motion", energy),
-        Metric("joint_error", "", "largest error of a joint, as a share", joints),
+        Metric("bounce_height", "m", "how much too high or low a body bounces", bounce_height),
+        Metric("energy", "", "drift of energy, as a fraction of the energy in motion", energy),
+        Metric("joint_error", "", "largest error of a joint, as a fraction of its length", joints),
         Metric("penetration", "m", "deepest overlap", penetration),
-        Metric("drift", "m", "how far what lies still strays", drift),
-        Metric("missed_contacts", "", "contacts that were never seen", missed_contacts),
-        Metric("passes", "", "share of meetings that were passed through", passes),
-        Metric("settle_time", "s", "how much too soon or late all settles", settle_time),
+        Metric("drift", "m", "how far bodies move that should lie still", drift),
+        Metric("missed_contacts", "", "contacts that the engine never saw", missed_contacts),
+        Metric("passes", "", "fraction of the contacts that were passed through", passes),
+        Metric("settle_time", "s", "how much too early or late everything comes to rest", settle_time),
     )
 }
 

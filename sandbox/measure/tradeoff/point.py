@@ -31,7 +31,12 @@ class Point:
     """ms per simulated second: the least of separate repeats, nothing recorded"""
     cost_median: float | None
     repeats: int
-    """0 where another point is as right and by far cheaper: the cost is then of the run that gave the error"""
+    """0 where another point of its engine is as right and by far cheaper: the cost is then of the run that gave the
+    error, with its frames kept and audited"""
+    counted: float | None
+    """ms per simulated second by the counters of the run (`counted_cost`): the same on every machine"""
+    is_own: bool
+    """whether it is the scene's own setting"""
     work: Mapping[str, int]
     """deterministic counters: substeps, pair tests, contact iterations, events"""
 
@@ -45,6 +50,8 @@ class Point:
             "cost_ms_per_second": finite(self.cost),
             "cost_median_ms_per_second": finite(self.cost_median),
             "repeats": self.repeats,
+            "counted_cost_ms_per_second": finite(self.counted),
+            "scene_setting": self.is_own,
             "status": self.status,
             "reason": self.reason,
             "metrics": {name: finite(value) for name, value in self.metrics.items()},

@@ -13,8 +13,8 @@ import numpy as np
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.closed import solved
-from sandbox.measure.compare.patience import TookTooLongError, patient_run, working
-from sandbox.measure.tradeoff.cost import seconds_of
+from sandbox.measure.compare.patience import TookTooLongError, working
+from sandbox.measure.tradeoff.cost import bounded_run, seconds_of, warm_up
 from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS
@@ -59,7 +59,8 @@ def proposals(
     tolerance: float,
     engine: str,
     settings: Settings,
-    patience: float,
+    limit: float,
+    deadline: float = math.inf,
     repeats: int = 3,
 ) -> list[Proposal]:
     """Return the cheaper models that stay within the tolerance, the cheapest first.
@@ -70,21 +71,22 @@ def proposals(
         tolerance: in its unit.
         engine: whose setting they would stand in for.
         settings: these, choices left to the engine still open.
-        patience: s that one run may take, and the timing of one model.
-        repeats: how often each is timed, if there is the time.
+        limit: counted cost that one run may have, s.
+        deadline: by the clock of `working`, s.
+        repeats: how often each is timed.
     """
-    found = [*_formula(judges, metric, tolerance, engine, settings, patience, repeats)]
+    found = [*_formula(judges, metric, tolerance, engine, settings, repeats)]
     for what, change in _simplifications(judges):
         error, simpler = 0.0, None
         for judge in judges:
             changed = _changed(judge.scene, change)
-            off = None if changed is None else _error(judge, metric, changed, engine, settings, patience)
+            off = None if changed is None else _error(judge, metric, changed, engine, settings, limit, deadline)
             error = max(error, math.inf if off is None else off)
             if not error <= tolerance:
                 break
             simpler = simpler or changed
         if simpler is not None and error <= tolerance:
-            own, its = _timed(judges[0].scene, simpler, engine, settings, patience, repeats)
+            own, its = _timed(judges[0].scene, simpler, engine, settings, repeats)
             if own is not None and its is not None and its <= CHEAPER * own:
                 found.append(_proposal(what, engine, error, its, own, judges[0].scene, metric))
     return sorted(found, key=lambda each: each.ratio)
@@ -96,7 +98,6 @@ def _formula(
     tolerance: float,
     engine: str,
     settings: Settings,
-    patience: float,
     repeats: int,
 ) -> Iterator[Proposal]:
     """Propose the closed form, where the scene has one for all of it."""
@@ -105,7 +106,7 @@ def _formula(
     scene, took, forms = judges[0].scene, [], [solved(judge.scene, settings) for judge in judges]
     errors = [None if f is None else METRICS[metric].measure(f, j) for f, j in zip(forms, judges, strict=True)]
     worst = max(math.inf if each is None or math.isnan(each) else each for each in errors)
-    own, _ = _timed(scene, None, engine, settings, patience, repeats)
+    own, _ = _timed(scene, None, engine, settings, repeats)
     if worst > tolerance or own is None:
         return
     for _ in range(repeats):
@@ -116,26 +117,27 @@ def _formula(
         yield _proposal("no engine: the scene has a closed form", None, worst, min(took), own, scene, metric)
 
 
-def _error(judge: Judge, metric: str, scene: Scene, engine: str, settings: Settings, patience: float) -> float | None:
+def _error(
+    judge: Judge, metric: str, scene: Scene, engine: str, settings: Settings, limit: float, deadline: float
+) -> float | None:
     if ENGINES[engine].missing(scene, settings):
         return None
     try:
-        run = patient_run(scene, engine, settings, patience, audit=True)
+        run, _ = bounded_run(scene, engine, settings, limit, deadline)
     except TookTooLongError:
         return None
     return METRICS[metric].measure(run, judge) if run.status == "ok" else None
 
 
 def _timed(
-    scene: Scene, other: Scene | None, engine: str, settings: Settings, patience: float, repeats: int
+    scene: Scene, other: Scene | None, engine: str, settings: Settings, repeats: int
 ) -> tuple[float | None, float | None]:
     """Return the least time that each of two scenes takes in turns, s; None where one does not get to its end."""
     both = [each for each in (scene, other) if each is not None]
     taken: list[list[float]] = [[] for _ in both]
-    began = working()
-    for turn in range(repeats):
-        if turn and (working() - began) * (turn + 1) / turn > patience:
-            break
+    for each in both:
+        warm_up(each, engine, settings)
+    for _ in range(repeats):
         for each, times in zip(both, taken, strict=True):
             seconds = seconds_of(each, engine, settings)
             if seconds is None:

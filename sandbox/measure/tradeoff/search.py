@@ -1,5 +1,8 @@
 """Search: which variants are worth a run. It refines near the front, and stops branches that are outdone.
 
+It is bounded and steered by counted cost (`cost.py`), so that the same search tries the same variants in the same order
+on every machine, unless a time limit ends it.
+
 First each engine's substeps are doubled until it meets the tolerance, if it can, so that there is an answer; and the
 ways together that are known to suit such a scene are tried. From its own settings on, the variants one choice away are
 tried then: of those trials that nothing outdoes on the same engine, the one that matters most for what is asked. At
@@ -7,7 +10,7 @@ last the smallest number of substeps and of iterations that still meets the tole
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import cycle
 
@@ -17,14 +20,15 @@ from sandbox.measure.tradeoff.front import outdone
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.trial import Trial, tried
 from sandbox.measure.tradeoff.variant import Space, Variant
+from sandbox.trajectory import Trajectory
 
 MARGIN = 0.7
-"""A trial is outdone by one that takes no more than this share of its time and is at least as right; times of a single
-run say no more."""
+"""A trial is outdone by one that has no more than this share of its counted cost and is at least as right; counted
+costs say no more of the time that each takes."""
 ENOUGH = 1e-6
 """Errors below this share of the tolerance are as good as none; where none is tolerated, of a single miss."""
 SLOW = 0.2
-"""The share of the patience that one variant's run may take, for each seed."""
+"""The share of the effort that one variant's run may take, for each seed."""
 FALLS = 0.8
 """Where half the step leaves more than this share of an error, it was of no use."""
 FLAT = 2
@@ -32,11 +36,12 @@ FLAT = 2
 FAR = 16
 """times its own substeps an engine goes at first: beyond, another way of doing things may be the cheaper one."""
 WIDE = 0.8
-"""The share of trials and time after which nothing new is looked for, so that some is left to close in."""
+"""The share of trials and effort after which nothing new is looked for, so that some is left to close in."""
 LITTLE = 0.95
 """What leaves more than this share of the error of something cheaper is not gone on from."""
-LEAST = 1.0
-"""s that an engine's own settings may always take."""
+
+LEAST = 30.0
+"""Counted cost, s, that a run with an engine's own settings may always have, however small the effort."""
 
 
 @dataclass
@@ -50,19 +55,25 @@ class Search:
     """in the unit of the metric: errors near it matter most"""
     budget: float | None
     """s for the whole run, where a cost is asked for"""
-    patience: float
-    """s that the search may take"""
+    effort: float
+    """counted cost that all trials together may have, s; every engine's own settings are tried even so"""
     most: int
     """trials"""
     told: Told
+    deadline: float = math.inf
+    """by the clock of `working`, s"""
+    known: Mapping[str, Trajectory] = field(default_factory=dict)
+    """by engine: runs with its own settings that were made already"""
     trials: dict[Variant, Trial] = field(default_factory=dict)
     untried: set[Variant] = field(default_factory=set)
-    """variants that would have taken too long"""
+    """variants that would have cost too much"""
     interrupted: bool = False
     """by the user; what was tried till then is kept"""
+    spent: float = 0.0
+    """counted cost of all trials, s"""
 
     def run(self) -> list[Trial]:
-        """Try variants until none is worth it, or the patience is at its end; return all trials in order."""
+        """Try variants until none is worth it, or the effort is at its end; return all trials in order."""
         try:
             self._look()
         except KeyboardInterrupt:
@@ -70,9 +81,8 @@ class Search:
         return list(self.trials.values())
 
     def _look(self) -> None:
-        self._began = working()
         expanded: set[Variant] = set()
-        starts = [self._try(variant) for variant in self.space.starts()[: self.most]]
+        starts = [self._try(variant) for variant in self.space.starts()[: self.most] if working() < self.deadline]
         for start in starts:
             self._reach(start)
         by_engine = {start.variant.engine: start for start in starts if start is not None and start.status != "stopped"}
@@ -84,16 +94,14 @@ class Search:
             if self.budget
             else [self._near_tolerance, self._cheap]
         )
-        turns = cycle([(engine, aim) for aim in aims for engine in self.space.engines])
+        turns = {engine: cycle(aims) for engine in self.space.engines}
         while self._goes_on(WIDE):
             open_trials = [t for v, t in self.trials.items() if v not in expanded and self._promising(t)]
             if not open_trials:
                 break
-            engine, aim = next(turns)  # every engine gets its turn: who asks for one wants its curve
-            own = [t for t in open_trials if t.variant.engine == engine]
-            if not own:
-                continue
-            best = min(own, key=aim)
+            # The engine that cost least so far is next: one that is slow leaves the others their share.
+            engine = min({t.variant.engine for t in open_trials}, key=self._spent_on)
+            best = min((t for t in open_trials if t.variant.engine == engine), key=next(turns[engine]))
             expanded.add(best.variant)
             for variant in self.space.near(best.variant):
                 if self._goes_on(WIDE) and (best.status != "stopped" or variant.work < best.variant.work):
@@ -122,25 +130,38 @@ class Search:
             trial = found
 
     def _goes_on(self, share: float = 1.0) -> bool:
-        return len(self.trials) < share * self.most and self._left > (1.0 - share) * self.patience
+        return (
+            len(self.trials) < share * self.most
+            and self._left > (1.0 - share) * self.effort
+            and working() < self.deadline
+        )
+
+    def _spent_on(self, engine: str) -> tuple[float, int]:
+        """Return what an engine's trials have cost, and its place among the engines, which decides between equals."""
+        spent = sum(trial.spent for variant, trial in self.trials.items() if variant.engine == engine)
+        return spent, self.space.engines.index(engine)
 
     @property
     def _left(self) -> float:
-        return self.patience - (working() - self._began)
+        return self.effort - self.spent
 
     def _try(self, variant: Variant, parent: Trial | None = None) -> Trial | None:
-        """Try a variant that was not tried, unless by its parent's time it would take too long."""
+        """Try a variant that was not tried, unless by its parent's counted cost it would cost too much."""
         if variant in self.trials:
             return self.trials[variant]
-        allowed = min(SLOW * self.patience * len(self.judges), self._left)
+        limit, known = max(self.effort, LEAST), self.known.get(variant.engine)
         if parent is not None:
-            expected = parent.seconds * variant.work / parent.variant.work * len(self.judges)
-            if expected > max(allowed, 0.0):
+            limit, known = min(SLOW * self.effort, max(self._left, 0.0) / len(self.judges)), None
+            if parent.cost * variant.work / parent.variant.work > limit:
                 self.untried.add(variant)
                 return None
         self.told(f"{len(self.trials) + 1} tried: {_called(variant)}")
-        found = tried(variant, self.space, self.judges, max(allowed, LEAST if parent is None else 0.0))
+        found = tried(variant, self.space, self.judges, limit, self.deadline, known)
+        if found.status == "stopped" and working() >= self.deadline:
+            self.untried.add(variant)
+            return None
         self.trials[variant] = found
+        self.spent += found.spent
         return found
 
     def _error(self, trial: Trial) -> float:
@@ -159,8 +180,8 @@ class Search:
             if trial.status == "ok" and trial.metrics.get(self.metric) is None:
                 return not good and trial is same[0]
             return not good and trial.variant.work >= max(t.variant.work for t in same)
-        others = [(t.seconds, LITTLE * self._error(t)) for t in good]
-        return not outdone(trial.seconds, self._error(trial), others, MARGIN)
+        others = [(t.cost, LITTLE * self._error(t)) for t in good]
+        return not outdone(trial.cost, self._error(trial), others, MARGIN)
 
     def _near_tolerance(self, trial: Trial) -> float:
         error, wanted = self._error(trial), self.tolerance or ENOUGH
@@ -168,10 +189,10 @@ class Search:
 
     def _near_budget(self, trial: Trial) -> float:
         assert self.budget is not None
-        return abs(math.log(max(trial.seconds, 1e-9) / self.budget))
+        return abs(math.log(max(trial.cost, 1e-9) / self.budget))
 
     def _cheap(self, trial: Trial) -> float:
-        return trial.seconds if math.isfinite(trial.error(self.metric)) else math.inf
+        return trial.cost if math.isfinite(trial.error(self.metric)) else math.inf
 
     def _close_in(self) -> None:
         """Of what meets the tolerance, and is outdone by nothing, find the fewest substeps and iterations that do."""

@@ -5,6 +5,7 @@ step with very many iterations, and the truth. The largest distances between nei
 the time step's and the model's parts; the whole is at most their sum, and may be less where they cancel.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -13,8 +14,9 @@ from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.errors import errors
-from sandbox.measure.compare.patience import TookTooLongError, patient_run, working
+from sandbox.measure.compare.patience import TookTooLongError
 from sandbox.measure.finite import finite
+from sandbox.measure.tradeoff.cost import bounded_run
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
@@ -22,7 +24,7 @@ from sandbox.trajectory import Trajectory
 MANY_ITERATIONS = 16
 """How many times the iterations stand for infinitely many."""
 FINEST = 16
-"""How many times the substeps stand for a step of 0, if there is the time; else as many as there is time for."""
+"""How many times the substeps stand for a step of 0, if the limit allows; else as many as it does."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +53,8 @@ class Split:
         return {**own, **{key: finite(getattr(self, key)) for key in figures}, "finest": self.finest}
 
 
-def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split | None:
-    """Take the position error of an engine's settings apart; None where no truth is, or no finer run ends in time.
+def split(judge: Judge, engine: str, asked: Settings, limit: float, deadline: float = math.inf) -> Split | None:
+    """Take the position error of an engine's settings apart; None where no truth is, or no finer run is allowed.
 
     The model's part is what is left at the finest step, if halving the step changed it by less than a tenth; a part
     that still shrinks belongs to the time step.
@@ -61,11 +63,12 @@ def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split 
         judge: gives scene and truth.
         engine: its name.
         asked: settings, choices left to the engine still open.
-        patience: s that all runs together may take.
+        limit: counted cost that all runs together may have, s.
+        deadline: by the clock of `working`, s.
     """
     if judge.truth is None:
         return None
-    runs = _Runs(judge, engine, working() + patience)
+    runs = _Runs(judge, engine, limit, deadline)
     own = runs.of(asked)
     if own is None:
         return None
@@ -92,26 +95,29 @@ def split(judge: Judge, engine: str, asked: Settings, patience: float) -> Split 
     )
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Runs:
     judge: Judge
     engine: str
-    end: float
-    """of the patience, s, by the clock of `working`"""
+    left: float
+    """counted cost that further runs may have, s"""
+    deadline: float
 
     def of(self, settings: Settings) -> Trajectory | None:
         """Return a run that got to its end, or None."""
-        left = self.end - working()
-        if left <= 0.0:
+        if self.left <= 0.0:
             return None
         try:
-            found = patient_run(self.judge.scene, self.engine, settings, left)
+            scene, end = self.judge.scene, self.deadline
+            found, counted = bounded_run(scene, self.engine, settings, self.left, end, audit=False)
         except TookTooLongError:
+            self.left = 0.0
             return None
+        self.left -= counted
         return found if found.status == "ok" else None
 
     def finer(self, settings: Settings) -> Iterator[tuple[int, Trajectory]]:
-        """Yield runs of ever more substeps, 2, 4, 8 …, as long as they get to their end in time."""
+        """Yield runs of ever more substeps, 2, 4, 8 …, as long as they are allowed."""
         factor = 2
         while factor <= FINEST:
             try:

@@ -1,39 +1,57 @@
-"""Weighing: a scene's engines and settings, tried, timed and held against the best known truth."""
+"""Weighing: a scene's engines and settings, tried, timed and held against the best known truth.
+
+Which settings are tried, in which order, and how far off each is depends on the scene and on the counted work that is
+allowed, never on the clock, unless a time limit is given. Times are of this machine; where two are too close to tell
+apart, counted work decides which is the cheaper.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from sandbox.engines.registry import ENGINES, engine_named
 from sandbox.measure.compare.comparing import usual_tolerance
-from sandbox.measure.compare.truth import Truth, truth_of
+from sandbox.measure.compare.patience import working
+from sandbox.measure.compare.truth import Truth, seek_truth
 from sandbox.measure.recorder import require_memory
 from sandbox.measure.seeds import is_random, seeded
 from sandbox.measure.told import Told, nobody
-from sandbox.measure.tradeoff.aim import Aim, aim_at, metric_named, require_aim
+from sandbox.measure.tradeoff.aim import AUDITED, Aim, aim_at, metric_named, require_aim
 from sandbox.measure.tradeoff.cost import Cost, costs
-from sandbox.measure.tradeoff.front import outdone, pareto
+from sandbox.measure.tradeoff.front import outdone
 from sandbox.measure.tradeoff.judge import Judge, zoom_of
-from sandbox.measure.tradeoff.picking import FRESH, LONGER, Again, cheapest, closest
+from sandbox.measure.tradeoff.picking import (
+    FRESH,
+    LONGER,
+    Again,
+    cheapest,
+    closest,
+    nearest_to_budget,
+    nearest_to_tolerance,
+)
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.proposals import Proposal, proposals
 from sandbox.measure.tradeoff.search import SLOW, Search
 from sandbox.measure.tradeoff.split import Split, split
 from sandbox.measure.tradeoff.trial import Trial, tried
 from sandbox.measure.tradeoff.variant import Space, Variant
-from sandbox.measure.tradeoff.weighed import Tradeoff
+from sandbox.measure.tradeoff.weighed import Tradeoff, front_of
 from sandbox.measure.versions import machine, versions
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
+from sandbox.trajectory import Trajectory
 
-PATIENCE = 60.0
-"""s that the search may take where nothing else is said; truth and timing come on top."""
+EFFORT = 30.0
+"""Counted work that the search may do where nothing else is asked for, about seconds; truth and timing come on top."""
 REPEATS = 5
 POINTS = 120
 NEAR = 0.5
-"""What takes more than the inverse of this share of a point that is as right is not timed apart."""
+"""What costs more than the inverse of this share of a point of its engine that is as right is not timed apart."""
 AGAIN = 0.5
-"""The share of the patience that timing again may take."""
+"""The share of the effort that timing again may take."""
+FEWEST = 2
+"""Repeats at least, where more were asked for: the first may be slow for another reason than its settings."""
 SEEDS = 2**63
 """They go on at 0."""
 
@@ -48,10 +66,12 @@ def tradeoff(
     fps: float = 60.0,
     seeds: int = 1,
     zoom: float | None = None,
-    patience: float = PATIENCE,
+    effort: float = EFFORT,
+    time_limit: float | None = None,
     repeats: int = REPEATS,
     most: int = POINTS,
-    truth: Truth | None = None,
+    truth: Truth | str | None = None,
+    runs: Mapping[str, Trajectory] = MappingProxyType({}),
     told: Told | None = None,
     **settings: Any,
 ) -> Tradeoff:
@@ -67,11 +87,15 @@ def tradeoff(
         fps: frames a second of the budget; what is recommended steps as often, or as often as the scene does.
         seeds: how many, from the scene's own on; errors are the worst of them.
         zoom: px/m, for errors in pixels; by default all that happens fills a window of 1280 × 720.
-        patience: s that the search may take.
+        effort: counted work that the search may do, in about seconds of computing: the same settings are tried
+            on every machine. Every engine's own settings are tried, however small the effort.
+        time_limit: s after which nothing more is tried; what is tried then depends on the machine.
         repeats: how often what is near the front is timed.
         most: how many settings are tried.
-        truth: of this scene and its frames, as close as the tolerance asks for, where it is known already.
-        told: who is told what is being done.
+        truth: of this scene and its frames, as close as the tolerance asks for, or why there is none, where it was
+            sought already.
+        runs: by engine, runs of this scene with its own settings, where they were made already.
+        told: called with what is being done.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
     Raises:
@@ -84,11 +108,12 @@ def tradeoff(
     names = tuple(dict.fromkeys(ENGINES if engines is None else engines))
     for name in names:
         engine_named(name)
-    _require_sense(seeds, zoom, patience, repeats, most)
+    _require_sense(seeds, zoom, effort, time_limit, repeats, most)
     require_aim(metric, tolerance, budget, fps)
     base = scene.solver.replace(**settings) if settings else scene.solver
     require_memory(scene, base, 4 * len(scene.bodies))
     say = told or nobody
+    deadline = math.inf if time_limit is None else working() + time_limit
 
     say("the truth")
     known, fresh = _seeds(scene, seeds)
@@ -100,41 +125,53 @@ def tradeoff(
     aim = aim_at(judges[0], metric, tolerance, budget, fps)._replace(step=max(base.dt, LONGER / fps))
     space = Space(scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps)
     hurry = None if aim.hurry is None else aim.hurry * scene.world.duration
-    search = Search(space, judges, aim.metric.name, aim.tolerance, hurry, patience, most, say)
+    search = Search(
+        space, judges, aim.metric.name, aim.tolerance, hurry, effort, most, say, deadline, _own_runs(runs, space, aim)
+    )
     trials = search.run()
 
     def weighed(repeats: int, fresh: tuple[int, ...]) -> Tradeoff:
-        """Time and answer; with no repeats what is known is told at once."""
+        """Time and answer; with no repeats, answer with the times of the runs that were scored."""
         say("timing")
-        points = [*_timed(trials, space, aim, repeats, patience), *_refused(scene, names, base)]
+        points = [*_timed(trials, space, aim, repeats, effort), *_refused(scene, names, base)]
         trial_of = {id(point): trial for point, trial in zip(points, trials, strict=False)}  # the refused have none
-        again = _again(space, trial_of, aim, lambda: _judges(scene, base, close, fresh, judges[0].zoom), patience)
-        say("held to its word")
-        within = cheapest(points, aim, fresh, again)
+        again = _again(space, trial_of, aim, lambda: _judges(scene, base, close, fresh, judges[0].zoom), effort)
+        say("trying the answer on fresh seeds")
+        within, best = cheapest(points, aim, fresh, again), closest(points, aim, fresh, again)
         splits: list[Split] = []
         cheaper: list[Proposal] = []
-        if repeats:
+        if repeats and working() < deadline:
             say("where the error comes from, and what a cheaper model would do")
-            splits = _splits(judges[0], space, patience)
-            cheaper = _proposals(judges, aim, within.point if within else None, space, patience)
+            splits = _splits(judges[0], space, effort, deadline)
+            cheaper = _proposals(judges, aim, within.point if within else None, space, effort, deadline)
         return Tradeoff(
-            scene,
-            judges[0].truth,
-            aim.metric,
-            judges[0].zoom,
-            tuple(points),
-            tuple(pareto([p for p in points if p.usable], lambda p: p.cost or 0.0, lambda p: p.error or 0.0)),
-            tuple(splits),
-            tuple(cheaper),
-            aim.tolerance,
-            budget,
-            fps,
-            within,
-            closest(points, aim, fresh, again),
-            known,
-            len(search.untried - set(search.trials)),
-            machine(),
-            versions(),
+            scene=scene,
+            best=judges[0].truth,
+            doubt=judges[0].doubt,
+            metric=aim.metric,
+            metric_reason=aim.reason,
+            zoom=judges[0].zoom,
+            points=tuple(points),
+            pareto=tuple(front_of(points)),
+            splits=tuple(splits),
+            proposals=tuple(cheaper),
+            tolerance=aim.tolerance,
+            budget=budget,
+            fps=fps,
+            within_tolerance=within,
+            within_budget=best,
+            cheapest_by_engine={
+                name: cheapest([p for p in points if p.engine == name], aim, fresh, again) for name in space.engines
+            },
+            nearest_to_tolerance=None if within else nearest_to_tolerance(points, aim),
+            nearest_to_budget=None if best or budget is None else nearest_to_budget(points, aim),
+            seeds=known,
+            untried=len(search.untried - set(search.trials)),
+            effort=effort,
+            spent=search.spent,
+            out_of_time=working() >= deadline,
+            machine=machine(),
+            versions=versions(),
             interrupted=not repeats,
         )
 
@@ -146,11 +183,13 @@ def tradeoff(
     return weighed(0, ())
 
 
-def _require_sense(seeds: int, zoom: float | None, patience: float, repeats: int, most: int) -> None:
+def _require_sense(
+    seeds: int, zoom: float | None, effort: float, time_limit: float | None, repeats: int, most: int
+) -> None:
     for what, value in (("seeds", seeds), ("repeats", repeats), ("most", most)):
         if value < 1:
             raise ValueError(f"{what} of {value}; at least 1")
-    for what, figure in (("zoom", zoom), ("patience", patience)):
+    for what, figure in (("zoom", zoom), ("effort", effort), ("time limit", time_limit)):
         if figure is not None and not 0.0 < figure < math.inf:
             raise ValueError(f"a {what} of {figure:g}; it is positive and finite")
 
@@ -177,16 +216,17 @@ def _judges(
     close: float,
     seeds: Sequence[int],
     zoom: float | None,
-    known: Truth | None = None,
+    known: Truth | str | None = None,
 ) -> list[Judge]:
     """Return a judge for each seed; the truth of the scene's own may be known."""
     found: list[Judge] = []
     for seed in seeds:
         same = seed == scene.world.seed
         own = scene if same else seeded(scene, seed)
-        truth = known if same and known is not None else truth_of(own, base, close)
+        sought = known if same and known is not None else seek_truth(own, base, close)
+        truth, doubt = (sought, None) if isinstance(sought, Truth) else (None, sought)
         zoom = zoom_of(own, truth) if zoom is None else zoom  # the first one's for all: pixels are pixels
-        found.append(Judge(own, truth, zoom))
+        found.append(Judge(own, truth, zoom, doubt))
     return found
 
 
@@ -202,39 +242,63 @@ def _refused(scene: Scene, names: Sequence[str], base: Settings) -> list[Point]:
     reasons = ((name, _refusal(scene, name, base)) for name in names)
     nothing: dict[str, float | None] = {}
     return [
-        Point(name, base, base, {}, "refused", reason, nothing, None, None, None, 0, {})
+        Point(name, base, base, {}, "refused", reason, nothing, None, None, None, 0, None, True, {})
         for name, reason in reasons
         if reason is not None
     ]
 
 
-def _timed(trials: Sequence[Trial], space: Space, aim: Aim, repeats: int, patience: float) -> list[Point]:
-    """Time what is near the front again and again, if at all; of what is far, the run that was recorded says enough."""
-    ok = [trial for trial in trials if trial.status == "ok"]
-    seen = [(trial.seconds, trial.error(aim.metric.name)) for trial in ok]
-    near = [trial for trial in ok if not outdone(trial.seconds, trial.error(aim.metric.name), seen, NEAR)]
+def _own_runs(runs: Mapping[str, Trajectory], space: Space, aim: Aim) -> dict[str, Trajectory]:
+    """Return the runs that are what an engine's own settings in this search would give, as far as the metric asks."""
+    found: dict[str, Trajectory] = {}
+    for name in space.engines:
+        run = runs.get(name)
+        if run is None or (aim.metric.name in AUDITED and not run.info["audited"]):
+            continue
+        own = ENGINES[name].resolve(space.scene, space.own(name)).model_dump(mode="json")
+        if run.info["settings"] == own and run.info["seed"] == space.scene.world.seed:
+            found[name] = run
+    return found
+
+
+def _timed(trials: Sequence[Trial], space: Space, aim: Aim, repeats: int, effort: float) -> list[Point]:
+    """Time what is near the front of its engine again and again; of what is far, the run that was recorded says enough.
+
+    The scene's own settings are always timed.
+    """
+    own = set(space.starts())
+    near: list[Trial] = []
+    for engine in space.engines:
+        ok = [trial for trial in trials if trial.status == "ok" and trial.variant.engine == engine]
+        seen = [(trial.cost, trial.error(aim.metric.name)) for trial in ok]
+        near += [t for t in ok if t.variant in own or not outdone(t.cost, t.error(aim.metric.name), seen, NEAR)]
     ways = [(trial.variant.engine, space.settings(trial.variant)) for trial in near]
-    found = dict(zip(near, costs(space.scene, ways, repeats, AGAIN * patience), strict=True)) if repeats else {}
-    rough = {trial: Cost.of([trial.seconds], space.scene.world.duration)._replace(repeats=0) for trial in ok}
-    return [_point(trial, space, aim, {**rough, **found}.get(trial)) for trial in trials]
+    once = sum(trial.cost for trial in near)
+    times = min(repeats, max(FEWEST, int(AGAIN * effort / once) if once else repeats))
+    found = dict(zip(near, costs(space.scene, ways, times), strict=True)) if repeats else {}
+    duration = space.scene.world.duration
+    rough = {t: Cost.of([t.seconds], duration)._replace(repeats=0) for t in trials if t.status == "ok"}
+    return [_point(trial, space, aim, {**rough, **found}.get(trial), trial.variant in own) for trial in trials]
 
 
-def _point(trial: Trial, space: Space, aim: Aim, cost: Cost | None) -> Point:
+def _point(trial: Trial, space: Space, aim: Aim, cost: Cost | None, is_own: bool) -> Point:
     error = trial.metrics.get(aim.metric.name) if trial.status == "ok" else None
     asked = space.settings(trial.variant)
     return Point(
-        trial.variant.engine,
-        asked,
-        trial.settings,
-        changes(space.base, asked),
-        trial.status,
-        trial.reason,
-        trial.metrics,
-        error,
-        None if cost is None else cost.least,
-        None if cost is None else cost.median,
-        0 if cost is None else cost.repeats,
-        trial.work,
+        engine=trial.variant.engine,
+        asked=asked,
+        settings=trial.settings,
+        changes=changes(space.base, asked),
+        status=trial.status,
+        reason=trial.reason,
+        metrics=trial.metrics,
+        error=error,
+        cost=None if cost is None else cost.least,
+        cost_median=None if cost is None else cost.median,
+        repeats=0 if cost is None else cost.repeats,
+        counted=1e3 * trial.cost / space.scene.world.duration,
+        is_own=is_own,
+        work=trial.work,
     )
 
 
@@ -245,9 +309,9 @@ def changes(base: Settings, chosen: Settings) -> dict[str, Any]:
 
 
 def _again(
-    space: Space, trial_of: Mapping[int, Trial], aim: Aim, judging: Callable[[], list[Judge]], patience: float
+    space: Space, trial_of: Mapping[int, Trial], aim: Aim, judging: Callable[[], list[Judge]], effort: float
 ) -> Again:
-    """Return who runs a point on fresh seeds; who judges is asked for when there is one."""
+    """Return a function that runs a point on fresh seeds, whose truths are sought at its first call."""
     made: list[Judge] = []
     known: dict[Variant, float] = {}
 
@@ -255,21 +319,23 @@ def _again(
         made[:] = made or judging()
         variant = trial_of[id(point)].variant
         if variant not in known:
-            known[variant] = tried(variant, space, made, SLOW * patience * len(made)).error(aim.metric.name)
+            known[variant] = tried(variant, space, made, SLOW * effort).error(aim.metric.name)
         return known[variant]
 
     return again
 
 
-def _splits(judge: Judge, space: Space, patience: float) -> list[Split]:
-    found = (split(judge, name, space.own(name), SLOW * patience) for name in space.engines if name != "exact")
+def _splits(judge: Judge, space: Space, effort: float, deadline: float) -> list[Split]:
+    found = (split(judge, name, space.own(name), SLOW * effort, deadline) for name in space.engines if name != "exact")
     return [each for each in found if each is not None]
 
 
-def _proposals(judges: Sequence[Judge], aim: Aim, pick: Point | None, space: Space, patience: float) -> list[Proposal]:
+def _proposals(
+    judges: Sequence[Judge], aim: Aim, pick: Point | None, space: Space, effort: float, deadline: float
+) -> list[Proposal]:
     """Propose cheaper models than the pick's; where there is none, than the first engine's with its own settings."""
     if not space.engines:
         return []
     engine = space.engines[0] if pick is None else pick.engine
     chosen = space.own(engine) if pick is None else pick.asked
-    return proposals(judges, aim.metric.name, aim.tolerance, engine, chosen, SLOW * patience)
+    return proposals(judges, aim.metric.name, aim.tolerance, engine, chosen, SLOW * effort, deadline)

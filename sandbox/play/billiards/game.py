@@ -7,6 +7,7 @@ from sandbox.action import ActionError, Strike
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Call
 from sandbox.games.billiards.rules.happening import GameError
+from sandbox.games.billiards.rules.verdict import player
 from sandbox.play.billiards.cue import Cue
 from sandbox.play.billiards.hearing import Hearing
 from sandbox.play.billiards.opponent import Opponent
@@ -18,8 +19,8 @@ from sandbox.scene.model import Scene
 from sandbox.scene.part import Point
 from sandbox.scene.spots import TableGame
 
-Players = Literal["alone", "two", "bot"]
-PLAYERS: tuple[Players, ...] = ("alone", "two", "bot")
+Players = Literal["one player", "two players", "you vs bot"]
+PLAYERS: tuple[Players, ...] = get_args(Players)
 
 BOT = 1
 """the bot's number"""
@@ -35,25 +36,31 @@ def plays(scene: Scene) -> bool:
 class Game:
     """A game that is played in a session. Time stands still at the table until somebody strikes."""
 
-    def __init__(self, live: Live, players: Players | None = None, shot: Shot | None = None) -> None:
+    def __init__(
+        self, live: Live, players: Players | None = None, shot: Shot | None = None, misses: bool = False
+    ) -> None:
         """Begin.
 
         Args:
             live: the session; its scene has no shots of its own where it names a game.
             players: by default two, and one where there are no rules.
             shot: with which the scene would have begun: the cue is laid ready for it.
+            misses: whether snooker is played with the foul and a miss.
 
         Raises:
             GameError: the game that the scene names cannot be played on its table.
         """
         game = live.scene.play.game or "free"
-        self.players: Players = players or ("alone" if game == "free" else "two")
+        self.players: Players = players or ("one player" if game == "free" else "two players")
+        self.misses = misses and game == "snooker"
+        """whether a miss may be played again, in snooker"""
         self.live = live
-        first = Match.begin(live.scene, game, 1 if self.players == "alone" else 2)
+        terms = {"misses": True} if self.misses else {}
+        first = Match.begin(live.scene, game, 1 if self.players == "one player" else 2, **terms)
         self._turns = Turns(first)
         along = first.layout.along
         self.cue = Cue.laid(shot) if shot is not None else Cue(math.atan2(along[1], along[0]))
-        self.opponent = Opponent(seed=live.scene.world.seed) if self.players == "bot" else None
+        self.opponent = Opponent(seed=live.scene.world.seed) if self.players == "you vs bot" else None
         self._hearing = Hearing(live)
         self.notes: list[tuple[str, str]] = []
         """(level, text) of what happened; whoever tells it empties the list"""
@@ -104,6 +111,19 @@ class Game:
     def mine(self) -> bool:
         """Whether it is a person's stroke."""
         return self.aiming and not self._bots(self.match)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the players are called."""
+        called = [player(number) for number in range(self.match.state.players)]
+        if self.players == "you vs bot":
+            called[BOT] = "bot"
+        return tuple(called)
+
+    @property
+    def bot_is_thinking(self) -> bool:
+        """Whether it is the bot's stroke, and the cue still lies as the last player left it."""
+        return self.opponent is not None and not self.opponent.is_aiming and self._bots(self.match)
 
     def _bots(self, match: Match) -> bool:
         return self.opponent is not None and match.turn == BOT
@@ -190,7 +210,7 @@ class Game:
             ActionError: it is nobody's here.
         """
         if self.resting and self.match.over:
-            raise ActionError("the frame is over; R begins another")
+            raise ActionError("the frame is over; press R for a new one")
         if not self.aiming:
             raise ActionError("wait until the balls are at rest")
         if not self.mine:
@@ -229,7 +249,7 @@ class Game:
         while strikes and self._bots(self._turns.match(len(strikes) - 1)):
             strikes.pop()
         if not strikes:
-            raise ActionError("there is no stroke to take back")
+            raise ActionError("no shot to undo")
         struck = self.live.session.actions[strikes[-1]]
         assert isinstance(struck, Strike)
         self.live.retract(strikes[-1])
@@ -239,7 +259,7 @@ class Game:
         if self.opponent is not None:
             self.opponent.forget()
         self.cue = Cue(struck.aim, struck.speed, struck.side, struck.height)
-        self.notes.append(("info", "the stroke is taken back"))
+        self.notes.append(("info", "shot undone"))
 
     def close(self) -> None:
         """Let go of the bot."""

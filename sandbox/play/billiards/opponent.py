@@ -39,9 +39,9 @@ class Opponent:
         self._from: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
-    def thinking(self) -> bool:
-        """Whether it has yet to find a shot."""
-        return self._future is not None and not self._future.done()
+    def is_aiming(self) -> bool:
+        """Whether it has found a shot, and moves the cue to it."""
+        return self._since >= 0.0
 
     def thought(self, match: Match) -> Thought | None:
         """Return what it does with a table; it begins to think where it has not yet."""

@@ -28,6 +28,8 @@ class Seats:
         """what a hand does"""
         self.players: Players | None = None
         """who is asked to play, from the next game on; None leaves it to the game"""
+        self.misses = False
+        """whether snooker is played with the foul and a miss, from the next game on"""
 
     @property
     def waits(self) -> bool:
@@ -47,7 +49,7 @@ class Seats:
         # A scene that starts by its own shot has been struck already.
         shot = file.shots[0] if file.shots and not live.scene.shots else None
         try:
-            self.game = Game(live, self.players, shot)
+            self.game = Game(live, self.players, shot, self.misses)
         except GameError as error:
             tell(str(error), "warning")
         else:

@@ -25,9 +25,9 @@ class Seen:
         return replace(sight, aim=aim, frame=replace(sight.frame, position=position))
 
     def aim(self) -> Aim | None:
-        """Return what is drawn of the next stroke; nothing while balls roll."""
+        """Return what is drawn of the next stroke; nothing while balls roll or the bot looks for its shot."""
         person, game = self._person, self._person.game
-        if not game.aiming:
+        if not game.aiming or game.bot_is_thinking:
             return None
         match, cue, call, ball = game.match, game.cue, game.call, game.ball
         carried = person.carried is not None

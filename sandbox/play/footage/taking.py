@@ -92,7 +92,7 @@ class Taking:
     def session(self, show: Live | Stored | None, name: str) -> None:
         """Keep the session, to be replayed."""
         if not isinstance(show, Live):
-            self._tell("a stored run is stored already" if show is not None else "there is no session yet", "warning")
+            self._tell("a stored run is already saved" if show is not None else "there is no session yet", "warning")
             return
         if show.busy is not None:  # where it is going is what is to be kept, not somewhere on the way
             self._waiting = show, name
@@ -102,6 +102,7 @@ class Taking:
         try:
             show.session.recording().save(outfile.temporary)
             self._tell(f"session: {outfile.place()}", "info")
+            show.session.note_saved()
         except (CaptureError, OSError) as error:
             outfile.discard()
             self._tell(f"the session cannot be saved: {error}", "error")

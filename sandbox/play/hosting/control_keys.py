@@ -70,7 +70,7 @@ def told(controls: tuple[Control, ...]) -> tuple[tuple[str, str], ...]:
         pad = f"; gamepad: {_buttons(control.pad)}" if control.pad else ""
         rows.append((keys or "Gamepad", f"{control.about}{pad}"))
     if any(control.pad for control in controls):
-        rows.append(("Gamepad Start", "pause, go on"))
+        rows.append(("Gamepad Start", "pause / resume"))
     return tuple(rows)
 
 

@@ -51,6 +51,8 @@ def rows(status: Status) -> tuple[Row, ...]:
     ]
     if status.ended is not None:
         found.append(Row(f"ENDED: {status.ended} (R restarts)", WARNING, "triangle", bold=True, rank=2))
+    elif status.unfocused:
+        found.append(Row("PAUSED  (another window is active)", WARNING, "bars", bold=True, rank=2))
     elif status.paused:
         space_claimed = any("space" in key.lower() for key, _ in status.claimed)
         keys = "P" if space_claimed else "P or Space"
@@ -68,7 +70,7 @@ def _speed(status: Status) -> list[Row]:
     still = status.paused or status.ended is not None
     apart = not still and math.isfinite(real) and abs(real - asked) > APART * abs(asked)
     if apart:
-        return [Row(f"speed {percent(asked)}, really {percent(real)}", ORANGE, rank=4)]
+        return [Row(f"speed {percent(asked)}, running at {percent(real)}", ORANGE, rank=4)]
     return [] if asked == 1 else [Row(f"speed {percent(asked)}", rank=5)]
 
 
@@ -78,8 +80,8 @@ def _doubts(status: Status) -> list[Row]:
     if status.trust == "trusted":
         found.append(Row("predictable", GREEN, "disc", rank=6))
     elif status.trust == "lost":
-        since = "" if status.horizon is None else f" since {clock(status.horizon)}"
-        found.append(Row(f"past the horizon{since}", WARNING, "triangle", rank=3))
+        since = "" if status.horizon is None else f" (since {clock(status.horizon)})"
+        found.append(Row(f"no longer predictable{since}", WARNING, "triangle", rank=3))
     if status.ghost is not None:
         away = "" if status.distance is None else f": {figure(status.distance, 'm')} away"
         found.append(Row(f"ghost {status.ghost}{away}", INK, "ring", rank=6))
@@ -123,6 +125,12 @@ def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int
         top = block.bottom + _pad(size)
         below = pygame.Rect(free.left, top, free.width, free.bottom - top)
         return _draw_faults(surface, status.faults, below if below.height > 6 * size else free, size)
+    if status.question is not None:
+        _draw_notice(surface, status.question, free, size, WARNING)
+    elif status.waits_for_start:
+        _draw_notice(surface, "Press Space to start", free, 1.5 * size, SKY)
+    elif status.out_of_sight is not None:
+        _draw_notice(surface, status.out_of_sight, free, size, SKY)
     box = _draw_picked(surface, status.picked, free, block, size)
     _draw_messages(surface, status.messages, free, (block, box), size)
     return nothing
@@ -183,6 +191,19 @@ def draw_mark(surface: pygame.Surface, mark: Mark, at: tuple[float, float], radi
     elif mark == "bars":
         for side in (-0.75, 0.2):
             pygame.draw.rect(surface, colour, (x + side * radius, y - radius, 0.65 * radius, 2 * radius))
+
+
+def _draw_notice(surface: pygame.Surface, text: str, free: pygame.Rect, size: float, edge: Colour) -> None:
+    """Draw what waits for an answer, in the middle."""
+    lines = wrapped(text, size, free.width - 2 * size, 3, bold=True)
+    line = round(1.4 * size)
+    wide = max(measure(each, size, bold=True)[0] for each in lines)
+    rect = pygame.Rect(0, 0, wide + 2 * round(size), len(lines) * line + round(size))
+    rect.center = free.center
+    plate(surface, rect, 0.5 * size, opacity=244, edge=edge)
+    for k, each in enumerate(lines):
+        at = rect.centerx, rect.top + 0.5 * size + (k + 0.5) * line
+        write(surface, each, at, size, INK, "center", bold=True)
 
 
 def _draw_rate(surface: pygame.Surface, status: Status, free: pygame.Rect, block: pygame.Rect, size: float) -> None:

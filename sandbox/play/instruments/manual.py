@@ -20,11 +20,11 @@ LINE_STEP = 1.66
 """heights of a letter from line to line"""
 
 MOUSE = (
-    ("wheel", "zoom about the cursor"),
-    ("right-drag", "pan"),
-    ("left-drag", "pull a body"),
-    ("left-drag, paused", "move a body"),
-    ("click", "pick a body"),
+    ("Wheel", "zoom about the cursor"),
+    ("Right-drag", "pan"),
+    ("Left-drag", "pull a body"),
+    ("Left-drag, paused", "move a body"),
+    ("Click", "select a body"),
 )
 
 

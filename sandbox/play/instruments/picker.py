@@ -67,6 +67,9 @@ class Picker:
         """what cards are filtered by"""
         self.chosen = 0
         """of the cards that are shown"""
+        self.confirmed: Path | None = None
+        """chosen once already, where opening it loses something"""
+        self._note = ""
         self.closed = False
         """Somebody wants none of them."""
         self._picture = Picture()
@@ -84,6 +87,10 @@ class Picker:
         words = self.typed.casefold().split()
         fitting = [card for card in self.cards if card.fits(words)]
         return sorted(fitting, key=lambda card: not card.is_called(self.typed))
+
+    def ask(self, path: Path, note: str) -> None:
+        """Say what opening a scene would lose; chosen once more, it is opened."""
+        self.confirmed, self._note = path, note
 
     def handle(self, event: pygame.event.Event) -> Path | None:
         """Take an event in, and return the file of the scene that it chooses, if it does."""
@@ -170,6 +177,9 @@ class Picker:
             if self.typed:
                 x = word.right + max(round(0.1 * size), 1)
                 pygame.draw.line(surface, SKY, (x, box.top + 0.5 * size), (x, box.bottom - 0.5 * size))
+        if self._note:
+            note = shortened(self._note, size, width)
+            rect = write(surface, note, (margin, rect.bottom + 0.6 * size), size, WARNING, bold=True)
         return round(rect.bottom + 1.2 * size)
 
     def _lay_out(self, shown: Sequence[Card], free: pygame.Rect, size: float) -> None:

@@ -103,7 +103,8 @@ def _rows(board: Board, room: float, size: float, gap: int) -> list[tuple[list[C
     """Return the cells in rows that fit, each with their widths, px; the score comes first."""
     cells = [("score", board.score), *board.lines[:MOST_LINES]]
     rows: list[tuple[list[Cell], list[int]]] = [([], [])]
-    for label, text in cells:
+    for name, text in cells:
+        label = name[:1].upper() + name[1:]
         text = shortened(text, 1.25 * size, room, mono=True)
         wide = max(measure(label, 0.82 * size)[0], measure(text, 1.25 * size, mono=True)[0])
         wide += -wide % round(1.5 * size)  # figures that change their length do not make all others jump

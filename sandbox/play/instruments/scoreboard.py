@@ -8,7 +8,8 @@ import pygame
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Decision
 from sandbox.games.billiards.rules.eight_ball import EightBallState
-from sandbox.play.billiards.game import Game
+from sandbox.games.billiards.rules.verdict import renamed
+from sandbox.play.billiards.game import BOT, Game
 from sandbox.play.billiards.person import Person
 from sandbox.play.drawing.palette import FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY, Colour, hex_colour
 from sandbox.play.drawing.table.coats import IVORY, Coat, coat_of
@@ -49,7 +50,7 @@ def draw_scoreboard(surface: pygame.Surface, person: Person, free: pygame.Rect, 
     width = min(right - left, round(WIDEST * unit))
     game = person.game
     match, line = game.match, round(1.5 * size)
-    told = _told(person)
+    told = status_line(person)
     choices = _choices(person)
     down = _down(match)
     lines = wrapped(told, size, width - 2 * pad - 1.3 * size, 2)
@@ -82,7 +83,7 @@ def _players(surface: pygame.Surface, game: Game, rect: pygame.Rect, y: float, s
         if on:
             marked = pygame.Rect(round(left - 0.3 * size), round(y - 0.75 * size), round(cell), round(1.5 * size))
             pygame.draw.rect(surface, PANEL_RAISED, marked, border_radius=round(0.4 * size))
-        name = "bot" if game.players == "bot" and player == 1 else f"player {player + 1}"
+        name = game.names[player]
         if state.players == 1:
             name = "free play" if match.rules.name == "free" else match.rules.name
         group = ""
@@ -97,19 +98,19 @@ def _players(surface: pygame.Surface, game: Game, rect: pygame.Rect, y: float, s
             write(surface, score, (left + cell - 0.9 * size, y), size, INK, "midright", bold=True, mono=True)
 
 
-def _told(person: Person) -> str:
+def status_line(person: Person) -> str:
     """Return the line about what happened and what is to be done."""
     game, match = person.game, person.game.match
     if not game.resting:
-        return "the balls roll"
+        return "balls rolling"
+    before = renamed("; ".join(match.messages), game.names)
     if match.over:
-        return f"{'; '.join(match.messages) or 'the frame is over'} (R begins another)"
-    who = "bot" if game.players == "bot" and match.turn == 1 else f"player {match.turn + 1}"
-    before = "; ".join(match.messages)
-    if game.opponent is not None and match.turn == 1:
-        now = f"{who} {'thinks' if game.opponent.thinking else 'takes aim'}"
+        return f"{before or 'the frame is over'}; press R for a new frame"
+    who = game.names[match.turn]
+    if game.opponent is not None and match.turn == BOT:
+        now = f"{who} is {'thinking' if game.bot_is_thinking else 'aiming'}"
     elif person.carried is not None:
-        now = "click where the cue ball is to lie"
+        now = "click to place the cue ball"
     elif match.choices.needed and game.call.pocket is None:
         now = f"{who}: click the pocket of the {match.choices.balls[0] if match.choices.balls else 'ball'}"
     elif match.state.in_hand is not None and match.rules.name != "free":

@@ -58,7 +58,7 @@ def thumbnail(scene: Scene, size: tuple[int, int], picture: Picture, unit: float
     flown = _bursts(scene, box)
     tells = not flown and scene.play.area is None  # at a table nothing happens until somebody strikes
     later = _later(scene) if tells and 0 < len(scene.bodies) <= FEW else None
-    frame = _free_flight(scene, FLOWN * scene.world.duration if flown else 0.0)
+    frame = frame_in_flight(scene, FLOWN * scene.world.duration if flown else 0.0)
     camera = Camera.fitting(box, size, margin=0.08, turned=lies_down(scene, size))
     picture.draw(made, camera, Sight(scene, scene.bodies, frame, ghost=later), unit=unit)
     return made
@@ -74,7 +74,7 @@ def _bursts(scene: Scene, box: Box) -> bool:
     return extent < BURST * max(right - left, top - bottom)
 
 
-def _free_flight(scene: Scene, time: float) -> Frame:
+def frame_in_flight(scene: Scene, time: float = 0.0) -> Frame:
     """Return where the bodies are after a time in which they meet nothing, in still air without drag."""
     bodies = scene.bodies
     gravity = np.where(bodies.fixed[:, None], 0.0, np.asarray(scene.world.gravity))

@@ -2,13 +2,28 @@
 
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import able
+from sandbox.games.referee import Referee
+from sandbox.games.registry import rules_of
 from sandbox.play.billiards.seats import laid
 from sandbox.play.hosting.host import refereed
 from sandbox.play.messages import Messages
 from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
+from sandbox.recording import Recording
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
+
+
+def played_again(recording: Recording) -> Live:
+    """Return a session that has done again all that was done in another, and goes on from there."""
+    rules = rules_of(recording.scene)
+    game = None if rules is None else Referee(rules, recording.presses)
+    session = Session(
+        recording.scene, recording.engine, recording.settings, recording.actions, game, recording.duration
+    )
+    live = Live(session)
+    live.seek(round(recording.duration / session.settings.dt))
+    return live
 
 
 def begun(scene: Scene, engine: str, settings: Settings | None, messages: Messages) -> Live | None:

@@ -1,7 +1,7 @@
 """Companions: runs beside the session, from the same state by the same actions: the ghost and the twin.
 
-The ghost is the scene as another engine has it, the twin the scene with one ball moved by 1e-12 m. Each begins where
-the session is when it is asked for; while the session goes back, it waits.
+The ghost is the scene as another engine has it, the twin the scene with every
+body moved by 1e-12 m. Each begins where the session is when it is asked for; while the session goes back, it waits.
 """
 
 from collections.abc import Collection
@@ -11,16 +11,15 @@ from time import perf_counter
 import numpy as np
 
 from sandbox.action import Action, ActionError, Switch
-from sandbox.engines.checkpoint import Checkpoint
+from sandbox.engines.checkpoint import Checkpoint, cast
 from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.relay import Relay
 from sandbox.measure.compare.comparing import usual_tolerance
-from sandbox.measure.compare.horizon import NUDGE, ULPS
-from sandbox.scene.meetings import meetings
+from sandbox.measure.compare.horizon import perturb
 from sandbox.scene.settings import COMMON
-from sandbox.trajectory import FloatArray, Frame
+from sandbox.trajectory import Frame
 
 PATIENCE = 0.3
 """s that the steps of a companion may take to compute for one picture."""
@@ -132,10 +131,10 @@ class Trust:
         self.horizon: float | None = None
         """s, when the two had come apart; known as long as the session goes the same way"""
         self.spread: float | None = None
-        nudged = _nudged(point)
-        self.able = nudged is not None
+        perturbed = _perturbed(point)
+        self.able = perturbed is not None
         """whether anything can grow at all"""
-        self._twin = Companion(nudged, step) if nudged is not None else None
+        self._twin = Companion(perturbed, step) if perturbed is not None else None
 
     @property
     def step(self) -> int:
@@ -187,17 +186,16 @@ def apart(a: Frame, b: Frame) -> float | None:
     return float(distance.max()) if len(distance) else None
 
 
-def _nudged(point: Checkpoint) -> Checkpoint | None:
-    """Return the moment with the first ball that moves and can meet something a little elsewhere; None without one."""
-    free = meetings(point.scene, point.bodies).free
-    able = np.flatnonzero(~point.bodies.fixed & ~free & point.frame.present)
-    if not len(able):
+def _perturbed(point: Checkpoint) -> Checkpoint | None:
+    """Return the moment with every body that can meet something moved a little (`perturb`); None without any."""
+    frame, there = point.frame, point.frame.present
+    moved = perturb(point.scene.placed(cast(point.bodies, frame), frame.time, point.broken))
+    if moved is None:
         return None
-    position: FloatArray = point.frame.position.copy()
-    place = position[able[0]]
-    position[able[0]] = place + np.maximum(NUDGE * np.sqrt(0.5), ULPS * np.spacing(np.abs(place)))
-    frame = point.frame
-    return replace(point, frame=replace(frame, position=position))
+    state = {key: getattr(frame, key).copy() for key in ("position", "velocity", "angle")}
+    for key, array in state.items():
+        array[there] = getattr(moved.bodies, key)
+    return replace(point, frame=replace(frame, **state))
 
 
 def follows(action: Action) -> Action | None:

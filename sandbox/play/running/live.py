@@ -13,12 +13,12 @@ from sandbox.play.running.burning import burning
 from sandbox.play.running.company import Company
 from sandbox.play.running.journey import Journey
 from sandbox.play.running.pace import Pace
-from sandbox.play.running.session import Session, WrongWayError
+from sandbox.play.running.session import Replaced, Session, WrongWayError
 from sandbox.play.running.showing import Showing
 from sandbox.play.running.switching import switch
 from sandbox.play.sight import Sight
 from sandbox.scene.zone import notes
-from sandbox.trajectory import Contacts
+from sandbox.trajectory import Contacts, Frame
 
 LEAST, MOST = 0.012, 0.03
 """s of each picture that steps may take: as much as all else takes, within these bounds. Where they need more, the
@@ -61,6 +61,12 @@ class Live(Showing):
     def between_steps(self) -> float:
         """Where the picture lies between the last two states."""
         return self.pace.between(self.session.settings.dt)
+
+    @property
+    def drawn(self) -> Frame:
+        """The state that pictures show; it may lie between two steps."""
+        session = self.session
+        return self.frame if self.peeking else between(session.previous, session.frame, self.between_steps)
 
     def go_on(self, elapsed: float, paused: bool) -> None:
         """Let real time pass, s: make the steps it is enough for, or some of the way to where we are going."""
@@ -122,8 +128,10 @@ class Live(Showing):
             ActionError: it cannot be done. Nothing has changed then.
         """
         self._check_there()
+        before = self.session.replaced
         done = self.session.act(action)
         self.company.did(done)
+        self._tell_replaced(before)
         self._hear()
 
     def press(self, control: str, value: float) -> None:
@@ -133,9 +141,18 @@ class Live(Showing):
             ActionError: it cannot be done. Then it was not pressed.
         """
         self._check_there()
+        before = self.session.replaced
         for action in self.session.press(control, value):
             self.company.did(action)
+        self._tell_replaced(before)
         self._hear()
+
+    def _tell_replaced(self, before: Replaced | None) -> None:
+        """Say that what came later is replaced, where it has just been."""
+        now = self.session.replaced
+        if now is not None and now is not before:
+            text = f"what came after {now.time:.4g} s is replaced (Ctrl+Z brings it back)"
+            self.company.notes.append(("warning", text))
 
     def _hear(self) -> None:
         self._contacts = self.session.contacts()
@@ -243,8 +260,7 @@ class Live(Showing):
             picked: number of the picked body.
             pull: where a body is held, and the hand, m.
         """
-        session, present, scene = self.session, self._peek is None, self.shown
-        frame = between(session.previous, session.frame, self.between_steps) if present else self.frame
+        session, present, scene, frame = self.session, self._peek is None, self.shown, self.drawn
         touches = self._contacts.some(~notes(self._contacts.pair, session.scene))
         return Sight(
             scene=scene,

@@ -12,8 +12,9 @@ up part of the session, as a switch that changes nothing: who replays the sessio
 from collections.abc import Iterator
 from dataclasses import replace
 from time import perf_counter
+from typing import NamedTuple
 
-from sandbox.action import Action, ActionError
+from sandbox.action import Action, ActionError, Switch
 from sandbox.games.referee import Referee
 from sandbox.play.breaks import BreakTimes
 from sandbox.play.running.calm import Calm
@@ -34,6 +35,15 @@ FINE = 64
 
 class WrongWayError(Exception):
     """The way from a checkpoint leads to another state than was seen before."""
+
+
+class Replaced(NamedTuple):
+    """What came after a moment of a session, before something else was done there."""
+
+    time: float
+    """s, of that moment"""
+    recording: Recording
+    """the whole session as it was"""
 
 
 class Session(Course):
@@ -60,6 +70,10 @@ class Session(Course):
         self._unsure: list[int] = []
         self._astray = False
         self._contacts: list[Contacts] = []
+        self._whole: tuple[int, Recording] | None = None  # the step it had come to, and all up to there
+        self.replaced: Replaced | None = None
+        """what came later, where something new was done at an earlier moment; the last that was replaced"""
+        self._saved = self._script.whole
         self._everyone = self.bodies
         self._breaks = BreakTimes(len(self.scene.links))
         self._previous = self._frame = self.relay.frame()
@@ -169,8 +183,23 @@ class Session(Course):
         if mark is not None and self._script.hand_over(mark.actions, mark.point.frame.time):
             self.history.inserted(mark.step)
 
+    @property
+    def unsaved(self) -> tuple[Action, ...]:
+        """What was done since the session began, or was last saved; also what lies later than now."""
+        saved, done = ([each for each in part if not _only_resumes(each)] for part in (self._saved, self._script.whole))
+        return tuple(done[len(saved) :] if done[: len(saved)] == saved else done)
+
+    def note_saved(self) -> None:
+        """Take note that all that was done has been saved."""
+        self._saved = self._script.whole
+
     def recording(self) -> Recording:
-        """Return all up to now, to be replayed; a state that only a way from a checkpoint has led to, by that way."""
+        """Return the whole session, to be replayed: up to the last moment that it came to, also if it has gone back.
+
+        A state that only a way from a checkpoint has led to is recorded by that way.
+        """
+        if self._whole is not None and self._step < self._whole[0]:
+            return self._whole[1]
         recording, mark = super().recording(), self._mark
         if mark is None or not self._unsure:
             return recording
@@ -233,6 +262,7 @@ class Session(Course):
     def _go_another_way(self, action: Action | None) -> None:
         """Take note of what has just been done, if anything: what came later is forgotten."""
         self._own_up()
+        self._replace_later()
         self._script.add(action, self.relay)
         self._until = min(self._until, self.relay.time)
         self._forget_from(self._step)
@@ -240,6 +270,12 @@ class Session(Course):
         self._frame = self._previous = self.relay.frame()
         self.history.keep(self._step, self._frame)
         self._calm = Calm()
+
+    def _replace_later(self) -> None:
+        """Take note that what came after the present moment is replaced by something else."""
+        if self._whole is not None and self._step < self._whole[0]:
+            self.replaced = Replaced(self.relay.time, self._whole[1])
+        self._whole = None
 
     def _forget_from(self, step: int) -> None:
         """Forget what was seen of a step and of all after it."""
@@ -258,6 +294,7 @@ class Session(Course):
         """
         step = self.history.nearest(self.actions[place].time)[0]
         self._script.cut(place)
+        self._whole = None
         self._forget_from(step)
         self._astray = True  # what is seen was never done
         return step
@@ -268,6 +305,8 @@ class Session(Course):
         The session is in between while this is not finished; a caller may give up, and ask for another step.
         """
         step = max(0, step)
+        if step < self._step and self._step >= self.history.furthest and not self._astray:
+            self._whole = self._step, self.recording()
         if step < self._step or self._astray:
             self._restore(self.history.before(step))
         try:
@@ -297,3 +336,8 @@ class Session(Course):
         self._contacts.clear()
         self._previous = self._frame = self.relay.frame()
         self.history.keep(self._step, self._frame)
+
+
+def _only_resumes(action: Action) -> bool:
+    """Tell whether an action is the taking up of a checkpoint, which changes nothing."""
+    return isinstance(action, Switch) and action.engine is None and not action.settings

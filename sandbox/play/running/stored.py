@@ -58,6 +58,11 @@ class Stored:
         return self.film.frame(self._time)
 
     @property
+    def drawn(self) -> Frame:
+        """The state that pictures show."""
+        return self.frame
+
+    @property
     def begin(self) -> float:
         """Its first time, s."""
         return float(self._times[0])

@@ -25,13 +25,14 @@ ENGINES = (
     Column("engine"),
     Column("verdict"),
     Column("max error, m", True, "the largest distance of any body from the truth while that is trusted"),
-    Column("rms, m", True, "root of the mean square over bodies and frames"),
-    Column("max, m/s", True, "the largest velocity error"),
+    Column("rms error, m", True, "root of the mean square over bodies and frames"),
+    Column("max error, m/s", True, "the largest velocity error"),
     Column("energy", True, "how far the energy is off, as a share: from the truth's, else from the start's"),
     Column("momentum", True, "how far the momentum is off, as a share"),
     Column("contacts", True, "that the truth has too"),
     Column("missed", True, "contacts of the truth that never happened"),
     Column("phantom", True, "contacts that the truth does not have"),
+    Column("after", True, "contacts in one of the two alone after a body had diverged: not judged"),
     Column("seconds", True, "of the steps alone"),
     Column("ms per s", True, "milliseconds per simulated second"),
 )
@@ -117,7 +118,7 @@ def engines_table(comparison: Comparison) -> Markup:
                 number(row.score.max_velocity),
                 share(row.energy_drift),
                 share(row.momentum_drift),
-                *(count(row.count(kind)) for kind in ("matched", "missed", "phantom")),
+                *(count(row.count(kind)) for kind in ("matched", "missed", "phantom", "after_divergence")),
                 number(row.seconds),
                 number(cost),
             ]
@@ -161,7 +162,7 @@ def explanations(comparison: Comparison) -> list[Section]:
 
 
 def _odd(row: Row) -> list[Event]:
-    return [event for event in row.events or () if event.kind != "matched"]
+    return [event for event in row.events or () if event.kind in ("missed", "phantom")]
 
 
 def _events(rows: Sequence[Row], events: Sequence[tuple[Row, Event]]) -> Markup:
@@ -186,19 +187,17 @@ def _events(rows: Sequence[Row], events: Sequence[tuple[Row, Event]]) -> Markup:
 
 
 def _knobs(row: Row) -> Markup:
-    columns = Column(row.engine), Column("set to"), Column("leaves of the error", True), Column("error, m", True)
+    columns = Column("change"), Column("of the error is left", True), Column("max error, m", True)
     cells = [
         [
-            knob.knob,
-            number(knob.value) if isinstance(knob.value, float) else str(knob.value),
+            knob.label,
             f"×{number(knob.ratio)}" if knob.ratio is not None else knob.status,
             number(knob.max_position_error) if knob.max_position_error is not None else NONE,
         ]
         for knob in row.why
     ]
-    return tag(
-        "details", tag("summary", f"{row.engine}: one knob at a time"), table(columns, cells, "One knob at a time")
-    )
+    caption = f"{row.engine}: what changes of settings leave of the error"
+    return tag("details", tag("summary", caption), table(columns, cells, "Changes of settings"))
 
 
 def settings_of(rows: Sequence[Row]) -> Markup:

@@ -46,17 +46,27 @@ POINTS = "Every point is a setting. Click one for its [solver] table, to be copi
 
 
 def answers(document: Document) -> Markup | None:
-    """Return the sentences that people came for."""
+    """Return the sentences that people came for, and in which metric they are."""
     told_ = document.get("answers") or []
-    return (
-        tag("ul", *(tag("li", f"{text[:1].upper()}{text[1:]}") for text in told_), class_="answers") if told_ else None
-    )
+    if not told_:
+        return None
+    sentences = tag("ul", *(tag("li", f"{text[:1].upper()}{text[1:]}") for text in told_), class_="answers")
+    return joined(sentences, tag("p", metric_of(document), class_="soft"))
+
+
+def metric_of(document: Document) -> str:
+    """Say what errors are counted in, and why."""
+    name = str(document["metric"]).replace("_", " ")
+    about = f", the {document['metric_about']}" if document.get("metric_about") else ""
+    reason = f", because {document['metric_reason']}" if document.get("metric_reason") else ""
+    return f"Errors are {name}{about}{reason}."
 
 
 def truth_of(document: Document) -> str:
     """Say what errors are measured against."""
     if not document.get("truth"):
-        return "There is no truth to measure errors against."
+        why = f": {document['truth_about']}" if document.get("truth_about") else ""
+        return f"There is no truth to measure errors against{why}."
     about = f" ({document['truth_about']})" if document.get("truth_about") else ""
     until = document.get("trusted_until")
     trusted = "" if until is None else f", trusted until {number(until, 4)} s"
@@ -134,7 +144,7 @@ def _front_table(points: Sequence[WorkPoint], document: Document) -> Markup:
         Column("changes"),
         Column(f"{document['metric'].replace('_', ' ')}{', ' if unit else ''}{unit}", True),
         Column("ms per s", True, "milliseconds per simulated second, the least of the repeats"),
-        Column("median", True),
+        Column("median", True, "milliseconds per simulated second, the median of the repeats"),
         Column("repeats", True),
     )
     rows = [
@@ -182,7 +192,8 @@ def _changes(point: WorkPoint) -> str:
     """Return what a point changes of the scene's own solver, in a line."""
     changes = point.document.get("changes") or {}
     words = [f"{key} {number(value, 4) if isinstance(value, float) else value}" for key, value in changes.items()]
-    return ", ".join(words).replace("_", " ") or "as the scene has it"
+    text = ", ".join(words).replace("_", " ") or "as the scene has it"
+    return f"{text} (the scene's own)" if changes and point.document.get("scene_setting") else text
 
 
 def _proposals(proposals: Sequence[Document], unit: str) -> Markup:

@@ -25,6 +25,7 @@ class Terrain(Surfaced):
     width: Annotated[float, Field(gt=0, le=1e6)]
     """m"""
     columns: Annotated[int, Field(ge=2, le=MAX_COLUMNS)] = 300
+    """how many columns the ground is made of"""
     base: Level = 10.0
     """m, of the lowest column"""
     height: Level = 40.0
@@ -48,6 +49,7 @@ class Player(Part):
     bot: Annotated[float, Field(ge=0, le=1)] | None = None
     """the skill of who aims by itself: 1 never errs; without one, a person plays"""
     colour: Colour | None = None
+    """of the tank, `#rrggbb`"""
 
 
 class Artillery(Part):
@@ -60,6 +62,7 @@ class Artillery(Part):
     players: Annotated[tuple[Player, ...], Field(min_length=2, max_length=10, alias="player")]
     """in the order of their turns"""
     edges: Edges = "open"
+    """what a shell meets at the left and right end of the ground: nothing, the other end, or a wall"""
     wind: Annotated[float, Field(ge=0, le=100)] = 0.0
     """m/s; the wind of each turn is drawn anew, up to this to either side; 0 leaves the world's as it is"""
     speed: Annotated[float, Field(gt=0, le=1e4)] = 60.0

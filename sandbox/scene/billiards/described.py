@@ -30,11 +30,14 @@ class Billiards(Part):
     place: dict[Name, Point] = Field(default_factory=dict)
     """where balls of the set lie instead, by name, m: racked ones, or more"""
     ball_radius: Radius | None = None
+    """m; without one, that of the set"""
     ball_mass: Mass | None = None
     """kg"""
     ball_restitution: Restitution = 0.95
     """of two balls; without rubbing, unless `[contact_models]` says so"""
     cushion_restitution: Restitution = 0.85
+    """of the cushions, 0 to 1"""
     cushion_friction: Friction = 0.2
+    """Coulomb friction μ of the cushions"""
     nose: Annotated[float, Field(gt=0, le=1e9)] | None = None
     """height of the cushions' noses above the floor, m"""

@@ -27,6 +27,7 @@ class Element(Part):
     mirrored: bool = False
     """Build it a second time beyond the table's axis; the names of the two begin with `left` and `right`."""
     colour: Colour | None = None
+    """in the window, `#rrggbb`"""
 
 
 class Scoring(Element):
@@ -46,9 +47,12 @@ class Line(Element):
     """A line of straight pieces and arcs, such as `[[0.0, 0.1], [0.0, 1.0, 0.2], [0.5, 1.0]]`, one corner rounded."""
 
     points: Corners
+    """its corners, m; a third number rounds a corner by an arc of that radius, m"""
     thickness: Size
+    """full thickness, m"""
     closed: bool = False
     """Join the last point to the first."""
     layers: Layers = (GROUND,)
+    """on which it is solid"""
     fill: Colour | None = None
     """of what a closed line encloses"""

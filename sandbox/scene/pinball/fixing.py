@@ -59,7 +59,8 @@ def slingshot(to: Building, name: str, of: Slingshot) -> None:
     """Add the side that kicks, and the rubber around the other two."""
     first, second, behind = of.points
     alike = {"thickness": of.thickness, "material": "rubber", "colour": of.colour}
-    to.wall(name, (first, second), kick=Kick(speed=of.speed, threshold=of.threshold, profile="middle"), **alike)
+    kick = Kick(speed=of.speed, threshold=of.threshold, profile="middle", adds_to="approach")
+    to.wall(name, (first, second), kick=kick, **alike)
     to.wall(f"{name} back", (second, behind, first), **alike)
     to.paint(darker(of.colour, 0.45), of.points)
     middle = sum(x for x, _ in of.points) / 3.0, sum(y for _, y in of.points) / 3.0

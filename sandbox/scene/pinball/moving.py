@@ -15,6 +15,7 @@ class PinballBall(Element):
     """A steel ball."""
 
     position: Point
+    """of its centre as the game starts, m"""
     radius: Radius | None = None
     """m; without one, `ball_radius` of the table"""
     mass: Mass | None = None
@@ -29,6 +30,7 @@ class Flipper(Element):
     """
 
     pivot: Point
+    """where it turns, m"""
     stops: tuple[Angle, Angle] = (-0.541, 0.349)
     """directions of the bat at rest and raised, rad: −31° and 20°, as of the left one of a pair"""
     length: Length = 0.0702
@@ -42,6 +44,7 @@ class Flipper(Element):
     side: Literal["left", "right"] | None = None
     """whose button it obeys; without one, that on whose side of the table its pivot is"""
     drive: Literal["torque", "stroke"] = "torque"
+    """`torque`: turned by its coil; `stroke`: at its rates, whatever it meets"""
     torque: Annotated[float, Field(gt=0, le=1e6)] = 0.513
     """N·m"""
     rate: Annotated[float, Field(gt=0, le=1e4)] = 40.0

@@ -10,9 +10,11 @@ class Art(Element):
     """A painted area: a disc, or an outline whose corners may be rounded."""
 
     colour: Colour
+    """`#rrggbb`"""
     position: Point | None = None
     """of a disc's centre, m"""
     radius: Radius | None = None
+    """of a disc, m"""
     points: Corners | None = None
     """corners of an outline, m"""
 

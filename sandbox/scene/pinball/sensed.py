@@ -11,7 +11,9 @@ class Rollover(Scoring):
     """A wire in a lane that the ball rolls over."""
 
     position: Point
+    """of its middle, m"""
     radius: Radius = 0.008
+    """m: it notes a ball whose centre is nearer than this"""
     score: Points = 250
 
 
@@ -29,6 +31,7 @@ class Kicker(Scoring):
     """A hole that holds a ball until rules let it go."""
 
     position: Point
+    """of its centre, m"""
     radius: Radius = 0.0135
     """that the ball's centre must come within, 25 units, m"""
     out: Velocity
@@ -40,6 +43,7 @@ class Drain(Scoring):
     """Where a ball is lost: the line that its centre must cross."""
 
     points: tuple[Point, Point]
+    """the two ends of the line, m"""
     thickness: Length = 0.02
     """m"""
 

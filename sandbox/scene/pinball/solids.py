@@ -21,7 +21,9 @@ class PinballWall(Line):
     """Wood, plastic or wire."""
 
     thickness: Size = 0.006
+    """full thickness, m"""
     material: MaterialName = "wall"
+    """name of its material"""
 
 
 class Rubber(Line):
@@ -35,22 +37,29 @@ class PinballPost(Element):
     """A round post with a sleeve."""
 
     position: Point
+    """of its centre, m"""
     radius: Radius = 0.005
+    """of the post, m"""
     material: MaterialName = "post"
+    """name of its material"""
     layers: Layers = (GROUND,)
+    """on which it is solid"""
 
 
 class Gate(Scoring):
     """A wire that lets pass from the right of its direction, first to second point, and is a wall from the left."""
 
     points: tuple[Point, Point]
+    """the two ends of the wire, m"""
     thickness: Size = 0.003
+    """of the wire, m"""
 
 
 class Bumper(Scoring):
     """A pop bumper: it throws whatever hits it."""
 
     position: Point
+    """of its centre, m"""
     radius: Radius = 0.0243
     """45 units, m"""
     speed: Speed = 0.81
@@ -66,8 +75,9 @@ class Slingshot(Scoring):
     points: tuple[Point, Point, Point]
     """its three posts, m: the ends of the side that kicks, and the one behind"""
     thickness: Size = 0.008
+    """of the rubber, m"""
     speed: Speed = 2.16
-    """that it adds in its middle, m/s"""
+    """that it adds to the approach in its middle, m/s"""
     threshold: Threshold = 0.054
     """m/s"""
     score: Points = 10
@@ -81,7 +91,9 @@ class Standup(Scoring):
     facing: Vector
     """out of its face; any length"""
     width: Length = 0.025
+    """of its face, m"""
     thickness: Size = 0.005
+    """of the target, m"""
     score: Points = 500
 
 
@@ -93,9 +105,11 @@ class DropTargets(Scoring):
     facing: Vector
     """out of the faces; any length"""
     count: Annotated[int, Field(ge=1, le=20)] = 3
+    """how many targets"""
     width: Length = 0.025
     """of each, m"""
     gap: Size = 0.003
     """between two, m"""
     thickness: Size = 0.005
+    """of each, m"""
     score: Points = 500

@@ -138,7 +138,7 @@ for _ in range(2):
 @pytest.mark.parametrize(("count", "said"), [(99, ""), (100, "100 bodies without compiled kernels will be slow")])
 def test_large_scenes_uncompiled_are_said_to_be_slow_once(count, said):
     _, errors = python(SLOW.replace("COUNT", str(count)), NUMBA_DISABLE_JIT="1")
-    assert errors == (f"{said}: pip install 'sandbox2d[fast]'\n" if said else "")
+    assert errors == (f"{said}: pip install -e '.[fast]'\n" if said else "")
 
 
 def test_large_scenes_compiled_are_not():

@@ -14,6 +14,7 @@ from sandbox.engines.relay import start
 from sandbox.games.artillery.bot import chances
 from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.rules import ArtilleryRules
+from sandbox.games.artillery.shot import Shot
 from sandbox.games.artillery.tanks import PER_KILL
 from sandbox.games.artillery.weapons import WEAPONS, Weapon
 from sandbox.games.bout import Bout
@@ -98,6 +99,13 @@ def test_a_perfect_gunner_hits_with_its_first_shot(seed: int) -> None:
     assert first.off is not None
     assert first.off < 1e-5  # Runge–Kutta's error and the cubic's at 20 ms
     assert rules.field.tanks.every[1].health < 100.0
+
+
+def test_miss_is_told_along_each_axis() -> None:
+    shot = Shot("Red", "shell", (172.07, 3.06), (171.94, 3.131), 6.0)
+    assert shot.told == "landed at 172.07 m, exact solution 171.94 m (Δx 130 mm, Δy 71.0 mm)"
+    level = Shot("Red", "shell", (172.07, 3.0), (171.94, 3.0), 6.0)
+    assert level.told == "landed at 172.07 m, exact solution 171.94 m (Δx 130 mm)"
 
 
 @pytest.mark.slow
@@ -315,8 +323,8 @@ def test_a_copy_goes_on_by_itself() -> None:
 def test_lines_and_cues_tell_what_goes_on() -> None:
     rules, _, _ = played(loads(TEXT), taps("fire"))
     lines = dict(rules.lines())
-    assert set(lines) >= {"Red", "> Blue", "wind", "gun", "weapon", "last shot"}
-    assert "exactly" in lines["last shot"] or "gone" in lines["last shot"]
+    assert set(lines) >= {"Red", "▸ Blue", "wind", "gun", "weapon", "last shot"}
+    assert "exact" in lines["last shot"] or "gone" in lines["last shot"]
     cues = rules.cues()
     assert list(cues)[:2] == ["turn", "fire"]
     assert "blast" in cues

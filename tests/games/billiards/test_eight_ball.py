@@ -56,7 +56,7 @@ def test_cue_ball_does_not_count_among_the_four() -> None:
 
 def test_scratch_on_the_break_is_in_hand_behind_the_head_string() -> None:
     verdict = played(RULES, START, *DRY, "9 in left", "cue in left")
-    assert verdict.fouls == ("the cue ball fell",)
+    assert verdict.fouls == ("scratch",)
     assert not verdict.goes_on
     assert (verdict.state.turn, verdict.state.in_hand) == (1, "behind the head string")
     assert "9" not in verdict.state.table
@@ -119,11 +119,11 @@ def test_foul_on_an_open_table_leaves_it_open() -> None:
 
 
 FOULS = {
-    "the cue ball fell": ("cue hits 1", "1 at rail", "cue in left"),
+    "scratch": ("cue hits 1", "1 at rail", "cue in left"),
     "the cue ball touched no ball": ("cue at rail",),
     "the 9 was touched first; one of 1, 2, 3, 4, 5, 6, 7 was on": ("cue hits 9", "cue hits 1", "1 in left"),
     "the 8 was touched first; one of 1, 2, 3, 4, 5, 6, 7 was on": ("cue hits 8", "cue at rail"),
-    "no ball came to a cushion after the touch": ("cue at rail", "cue hits 1", "1 hits 2"),
+    "no rail after contact": ("cue at rail", "cue hits 1", "1 hits 2"),
 }
 
 
@@ -174,7 +174,7 @@ def test_eight_in_the_pocket_that_was_called_wins() -> None:
 
 LOSSES = {
     "the eight fell in a pocket that was not called": (LAST, ("cue hits 8", "8 in left"), {"pocket": "right"}),
-    "the eight fell on a foul: the cue ball fell": (
+    "the eight fell on a foul: scratch": (
         LAST,
         ("cue hits 8", "8 in left", "cue in right"),
         {"pocket": "left"},

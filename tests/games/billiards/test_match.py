@@ -19,10 +19,13 @@ from sandbox.trajectory import FloatArray
 UP = 0.5 * np.pi
 
 
+def table_of(now: Match) -> Table:
+    return Table(now.scene).with_balls(dict(zip(now.layout.names, now.position, strict=True)))
+
+
 def shot(now: Match, stroke: Stroke, call: Call | None = None) -> Match:
     """What a stroke leads to, on the exact engine."""
-    table_now = Table(now.scene).with_balls(dict(zip(now.layout.names, now.position, strict=True)))
-    outcome = table_now.shoot(stroke, now.cue)
+    outcome = table_of(now).shoot(stroke, now.cue)
     assert outcome.complete
     return now.played(outcome.contacts, outcome.position, call)
 
@@ -77,6 +80,48 @@ def test_cue_ball_that_falls_is_in_hand_at_a_legal_place() -> None:
         after.place(position_of(after, "5"))
     with pytest.raises(GameError, match="not in hand"):
         after_break(to_side()).place((0.3, 0.3))
+
+
+@pytest.mark.parametrize(("along", "fair"), [(0.0, False), (0.3, True)])
+def test_ball_frozen_to_a_cushion_is_driven_there_only_by_leaving_it(along: float, fair: bool) -> None:
+    """WPA 8.4: pressed straight into its own cushion it is not driven; one that gets to another cushion is."""
+    radius = match("9-ball").layout.radius[0]
+    away = {str(k): (0.2 + 0.1 * k, 2.3) for k in range(2, 10)}
+    now = after_break({"1": (radius, 0.9), "cue": (0.4, 0.9 - along), **away})
+    aim = np.pi - np.arctan2(along, 0.4)
+    speed = 0.55 if along == 0.0 else 3.0  # so gently that nothing comes to another cushion
+    after = shot(now, Stroke(aim=float(aim), speed=speed))
+    assert after.verdict is not None
+    assert after.verdict.fouls == (() if fair else ("no rail after contact",))
+
+
+@pytest.mark.parametrize(
+    ("aim", "ball", "fair"),
+    [
+        (0.0, (0.9, 0.4), False),  # straight at it
+        (-UP, (0.5, 0.15), False),
+        (UP, (0.5, 0.63), False),
+        (np.pi, (1.2, 0.4), False),  # off a side cushion behind the head string
+        (UP, (0.5, 0.635), True),  # a ball on the head string is not behind it
+        (UP, (0.5, 0.9), True),
+        (-UP, (0.5, 0.9), True),  # off the head cushion
+        (UP, (0.5, 0.2), True),  # off the foot cushion
+    ],
+)
+def test_cue_ball_in_hand_behind_the_head_string_has_to_cross_it_to_a_ball_behind_it(
+    aim: float, ball: tuple[float, float], fair: bool
+) -> None:
+    """WPA 6.11."""
+    others = {str(k): (1.0, 1.2 + 0.08 * k) for k in range(2, 16)}
+    now = after_break({**others, "1": ball, "cue": (0.5, 0.4)}, "8-ball", in_hand="behind the head string")
+    outcome = table_of(now).shoot(Stroke(aim=float(aim), speed=6.0), "cue")
+    assert next(each.other for each in now.happenings(outcome.contacts) if each.kind == "ball") == "1"
+    after = now.played(outcome.contacts, outcome.position)
+    assert after.verdict is not None
+    wrong = [foul for foul in after.verdict.fouls if "behind the head string" in foul]
+    assert bool(wrong) is not fair
+    if wrong:
+        assert (after.turn, after.state.in_hand) == (1, "anywhere")
 
 
 def test_nine_that_falls_on_a_foul_is_spotted_behind_what_lies_there() -> None:

@@ -39,7 +39,7 @@ BREAK_FOULS = {
     "the break was too weak": DRY[:-1],
     "the 2 was touched first; the 1 was on": ("cue hits 2", "5 in left"),
     "the cue ball touched no ball": ("cue at rail",),
-    "the cue ball fell": (*DRY, "cue in left"),
+    "scratch": (*DRY, "cue in left"),
 }
 
 
@@ -76,10 +76,10 @@ def test_other_balls_stay_down_on_a_foul_and_count_for_nobody() -> None:
 
 
 FOULS = {
-    "the cue ball fell": ("cue hits 1", "1 in left", "cue in left"),
+    "scratch": ("cue hits 1", "1 in left", "cue in left"),
     "the cue ball touched no ball": ("cue at rail",),
     "the 3 was touched first; the 1 was on": ("cue hits 3", "cue hits 1", "1 in left"),
-    "no ball came to a cushion after the touch": ("cue hits 1",),
+    "no rail after contact": ("cue hits 1",),
 }
 
 
@@ -118,7 +118,7 @@ def test_push_out_that_makes_balls_does_not_go_on_and_spots_the_nine() -> None:
 
 def test_push_out_into_a_pocket_is_foul() -> None:
     verdict = played(RULES, SECOND, "cue in left", push_out=True)
-    assert verdict.fouls == ("the cue ball fell",)
+    assert verdict.fouls == ("scratch",)
     assert verdict.state.decisions == ()
 
 

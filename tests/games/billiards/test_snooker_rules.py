@@ -90,7 +90,7 @@ def test_missed_colour_passes_with_red_on() -> None:
 
 
 FOULS = [
-    (PLAY, {}, ("cue hits red-1", "cue in left"), 4, "the cue ball fell"),
+    (PLAY, {}, ("cue hits red-1", "cue in left"), 4, "in-off"),
     (PLAY, {}, ("cue at rail",), 4, "the cue ball touched no ball"),
     (PLAY, {}, ("cue hits yellow",), 4, "the yellow was touched first"),
     (PLAY, {}, ("cue hits black",), 7, "the black was touched first"),

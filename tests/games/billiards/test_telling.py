@@ -35,9 +35,23 @@ def test_what_began_before_the_stroke_is_left_out() -> None:
 
 def test_what_touches_from_the_start_counts_once_it_was_left() -> None:
     against = frozenset({(0, 1), (2, -1)})
-    rows = contacts((0.0, 0, 1), (1e-4, 2, -1), (0.0, 0, 3), (0.7, 2, -1), (0.8, 0, 1))
+    rows = contacts((0.0, 0, 1), (1e-4, 2, -1), (0.0, 0, 3), (0.3, 0, 2), (0.7, 2, -1), (0.8, 0, 1))
     told = happenings_of(POOL, rows, 0.0, against)
-    assert [(each.ball, each.other) for each in told] == [("cue", "3"), ("2", FIXED[0]), ("cue", "1")]
+    expected = [("cue", "3"), ("cue", "2"), ("2", FIXED[0]), ("cue", "1")]
+    assert [(each.ball, each.other) for each in told] == expected
+
+
+def test_ball_frozen_to_a_cushion_and_pressed_into_it_is_not_driven_there() -> None:
+    against = frozenset({(2, -1), (2, 3), (3, -2)})  # the 2 and the 3 touch each other, and a cushion each
+    rows = contacts((0.659, 0, 2), (0.6591, 2, -1), (0.66, 3, -2), (0.9, 3, -2), (0.95, 2, -2), (1.2, 2, -1))
+    told = happenings_of(POOL, rows, 0.0, against, "cue")
+    assert [(each.time, each.ball) for each in told if each.kind == "cushion"] == [(0.9, "3"), (0.95, "2"), (1.2, "2")]
+
+
+def test_struck_ball_frozen_to_a_cushion_counts_there_once_it_comes_back() -> None:
+    rows = contacts((1e-3, 0, -1), (0.4, 0, 1), (0.402, 0, -1))
+    told = happenings_of(POOL, rows, 0.0, frozenset({(0, -1)}), "cue")
+    assert [each.kind for each in told] == ["ball", "cushion"]
 
 
 def test_touching_balls_cushions_and_jaws_are_found() -> None:

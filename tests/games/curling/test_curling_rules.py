@@ -9,6 +9,7 @@ from ice import Rink, sheet
 import sandbox
 from sandbox.action import Move, SetParameter, actions_from_json
 from sandbox.games.bout import Bout
+from sandbox.games.curling.count import guards, short
 from sandbox.games.curling.rules import Curling
 from sandbox.games.curling.score import Score
 from sandbox.games.curling.sheet import RELEASE, gone, waiting
@@ -72,6 +73,25 @@ def test_a_guard_that_is_taken_out_too_soon_is_put_back(rink: Rink) -> None:
     rink.throw(weight=14.0)
     assert rink.place("yellow-1") == (-4.0, -0.55)
     assert rink.place("red-2") == gone(0, 1)
+    assert ("", "a guard was taken out too soon") in rink.rules.lines()
+
+
+def test_a_stone_short_of_the_hog_line_that_touched_a_guard_is_a_guard(rink: Rink) -> None:
+    lay(rink, red_1=(-6.15, -0.02))
+    rink.rules._score = Score(2, thrown=1)
+    rink.rules._ready = False
+    rink.until("next")
+    rink.rules._broom = rink.rules._ice.through((-6.15, -0.02), 1, 0.2).heading * -RELEASE
+    rink.hold("softer", 5.9 / 2.5)
+    rink.step(("throw", 1.0), ("throw", 0.0))
+    rink.until("next")
+    x, y = rink.place("yellow-1")
+    assert short((x, y))
+    assert not guards((x, y))
+    lay(rink, red_1=(0.0, 2.0))
+    rink.rules._broom = rink.rules._ice.through((x, y), 1, 3.2).heading * -RELEASE
+    rink.throw(weight=14.0)
+    assert rink.place("yellow-1") == (x, y)
     assert ("", "a guard was taken out too soon") in rink.rules.lines()
 
 

@@ -125,7 +125,7 @@ def test_three_balls_are_a_game() -> None:
     for _ in range(3):
         assert game.game.over is None
         drained(game, next_ball(game) if game.game.trough.live else 0)
-    assert game.game.over == "all balls were played"
+    assert game.game.over == "game over"
     assert "over" in game.cues
 
 
@@ -169,7 +169,7 @@ def test_one_ball_is_enough_for_a_game() -> None:
     game = Table(table(balls=1))
     for _ in range(3):
         drained(game)
-    assert game.game.over == "all balls were played"
+    assert game.game.over == "game over"
 
 
 @pytest.mark.parametrize("where", [(0.2, -0.5), (9.0, 0.5), (float("nan"), 0.5), (0.2, float("inf"))])
@@ -179,7 +179,7 @@ def test_ball_that_left_the_table_is_returned_to_the_plunger_and_told(where: tup
     game.put(0, where)
     served = moves(game.look()) + moves(game.wait(1.0))
     assert served[-1][1] == SERVE
-    assert game.lines()[""] == "ball lost: back to the plunger"
+    assert game.lines()[""] == "ball returned"
     assert game.lines()["Ball"] == "1 of 3"
     assert len(game.game.trough.live) == 1
 
@@ -191,7 +191,7 @@ def test_ball_that_is_gone_for_good_ends_the_ball_and_the_last_one_the_game() ->
         game.present[ball] = False
         game.look()
         game.wait(WAIT)
-    assert game.game.over == "no ball is left on the table"
+    assert game.game.over == "game over: no ball left on the table"
 
 
 def test_nothing_moves_but_by_the_player_between_balls() -> None:

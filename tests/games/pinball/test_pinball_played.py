@@ -107,7 +107,7 @@ def played() -> Trajectory:
 
 def test_plain_table_is_played_to_its_end(played: Trajectory) -> None:
     game = played.info["game"]
-    assert game["over"] == "all balls were played"
+    assert game["over"] == "game over"
     assert game["score"] > 0
     assert game["score"] == round(game["score"], -1)
     assert played.time[-1] < 60.0

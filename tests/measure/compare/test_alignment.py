@@ -117,3 +117,28 @@ def test_rest_that_begins_at_another_time_is_no_miss() -> None:
     truth = run_of(SCENE, position, contacts=[(0.2, (0, -1), -9.0)])
     run = run_of(SCENE, position, contacts=[(0.6, (0, -1), -9.0)])
     assert aligned(run, truth, SCENE, DT, TOLERANCE, 2.0) == ()
+
+
+def test_contacts_without_a_partner_after_the_bodies_have_parted_are_not_judged() -> None:
+    """Body a is 0.1 m off from 0.8 s on, and b never. Frames are 0.1 s apart."""
+    position = run_of(SCENE).position.copy()
+    position[8:, 0, 0] += 0.1
+    truth = run_of(
+        SCENE, contacts=[(0.5, (0, -1), -1.0), (0.79, (0, 1), 1.0), (1.2, (0, -1), -1.0), (1.5, (1, 2), 1.0)]
+    )
+    run = run_of(SCENE, position, contacts=[(0.5, (0, -1), -1.0), (1.31, (0, -1), -1.0), (1.7, (0, 1), 1.0)])
+    assert [(e.kind, e.when) for e in aligned(run, truth, SCENE, DT, TOLERANCE, 2.0)] == [
+        ("matched", 0.5),
+        ("missed", 0.79),
+        ("after_divergence", 1.2),
+        ("after_divergence", 1.31),
+        ("missed", 1.5),
+        ("after_divergence", 1.7),
+    ]
+
+
+def test_the_contact_that_was_missed_and_parted_them_is_judged() -> None:
+    position = run_of(SCENE).position.copy()
+    position[6:, 0, 0] += 0.1
+    truth = run_of(SCENE, contacts=[(0.55, (0, -1), -1.0)])
+    assert [e.kind for e in aligned(run_of(SCENE, position), truth, SCENE, DT, TOLERANCE, 2.0)] == ["missed"]

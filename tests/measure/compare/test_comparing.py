@@ -1,7 +1,7 @@
 """Comparing: whole comparisons, with figures that are known beforehand."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
@@ -13,10 +13,10 @@ from sandbox.measure import drive
 from sandbox.measure.compare import compare
 from sandbox.measure.compare import truth as truth_module
 from sandbox.measure.compare.truth import truth_of
-from sandbox.measure.compare.why import Knob, knobs, verdict
+from sandbox.measure.compare.why import NOT_TRIED, Knob, knobs, verdict
 from sandbox.scene.file import load, loads
 from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.settings import Detection, Integrator, Settings
 from sandbox.scene.shipped import find
 
 BOUNCE = load(find("bounce"), ["world.duration=2.0"])
@@ -35,6 +35,7 @@ KEYS = [
     "matched_contacts",
     "missed_contacts",
     "phantom_contacts",
+    "contacts_after_divergence",
     "max_contact_delay",
     "trusted_until",
     "seconds",
@@ -97,7 +98,17 @@ def test_bounce_is_matched_with_its_delay() -> None:
 
 def test_row_has_exactly_the_keys_promised() -> None:
     document = compare(BOUNCE, ["pymunk"]).document("bounce")
-    promised = ["scene", "title", "truth", "truth_about", "trusted_until", "duration", "tolerance", "engines"]
+    promised = [
+        "scene",
+        "title",
+        "truth",
+        "truth_about",
+        "truth_confirmed_by",
+        "trusted_until",
+        "duration",
+        "tolerance",
+        "engines",
+    ]
     assert list(document) == promised
     assert list(document["engines"][0]) == KEYS
     assert (document["scene"], document["title"]) == ("bounce", "Bounce")
@@ -179,15 +190,33 @@ def test_missed_wall_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     assert row.energy_drift == pytest.approx(0.75, rel=1e-9)  # it kept all, and should have kept e² = ¼
 
 
-def test_why_says_that_a_finer_step_halves_the_error() -> None:
-    comparison = compare(load(find("ball")), ["pymunk"], why=True)
-    (row,) = comparison.rows
+def test_why_names_half_kick_in_free_flight_and_the_factor_of_a_finer_step() -> None:
+    (row,) = compare(load(find("ball")), ["pymunk"], why=True).rows
     tried = {(knob.knob, knob.value): knob for knob in row.why}
     assert tried["dt", 0.005].ratio == pytest.approx(0.5, rel=1e-9)  # first order; hundreds of roundings of 10 m
+    assert tried["substeps", 4].ratio == pytest.approx(0.25, rel=1e-9)  # likewise
     assert tried["slop", 0.0].ratio == tried["iterations", 40].ratio == 1.0
     assert tried["integrator", "rk4"].status == "refused"
     assert tried["detection", "swept"].status == "refused"
-    assert row.verdict == "pymunk: dt = 0.005 moves the difference most, from 0.0491 m to 0.0245 m (×0.5)"
+    assert tried["half_kick", True].max_position_error == pytest.approx(0.0, abs=1e-12)  # roundings of 10 m
+    assert row.verdict is not None
+    assert row.verdict.startswith("pymunk: largest gain by half_kick = True: ")
+    assert not any(" and " in knob.label for knob in row.why)  # one alone suffices
+
+
+def test_why_tries_two_methods_where_neither_suffices_alone() -> None:
+    """A bounce is exact to rounding with exact flight and the time of impact, and with either alone it is not."""
+    (row,) = compare(BOUNCE, ["reference"], why=True).rows
+    tried = {knob.label: knob for knob in row.why}
+    flight, impact = "integrator = velocity_verlet", "detection = bisect"
+    alone = min(tried[flight].ratio or 0.0, tried[impact].ratio or 0.0)
+    both = tried[f"{flight} and {impact}"]
+    assert alone > 0.1
+    assert both.ratio is not None
+    assert both.ratio < 1e-6 * alone
+    assert dict(both.changes) == {"integrator": "velocity_verlet", "detection": "bisect"}
+    assert row.verdict is not None
+    assert f"largest gain by {flight} and {impact}" in row.verdict
 
 
 def test_why_has_nothing_to_say_of_an_engine_that_is_right() -> None:
@@ -195,11 +224,37 @@ def test_why_has_nothing_to_say_of_an_engine_that_is_right() -> None:
     assert (row.why, row.verdict) == ((), None)
 
 
-def test_knobs_change_one_choice_each() -> None:
-    settings = Settings(integrator="explicit_euler", detection="discrete", record_every=3)
-    changes = [change for _, _, change in knobs(settings)]
-    assert changes[:3] == [{"dt": 0.005, "record_every": 6}, {"slop": 0.0}, {"iterations": 40}]
-    assert [next(iter(change)) for change in changes[3:]] == ["integrator"] * 4 + ["detection"] * 3
+def chosen(annotation: Any) -> Any:
+    """Return some value of a setting's type."""
+    parts = [part for part in get_args(annotation) if part is not type(None)]
+    if parts and isinstance(parts[0], str):
+        return parts[0]
+    kind = next((part for part in (annotation, *parts) if part in (bool, int, float)), None)
+    return {bool: False, int: 3, float: 0.25}[kind] if kind else chosen(parts[0])
+
+
+def test_every_setting_is_tried_or_left_out_for_a_reason() -> None:
+    """Law for all settings there are, those added later included: filled in, each yields a valid change."""
+    filled = Settings(**{name: chosen(info.annotation) for name, info in Settings.model_fields.items()})
+    tried: dict[str, list[dict[str, Any]]] = {}
+    for name, _, changes in knobs(filled):
+        tried.setdefault(name, []).append(changes)
+        other = filled.replace(**changes)
+        assert other != filled
+        assert other.dt * other.record_every == filled.dt * filled.record_every  # the same frames are kept
+    assert set(tried) | set(NOT_TRIED) == set(Settings.model_fields)
+    assert not set(tried) & set(NOT_TRIED)
+    assert all(NOT_TRIED.values())
+    words = {name: len(set(map(str, values))) for name, values in tried.items()}
+    assert words["integrator"] == len(get_args(Integrator)) - 1
+    assert words["detection"] == len(get_args(Detection)) - 1
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_every_setting_that_an_engine_fills_in_is_tried(engine: str) -> None:
+    filled = registry.ENGINES[engine].resolve(BOUNCE, BOUNCE.solver)
+    stated = {name for name in Settings.model_fields if getattr(filled, name) is not None}
+    assert {name for name, _, _ in knobs(filled)} == stated - set(NOT_TRIED)
 
 
 def test_verdict_names_the_first_of_equals() -> None:
@@ -209,8 +264,8 @@ def test_verdict_names_the_first_of_equals() -> None:
         for value, r in (("a", 2e-13), ("b", 1e-13))
     ]
     assert "integrator = a" in verdict("e", (knob, *others), 1.0)
-    assert "no single knob" in verdict("e", (replace(knob, ratio=0.95), replace(knob, ratio=3.0)), 1.0)
-    assert "none of the knobs" in verdict("e", (replace(knob, status="refused", ratio=None),), 1.0)
+    assert "no other setting lowers" in verdict("e", (replace(knob, ratio=0.95), replace(knob, ratio=3.0)), 1.0)
+    assert "no other setting could be tried" in verdict("e", (replace(knob, status="refused", ratio=None),), 1.0)
 
 
 def test_scene_without_bodies_is_compared_too() -> None:
@@ -255,9 +310,19 @@ def test_truth_that_is_known_is_not_sought_again(monkeypatch: pytest.MonkeyPatch
     def sought(*_: Any) -> None:
         raise AssertionError("the truth is known")
 
-    monkeypatch.setattr("sandbox.measure.compare.comparing.truth_of", sought)
+    monkeypatch.setattr("sandbox.measure.compare.comparing.seek_truth", sought)
     monkeypatch.setattr("sandbox.measure.tradeoff.weighing.truth_of", sought)
     judged = compare(BOUNCE, ("pymunk",), truth=known)
     assert judged.best is known
     weighed = sandbox.tradeoff(BOUNCE, ("pymunk",), truth=known, most=1, repeats=1)
     assert weighed.points[0].error == judged.rows[0].score.max_position
+
+
+def test_what_a_notebook_shows_is_short() -> None:
+    comparison = compare(load(find("gas"), ["world.duration=1.0"]), ["pymunk"], why=True)
+    run, (row,) = comparison.trajectories["pymunk"], comparison.rows
+    for value in (comparison, comparison.best, row, run, run.at([0])):
+        assert len(repr(value)) < 1000
+    assert "pymunk" in repr(comparison)
+    assert "225 bodies" in repr(run)
+    assert "missed 0" in repr(row)

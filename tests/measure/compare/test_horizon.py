@@ -1,44 +1,153 @@
 """Horizon: what a nudge is, and where it comes to matter."""
 
+import math
+from typing import Any
+
 import numpy as np
 import pytest
 from runs_by_hand import run_of, scene_of
 
-from sandbox.measure.compare.horizon import NUDGE, agree_until, nudged
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.compare.gaps import gap
+from sandbox.measure.compare.horizon import NUDGE, agree_until, perturb, touching_pairs
 from sandbox.measure.compare.truth import truth_of
 from sandbox.scene.file import load, loads
-from sandbox.scene.shipped import find
+from sandbox.scene.model import Scene
+from sandbox.scene.shipped import find, shipped
 from sandbox.scene.surfaces import surfaces_of
+from sandbox.trajectory import FloatArray
 
 
-def test_nudge_moves_the_first_ball_that_can_meet_something() -> None:
-    scene = scene_of()
-    other = nudged(scene)
+def moved(scene: Scene, **options: Any) -> FloatArray:
+    """Return by how much each body of a scene is moved, (N, 2) m; the scene itself stays as it was."""
+    before = scene.bodies
+    other = perturb(scene, **options)
     assert other is not None
-    away = other.bodies.position - scene.bodies.position
-    assert np.hypot(*away[0]) == pytest.approx(NUDGE, rel=1e-3)  # y is 5 m, of which 1e-12 has three digits
-    assert not away[1:].any()
+    assert scene.bodies is before
+    return other.bodies.position - before.position
+
+
+def test_every_body_that_can_meet_something_is_moved_in_a_direction_of_its_own() -> None:
+    scene = load(find("gas"))
+    away = moved(scene)
+    assert np.hypot(*away.T) == pytest.approx(np.full(len(away), NUDGE), rel=0.01)  # places of 10 m have 2e-15 m digits
+    assert len(np.unique(np.round(np.arctan2(*away.T), 2))) > 100  # of 225, in a quarter of 628 steps of 0.01 rad each
+    assert (moved(scene) == away).all()
+    assert (moved(scene, seed=1) != away).any(axis=1).all()
 
 
 def test_nudge_far_out_is_not_lost_in_rounding() -> None:
     scene = loads("[[ball]]\nposition = [1e9, 0]\nradius = 1\n[[ball]]\nposition = [2e9, 0]\nradius = 1\n")
-    other = nudged(scene)
+    assert np.abs(moved(scene)[:, 0]).tolist() == [4 * np.spacing(1e9), 4 * np.spacing(2e9)]
+
+
+RACK = "".join(
+    f"[[ball]]\nname = 'r{row}-{k}'\nposition = [{row * math.sqrt(3.0) * 0.5!r}, {k - 0.5 * row!r}]\nradius = 0.5\n"
+    for row in range(4)
+    for k in range(row + 1)
+)
+FLOOR = "[[plane]]\nname = 'floor'\npoint = [0, 0]\nnormal = [0, 1]\n"
+WALL = "[[plane]]\nname = 'side'\npoint = [-0.5, 0]\nnormal = [1, 0]\n"
+
+
+def boxes(count: int) -> str:
+    return "".join(f"[[box]]\nname = 'b{k}'\nposition = [0, {k + 0.5}]\nsize = [1, 1]\n" for k in range(count))
+
+
+def test_a_rack_whose_balls_touch_moves_as_one() -> None:
+    away = moved(loads(RACK + "[[ball]]\nname = 'cue'\nposition = [-5, 0]\nradius = 0.5\n"))
+    assert (away[:-1] == away[0]).all()
+    assert (away[-1] != away[0]).any()
+
+
+def test_boxes_of_a_stack_move_along_their_contacts() -> None:
+    scene = loads(FLOOR + boxes(5))
+    away = moved(scene)
+    assert (away[:, 1] == 0.0).all()
+    assert np.abs(away[:, 0]) == pytest.approx(np.full(5, NUDGE), rel=1e-9)  # beside 0 there is room for digits
+    assert len(set(away[:, 0].tolist())) == 2  # to either side, so some move against each other
+
+
+def test_what_is_wedged_keeps_its_place_and_is_given_a_velocity() -> None:
+    scene = loads(FLOOR + WALL + boxes(1))
+    other = perturb(scene)
     assert other is not None
-    assert other.bodies.position[0, 0] == 1e9 + 4 * np.spacing(1e9)
+    assert (other.bodies.position == scene.bodies.position).all()
+    assert np.hypot(*other.bodies.velocity.T) == pytest.approx([NUDGE], rel=1e-12)  # rounding
+    assert (other.bodies.angle == scene.bodies.angle).all()
+
+
+def test_a_polygon_that_touches_nothing_is_turned_too() -> None:
+    scene = loads(FLOOR + "[[box]]\nposition = [0, 3]\nsize = [1, 1]\n")
+    other = perturb(scene)
+    assert other is not None
+    assert abs(float(other.bodies.angle[0])) == pytest.approx(NUDGE / math.sqrt(0.5), rel=1e-9)  # half a diagonal
+
+
+@pytest.mark.parametrize("name", [each.name for each in shipped() if "100k" not in each.name])
+def test_no_perturbation_brings_an_overlap_or_takes_a_contact(name: str) -> None:
+    """Law, for every shipped scene: gaps between things that touch change by rounding and no more."""
+    scene = load(find(name))
+    other = perturb(scene)
+    if other is None:
+        return
+    old, new = scene.bodies, other.bodies
+    for pair, _ in touching_pairs(scene):
+        gaps = gap(scene, old, np.stack((old.position, new.position)), np.stack((old.angle, new.angle)), pair)
+        assert abs(gaps[1] - gaps[0]) <= 1e-14 * max(1.0, np.abs(old.position[pair[0]]).max())  # some 50 last digits
+    if not ENGINES["exact"].missing(scene, scene.solver):
+        assert ENGINES["exact"].missing(other, other.solver) == ()
+
+
+CROWD = """
+[world]
+duration = 6.0
+seed = 3
+[solver]
+dt = 0.005
+[[scatter]]
+name = "crowd"
+count = 40
+lower = [-1.7, -1.7]
+upper = [1.7, 1.7]
+radius = 0.1
+restitution = 1.0
+velocity_jitter = 2.0
+[[wall]]
+points = [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]]
+closed = true
+restitution = 1.0
+"""
+APART = {
+    "far": "[[ball]]\nname = 'far'\nposition = [30, 0.1]\nradius = 0.2\nvelocity = [1, 0.3]\n",
+    "caged": "[[ball]]\nname = 'caged'\nposition = [10, 0.1]\nradius = 0.2\nvelocity = [1, 0.3]\nrestitution = 1.0\n"
+    "[[wall]]\npoints = [[9, -1], [11, -1], [11, 1], [9, 1]]\nclosed = true\nrestitution = 1.0\n",
+}
+
+
+@pytest.mark.parametrize("apart", APART)
+def test_a_ball_that_meets_nothing_changes_no_horizon(apart: str) -> None:
+    """Law: what another ball does in a place of its own says nothing of a crowd."""
+    crowd, more = loads(CROWD), loads(CROWD + APART[apart])
+    assert more.bodies.names[0] == apart  # balls stand before a scatter
+    alone, beside = (truth_of(scene, scene.solver, 1e-3) for scene in (crowd, more))
+    assert alone is not None
+    assert beside is not None
+    assert alone.kind == beside.kind == "exact"
+    assert 0.5 < alone.trusted_until < 5.0
+    assert beside.trusted_until == alone.trusted_until  # the crowd is perturbed alike, and `exact` moves each by itself
 
 
 def test_scene_in_which_nothing_can_meet_has_no_nudge() -> None:
-    assert nudged(loads("[[ball]]\nposition = [0, 0]\nradius = 1\n")) is None
+    assert perturb(loads("[[ball]]\nposition = [0, 0]\nradius = 1\n")) is None
 
 
-def test_nudge_moves_a_ball_of_a_generator_and_nothing_else() -> None:
+def test_perturbation_changes_places_and_nothing_else() -> None:
     scene = load(find("gas"))
-    other = nudged(scene)
+    other = perturb(scene)
     assert other is not None
     old, new = scene.bodies, other.bodies
-    assert scene.bodies is old  # the scene itself is as it was
     assert new.names == old.names
-    assert np.count_nonzero((new.position != old.position).any(axis=1)) == 1
     for key in ("velocity", "angle", "angular_velocity", "radius", "mass", "fixed"):
         assert np.array_equal(getattr(new, key), getattr(old, key))
     mine, its = surfaces_of(scene, old), surfaces_of(other, new)

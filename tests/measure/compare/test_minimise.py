@@ -7,7 +7,8 @@ import pytest
 
 from sandbox.measure.compare import disagreement as module
 from sandbox.measure.compare.disagreement import Disagreement, Parting
-from sandbox.measure.compare.minimise import Minimised, minimise
+from sandbox.measure.compare.horizon import TOUCH
+from sandbox.measure.compare.minimise import Minimised, minimise, overlaps
 from sandbox.measure.compare.spelled import spelled
 from sandbox.scene.bodies import COLUMNS
 from sandbox.scene.file import dumps, from_document, load, loads
@@ -189,6 +190,59 @@ def test_where_engines_agree_there_is_nothing_to_minimise() -> None:
 def test_what_a_nudge_changes_as_much_is_no_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "agree_until", lambda *_: 0.005)
     assert BOTH.of(loads(TUNNEL)) is None
+
+
+NEIGHBOURS = """
+[world]
+duration = 0.1
+[[ball]]
+name = "left"
+position = [10.02, 0.0312]
+velocity = [1.0, 0.0]
+radius = 0.0123
+[[ball]]
+name = "right"
+position = [10.06, 0.0234]
+radius = 0.0123
+[[wall]]
+name = "below"
+points = [[10.0, 0.01], [10.2, 0.01]]
+thickness = 0.001
+"""
+"""To one digit both balls are at (10, 0.03), and to any digit but the last the left one is in the wall."""
+
+
+class Found(Disagreement):
+    """Whatever still has all names of which something hangs, parts."""
+
+    def of(self, scene: Scene, patience: float = math.inf) -> Parting | None:
+        names = {*scene.bodies.names, *scene.fixed_names}
+        wanted = {"left", "right", "below"} <= names
+        return Parting(0.05, "left", 1.0, frozenset({"left"})) if wanted else None
+
+
+def test_no_step_lays_two_things_into_each_other() -> None:
+    """Law: what overlaps in the smallest scene overlaps in the scene given, and no less deep."""
+    for text in (NEIGHBOURS, NEIGHBOURS.replace("10.06", "10.03")):  # apart, and overlapping from the start
+        scene = loads(text)
+        found = minimise(scene, Found(["pymunk", "reference"], 1e-4))
+        before, after = overlaps(scene), overlaps(loads(dumps(found.scene)))
+        assert found.runs > 5
+        assert found.scene != scene
+        for pair, depth in after.items():
+            assert depth <= before.get(pair, 0.0) + TOUCH
+
+
+def test_another_body_that_parts_is_another_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = Disagreement(["pymunk", "reference"], 1e-4)
+
+    def of(scene: Scene, patience: float = math.inf) -> Parting | None:
+        name = "right" if "right" in scene.bodies.names else "left"
+        return Parting(0.05, name, 1.0, frozenset({name}))
+
+    monkeypatch.setattr(asked, "of", of)
+    found = minimise(loads(NEIGHBOURS), asked)
+    assert found.scene.bodies.names == ("right",)  # the left one alone, which is tried first, would part as well
 
 
 @pytest.mark.parametrize("after", [1, 4, 9])

@@ -7,7 +7,7 @@ import pytest
 from shots_by_hand import R, ball, floor, pocket, shot, straight_pot
 
 from sandbox.measure.shots.attempt import attempt_of
-from sandbox.measure.shots.horizon import horizon
+from sandbox.measure.shots.horizon import By, horizon
 from sandbox.measure.shots.parting import Parting
 from sandbox.measure.shots.spread import Spread
 
@@ -100,3 +100,14 @@ def test_a_ball_that_falls_in_one_shot_alone_is_apart() -> None:
 def test_what_is_not_positive_is_refused(nudge: float, tolerance: float) -> None:
     with pytest.raises(ValueError, match="both are more than 0"):
         horizon(floor(shot()), nudge=nudge, tolerance=tolerance)
+
+
+@pytest.mark.parametrize("by", ["aim", "place"])
+def test_a_ball_that_is_not_hit_changes_no_horizon(by: By) -> None:
+    """Law: all that moves is moved by the struck ball, so its nudge says all, whatever else lies on the table."""
+    balls = ball("a", 0.3, 0.01), ball("b", 0.6, -0.03)
+    alone, beside = floor(*balls, shot(0.0, 5.0)), floor(ball("far", -0.9, 0.4), *balls, shot(0.0, 5.0))
+    found, other = (horizon(scene, nudge=1e-4, by=by, ladder=(1e-4,)) for scene in (alone, beside))
+    assert found.parted.time is not None
+    assert other.parted == found.parted
+    assert other.ladder == found.ladder

@@ -1,4 +1,4 @@
-"""Costs: of separate repeats, in turns, with nothing recorded; no figure of them is asserted on."""
+"""Costs: counted, the same at every repeat; and timed in turns, with nothing recorded. No time is asserted on."""
 
 import math
 from types import SimpleNamespace
@@ -7,8 +7,9 @@ import pytest
 from runs_by_hand import DROP, scene_of
 
 from sandbox.engines.contract import Divergence, Exhaustion
+from sandbox.measure.compare.patience import TookTooLongError
 from sandbox.measure.tradeoff import cost as module
-from sandbox.measure.tradeoff.cost import Cost, costs, seconds_of
+from sandbox.measure.tradeoff.cost import Cost, bounded_run, costs, seconds_of, warm_up
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -46,25 +47,52 @@ def test_run_that_does_not_end_has_no_cost_and_is_closed(error: Exception, monke
     broken = SimpleNamespace(step=step, frame=lambda: None, close=lambda: closed.append(True))
     monkeypatch.setattr(module, "start", lambda *_: broken)
     scene = scene_of(DROP)
-    assert costs(scene, [("pymunk", scene.solver)], 3, math.inf) == [None]
-    assert closed == [True]  # and not tried again
+    assert costs(scene, [("pymunk", scene.solver)], 3) == [None]
+    assert closed == [True, True]  # the warm-up and the first turn; it is not tried again
 
 
-def test_ways_are_timed_in_turns_as_long_as_there_is_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    now, order = [0.0], []
+def test_ways_are_warmed_up_and_timed_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    order: list[str] = []
 
     def seconds(scene: Scene, engine: str, settings: Settings) -> float:
         order.append(engine)
-        now[0] += 1.0
         return 1.0
 
     monkeypatch.setattr(module, "seconds_of", seconds)
-    monkeypatch.setattr(module, "working", lambda: now[0])
+    monkeypatch.setattr(module, "warm_up", lambda _, engine, settings: order.append(f"warm {engine}"))
     scene = scene_of(DROP)
-    ways = [("a", scene.solver), ("b", scene.solver)]
-    found = costs(scene, ways, 5, 6.0)
-    assert order == ["a", "b"] * 3  # a fourth turn would end at 8 s
+    found = costs(scene, [("a", scene.solver), ("b", scene.solver)], 3)
+    assert order == ["warm a", "warm b"] + ["a", "b"] * 3
     assert [each.repeats for each in found if each is not None] == [3, 3]
-    order.clear()
-    costs(scene, ways, 5, 0.0)
-    assert order == ["a", "b"]  # once, whatever it takes
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "exact", "reference"])
+def test_warm_up_is_short_and_also_of_a_run_of_one_step(engine: str) -> None:
+    scene = scene_of(DROP)
+    for dt in (0.02, 0.4, 0.5):
+        warm_up(scene, engine, scene.solver.replace(dt=dt))
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
+def test_counted_cost_is_the_same_every_time_and_grows_with_the_steps(engine: str) -> None:
+    scene = scene_of(DROP)
+    (_, once), (_, again) = (bounded_run(scene, engine, scene.solver, math.inf) for _ in range(2))
+    _, finer = bounded_run(scene, engine, scene.solver.replace(dt=0.005), math.inf)
+    assert once == again > 0.0
+    assert 2.0 * once < finer
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
+def test_run_beyond_the_limit_is_given_up_however_fast_the_machine(engine: str) -> None:
+    scene = scene_of(DROP)
+    found, counted = bounded_run(scene, engine, scene.solver, math.inf)
+    again, _ = bounded_run(scene, engine, scene.solver, counted)
+    assert again.info["state_hash"] == found.info["state_hash"]
+    with pytest.raises(TookTooLongError, match="counted work"):
+        bounded_run(scene, engine, scene.solver, math.nextafter(counted, 0.0))
+
+
+def test_run_beyond_a_deadline_is_given_up() -> None:
+    scene = scene_of(DROP)
+    with pytest.raises(TookTooLongError, match="time limit"):
+        bounded_run(scene, "pymunk", scene.solver, math.inf, -math.inf)

@@ -123,11 +123,19 @@ def test_penetration_is_the_deepest_of_any_that_touched(scene: Scene) -> None:
 def test_drift_is_of_what_lies_still_in_truth_and_of_the_second_half(scene: Scene) -> None:
     moving = run_of(scene).position.copy()
     moving[:, 1, 0] += np.linspace(0.0, 1.0, 21)  # b wanders in truth: it does not count
+    moving[:5, 0, 1] += np.linspace(1.0, 0.0, 5)  # a falls in truth before it lies still
     judge = judge_of(scene, run_of(scene, moving))
     early = shifted(run_of(scene, moving), slice(0, 5), 0, (1.0, 0.0))
     assert measured(run_of(scene, early), judge)["drift"] == 0.0
     late = shifted(run_of(scene, moving), slice(15, None), 0, (0.0, 0.02))
     assert measured(run_of(scene, late), judge)["drift"] == pytest.approx(0.02, rel=1e-12)
+
+
+def test_drift_of_what_stands_in_truth_from_the_start_counts_from_there(scene: Scene) -> None:
+    """A stack that falls at once lies still in the second half too."""
+    judge = judge_of(scene, run_of(scene))
+    fallen = shifted(run_of(scene), slice(5, None), 0, (0.3, -0.4))
+    assert measured(run_of(scene, fallen), judge)["drift"] == pytest.approx(0.5, rel=1e-12)
 
 
 def test_nothing_drifts_where_all_moves(scene: Scene) -> None:

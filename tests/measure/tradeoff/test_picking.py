@@ -1,13 +1,25 @@
 """Picking: the cheapest that keeps its word, the best that the budget buys."""
 
 import math
+from random import Random
 
+import pymunk
 import pytest
+from runs_by_hand import DROP, scene_of
 from trials_by_hand import point_of
 
+from sandbox.engines.native.space import new_space
+from sandbox.engines.registry import ENGINES
 from sandbox.measure.tradeoff.aim import Aim
 from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.measure.tradeoff.picking import called, cheapest, closest
+from sandbox.measure.tradeoff.picking import (
+    called,
+    cheapest,
+    closest,
+    nearest_to_budget,
+    nearest_to_tolerance,
+    pymunk_lines,
+)
 from sandbox.measure.tradeoff.point import Point
 
 AIM = Aim(METRICS["max_position"], 0.01, 0.5, 60.0)
@@ -41,6 +53,74 @@ def test_pick_that_fails_on_fresh_seeds_gives_way_to_the_next() -> None:
 @pytest.mark.parametrize("fresh", [math.inf, math.nan, 0.02])
 def test_none_is_picked_where_all_fail_on_fresh_seeds(fresh: float) -> None:
     assert cheapest(POINTS, AIM, (1,), lambda _: fresh) is None
+
+
+def test_times_within_the_noise_are_decided_by_counted_work() -> None:
+    def picked(*costs: float) -> float | None:
+        points = [point_of(cost, 0.0, counted=counted) for cost, counted in zip(costs, (3.0, 2.0, 1.0), strict=True)]
+        found = cheapest(points, AIM, (), never)
+        assert found is not None
+        return found.point.counted
+
+    assert picked(10.0, 10.0, 10.0) == 1.0
+    assert picked(10.0, 11.0, 14.0) == picked(14.0, 11.0, 10.0) == 1.0
+    assert picked(10.0, 14.0, 16.0) == 2.0  # the third takes more than noise explains
+    assert picked(10.0, 16.0, 20.0) == 3.0
+
+
+def test_of_settings_alike_in_time_and_work_the_one_that_changes_less_is_taken() -> None:
+    plain = point_of(10.4, 0.001, counted=10.4, substeps=2)
+    points = [point_of(10.0, 0.002, counted=10.0, substeps=2, half_kick=True), plain]
+    found = cheapest(points, AIM, (), never)
+    assert found is not None
+    assert found.point is plain
+
+
+def test_noise_of_the_clock_does_not_change_the_answer() -> None:
+    noise = Random(1)
+    for _ in range(200):
+        points = [point_of(c * noise.uniform(1.0, 1.2), e, counted=c) for c, e in ((10.0, 0.009), (20.0, 0.001))]
+        points.append(point_of(11.0 * noise.uniform(1.0, 1.2), 0.002, counted=11.0))
+        found = cheapest(points, AIM, (), never)
+        assert found is not None
+        assert found.point.counted == 10.0
+
+
+def test_a_time_with_frames_kept_is_no_match_for_one_without() -> None:
+    found = cheapest([point_of(1.0, 0.0, repeats=0), point_of(9.0, 0.0)], AIM, (), never)
+    assert found is not None
+    assert found.point.cost == 9.0
+
+
+def test_nearest_is_the_most_accurate_and_of_the_budget_the_cheapest() -> None:
+    aim = AIM._replace(tolerance=1e-9, budget=1e-9)
+    near, cheap = nearest_to_tolerance(POINTS, aim), nearest_to_budget(POINTS, aim)
+    assert near is not None
+    assert cheap is not None
+    assert (near.point, cheap.point) == (POINTS[3], POINTS[0])
+    assert "ms a frame" in cheap.sentence
+    assert nearest_to_tolerance([point_of(1.0, None)], aim) is None
+    assert nearest_to_budget([], aim) is None
+
+
+def test_lines_for_pymunk_give_a_space_what_the_engine_gives_its_own() -> None:
+    scene = scene_of(DROP)
+    filled = ENGINES["pymunk"].resolve(scene, scene.solver.replace(substeps=3, iterations=7, half_kick=True))
+    ours, own = new_space(scene, filled), pymunk.Space()
+    own.gravity = scene.world.gravity
+    body = pymunk.Body(1.0, 1.0)
+    own.add(body)
+    steps: list[float] = []
+    step = own.step
+    own.step = lambda h: (steps.append(h), step(h))  # type: ignore[method-assign, assignment]
+    exec("\n".join(pymunk_lines(filled)), {"space": own, "body": body})
+    for name in ("iterations", "collision_slop", "collision_bias", "collision_persistence"):
+        assert getattr(own, name) == getattr(ours, name)
+    assert steps == [filled.h] * 3
+    h, g = filled.h, scene.world.gravity[1]
+    # Half a step ahead, positions of free flight are exact but for rounding.
+    assert body.position.y == pytest.approx(0.5 * g * (3 * h) ** 2, rel=1e-12)
+    assert pymunk_lines(filled.replace(substeps=1, half_kick=False))[-1] == "space.step(0.02)"
 
 
 def test_what_has_no_figures_is_not_picked() -> None:

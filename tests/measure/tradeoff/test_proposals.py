@@ -39,7 +39,7 @@ def proposed(
     for text in texts:
         scene = scene_of(text)
         judges.append(Judge(scene, truth_of(scene, scene.solver, 1e-6), 100.0))
-    return proposals(judges, metric, tolerance, "pymunk", judges[0].scene.solver.replace(substeps=32), 60.0, 2)
+    return proposals(judges, metric, tolerance, "pymunk", judges[0].scene.solver.replace(substeps=32), 60.0, repeats=2)
 
 
 def test_balls_that_never_meet_need_not_look_for_each_other(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,8 +1,10 @@
-"""The search, on landscapes made by hand: error and cost are functions of the variant alone."""
+"""The search, on landscapes made by hand: error and counted cost are functions of the variant alone."""
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from random import Random
+from typing import Any
 
 import pytest
 from runs_by_hand import DROP, scene_of
@@ -48,18 +50,24 @@ def order(power: float, at_one: float = 1.0, floor: float = 0.0) -> Law:
 class Landscape:
     """Trials as a law has them; costs are the variant's work, and those of some words more."""
 
-    def __init__(self, law: Law, price: Callable[[Variant], float] = lambda variant: 1.0) -> None:
+    def __init__(
+        self,
+        law: Law,
+        price: Callable[[Variant], float] = lambda variant: 1.0,
+        clock: Callable[[], float] = lambda: 0.0,
+    ) -> None:
         self.law, self.price = law, price
         self.asked: list[Variant] = []
+        self.clock = clock
 
-    def __call__(self, variant: Variant, space: Space, judges: Sequence[Judge], patience: float) -> Trial:
+    def __call__(self, variant: Variant, space: Space, judges: Sequence[Judge], limit: float, *_: Any) -> Trial:
         self.asked.append(variant)
         error = self.law(variant)
         bad = error is not None and math.isinf(error)
         metrics = {**dict.fromkeys(METRICS), "max_position": None if bad else error}
-        seconds = 1e-3 * variant.work * self.price(variant)
+        cost = 1e-3 * variant.work * self.price(variant)
         status, reason = ("diverged", "by law") if bad else ("ok", None)
-        return Trial(variant, space.settings(variant), status, reason, metrics, seconds, {})
+        return Trial(variant, space.settings(variant), status, reason, metrics, cost, cost, self.clock(), {})
 
 
 def searched(
@@ -71,21 +79,21 @@ def searched(
     scene: Scene | None = None,
     budget: float | None = None,
     most: int = 150,
-    patience: float = 1e6,
-    trying: Callable[[Variant, Space, Sequence[Judge], float], Trial] | None = None,
+    effort: float = 1e6,
+    trying: Callable[..., Trial] | None = None,
 ) -> Search:
     monkeypatch.setattr(module, "tried", trying or landscape)
     scene = scene_of(DROP) if scene is None else scene
     judges = [judge_of(scene, until=0.0)]
     space = Space(scene, scene.solver, engines, frame=1.0)
-    found = Search(space, judges, "max_position", tolerance, budget, patience, most, lambda _: None)
+    found = Search(space, judges, "max_position", tolerance, budget, effort, most, lambda _: None)
     found.run()
     return found
 
 
 def cheapest(search: Search) -> Trial:
     good = [trial for trial in search.trials.values() if trial.error("max_position") <= search.tolerance]
-    return min(good, key=lambda trial: trial.seconds)
+    return min(good, key=lambda trial: trial.cost)
 
 
 @pytest.mark.parametrize(("power", "tolerance"), [(1.0, 0.3), (1.0, 0.0023), (2.0, 0.011), (4.0, 0.0023)])
@@ -162,11 +170,11 @@ def test_start_that_diverges_is_refined(monkeypatch: pytest.MonkeyPatch) -> None
 def test_coarser_steps_are_tried_where_the_scenes_own_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     landscape = Landscape(order(1.0))
 
-    def impatient(variant: Variant, space: Space, judges: Sequence[Judge], patience: float) -> Trial:
-        found = landscape(variant, space, judges, patience)
+    def bounded(variant: Variant, space: Space, judges: Sequence[Judge], limit: float, *_: Any) -> Trial:
+        found = landscape(variant, space, judges, limit)
         return found if steps(variant) <= 0.25 else replace(found, status="stopped", metrics=dict.fromkeys(METRICS))
 
-    search = searched(monkeypatch, landscape, 5.0, trying=impatient)
+    search = searched(monkeypatch, landscape, 5.0, trying=bounded)
     assert steps(cheapest(search).variant) == 0.25
     assert max(map(steps, landscape.asked)) == 1.0
     assert landscape.asked[1].work < landscape.asked[0].work  # nothing as slow is tried beside it
@@ -224,33 +232,56 @@ def test_most_is_kept(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
     assert max(1.0, 0.8 * most) <= len(landscape.asked) <= most
 
 
-def test_patience_is_kept_by_a_clock_that_the_trials_move(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_effort_is_kept_by_the_counted_cost_of_the_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+    landscape, allowed = Landscape(order(1.0)), []
+
+    def noted(variant: Variant, space: Space, judges: Sequence[Judge], limit: float, *_: Any) -> Trial:
+        allowed.append(limit)
+        return landscape(variant, space, judges, limit)
+
+    search = searched(monkeypatch, landscape, 1e-3, effort=0.1, most=400, trying=noted)
+    assert search.spent == pytest.approx(sum(trial.spent for trial in search.trials.values()), rel=1e-12)  # a sum
+    assert search.spent <= 0.1 + 1e-12  # what would cost more than what is left was left out
+    assert search.untried
+    assert max(allowed[1:]) <= 0.2 * 0.1  # a fifth of it, for one
+
+
+@pytest.mark.parametrize("slower", [1e-3, 1.0, 1e3])
+def test_the_clock_changes_nothing(monkeypatch: pytest.MonkeyPatch, slower: float) -> None:
+    noise = Random(4)
+    plain, odd = Landscape(order(1.0)), Landscape(order(1.0), clock=lambda: slower * noise.random())
+    for landscape in (plain, odd):
+        searched(monkeypatch, landscape, 0.02, engines=("pymunk", "reference", "exact"), effort=0.5)
+    assert plain.asked == odd.asked
+
+
+def test_a_time_limit_ends_the_search_and_keeps_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [0.0]
     landscape = Landscape(order(1.0))
 
-    def slow(variant: Variant, space: Space, judges: Sequence[Judge], patience: float) -> Trial:
-        found = landscape(variant, space, judges, patience)
-        now[0] += found.seconds
-        allowed.append(patience)
-        return found
+    def slow(variant: Variant, space: Space, judges: Sequence[Judge], limit: float, *_: Any) -> Trial:
+        now[0] += 1.0
+        return landscape(variant, space, judges, limit)
 
-    allowed: list[float] = []
     monkeypatch.setattr(module, "working", lambda: now[0])
     monkeypatch.setattr(module, "tried", slow)
     scene = scene_of(DROP)
     space = Space(scene, scene.solver, ("pymunk",))
-    search = Search(space, [judge_of(scene, until=0.0)], "max_position", 1e-3, None, 0.1, 400, lambda _: None)
-    search.run()
-    assert now[0] <= 0.1 + 1e-12  # what would take longer than what is left was left out
-    assert search.untried
-    assert max(allowed[1:]) <= 0.2 * 0.1  # a fifth of it, for one
+    search = Search(space, [judge_of(scene, until=0.0)], "max_position", 1e-3, None, 1e6, 400, lambda _: None, 5.0)
+    assert len(search.run()) == 5
+
+
+def test_own_settings_of_every_engine_are_tried_whatever_they_cost(monkeypatch: pytest.MonkeyPatch) -> None:
+    landscape = Landscape(order(1.0))
+    search = searched(monkeypatch, landscape, 1e-3, engines=("pymunk", "exact", "reference"), effort=1e-9)
+    assert list(search.trials) == search.space.starts()
 
 
 def test_budget_is_aimed_at(monkeypatch: pytest.MonkeyPatch) -> None:
     """The tolerance is met at once; what the budget buys is looked for all the same, and a finer step is better."""
     budget = 1e-3 * Variant("pymunk", substeps=20).work
     search = searched(monkeypatch, Landscape(order(1.0)), 2.0, budget=budget)
-    able = [trial for trial in search.trials.values() if trial.seconds <= budget]
+    able = [trial for trial in search.trials.values() if trial.cost <= budget]
     best = min(able, key=lambda trial: trial.error("max_position"))
     assert steps(best.variant) >= 10.0  # within a factor of 2 of what it buys
 

@@ -2,6 +2,8 @@
 
 import json
 import math
+from random import Random
+from time import perf_counter
 from typing import Any
 
 import pytest
@@ -12,13 +14,15 @@ from sandbox.engines.registry import ENGINES, UnknownEngineError
 from sandbox.measure.compare.truth import truth_of
 from sandbox.measure.seeds import seeded
 from sandbox.measure.tradeoff import Tradeoff, tradeoff
+from sandbox.measure.tradeoff import cost as cost_module
 from sandbox.measure.tradeoff import weighing as module
 from sandbox.measure.tradeoff.aim import UnknownMetricError
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.measure.tradeoff.picking import called
+from sandbox.measure.tradeoff.picking import ALIKE, NOISE, called
 from sandbox.measure.tradeoff.point import Point
 from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
 
 PROMISED = {"scene", "truth", "metric", "points", "pareto", "within_tolerance", "within_budget"}
 OF_A_POINT = {"engine", "settings", "error", "cost_ms_per_second", "status"}
@@ -46,7 +50,7 @@ restitution = 0.5
 
 
 def weighed(scene: Scene, *engines: str, **more: Any) -> Tradeoff:
-    return tradeoff(scene, engines or ("pymunk",), **{"patience": 60.0, "most": 14, "repeats": 1, **more})
+    return tradeoff(scene, engines or ("pymunk",), **{"most": 14, "repeats": 1, **more})
 
 
 def error_of(scene: Scene, point: Point, metric: str = "max_position") -> float:
@@ -69,7 +73,10 @@ def test_pick_keeps_to_the_tolerance_when_run_on_its_own() -> None:
     assert point.error is not None
     assert point.error <= 4e-3
     assert error_of(scene, point) == point.error
-    assert point.cost == min(p.cost or 0.0 for p in found.points if p.usable and (p.error or 0.0) <= 4e-3)
+    able = [p for p in found.points if p.repeats and (p.error or 0.0) <= 4e-3]
+    least = min(p.cost or 0.0 for p in able)
+    close = [p for p in able if (p.cost or 0.0) <= NOISE * least]
+    assert (point.counted or 0.0) <= ALIKE * min(p.counted or 0.0 for p in close)
 
 
 def test_pick_of_a_random_scene_keeps_to_the_tolerance_on_seeds_that_nobody_used() -> None:
@@ -144,13 +151,92 @@ def test_document_has_the_keys_promised_and_no_figure_that_json_lacks() -> None:
     costs = [row["cost_ms_per_second"] for row in document["pareto"]]
     assert errors == sorted(errors, reverse=True)
     assert costs == sorted(costs)
-    assert len(document["answers"]) == 2
+    assert [each.split(" setting")[0] for each in document["answers"]] == ["cheapest", "most accurate"]
 
 
 def test_work_is_counted_and_the_same_every_time() -> None:
     first, second = (weighed(scene_of(DROP), most=3) for _ in range(2))
     assert [point.work for point in first.points] == [point.work for point in second.points]
     assert all(point.work for point in first.points)
+
+
+def test_machine_and_load_change_neither_what_is_tried_nor_its_errors_nor_the_answer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By a slow clock a run takes 1,000 times as long, and one run in three is interrupted by another program."""
+    found = []
+    for slow in (1.0, 1e3):
+        noise = Random(3)
+
+        def timed(scene: Scene, engine: str, settings: Settings, slow: float = slow, noise: Random = noise) -> float:
+            return slow * clock(scene, settings) * (1.0 if noise.random() < 0.7 else noise.uniform(1.0, 5.0))
+
+        monkeypatch.setattr(cost_module, "seconds_of", timed)
+        monkeypatch.setattr(cost_module, "working", lambda slow=slow: slow * perf_counter())
+        found.append(weighed(scene_of(DROP), "pymunk", "exact", tolerance=4e-3, repeats=5, most=30))
+    first, second = found
+    assert [(p.engine, p.settings, p.error, p.counted) for p in first.points] == [
+        (p.engine, p.settings, p.error, p.counted) for p in second.points
+    ]
+    assert first.spent == second.spent
+    assert first.within_tolerance is not None
+    assert second.within_tolerance is not None
+    assert first.within_tolerance.point.settings == second.within_tolerance.point.settings
+    assert second.within_tolerance.point.cost > 100.0 * first.within_tolerance.point.cost
+
+
+def clock(scene: Scene, settings: Settings) -> float:
+    """Return s that a run takes on a machine where a substep takes 10 µs."""
+    return 1e-5 * scene.world.duration / settings.h
+
+
+def test_scenes_own_setting_is_a_point_of_every_engine_and_marked() -> None:
+    found = weighed(scene_of(DROP), "pymunk", "exact", "reference", tolerance=1e-9, effort=1e-9)
+    own = [point for point in found.points if point.is_own]
+    assert [point.engine for point in own] == ["pymunk", "exact", "reference"]
+    assert all(not point.changes and point.repeats for point in own)
+    assert [row["scene_setting"] for row in found.document()["points"]] == [point.is_own for point in found.points]
+
+
+def test_runs_that_are_known_are_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of(DROP)
+    runs = sandbox.compare(scene, ("pymunk", "exact")).trajectories
+    plain = weighed(scene, "pymunk", "exact", most=2)
+    monkeypatch.setattr("sandbox.measure.tradeoff.trial.bounded_run", None)
+    again = weighed(scene, "pymunk", "exact", most=2, runs=runs)
+    assert [(p.settings, p.error, p.counted) for p in plain.points] == [
+        (p.settings, p.error, p.counted) for p in again.points
+    ]
+
+
+def test_nearest_is_given_where_nothing_is_within_the_tolerance_or_the_budget() -> None:
+    found = weighed(scene_of(DROP), tolerance=1e-12, budget=1e-9)
+    assert (found.within_tolerance, found.within_budget) == (None, None)
+    assert found.nearest_to_tolerance is not None
+    assert found.nearest_to_budget is not None
+    assert found.nearest_to_tolerance.point.error == min(p.error for p in found.points if p.usable)
+    assert all("the nearest is pymunk" in line for line in found.answers())
+    document = found.document()
+    assert document["nearest_to_tolerance"]["sentence"] in document["answers"][0]
+
+
+def test_metric_and_its_reason_are_stated() -> None:
+    found = weighed(scene_of(DROP), most=1)
+    assert (found.metric.name, found.metric_reason) == (
+        "max_position",
+        "the truth (closed form) is trusted to the end, 0.4 s",
+    )
+    assert found.document()["metric_reason"] == found.metric_reason
+    assert weighed(scene_of(DROP), most=1, metric="energy").metric_reason == "it was asked for"
+
+
+def test_where_two_methods_contradict_each_other_an_invariant_is_the_metric_and_the_reason_is_stated() -> None:
+    why = "reference, dt halved 8 times; pymunk contradicts it from 0 s on"
+    found = weighed(scene_of(DROP), most=2, truth=why)
+    assert (found.best, found.truth, found.metric.name) == (None, None, "penetration")
+    assert found.metric_reason == f"no truth is known ({why}), and bodies can touch"
+    assert found.document()["truth_about"] == why
+    assert f"because no truth is known ({why})" in found.error_about
 
 
 def test_metric_in_pixels_scales_with_the_zoom() -> None:
@@ -172,7 +258,9 @@ def test_metric_in_pixels_scales_with_the_zoom() -> None:
         {"fps": math.nan},
         {"seeds": 0},
         {"zoom": -1.0},
-        {"patience": 0.0},
+        {"effort": 0.0},
+        {"effort": math.inf},
+        {"time_limit": 0.0},
         {"repeats": 0},
         {"most": 0},
     ],
@@ -180,13 +268,13 @@ def test_metric_in_pixels_scales_with_the_zoom() -> None:
 def test_senseless_figure_is_refused_before_anything_is_run(
     wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "truth_of", None)
+    monkeypatch.setattr(module, "seek_truth", None)
     with pytest.raises(ValueError, match=r"at least|positive"):
         tradeoff(scene_of(DROP), **wrong)
 
 
 def test_unknown_names_are_refused_before_anything_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "truth_of", None)
+    monkeypatch.setattr(module, "seek_truth", None)
     with pytest.raises(UnknownMetricError, match="metrics: max_position"):
         tradeoff(scene_of(DROP), metric="beauty")
     with pytest.raises(UnknownEngineError, match="engines: pymunk"):
@@ -212,7 +300,7 @@ def test_nothing_that_moves_is_no_trap() -> None:
 def test_metric_that_says_nothing_is_told() -> None:
     found = weighed(scene_of(DROP), metric="joint_error", most=3)
     assert found.within_tolerance is None
-    assert found.answers() == ["joint_error says nothing of this scene; another --metric would"]
+    assert found.answers() == ["joint_error says nothing of this scene; choose another --metric"]
 
 
 def test_who_watches_is_told_what_is_being_done() -> None:

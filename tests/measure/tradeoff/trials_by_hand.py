@@ -29,8 +29,17 @@ def shifted(run: Trajectory, frames: slice | int, body: int, by: tuple[float, fl
     return found
 
 
-def point_of(cost: float, error: float | None, engine: str = "pymunk", **settings: Any) -> Point:
-    """Return a point of a cost, ms per simulated second."""
+def point_of(
+    cost: float,
+    error: float | None,
+    engine: str = "pymunk",
+    counted: float | None = None,
+    repeats: int = 1,
+    **settings: Any,
+) -> Point:
+    """Return a point of a cost, ms per simulated second; it is counted as what it takes, if nothing else is said."""
     chosen = Settings(**settings)
     metrics: Mapping[str, float | None] = dict.fromkeys(METRICS)
-    return Point(engine, chosen, chosen, settings, "ok", None, metrics, error, cost, cost, 1, {})
+    return Point(
+        engine, chosen, chosen, settings, "ok", None, metrics, error, cost, cost, repeats, counted or cost, False, {}
+    )

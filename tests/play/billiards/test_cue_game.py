@@ -1,15 +1,18 @@
 """A game in a session: strokes, turns, and the way back."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from seated import FREE, NINE, RADIUS, game_of, roll_out, turn
 
 from sandbox.action import ActionError, Strike
+from sandbox.games.billiards.rules.verdict import Verdict
 from sandbox.measure.replay import rerun
 from sandbox.play.billiards.person import Person
 from sandbox.play.billiards.seen import Seen
+from sandbox.play.instruments.scoreboard import status_line
 
 
 def test_time_stands_still_until_somebody_strikes() -> None:
@@ -102,7 +105,7 @@ def test_stroke_after_undo_goes_its_own_way_and_replays() -> None:
 
 
 def test_undo_without_a_stroke_says_so() -> None:
-    with pytest.raises(ActionError, match="no stroke"):
+    with pytest.raises(ActionError, match="no shot"):
         game_of(FREE).undo()
 
 
@@ -144,7 +147,7 @@ def test_strokes_of_a_hand_that_moves_balls_begin_where_they_lie() -> None:
 
 
 def test_bot_answers_the_break() -> None:
-    game = game_of(NINE, "bot")
+    game = game_of(NINE, "you vs bot")
     game.shoot(6.0)
     roll_out(game)
     for _ in range(200_000):
@@ -160,6 +163,25 @@ def test_bot_answers_the_break() -> None:
         game.undo()
         game.live.arrive()
         assert game.mine  # back at the person's stroke
+    game.close()
+
+
+def test_bot_has_one_name_and_no_aim_while_it_thinks() -> None:
+    game = game_of(NINE, "you vs bot")
+    person = Person(game)
+    state, said = replace(game.match.state, turn=1), ("foul: scratch; player 2 has the ball in hand",)
+    game.go_another_way(replace(game.match, state=state, verdict=Verdict(state, messages=said)))
+    assert game.bot_is_thinking
+    assert Seen(person).aim() is None
+    assert status_line(person) == "foul: scratch; bot has the ball in hand; bot is thinking"
+    for _ in range(200_000):
+        turn(game, 0.02)
+        if not game.bot_is_thinking:
+            break
+    aim = Seen(person).aim()
+    assert aim is not None
+    assert aim.angle == game.cue.aim
+    assert status_line(person).endswith("bot is aiming")
     game.close()
 
 

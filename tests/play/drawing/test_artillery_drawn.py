@@ -202,7 +202,7 @@ def test_keys_aim_and_fire_and_going_back_takes_back(window: Window, tmp_path: P
     crater = live.scene.walls[0].points
     assert rules.phase == "settle"
     assert rules.field.ground.points == crater
-    assert any("shell: at" in text for _, text in window.stage.messages.shown())
+    assert any("shell: landed at" in text for _, text in window.stage.messages.shown())
     recording = tmp_path / "duel.json"
     kept = live.session.recording()
     kept.save(recording)

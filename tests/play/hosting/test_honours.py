@@ -26,7 +26,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 class Hosted:
     """What honours need of a host."""
 
-    over: str | None = "all balls were played"
+    over: str | None = "game over"
     score: int = 5_000
     touched: bool = True
     rules: Any = field(init=False)
@@ -57,7 +57,7 @@ def test_initials_are_asked_for_at_the_end_and_kept() -> None:
     panel.watch(host)
     assert panel.honours.entering is None
     assert press(panel, "a") == [False]
-    host.over = "all balls were played"
+    host.over = "game over"
     panel.watch(host)
     assert press(panel, "a", "b", "*", "d", pygame.K_BACKSPACE, "c", "x", pygame.K_RETURN) == [True] * 8
     (best,) = opened().of(TABLE)

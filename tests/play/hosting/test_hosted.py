@@ -54,6 +54,7 @@ def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[Window]:
     with window_on(TOY, tmp_path, (1000, 640)) as opened:
+        opened.stage.start_game()
         yield opened
 
 
@@ -94,7 +95,7 @@ def test_help_lists_controls_and_scene_keys_are_theirs(window: Window) -> None:
     assert claims.told == (
         ("Up or Left Shift", "kick it; gamepad: A, stick up"),
         ("Left", "how far; gamepad: LT"),
-        ("Gamepad Start", "pause, go on"),
+        ("Gamepad Start", "pause / resume"),
     )
     assert {UP, LEFT, pygame.K_LSHIFT} <= window.desk.claimed(window.stage)
 
@@ -447,5 +448,5 @@ def test_a_game_of_many_keys_says_where_they_are_told() -> None:
     opened.stage.open(find("duel"))
     opened.turn(0.02)
     said = [text for _, text in opened.stage.messages.shown()]
-    assert said == ["Left, Right, Up, Down, W, Space, Gamepad Start: F1 tells what each does"]
+    assert said == ["Left, Right, Up, Down, W, Space, Gamepad Start (F1: help)"]
     opened.close()

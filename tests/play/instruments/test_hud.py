@@ -67,10 +67,10 @@ def test_pause_names_only_p_where_the_scene_claims_space() -> None:
     [
         (1.0, 1.0, None),
         (1.0, 0.91, None),
-        (1.0, 0.89, "speed 100 %, really 89 %"),
+        (1.0, 0.89, "speed 100 %, running at 89 %"),
         (0.63, 0.63, "speed 63 %"),
-        (0.5, 0.4, "speed 50 %, really 40 %"),
-        (2.0, 2.3, "speed 200 %, really 230 %"),
+        (0.5, 0.4, "speed 50 %, running at 40 %"),
+        (2.0, 2.3, "speed 200 %, running at 230 %"),
     ],
 )
 def test_real_speed_is_told_when_more_than_a_tenth_apart(asked: float, real: float, told: str | None) -> None:
@@ -85,7 +85,7 @@ def test_real_speed_is_not_told_while_paused() -> None:
 def test_trust_differs_in_word_and_shape() -> None:
     (held,) = [row for row in rows(replace(QUIET, trust="trusted")) if row.mark]
     (lost,) = [row for row in rows(replace(QUIET, trust="lost", horizon=3.2)) if row.mark]
-    assert (held.text, lost.text) == ("predictable", "past the horizon since 3.20 s")
+    assert (held.text, lost.text) == ("predictable", "no longer predictable (since 3.20 s)")
     assert held.mark != lost.mark
     assert not [row for row in rows(replace(QUIET, trust="unknown")) if row.mark]
 

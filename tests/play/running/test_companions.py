@@ -282,7 +282,7 @@ def test_horizon_is_known_before_and_after_it_when_going_back() -> None:
     assert company.trust is not None
     company.trust.tolerance = 1e-11
     while company.trust.state == "trusted" and session.time < 5.0:
-        together(session, company, 5)
+        together(session, company, 1)
     horizon, lost = company.trust.horizon, session.step_number
     assert horizon is not None
     together(session, company, 10)

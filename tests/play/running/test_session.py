@@ -69,6 +69,27 @@ def assert_replays(session: Session) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", ["bounce", "newtons_cradle"])
+def test_recording_keeps_what_came_after_the_moment_it_has_gone_back_to(name: str, engine: str) -> None:
+    session = Session(SCENES[name], engine)
+    played(session, 40)
+    session.act(Impulse(time=0.0, body=FIRST[name], impulse=(0.1 * float(session.bodies.mass[0]), 0.0)))
+    played(session, 40)
+    whole = session.recording()
+    for step in (60, 20, 0, 50):
+        go(session, step)
+        assert session.recording() == whole
+    assert_replays(session)
+    assert session.replaced is None
+    session.act(Impulse(time=0.0, body=FIRST[name], impulse=(0.0, 0.0)))
+    assert session.replaced is not None
+    assert session.replaced.recording == whole
+    assert session.replaced.time == pytest.approx(50 * session.settings.dt)
+    assert session.recording().duration == pytest.approx(50 * session.settings.dt)
+    assert_replays(session)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("acting", [False, True], ids=["untouched", "acted on"])
 def test_way_back_and_forth_leads_through_the_same_states(name: str, engine: str, acting: bool) -> None:

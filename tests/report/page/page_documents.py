@@ -57,7 +57,7 @@ def point(engine: str, dt: float, error: float | None, cost: float | None, **set
     """Return a point of a trade-off."""
     chosen, work = Settings(dt=dt, **settings), {"substeps": round(1.0 / dt)}
     metrics = {"max_position": error, "energy": 0.25}
-    return Point(engine, chosen, chosen, {"dt": dt}, "ok", None, metrics, error, cost, cost, 3, work)
+    return Point(engine, chosen, chosen, {"dt": dt}, "ok", None, metrics, error, cost, cost, 3, cost, dt == 0.01, work)
 
 
 def weighed(points: tuple[Point, ...], **more: Any) -> Tradeoff:
@@ -65,7 +65,9 @@ def weighed(points: tuple[Point, ...], **more: Any) -> Tradeoff:
     scene = loads(SCENE, "hostile.toml")
     rest = {
         "best": None,
+        "doubt": None,
         "metric": METRICS["max_position"],
+        "metric_reason": "the truth is trusted to the end",
         "zoom": 100.0,
         "pareto": (),
         "splits": (),
@@ -75,8 +77,14 @@ def weighed(points: tuple[Point, ...], **more: Any) -> Tradeoff:
         "fps": 60.0,
         "within_tolerance": None,
         "within_budget": None,
+        "cheapest_by_engine": {},
+        "nearest_to_tolerance": None,
+        "nearest_to_budget": None,
         "seeds": (0,),
         "untried": 0,
+        "effort": 1.0,
+        "spent": 0.5,
+        "out_of_time": False,
         "machine": {"cpu": "a <processor>", "cores": 2},
         "versions": {"python": "3"},
     }

@@ -9,7 +9,7 @@ happens to take away again. Here it stays, and a bouncing ball never comes below
 """
 
 from sandbox.engines.reference.detection.discrete import discrete
-from sandbox.engines.reference.detection.resting import MOST_IMPACTS, fresh, lasting, resting
+from sandbox.engines.reference.detection.resting import MOST_IMPACTS, fresh, gathered, lasting, resting
 from sandbox.engines.reference.stage import Stage
 
 EPSILON = 1e-9
@@ -33,6 +33,7 @@ def bisect(stage: Stage, h: float) -> None:
             else:
                 low = middle
         moved = stage.moved(low)
+        clash = gathered(stage, moved, clash)
         stage.impact(moved, clash, lasting(stage, moved, rest, clash), low)
         left -= low
     discrete(stage, left)

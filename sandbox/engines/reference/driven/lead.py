@@ -4,14 +4,13 @@ So contacts have their levers from the hinge: its mass nothing can move, and abo
 """
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
 
 import numpy as np
 
 from sandbox.engines.driving.arc import about, heaviness, seated
 from sandbox.engines.driving.plunger import along, placed, pulled
 from sandbox.engines.driving.stroke import struck
-from sandbox.engines.driving.torque import Torque
+from sandbox.engines.driving.torque import Torque, Turned
 from sandbox.engines.reference.motion import State
 from sandbox.engines.roster import Roster
 from sandbox.scene.driven import Mount, about_hinge
@@ -80,19 +79,6 @@ class Lead(ABC):
         return -self.mass * (self.gravity[0] * x + self.gravity[1] * y)
 
 
-class Turned(NamedTuple):
-    """Where a substep brings a body on a hinge, as `Torque.turned` has it."""
-
-    angle: float
-    """rad"""
-    spin: float
-    """rad/s"""
-    at: int
-    """the stop onto which it is pressed: −1 for its rest, 1 for its end, or 0"""
-    press: float
-    """N·m, what presses it there; signed as spins are"""
-
-
 class Hinge(Lead):
     """A body on a hinge, driven by a torque."""
 
@@ -104,8 +90,8 @@ class Hinge(Lead):
         super().__init__(roster, number, mount)
         assert isinstance(mount.drive, TorqueDrive)
         self._law = Torque(mount.drive, self.moment)
-        self._torque, self._h = 0.0, 0.0
-        self._planned = 0.0, 0.0, 0.0, 0.0  # angle, spin, mean torque, how long
+        self._h = 0.0
+        self._planned = 0.0, 0.0, 0.0, 0.0  # angle, spin, torque of the drive, its level
         self._held = 0, 0.0, 0.0  # by a stop: at which, N·m·s, in which time
         self._low, self._high = sorted(mount.drive.stops)
 
@@ -132,10 +118,9 @@ class Hinge(Lead):
         """Let the torque ramp, and the body glide."""
         level, torque, _ = self.state.tolist()
         angle, spin = float(x[0, self.number, 2]), float(x[1, self.number, 2])
-        self._torque, mean, _ = self._law.ramped(torque, level, h)
         self.fall = heaviness(self.mount.hinge, angle, self.mass, self.gravity)
-        self._planned = angle, spin, mean, h
-        self.turned, self._h = Turned(*self._law.turned(*self._planned[:3], self.fall, h)), h
+        self._planned = angle, spin, torque, level
+        self.turned, self._h = self._law.turn(*self._planned, self.fall, h), h
 
     def begin(self, x: State) -> None:
         """Leave it the velocity that it has: its torque is a force among the others."""
@@ -157,9 +142,8 @@ class Hinge(Lead):
 
         Return whether that leaves it pressed onto a stop on which it stands.
         """
-        angle, spin, mean, h = self._planned
         stood = self.stands
-        turned = Turned(*self._law.turned(angle, spin, mean, self.fall + self.moment * spun / h, h))
+        turned = self._law.turn(*self._planned, self.fall + self.moment * spun / self._h, self._h)
         self.turned = turned._replace(press=0.0)
         return stood and self.stands
 
@@ -169,7 +153,7 @@ class Hinge(Lead):
         after[0, n, 2] = min(max(after[0, n, 2], self._low), self._high)
         if self.turned.at and abs(after[1, n, 2]) <= STILL:
             after[1, n, 2] = 0.0
-        self.state[1] = self._torque
+        self.state[1] = self.turned.torque
 
 
 class Stroke(Lead):

@@ -69,7 +69,7 @@ class FreePlay(Rules[FreeState]):
             in_hand="anywhere" if shot.scratched else None,
             decisions=ALWAYS,
         )
-        told = ("the cue ball fell and is in hand",) if shot.scratched else ()
+        told = ("scratch: cue ball in hand",) if shot.scratched else ()
         if table or not state.rack:
             return Verdict(after, points=points, goes_on=goes_on, messages=told)
         top = max(after.scores)

@@ -13,8 +13,8 @@ class GameError(ValueError):
 class Happening:
     """A ball touched a ball or a cushion, or fell into a pocket.
 
-    A cushion is a wall or a jaw. One that a ball lies against when the shot begins is told only once the ball has left
-    it and come back (WPA 8.4); so is a ball that the cue ball touches from the start.
+    A cushion is a wall or a jaw. One that a ball is frozen to when the shot begins counts only once the ball has left
+    it and come back (WPA 8.4); so does a ball that the cue ball touches from the start.
     """
 
     time: float
@@ -38,6 +38,8 @@ class Shot:
     """balls and their pockets, in order of time, the cue ball too"""
     driven: frozenset[str]
     """balls that came to a cushion or fell once the cue ball had touched one"""
+    stayed_behind: bool = False
+    """whether a cue ball in hand behind the head string first touched a ball there without having crossed it"""
 
     @property
     def scratched(self) -> bool:
@@ -54,13 +56,14 @@ class Shot:
         return dict(self.fell).get(ball)
 
 
-def read(happenings: Iterable[Happening], cue: str, table: tuple[str, ...]) -> Shot:
+def read(happenings: Iterable[Happening], cue: str, table: tuple[str, ...], stayed_behind: bool = False) -> Shot:
     """Read a shot.
 
     Args:
         happenings: in any order.
         cue: the ball that was struck.
         table: the other balls on the table.
+        stayed_behind: as in `Shot`.
 
     Raises:
         GameError: a happening names a ball that is not on the table.
@@ -78,7 +81,7 @@ def read(happenings: Iterable[Happening], cue: str, table: tuple[str, ...]) -> S
         if each.kind == "pocket":
             fell.setdefault(each.ball, each.other)
     driven = frozenset(each.ball for each in ordered if each.kind != "ball" and each.time >= start)
-    return Shot(cue, ordered, first, tuple(fell.items()), driven)
+    return Shot(cue, ordered, first, tuple(fell.items()), driven, stayed_behind)
 
 
 def touched_by(cue: str, each: Happening) -> str | None:

@@ -9,7 +9,7 @@ DRIVEN = 4
 
 def scratch(shot: Shot) -> list[str]:
     """Return the foul of a cue ball that fell (WPA 6.1)."""
-    return ["the cue ball fell"] if shot.scratched else []
+    return ["scratch"] if shot.scratched else []
 
 
 def wrong_ball(shot: Shot, targets: frozenset[str]) -> list[str]:
@@ -23,12 +23,19 @@ def wrong_ball(shot: Shot, targets: frozenset[str]) -> list[str]:
 
 def no_rail(shot: Shot) -> list[str]:
     """Return the foul of a touch after which no ball fell or came to a cushion (WPA 6.3)."""
-    return ["no ball came to a cushion after the touch"] if shot.first and not shot.driven else []
+    return ["no rail after contact"] if shot.first and not shot.driven else []
+
+
+def from_behind(shot: Shot) -> list[str]:
+    """Return the foul of a cue ball in hand that was played at a ball behind the head string (WPA 6.11)."""
+    if not shot.stayed_behind:
+        return []
+    return [f"{named_first(shot)} behind the head string, which the cue ball had not crossed"]
 
 
 def standard(shot: Shot, targets: frozenset[str]) -> tuple[str, ...]:
     """Return the standard fouls of a shot."""
-    return (*scratch(shot), *wrong_ball(shot, targets), *no_rail(shot))
+    return (*scratch(shot), *wrong_ball(shot, targets), *from_behind(shot), *no_rail(shot))
 
 
 def broke(shot: Shot) -> bool:

@@ -44,8 +44,15 @@ class Rules(ABC, Generic[S]):
         """Return what may be decided and called before the next shot."""
         return Choices(decisions=() if state.over else state.decisions)
 
-    def judge(self, state: S, call: Call, happenings: Iterable[Happening]) -> Verdict[S]:
+    def judge(self, state: S, call: Call, happenings: Iterable[Happening], stayed_behind: bool = False) -> Verdict[S]:
         """Return what came of a shot. What was still to be decided is taken as `play`.
+
+        Args:
+            state: before the shot.
+            call: what was said of it.
+            happenings: in any order.
+            stayed_behind: whether a cue ball in hand behind the head string first touched a ball there, and had not
+                crossed the head string before.
 
         Raises:
             GameError: the frame is over, the call cannot be made now, or a ball is not on the table.
@@ -54,7 +61,7 @@ class Rules(ABC, Generic[S]):
             raise GameError("the frame is over")
         self.choices(state).check(call)
         cue = self.cue_ball(state)
-        shot = read(happenings, cue, state.without((cue,)))
+        shot = read(happenings, cue, state.without((cue,)), stayed_behind)
         return self._judge(replace(state, decisions=()), call, shot)
 
     def decide(self, state: S, decision: Decision) -> Verdict[S]:

@@ -47,7 +47,7 @@ class Stroke:
         shot, least = self.shot, max(LEAST, self.worth)
         found: list[tuple[int, str]] = []
         if shot.scratched:
-            found.append((least, "the cue ball fell"))
+            found.append((least, "in-off"))
         if not self.hit:
             if not shot.first:
                 found.append((least, "the cue ball touched no ball"))

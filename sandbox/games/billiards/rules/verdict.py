@@ -65,5 +65,12 @@ def _summed(one: tuple[int, ...], other: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def player(number: int) -> str:
-    """Return what a player is called."""
+    """Return what a player is called in messages."""
     return f"player {number + 1}"
+
+
+def renamed(message: str, names: tuple[str, ...]) -> str:
+    """Return a message with the players called by names of their own."""
+    for number, name in enumerate(names):
+        message = message.replace(player(number), name)
+    return message

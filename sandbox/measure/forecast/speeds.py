@@ -1,0 +1,267 @@
+"""Speeds: upper bounds of how fast each body can get, from energy, time, and impacts by heavier bodies."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sandbox.measure.forecast.held import farthest_fall
+from sandbox.measure.forecast.warning import ROUNDING
+from sandbox.scene.forces import Attraction
+from sandbox.scene.links import LinkKind
+from sandbox.scene.meetings import Meetings, meetings
+from sandbox.scene.model import Plane, Post, Scene, Wall
+from sandbox.scene.near import FloatArray
+from sandbox.scene.part import MAX_SPEED
+from sandbox.scene.potential import Potential
+from sandbox.scene.starts import height_above
+
+MOST_CLASSES = 200
+"""Masses that are told apart in a chain of impacts; of more, neighbouring ones count as one."""
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """Bounds of the speeds of a scene's N bodies."""
+
+    scene: Scene
+    meet: Meetings
+
+    @cached_property
+    def unknown(self) -> tuple[str, ...]:
+        """What makes bodies faster by an amount that no formula here bounds."""
+        scene, found = self.scene, []
+        if any(self._is_steep(each) for each in scene.attractions):
+            found.append("attraction without softening")
+        if scene.drives:
+            found.append("drives")
+        if len(scene.links.of(LinkKind.MOTOR)):
+            found.append("motors")
+        if any(thrust.key is not None for thrust in scene.thrusts):
+            found.append("thrusts by key")
+        return tuple(found)
+
+    @cached_property
+    def bounded(self) -> bool:
+        """Whether all that can make a body faster is accounted for."""
+        return not self.unknown
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """(N,) m/s at the start."""
+        return np.asarray(np.hypot(*self.scene.bodies.velocity.T))
+
+    @cached_property
+    def squared(self) -> FloatArray:
+        """(N,) m²/s²: the square of the speed at the start, and of what springs and attraction can add."""
+        scene, bodies = self.scene, self.scene.bodies
+        squared = np.square(self.start)
+        springs = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
+        if len(springs):
+            there = np.ones((1, len(bodies)), np.bool_)
+            stored = Potential(scene, bodies).of_springs(np.zeros(1), bodies.position[None], bodies.angle[None], there)
+            held = np.zeros(len(bodies), np.bool_)
+            held[springs.b] = True
+            held[springs.a[springs.a >= 0]] = True
+            squared += np.where(held, 2.0 * float(stored[0]) / bodies.mass, 0.0)
+        for each in scene.attractions:
+            if each.strength != 0.0 and not self._is_steep(each):
+                squared += 2.0 * abs(each.strength) * self._fallen(each)
+        return np.asarray(squared)
+
+    @cached_property
+    def thrust(self) -> FloatArray:
+        """(N,) m/s that thrusts without a key can add."""
+        scene, bodies = self.scene, self.scene.bodies
+        added = np.zeros(len(bodies))
+        for each in scene.thrusts:
+            if each.key is None and each.body in bodies.names:
+                number = bodies.names.index(each.body)
+                end = scene.world.duration if each.end is None else min(each.end, scene.world.duration)
+                added[number] += math.hypot(*each.force) * max(0.0, end - each.begin) / bodies.mass[number]
+        return added
+
+    @cached_property
+    def gravity(self) -> float:
+        """Its size, m/s²."""
+        return math.hypot(*self.scene.world.gravity)
+
+    @cached_property
+    def down(self) -> FloatArray:
+        """(2,) the direction of gravity, of length 1; only where there is some."""
+        return np.asarray(self.scene.world.gravity) / self.gravity
+
+    @cached_property
+    def own(self) -> FloatArray:
+        """(N,) m/s: by its own start, fall and forces.
+
+        From the start until a level floor below it or the end of the run; in scenes with other bodies than balls, or
+        joints, also the end of what it hangs on, or past all that could stop it.
+        """
+        scene, bodies = self.scene, self.scene.bodies
+        speed = np.sqrt(self.squared) + self.gravity * scene.world.duration
+        if self.gravity > 0:
+            for plane in scene.planes:
+                normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+                if float(normal @ self.down) < -1.0 + 1e-12:  # level to rounding: others can be slid down for ever
+                    drop = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
+                    speed = np.where(~self.meet.touches, speed, np.minimum(speed, self._after(drop)))
+            if len(scene.links) or not bodies.round.all():
+                speed = np.minimum(speed, self._after(np.maximum(self._fall(), 0.0)))
+        return self._moved(speed)
+
+    def toward(self, thing: Plane | Wall | Post) -> FloatArray:
+        """Return how fast each body can be, by its own start, fall and forces, where it touches a fixed thing, (N,)."""
+        bodies = self.scene.bodies
+        if isinstance(thing, Plane):
+            return self._across(thing)
+        if self.gravity == 0.0:
+            return self.own
+        if isinstance(thing, Wall):
+            depths, half = np.asarray(thing.points) @ self.down, 0.5 * thing.thickness
+        else:
+            depths, half = np.asarray([np.asarray(thing.position) @ self.down]), thing.radius
+        depth, lowest = bodies.position @ self.down, float(depths.max()) + half
+        level = float(np.ptp(depths)) == 0.0 and isinstance(thing, Wall)
+        # What falls onto a level wall touches its upper side first; anything else at its lowest point at the latest.
+        on_top = level & (depth + bodies.core <= float(depths.max()) - half)
+        drop = np.where(on_top, float(depths.max()) - half - bodies.core - depth, lowest + bodies.radius - depth)
+        return np.minimum(self.own, self._moved(self._after(drop)))
+
+    def _across(self, plane: Plane) -> FloatArray:
+        """Return how fast each body can be where it touches a plane, (N,) m/s.
+
+        Where nothing else can turn its flight, only the component across the plane counts.
+        """
+        scene, bodies = self.scene, self.scene.bodies
+        others = len(scene.links) or self.meet.mutual or scene.attractions or scene.thrusts or scene.drives
+        if len(scene.fixed) > 1 or others or any(scene.world.wind):
+            return self.own
+        normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+        pull = max(0.0, -float(np.asarray(scene.world.gravity) @ normal))
+        height = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
+        return np.minimum(self.own, self._moved(np.sqrt(np.square(bodies.velocity @ normal) + 2.0 * pull * height)))
+
+    @cached_property
+    def struck(self) -> FloatArray:
+        """(N,) m/s: after any series of kicks, and of impacts by others as far as their energy goes; 0 if no more.
+
+        What falls past all that it could meet strikes nothing any more.
+        """
+        bodies, meet = self.scene.bodies, self.meet
+        movers = ~bodies.fixed & meet.touches
+        own = self.own
+        if self.gravity > 0:
+            own = np.minimum(own, self._moved(self._after(np.maximum(self._fall(), 0.0))))
+        speed = np.where(movers, np.maximum(own, _kicked(meet)), own)
+        if meet.mutual and movers.any():
+            # From heavy to light: a resting body of mass m takes up to 2M/(M + m) of the speed of the one that hits it.
+            masses, of_body = np.unique(bodies.mass[movers], return_inverse=True)
+            of_body = of_body.reshape(-1)
+            fastest = np.zeros(len(masses))
+            np.maximum.at(fastest, of_body, speed[movers])
+            energy = 0.5 * float((bodies.mass * np.square(speed))[movers].sum())
+            for k in np.unique(np.linspace(0, len(masses) - 1, MOST_CLASSES).round().astype(int))[::-1].tolist():
+                fastest = np.maximum(fastest, fastest[k] * 2.0 / (1.0 + masses / masses[k]))
+            if not meet.surfaces.kicks.any():
+                fastest = np.minimum(fastest, np.sqrt(2.0 * energy / masses))
+            speed[movers] = np.maximum(speed[movers], fastest[of_body])
+        return np.where(speed > own * (1.0 + ROUNDING), speed, 0.0)
+
+    def core(self, attraction: Attraction) -> float:
+        """Return how near its centre bodies can get at most, m: to what is solid there."""
+        scene, bodies = self.scene, self.scene.bodies
+        if isinstance(attraction.toward, str):
+            core = float(bodies.core[bodies.names.index(attraction.toward)])
+            return core if self.meet.mutual else 0.0
+        posts = (
+            post for post in scene.posts if post.solid and math.dist(post.position, attraction.toward) < post.radius
+        )
+        cores = [post.radius - math.dist(post.position, attraction.toward) for post in posts]
+        fixed = bodies.fixed & (bodies.core > 0.0)
+        away = np.hypot(*(bodies.position - np.asarray(attraction.toward)).T)
+        cores += (bodies.core - away)[fixed].tolist() if self.meet.mutual else []
+        return max(0.0, *cores, 0.0)
+
+    def _fallen(self, attraction: Attraction) -> FloatArray:
+        """Return the integral of 1/(r² + ε²) over each body's way to the centre, or far away from it, (N,) 1/m."""
+        bodies, soft, near = self.scene.bodies, attraction.softening, self.core(attraction)
+        toward = attraction.toward
+        place = bodies.position[bodies.names.index(toward)] if isinstance(toward, str) else np.asarray(toward)
+        away = np.maximum(np.hypot(*(bodies.position - place).T), near)
+        drawn = attraction.strength > 0.0
+        if soft == 0.0:
+            with np.errstate(divide="ignore"):
+                return np.asarray(1.0 / near - 1.0 / away if drawn else 1.0 / away)
+        angle = np.arctan(away / soft)
+        return np.asarray((angle - math.atan(near / soft) if drawn else 0.5 * math.pi - angle) / soft)
+
+    def _is_steep(self, attraction: Attraction) -> bool:
+        """Return whether an attraction can make bodies faster than anything may be: nothing bounds the way to it."""
+        near = max(attraction.softening, self.core(attraction))
+        return abs(attraction.strength) >= near * MAX_SPEED**2 and attraction.strength != 0.0
+
+    def _after(self, drop: FloatArray) -> FloatArray:
+        """Return the speeds after a drop, or 0 where it cannot rise so high, (N,) m/s."""
+        return np.asarray(np.sqrt(np.maximum(self.squared + 2.0 * self.gravity * drop, 0.0)))
+
+    def _moved(self, speed: FloatArray) -> FloatArray:
+        """Return speeds with what thrusts and wind add; 0 for fixed bodies."""
+        world, bodies = self.scene.world, self.scene.bodies
+        if world.linear_drag or world.quadratic_drag:
+            if not len(self.scene.links) and not self.scene.attractions:
+                speed = np.minimum(speed, np.maximum(self.start, self._terminal))
+            speed = speed + math.hypot(*world.wind)
+        speed = speed + self.thrust
+        return np.where(bodies.fixed, 0.0, speed)
+
+    @property
+    def _terminal(self) -> float:
+        """The speed, m/s, through the air at which drag balances gravity."""
+        linear, quadratic = self.scene.world.linear_drag, self.scene.world.quadratic_drag
+        by_linear = self.gravity / linear if linear > 0.0 else math.inf
+        return min(by_linear, math.sqrt(self.gravity / quadratic) if quadratic > 0.0 else math.inf)
+
+    def _fall(self) -> FloatArray:
+        """Return how far each body can fall, (N,) m, until what holds it is taut or nothing is left to meet."""
+        scene, bodies, down = self.scene, self.scene.bodies, self.down
+        held = farthest_fall(scene, down)
+        if scene.planes:  # what is no level floor goes down for ever
+            return held
+        depth = bodies.position @ down
+        stays = np.where(bodies.fixed, 0.0, held)
+        lowest = float(np.max((depth + stays + bodies.radius)[np.isfinite(stays)], initial=-np.inf))
+        for wall in scene.walls:
+            lowest = max(lowest, float((np.asarray(wall.points) @ down).max()) + wall.thickness / 2.0)
+        for post in scene.posts:
+            lowest = max(lowest, float(np.asarray(post.position) @ down) + post.radius)
+        return np.minimum(held, lowest - depth + bodies.radius) if math.isfinite(lowest) else held
+
+
+def unknown_speeds(scene: Scene) -> tuple[str, ...]:
+    """Return what makes bodies of a scene faster by an amount that no formula bounds."""
+    return Speeds(scene, meetings(scene)).unknown
+
+
+def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
+    """Return about how fast each body can get, (N,) m/s: an upper bound where `Speeds.bounded`."""
+    speeds = Speeds(scene, meet)
+    return np.maximum(speeds.own, speeds.struck)
+
+
+def _kicked(meet: Meetings) -> float:
+    """Return how fast kicks make a body, m/s, that always comes back; by one kick where there is no end."""
+    surfaces, fastest = meet.surfaces, 0.0
+    for b in np.flatnonzero(surfaces.kicks).tolist():
+        kick = surfaces.surfaces[b].kick
+        assert kick is not None
+        for a in np.flatnonzero(meet.touching[b]).tolist():
+            e, f = float(surfaces.restitution[a, b]), float(surfaces.falloff[a, b])
+            # v = e v/(1 + f v) + k, that is f v² + (1 − e − k f) v − k = 0
+            half = 0.5 * (1.0 - e - kick.speed * f)
+            root = half + math.sqrt(half * half + f * kick.speed)
+            # and, where k adds to the approach, v = e (v + k)/(1 + f (v + k)): the same equation for v + k
+            met = kick.speed / root if root > 0.0 else (1.0 + (kick.adds_to == "approach")) * kick.speed
+            fastest = max(fastest, met - kick.speed if kick.adds_to == "approach" else met)
+    return fastest

@@ -1,0 +1,65 @@
+"""`sandbox schema`: the whole as JSON, one table for people, and what is no table."""
+
+import json
+
+import pytest
+from calling import json_of, lines_of
+
+from sandbox.cli.main import call
+from sandbox.scene.schema import dumps, schema
+
+
+def test_without_a_table_it_is_the_schema(capfd: pytest.CaptureFixture[str]) -> None:
+    assert call(["schema"]) == 0
+    assert capfd.readouterr().out == dumps()
+
+
+@pytest.mark.parametrize("table", ["ball", "[ball]", "solver", "body.box", "play.part", "pinball.bumper", "world"])
+def test_table_lists_each_of_its_keys_with_what_it_is(table: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "schema", table)
+    assert (status, err) == (0, [])
+    _, document, _ = json_of(capfd, "schema", table)
+    listed = {line.split()[0]: line for line in out[2:]}
+    assert list(listed) == list(document["properties"])
+    for key, node in document["properties"].items():
+        assert node["description"].split()[0] in listed[key]
+
+
+@pytest.mark.parametrize(("table", "kind"), [("joint", "rotary_limit"), ("drive", "plunger")])
+def test_table_of_several_kinds_lists_each(table: str, kind: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = lines_of(capfd, "schema", table)
+    assert status == 0
+    assert any(line.startswith(f"{table}, kind {kind}: ") for line in out)
+    _, document, _ = json_of(capfd, "schema", table)
+    assert kind in json.dumps(document["oneOf"])
+
+
+def test_ranges_leave_out_bounds_that_are_no_choice(capfd: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = lines_of(capfd, "schema", "ball")
+    lines = {line.split()[0]: line for line in out}
+    assert "number 0 … 1 " in lines["restitution"]
+    assert "number > 0 " in lines["radius"]
+    assert "1e+" not in lines["position"]
+    assert "must be given" in lines["position"]
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("bal", "did you mean 'ball'?"),
+        ("ball.radius", "'radius' is a value, no table"),
+        ("ball.x", "no key 'x'; known here: name,"),
+        ("", "known here: title,"),
+    ],
+)
+def test_what_is_no_table_is_one_line(table: str, words: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "schema", table)
+    assert (status, out, len(err)) == (2, [], 1)
+    assert words in err[0]
+
+
+def test_every_table_of_a_scene_can_be_listed(capfd: pytest.CaptureFixture[str]) -> None:
+    for key, node in schema()["properties"].items():
+        if node.get("type") != "string":
+            status, out, err = lines_of(capfd, "schema", key)
+            assert (status, err, len(out) > 2) == (0, [], True)

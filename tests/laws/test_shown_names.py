@@ -1,0 +1,152 @@
+"""Every name that a message, table or result shows of an element leads to it by a path of `--set`."""
+
+import re
+
+import pytest
+
+from sandbox.measure.forecast import notes, warnings
+from sandbox.scene.address import AddressError, assign
+from sandbox.scene.document import to_document
+from sandbox.scene.file import loads
+from sandbox.scene.model import Scene
+
+UNNAMED = """
+[world]
+gravity = [0, -9.81]
+[solver]
+dt = 0.05
+iterations = 1
+[[plane]]
+point = [0, 0]
+normal = [0, 1]
+[[plane]]
+point = [0, -1]
+normal = [0, 1]
+[[wall]]
+points = [[20, 0], [20, 9]]
+kick = { speed = 1.0, threshold = 0.1 }
+[[post]]
+position = [30, 0]
+radius = 1
+[[zone]]
+position = [-30, 4]
+radius = 0.01
+[[ball]]
+position = [0, 20]
+radius = 0.01
+[[ball]]
+position = [1, 20]
+radius = 0.01
+mass = 1000
+[[ball]]
+position = [2, 20]
+radius = 0.01
+[[box]]
+position = [5, 20]
+size = [0.1, 0.1]
+[[capsule]]
+position = [-5, 20]
+length = 0.2
+radius = 0.1
+[[polygon]]
+position = [-8, 20]
+points = [[0, 0], [2, 0], [2, 2], [1, 0.5], [0, 2]]
+[[box]]
+position = [9, 20]
+size = [0.1, 1]
+[[joint]]
+kind = "rod"
+between = ["ball-1", "ball-2"]
+length = 3
+[[joint]]
+kind = "rod"
+between = ["ball-2", "ball-3"]
+[[joint]]
+kind = "spring"
+between = ["box-1"]
+anchors = [[0, 30], [0, 0]]
+stiffness = 1e6
+[[thrust]]
+body = "ball-1"
+force = [0, 1]
+[[drive]]
+kind = "stroke"
+body = "box-2"
+pivot = [9, 20]
+stops = [0, 1]
+rate = 3
+[[rope]]
+start = [-20, 20]
+end = [-10, 20]
+links = 4
+mass = 0.001
+[[grid]]
+origin = [40, 20]
+columns = 3
+spacing = [0.5, 0.5]
+radius = 0.01
+"""
+
+GENERATORS = ("rope", "grid")
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return loads(UNNAMED)
+
+
+def resolved(scene: Scene, name: str) -> list[str]:
+    """The tables in which a name leads to an element, or to the generator that it is a part of."""
+    found = []
+    for kind, elements in to_document(scene).items():
+        if isinstance(elements, list):
+            try:
+                _, location = assign(to_document(scene), f"{kind}.{name}.anything", 1)
+            except AddressError as error:
+                if "is laid out by" in str(error):
+                    found.append(kind)
+            else:
+                assert location[0] == kind
+                found.append(kind)
+    return found
+
+
+def test_names_of_bodies_fixed_things_joints_drives_and_thrusts_are_paths(scene: Scene) -> None:
+    shown = [*scene.bodies.names, *scene.fixed_names, *scene.links.names, "drive-1", "thrust-1"]
+    assert len(shown) == len(set(shown))
+    for name in shown:
+        assert resolved(scene, name) == [name.partition("-")[0]]
+
+
+def test_each_path_leads_to_the_element_that_is_called_so(scene: Scene) -> None:
+    for kind, elements in to_document(scene).items():
+        for k in range(len(elements) if isinstance(elements, list) else 0):
+            assert assign(to_document(scene), f"{kind}.{kind}-{k + 1}.x", 1)[1] == (kind, k, "x")
+
+
+def test_names_in_warnings_and_notes_are_paths(scene: Scene) -> None:
+    told = [each.message for each in (*warnings(scene), *notes(scene))]
+    names = {name for message in told for name in re.findall(r"'([^']+)'", message)}
+    assert {"joint-1", "joint-3", "ball-1"} <= names  # the scene is made for them
+    for name in names:
+        assert resolved(scene, name), name
+
+
+def test_name_that_was_stated_outranks_one_that_would_be_made() -> None:
+    document = {"ball": [{}, {"name": "ball-1"}]}
+    assert assign(document, "ball.ball-1.mass", 1)[1] == ("ball", 1, "mass")
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("joint-1.length=2", "that is an element: joint.joint-1.length"),
+        ("rope-1-joint-2.strength=2", "that is part of an element: rope.rope-1.strength"),
+        ("rope.rope-1-joint-2.strength=2", "is laid out by rope.rope-1"),
+        ("grid-1-2.radius=2", "that is part of an element: grid.grid-1.radius"),
+    ],
+)
+def test_name_without_its_table_is_answered_with_the_path(scene: Scene, path: str, words: str) -> None:
+    key, _, value = path.partition("=")
+    with pytest.raises(AddressError, match=re.escape(words)):
+        assign(to_document(scene), key, value)

@@ -1,0 +1,140 @@
+"""Witnesses: a refined truth ends where a second method contradicts it, or where it breaks a conservation law."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+
+from sandbox.engines import registry
+from sandbox.engines.contract import Simulation
+from sandbox.engines.native.engine import PymunkEngine
+from sandbox.measure.compare import compare, refined, witness
+from sandbox.measure.compare.truth import seek_truth, truth_of
+from sandbox.scene.file import loads
+from sandbox.scene.model import Scene
+from sandbox.scene.settings import Settings
+
+DROP = """
+[world]
+gravity = [0.0, -10.0]
+duration = 1.0
+[solver]
+dt = 0.01
+[[plane]]
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+[[ball]]
+position = [0.0, 0.745]
+radius = 0.1
+restitution = 0.5
+"""
+"""It falls 0.645 m and meets the floor at √0.129 = 0.359 s."""
+MEETS = 0.129**0.5
+TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Another:
+    """pymunk with another world than the scene's: it converges, and to something else."""
+
+    gravity: float = 1.0
+    """a factor"""
+    restitution: float = 1.0
+    """likewise"""
+    name: str = "another"
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(PymunkEngine(), name)
+
+    def start(self, scene: Scene, settings: Settings | None = None) -> Simulation:
+        world = scene.world.model_copy(update={"gravity": tuple(self.gravity * g for g in scene.world.gravity)})
+        balls = tuple(
+            b.model_copy(update={"restitution": self.restitution * (b.restitution or 0.0)}) for b in scene.balls
+        )
+        bodies = replace(scene.bodies, elements=balls)
+        return PymunkEngine().start(scene.model_copy(update={"world": world}).placed(bodies), settings)
+
+
+def install(monkeypatch: pytest.MonkeyPatch, **engines: Any) -> None:
+    """Leave only these engines in the registry, and no formula."""
+    monkeypatch.setattr("sandbox.measure.compare.truth.solution", lambda _: None)
+    for name in list(registry.ENGINES):
+        monkeypatch.delitem(registry.ENGINES, name)
+    for name, engine in engines.items():
+        monkeypatch.setitem(registry.ENGINES, name, engine)
+
+
+def test_two_engines_that_agree_confirm_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, pymunk=PymunkEngine(), another=Another())
+    truth = truth_of(loads(DROP), loads(DROP).solver, TOLERANCE)
+    assert truth is not None
+    assert (truth.kind, truth.trusted_until, truth.witness) == ("refined", 1.0, "another")
+    assert "confirmed by another" in truth.about
+
+
+def test_a_truth_ends_where_two_engines_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, pymunk=PymunkEngine(), another=Another(restitution=0.5))
+    comparison = compare(loads(DROP), ["pymunk"], tolerance=TOLERANCE)
+    # After the impact at 3.6 m/s they differ by 0.9 m/s, so by the tolerance within 1.2 ms: 0.36 s is the first frame.
+    assert comparison.trusted_until is not None
+    assert MEETS - 0.01 <= comparison.trusted_until <= MEETS + 0.01  # frames are 0.01 s apart
+    assert "another comes to another answer" in comparison.sentence()
+    assert "there is no truth after that" in comparison.sentence()
+    (row,) = comparison.rows
+    assert row.count("missed") == row.count("phantom") == 0
+
+
+def test_where_two_engines_never_agree_there_is_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, pymunk=PymunkEngine(), another=Another(gravity=10.0))
+    scene = loads(DROP)
+    found = seek_truth(scene, scene.solver, 1e-4)  # ½·90·0.01² is 4.5 mm in the first frame
+    assert isinstance(found, str)
+    document = compare(scene, ["pymunk"], tolerance=1e-4).document()
+    assert (document["truth"], document["trusted_until"]) == (None, None)
+    assert "another comes to another answer" in document["truth_about"]
+    (row,) = document["engines"]
+    assert row["status"] == "ok"
+    assert row["max_position_error"] is row["missed_contacts"] is row["first_divergence"] is None
+
+
+def test_energy_that_grows_without_a_source_ends_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, one=Another(restitution=2.2), other=Another(restitution=2.2))  # 1.1: both are wrong alike
+    comparison = compare(loads(DROP), ["one"], tolerance=TOLERANCE)
+    assert comparison.trusted_until is not None
+    assert MEETS - 0.01 <= comparison.trusted_until <= MEETS + 0.01  # frames are 0.01 s apart
+    assert "energy grows" in comparison.sentence()
+
+
+def test_one_method_alone_confirms_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    dragged = loads(DROP.replace("duration", "linear_drag = 0.1\nduration"))  # with which half_kick is no choice
+    install(monkeypatch, pymunk=PymunkEngine())
+    found = seek_truth(dragged, dragged.solver, TOLERANCE)
+    assert isinstance(found, str)
+    assert "no second method" in found
+
+
+def test_another_method_of_the_same_engine_is_a_witness(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, pymunk=PymunkEngine())
+    scene = loads(DROP)
+    truth = truth_of(scene, scene.solver, TOLERANCE)
+    assert truth is not None
+    assert truth.witness == "pymunk without half_kick"
+    assert truth.trusted_until == 1.0
+
+
+def test_a_witness_takes_half_the_work_of_the_answer_or_three_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps: dict[str, int] = {}
+    for module in (refined, witness):
+        honest = module.patient_run
+
+        def counted(
+            scene: Scene, engine: str, settings: Settings, seconds: float,
+            *, name: str = module.__name__, honest: Any = honest, **options: Any,
+        ) -> Any:  # fmt: skip
+            steps[name] = steps.get(name, 0) + round(scene.world.duration / settings.h)
+            return honest(scene, engine, settings, seconds, **options)
+
+        monkeypatch.setattr(module, "patient_run", counted)
+    install(monkeypatch, pymunk=PymunkEngine(), another=Another(restitution=0.9))
+    assert truth_of(loads(DROP), loads(DROP).solver, TOLERANCE) is not None
+    assert 0 < steps[witness.__name__] <= max(0.5 * steps[refined.__name__], (1 + 2 + 4) * 100)

@@ -1,0 +1,150 @@
+"""What is hand-made is not lost without being asked, and can be brought back."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pygame
+import pytest
+from pressing import key, key_up, move
+from windowed import turned, window_on
+
+from sandbox.action import Action, Impulse, Move, Remove, SetParameter, Spawn
+from sandbox.play.hands import count_changes
+from sandbox.play.window import Window
+from sandbox.scene.discs import Ball
+
+REST = """
+title = "Rest"
+[solver]
+dt = 0.01
+[[ball]]
+name = "a"
+position = [0.0, 0.0]
+radius = 0.4
+"""
+B, R, ESCAPE = pygame.K_b, pygame.K_r, pygame.K_ESCAPE
+
+
+@pytest.fixture
+def window(tmp_path: Path) -> Iterator[Window]:
+    with window_on(REST, tmp_path) as opened:
+        pygame.event.clear()  # those of its opening
+        turned(opened, move(100, 300))
+        yield opened
+
+
+def strike(window: Window, code: int, mod: int = 0) -> None:
+    turned(window, key(code, mod), key_up(code))
+
+
+def test_changes_are_counted_as_a_person_would() -> None:
+    spawn = Spawn(time=0.0, ball=Ball(position=(0.0, 0.0), radius=1.0))
+    drag = [Move(time=0.0, body="a", position=(float(k), 0.0)) for k in range(5)]
+    actions: list[Action] = [
+        spawn,
+        spawn,
+        *drag,
+        Impulse(time=0.0, body="a", impulse=(1.0, 0.0)),
+        SetParameter(time=0.0, path="world.gravity", value=[0.0, -1.0]),
+        SetParameter(time=0.0, path="world.gravity", value=[0.0, -2.0]),
+        Remove(time=0.0, body="a"),
+    ]
+    assert count_changes(actions) == 5
+    assert count_changes(actions, moved_by_keys="a") == 4
+    assert count_changes([]) == 0
+
+
+@pytest.mark.parametrize("code", [R, ESCAPE, pygame.K_LEFTBRACKET])
+def test_key_that_would_lose_a_body_asks_first(window: Window, code: int) -> None:
+    strike(window, B)
+    live = window.stage.live
+    strike(window, code)
+    assert window.stage.question is not None
+    assert window.stage.question.startswith("1 hand-made change will be lost")
+    assert window.leaving is None
+    assert window.stage.live is live
+    strike(window, code)
+    assert window.leaving == 0 or window.stage.live is not live
+    assert window.stage.question is None
+
+
+def test_cross_asks_once(window: Window) -> None:
+    strike(window, B)
+    turned(window, pygame.event.Event(pygame.QUIT))
+    assert window.leaving is None
+    turned(window, pygame.event.Event(pygame.QUIT))
+    assert window.leaving == 0
+
+
+def test_any_other_key_takes_the_question_back(window: Window) -> None:
+    strike(window, B)
+    strike(window, R)
+    strike(window, pygame.K_p)
+    assert window.stage.question is None
+    strike(window, R)
+    assert window.stage.question is not None
+
+
+@pytest.mark.parametrize("code", [R, ESCAPE])
+def test_nothing_is_asked_where_nothing_is_lost(window: Window, code: int) -> None:
+    live = window.stage.live
+    strike(window, code)
+    assert window.leaving == 0 or window.stage.live is not live
+
+
+def test_nothing_is_asked_once_the_session_is_saved(window: Window) -> None:
+    strike(window, B)
+    strike(window, pygame.K_s, pygame.KMOD_CTRL)
+    strike(window, ESCAPE)
+    assert window.leaving == 0
+
+
+def test_restart_keeps_values_and_so_does_not_ask_for_them(window: Window) -> None:
+    window.commands._turn("gravity", -3.0, True)
+    turned(window)
+    live = window.stage.live
+    strike(window, R)
+    assert window.stage.live is not live
+    window.commands._turn("gravity", -4.0, True)
+    turned(window)
+    strike(window, ESCAPE)
+    assert window.stage.question is not None
+
+
+def test_undo_brings_back_what_a_restart_has_lost(window: Window) -> None:
+    strike(window, B)
+    strike(window, R)
+    strike(window, R)
+    assert window.stage.live is not None
+    assert len(window.stage.live.bodies) == 1
+    strike(window, pygame.K_z, pygame.KMOD_CTRL)
+    window.stage.live.arrive()
+    assert len(window.stage.live.bodies) == 2
+
+
+def test_undo_brings_back_what_was_replaced_at_an_earlier_moment(window: Window) -> None:
+    for _ in range(4):
+        live = turned(window)
+    end, whole = live.step_number, live.session.recording()
+    for _ in range(3):
+        strike(window, pygame.K_COMMA)
+    assert live.session.recording() == whole  # closing now keeps all of it
+    strike(window, B)
+    assert any("is replaced" in text for _, text in window.stage.messages.shown())
+    strike(window, pygame.K_z, pygame.KMOD_CTRL)
+    assert window.stage.live is not None
+    window.stage.live.arrive()
+    assert window.stage.live.step_number == end
+    assert window.stage.live.session.recording().state_hash == whole.state_hash
+
+
+def test_picker_asks_before_another_scene_takes_the_place(window: Window) -> None:
+    strike(window, B)
+    live = window.stage.live
+    strike(window, pygame.K_o, pygame.KMOD_CTRL)
+    strike(window, pygame.K_RETURN)
+    assert window.desk.picker is not None
+    assert window.stage.live is live
+    strike(window, pygame.K_RETURN)
+    assert window.desk.picker is None
+    assert window.stage.live is not live
