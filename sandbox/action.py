@@ -246,6 +246,12 @@ def actions_to_json(actions: tuple[Action, ...]) -> Any:
     return _ACTIONS.dump_python(actions, mode="json")
 
 
+def heading_of(element: Any) -> str:
+    """Return the heading under which a scene file, or a `Spawn`, states an element that can be spawned."""
+    kinds: dict[type, str] = {Ball: "ball", Box: "box", Capsule: "capsule", Polygon: "polygon", Compound: "body"}
+    return kinds.get(type(element), "")
+
+
 def in_order(actions: tuple[Action, ...]) -> tuple[Action, ...]:
     """Return actions by time; those of one time stay in the order in which they were given."""
     return tuple(sorted(actions, key=lambda action: action.time))

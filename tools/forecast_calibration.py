@@ -1,6 +1,7 @@
 """Calibration of forecasts: warnings of `sandbox check` against what then happened, on random scenes.
 
-    python tools/forecast_calibration.py [--kinds NAME,…] [--seeds N] [--from SEED] [--engines A,B] [--half fit|held-out] [--json]
+    python tools/forecast_calibration.py [--half fit|held-out] [--kinds NAME,…] [--seeds N] [--from SEED]
+                                         [--engines A,B] [--json]
 
 Every scene of `random_scenes.py` is forecast first, by the formulas alone and with a trial run, and then run in full on
 each engine. Rules of this file, which know nothing of the forecasts, decide what went wrong. Precision is the share of
@@ -70,6 +71,8 @@ class Observation:
     happened: bool
     half_foretold: bool
     """by the formulas and a trial run of half the scene at most"""
+    elsewhere: bool | None
+    """on the reference, by the formulas and a trial run on pymunk, as without `--engine`; None where there was none"""
     covered: bool
     """The trial run covered the whole scene."""
 
@@ -83,6 +86,8 @@ def halves() -> dict[str, tuple[tuple[str, ...], int]]:
 def observe(kind: str, seed: int, engines: Iterable[str]) -> Iterator[Observation]:
     """Forecast a scene, run it, and yield what was foretold and what happened on each engine that models it."""
     scene = from_document(document(kind, seed))
+    usual = forecast(scene)
+    usually = troubles(scene, (each.kind for each in usual.warnings))
     for engine in engines:
         if ENGINES[engine].missing(scene, scene.solver):
             continue
@@ -92,7 +97,8 @@ def observe(kind: str, seed: int, engines: Iterable[str]) -> Iterator[Observatio
         half = troubles(scene, (each.kind for each in forecast(scene, engine=engine, cover=0.5).warnings))
         came = judge(scene, run(scene, engine), engine)
         for trouble in sorted(came):
-            row = trouble in by_formulas, trouble in told, came[trouble], trouble in half, answer.covered
+            elsewhere = trouble in usually if engine == "reference" and usual.tried is not None else None
+            row = trouble in by_formulas, trouble in told, came[trouble], trouble in half, elsewhere, answer.covered
             yield Observation(kind, seed, engine, trouble, *row)
 
 
@@ -179,6 +185,9 @@ def summary(rows: list[Observation]) -> dict[str, Any]:
     }
     return {
         "foretold": {name: shares(confusion(some)) for name, some in part.items()},
+        "trial run on another engine": {
+            "all": shares(confusion((row for row in rows if row.elsewhere is not None), "elsewhere"))
+        },
         "trial run of half": {name: shares(confusion(some, "half_foretold")) for name, some in part.items()},
         "by formulas alone": {name: shares(confusion(some, "formulas")) for name, some in part.items()},
         **{

@@ -1,7 +1,7 @@
 """Random scenes of 43 kinds, for the calibration of forecasts: everyday set-ups with sizes and speeds drawn at random.
 
 A kind is a function of a random generator that returns a scene document. The scenes have nothing to do with the matrix
-of `sandbox extremes`. About every fourth runs for longer than a trial run of `sandbox check` covers.
+of `sandbox extremes`. Some run for longer than a trial run of `sandbox check` covers.
 """
 
 import math

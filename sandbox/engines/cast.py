@@ -4,6 +4,7 @@ from typing import Protocol
 
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Collides, Scene, Single
+from sandbox.scene.surfaced import Mover
 from sandbox.trajectory import BoolArray, FloatArray
 
 
@@ -55,8 +56,12 @@ class Cast(Protocol):
             ActionError: it is one.
         """
 
-    def change(self, scene: Scene) -> None:
+    def change(self, scene: Scene, spawned: tuple[Mover, ...] | None = None) -> None:
         """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
+
+        Args:
+            scene: the changed one.
+            spawned: the elements that joined since the start, with other coefficients; by default as they are.
 
         Raises:
             ActionError: it asks for what the settings or the engine cannot go on with.

@@ -19,6 +19,7 @@ from sandbox.scene.drives import PlungerDrive, TorqueDrive
 from sandbox.scene.links import Links
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Collides, Scene, Single
+from sandbox.scene.surfaced import Mover
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 NOTHING, FIXED, ALL = 0, 1, 2
@@ -181,16 +182,16 @@ class Roster:
     def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
         """Refuse no place: bodies may start from anywhere."""
 
-    def change(self, scene: Scene) -> None:
+    def change(self, scene: Scene, spawned: tuple[Mover, ...] | None = None) -> None:
         """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
 
         Raises:
             ActionError: it has more surfaces than a scene may have.
         """
-        if is_matter_same(scene, self.scene):
+        if spawned is None and is_matter_same(scene, self.scene):
             self.scene = scene
             return
-        spawned = self.bodies.elements[len(self.scene.elements) :]
+        spawned = self.bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
         meet = derived(scene, bodies)
         if scene.fixed != self.scene.fixed:

@@ -5,9 +5,20 @@ Everything is checked before anything changes.
 
 from dataclasses import replace
 
-from sandbox.action import SETTABLE, ActionError, Reshape, SetParameter, Toggle, is_settable, number_among
+from pydantic import ValidationError
+
+from sandbox.action import (
+    SETTABLE,
+    ActionError,
+    Reshape,
+    SetParameter,
+    Toggle,
+    heading_of,
+    is_settable,
+    number_among,
+)
 from sandbox.engines.cast import Cast
-from sandbox.scene.address import AddressError, assign
+from sandbox.scene.address import AddressError, assign, parse_path
 from sandbox.scene.crosscheck import course
 from sandbox.scene.demands import on_floor
 from sandbox.scene.document import change_value, to_document
@@ -15,6 +26,7 @@ from sandbox.scene.faults import SceneError
 from sandbox.scene.file import from_document
 from sandbox.scene.floored import floored
 from sandbox.scene.model import Post, Scene, Wall
+from sandbox.scene.surfaced import Mover
 
 
 def set_parameter(action: SetParameter, cast: Cast) -> None:
@@ -25,6 +37,10 @@ def set_parameter(action: SetParameter, cast: Cast) -> None:
     """
     if not is_settable(action.path):
         raise ActionError(f"{action.path!r} cannot be changed while a scene runs; what can: {SETTABLE}")
+    spawned = _with_coefficient(action, cast)
+    if spawned is not None:
+        cast.change(cast.scene, spawned)
+        return
     try:
         scene = change_value(cast.scene, action.path, action.value)
         wrong = action.path.startswith("surface.") and any(floored(scene, scene.bodies))
@@ -54,6 +70,36 @@ def _read_again(action: SetParameter, scene: Scene) -> Scene:
     except SceneError as error:
         raise ActionError("; ".join(f"{f.path}: {f.message}" for f in error.faults)) from None
     return read if begun else read.model_copy(update={"world": read.world.model_copy(update={"duration": 0.0})})
+
+
+def _with_coefficient(action: SetParameter, cast: Cast) -> tuple[Mover, ...] | None:
+    """Return the elements that joined the scene, one with another restitution or friction; None if that is of none.
+
+    They are addressed as those of the file are: `ball.spawned-1.restitution`.
+
+    Raises:
+        ActionError: the value is out of range.
+    """
+    try:
+        parts = parse_path(action.path)
+    except AddressError as error:
+        raise ActionError(str(error)) from None
+    if len(parts) != 3 or parts[1] not in cast.bodies.names:
+        return None
+    first = len(cast.scene.elements)
+    place = int(cast.bodies.element[cast.bodies.names.index(parts[1])]) - first
+    if place < 0:
+        return None
+    spawned = list(cast.bodies.elements[first:])
+    element = spawned[place]
+    if parts[0] != heading_of(element):
+        raise ActionError(f"{action.path}: {parts[1]!r} is of `{heading_of(element)}`")
+    try:
+        stated = element.model_dump(by_alias=True, exclude_unset=True)
+        spawned[place] = type(element).model_validate({**stated, parts[2]: action.value})
+    except ValidationError as error:
+        raise ActionError("; ".join(f"{action.path}: {each['msg']}" for each in error.errors())) from None
+    return tuple(spawned)
 
 
 def toggle(action: Toggle, cast: Cast) -> None:

@@ -121,6 +121,10 @@ class Camera:
         x, y = self._way(by)
         return replace(self, centre=(self.centre[0] - x, self.centre[1] - y))
 
+    def zoomed_to(self, scale: float) -> Self:
+        """Return this camera with another scale, px/m, about the middle of the picture."""
+        return replace(self, scale=min(max(scale, FARTHEST), CLOSEST))
+
     def eased(self, target: Self, elapsed: float) -> Self:
         """Return this camera on its way to another: soon where that is farther away, slowly where it is closer."""
         factor = target.scale / self.scale

@@ -16,16 +16,16 @@ from sandbox.play.drawing.picture import Picture
 from sandbox.play.drawing.text import measure, write
 from sandbox.play.facts import told
 from sandbox.play.hands import describe_loss
-from sandbox.play.hosting.host import Host
+from sandbox.play.instruments import hud
 from sandbox.play.instruments.graph import EnergyGraph
 from sandbox.play.instruments.honours_panel import HonoursPanel
-from sandbox.play.instruments.hud import draw_hud, hud_width
+from sandbox.play.instruments.hud import hud_width
 from sandbox.play.instruments.knob import Knob
 from sandbox.play.instruments.manual import Manual
 from sandbox.play.instruments.panel import Panel
 from sandbox.play.instruments.picker import Picker
 from sandbox.play.instruments.plates import plate
-from sandbox.play.instruments.score_panel import covered, draw_score
+from sandbox.play.instruments.score_panel import covered, draw_score, laid
 from sandbox.play.instruments.timeline import HEIGHT, Timeline
 from sandbox.play.instruments.tools import Tools
 from sandbox.play.knobs import Knobs
@@ -66,6 +66,7 @@ class Desk:
         """none of the bodies that move is in the picture"""
         self._untold = False  # the keys that the scene claims
         self._faults = pygame.Rect(0, 0, 0, 0)  # where they are shown
+        self._plates: dict[str, pygame.Rect] = {}
 
     def renew(self, same: bool) -> None:
         """Forget what was of the scene before."""
@@ -83,11 +84,37 @@ class Desk:
         """What the timeline covers at the bottom of the window, px."""
         return round(HEIGHT * self.unit) if self.panel.visible else 0
 
+    def taken(self, stage: Stage) -> list[pygame.Rect]:
+        """Return what plates cover of the picture for as long as the scene is on, px; messages come and go.
+
+        Of the state of things that is with the line that says that it is paused, so that pausing moves nothing.
+        """
+        show, free = stage.show, self._free
+        if show is None:
+            return []
+        told = hud.lay_rows(replace(self.account(stage), paused=True, waits_for_start=False), free, self.unit)
+        found = [told.rect]
+        if stage.gestures is not None:
+            found += self.tools.taken(stage.gestures.person, free, self._hud_width(show), self.unit)
+        elif stage.host is not None:
+            found.append(laid(stage.host.shown().board, free, self._hud_width(show), self.unit).rect)
+        return found
+
+    @property
+    def plates(self) -> dict[str, pygame.Rect]:
+        """What each plate covers, px, as it was last drawn."""
+        return {name: rect for name, rect in self._plates.items() if rect.width and rect.height}
+
     def covered(self, stage: Stage) -> tuple[int, int]:
         """Return what the score panel covers at the top and at the bottom of the window, px."""
         if stage.host is None or stage.gestures is not None or stage.show is None:
             return 0, 0
         return covered(stage.host.shown().board, self._free, self._hud_width(stage.show), self.unit)
+
+    @property
+    def free(self) -> pygame.Rect:
+        """What neither the panel nor the timeline covers."""
+        return self._free
 
     @property
     def _free(self) -> pygame.Rect:
@@ -189,7 +216,9 @@ class Desk:
         if self.picker is not None:
             self.picker.draw(surface, self.unit)
             return
-        foot = self.foot + self.covered(stage)[1]
+        plates: dict[str, pygame.Rect] = {}
+        above, below = self.covered(stage)
+        foot = self.foot + below
         if show is None:
             surface.fill(BACKGROUND)
         else:
@@ -200,10 +229,17 @@ class Desk:
             if stage.host is not None:
                 lit = replace(sight, lit=stage.host.shown().lit)
                 sight = over(stage.host.rules, lit, present=not stage.host.live.peeking)
+            told = self._plates.get("state")
+            if told is not None:
+                sight = replace(sight, below=float(told.bottom))
             depth = float(foot)
             self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=depth)
+            free = self._free
+            free = pygame.Rect(free.left, free.top + above, free.width, max(free.height - above - below, 0))
             aside = round(GRAPH[0] * self.unit) if "energy" in self.overlays else 0
-            self._inset.draw(surface, camera, sight, self._free, antialias=self.antialias, unit=self.unit, aside=aside)
+            near = self._inset.draw(surface, camera, sight, free, antialias=self.antialias, unit=self.unit, aside=aside)
+            if near is not None:
+                plates["inset"] = near
             if show.contacts is not self._heard:
                 self._heard = show.contacts
                 self._sounds.hits(show.contacts, show.bodies)
@@ -211,19 +247,30 @@ class Desk:
                 self._sounds.cue(cue)
         if stage.game is None:
             self.tools.foot = 0
-        status = replace(self.status(stage, rate, recording), out_of_sight=self._describe_absence(stage))
-        self._faults = draw_hud(surface, status, self.unit, right=self.panel.width, bottom=foot + self.tools.foot)
-        if show is not None and not self.manual.open:
-            if stage.gestures is not None:
-                self.tools.draw(surface, stage.gestures.person, self._free, self._hud_width(show), self.unit)
-            elif stage.host is not None:
-                self._draw_game(surface, stage, stage.host, self._hud_width(show))
         if show is not None:
-            self._draw_graph(surface, stage)
+            if not self.manual.open:
+                self._draw_play(surface, stage, self._hud_width(show), plates)
+            self._draw_graph(surface, stage, plates)
+        status = replace(self.status(stage, rate, recording), out_of_sight=self._describe_absence(stage))
+        self._faults = hud.draw_hud(
+            surface,
+            status,
+            self.unit,
+            right=self.panel.width,
+            bottom=self.foot,
+            taken=[rect for rect in plates.values() if rect.width and rect.height],
+            plates=plates,
+        )
+        if show is not None:
+            if stage.host is not None and not self.manual.open:
+                self._honours.draw(surface, self._free, self.unit)
             if self.foot:
+                plates["timeline"] = self._area
                 now = show.frame.time
                 self._timeline.draw(surface, self._area, show.begin, now, show.end, show.marks, self.unit)
+        self._plates = plates
         if self.panel.visible:
+            plates["panel"] = pygame.Rect(self._size[0] - self.panel.width, 0, self.panel.width, self._size[1])
             self._show_panel(stage, recording is not None)
             self.panel.draw(surface)
         if self.manual.open:
@@ -241,11 +288,16 @@ class Desk:
             words.append(f"Space launches {launched} again")
         return " · ".join(words)
 
-    def _draw_game(self, surface: pygame.Surface, stage: Stage, host: Host, left: int) -> None:
-        draw_score(surface, host.shown().board, self._free, left, self.unit)
-        for note in self._honours.watch(host):
-            stage.messages.tell(note, "warning")
-        self._honours.draw(surface, self._free, self.unit)
+    def _draw_play(self, surface: pygame.Surface, stage: Stage, left: int, plates: dict[str, pygame.Rect]) -> None:
+        """Draw how a game stands, and what a player has at hand."""
+        host = stage.host
+        if stage.gestures is not None:
+            self.tools.draw(surface, stage.gestures.person, self._free, left, self.unit)
+            plates |= self.tools.plates(self._free, self.unit)
+        elif host is not None:
+            plates["score"] = draw_score(surface, host.shown().board, self._free, left, self.unit)
+            for note in self._honours.watch(host):
+                stage.messages.tell(note, "warning")
 
     def draw_wait(self, surface: pygame.Surface, what: str) -> None:
         """Say over whatever was drawn what everything waits for; who was drawing may have locked the surface."""
@@ -266,16 +318,22 @@ class Desk:
         pixels = pygame.surfarray.array3d(note)[area.left : area.right, area.top : area.bottom]
         pygame.surfarray.pixels3d(surface)[seen.left : seen.right, seen.top : seen.bottom] = pixels
 
-    def _draw_graph(self, surface: pygame.Surface, stage: Stage) -> None:
+    def _draw_graph(self, surface: pygame.Surface, stage: Stage, plates: dict[str, pygame.Rect]) -> None:
+        """Draw the energies at the lower right, above what lies there; smaller where that leaves no room."""
         show = stage.show
         if show is None or "energy" not in self.overlays:
             return
         self._graph.add(show.frame.time, *show.energy())
-        width, height = round(GRAPH[0] * self.unit), round(GRAPH[1] * self.unit)
-        margin = round(10 * self.unit)
-        free = self._free
-        rect = pygame.Rect(free.right - width - margin, free.bottom - height - margin, width, height)
-        self._graph.draw(surface, rect.clip(free), self.unit)
+        margin, free, taken = round(10 * self.unit), self._free, [*self.taken(stage), *plates.values()]
+        bottoms = sorted({free.bottom, *(rect.top for rect in taken if rect.height)}, reverse=True)
+        for scale in (1.0, 0.8, 0.6, 0.45):
+            rect = pygame.Rect(0, 0, round(scale * GRAPH[0] * self.unit), round(scale * GRAPH[1] * self.unit))
+            for bottom in bottoms:
+                rect.bottomright = free.right - margin, bottom - margin
+                if free.contains(rect) and rect.collidelist(taken) < 0:
+                    plates["graph"] = rect
+                    self._graph.draw(surface, rect, self.unit)
+                    return
 
     def _show_panel(self, stage: Stage, recording: bool) -> None:
         live = stage.live
@@ -317,6 +375,10 @@ class Desk:
                 for keys, what in told:
                     stage.messages.tell(f"{keys}: {what}")
         return account(stage, self.claims(stage).told, rate, recording)
+
+    def account(self, stage: Stage) -> Status:
+        """Return what is told in words, with no word of what is recorded and how many pictures there are."""
+        return account(stage, self.claims(stage).told, 0.0, None)
 
     def close(self) -> None:
         """Fall silent."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, SetParameter, Spawn
 from sandbox.play.hulls import Hull, area_of
-from sandbox.play.picking import picked
+from sandbox.play.picking import is_free, picked
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 from sandbox.scene.bodies import Bodies
@@ -171,6 +171,7 @@ class Hands:
             made = _made(place, min(max(size / 40.0, 1e-9), 1e9), box, restitution=0.5, friction=0.5)
         else:
             made = _like(bodies, like, place, box)
+        made = _beside_others(live, made)
         live.act(Spawn(time=0.0, box=made) if isinstance(made, Box) else Spawn(time=0.0, ball=made))
 
     def shift(self, live: Live, body: str, by: Place) -> None:
@@ -182,6 +183,32 @@ class Hands:
         if body in live.bodies.names:
             x, y = live.frame.position[live.bodies.names.index(body)].tolist()
             live.act(Move(time=0.0, body=body, position=(x + by[0], y + by[1]), velocity=(0.0, 0.0)))
+
+
+RINGS, DIRECTIONS = 24, 16
+"""Places around the one that is pointed at that are tried, half a radius from ring to ring."""
+
+
+def _beside_others(live: Live, made: Ball | Box) -> Ball | Box:
+    """Return a new body at the nearest place where it overlaps nothing.
+
+    Raises:
+        ActionError: there is none nearby.
+    """
+    if made.collides == "none":
+        return made
+    form = form_of(made)
+    hulls = [Hull(np.asarray(piece.corners), piece.radius) for piece in form.pieces]
+    step = 0.5 * max(float(np.hypot(*hull.corners.T).max()) + hull.radius for hull in hulls)
+    x, y = made.position
+    for ring in range(RINGS):
+        for k in range(DIRECTIONS if ring else 1):
+            turn = math.tau * k / DIRECTIONS
+            place = x - ring * step * math.sin(turn), y + ring * step * math.cos(turn)
+            there = [Hull(hull.corners + np.asarray(place), hull.radius) for hull in hulls]
+            if is_free(live.scene, live.bodies, live.frame, there, made.layer):
+                return made.model_copy(update={"position": place})
+    raise ActionError("there is no room for it here; point at a free place")
 
 
 def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -> int:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import get_args
 
-from sandbox.action import Action, SetParameter, Switch
+from sandbox.action import Action, SetParameter, Switch, heading_of
 from sandbox.engines.registry import ENGINES
 from sandbox.play.instruments.knob import Knob, Value
 from sandbox.play.running.live import Live
@@ -96,13 +96,11 @@ def _surface(live: Live, file: Scene, picked: int | None, key: str, high: float)
     """
     scene = live.scene
     place = _place(live, picked)
-    if place >= len(scene.movers):
-        if picked is None:
-            return Knob(key, key, 0.0, high, 0.0, enabled=False, why="there is no ball")
-        value = getattr(live.bodies.elements[live.bodies.element[picked]], key) or 0.0
-        return Knob(key, key, 0.0, high, value, enabled=False, why="a ball added by hand keeps its own")
-    disc = scene.movers[place]
-    label = key if picked is None else f"{key} of {disc.name or 'this'}"
+    if place >= len(scene.movers) and picked is None:
+        return Knob(key, key, 0.0, high, 0.0, enabled=False, why="there is no ball")
+    disc = live.bodies.elements[live.bodies.element[picked or 0]] if place >= len(scene.movers) else scene.movers[place]
+    name = disc.name if picked is None or place < len(scene.movers) else live.bodies.names[picked]
+    label = key if picked is None else f"{key} of {name or 'this'}"
     default = None
     pairs = _pairs(scene, disc if picked is not None else None)
     if pairs:
@@ -150,6 +148,12 @@ def _paths(live: Live, key: str, picked: int | None) -> list[str]:
     """Return where a figure stands: of the picked body or its material, or of all pairs, balls and generators."""
     scene = live.scene
     place = _place(live, picked)
+    if picked is not None and place >= len(scene.movers):
+        element = live.bodies.elements[int(live.bodies.element[picked])]
+        pairs = _pairs(scene, element)
+        if pairs:
+            return [f"pair.{n}.{key}" for n in pairs]
+        return [f"{heading_of(element)}.{_quoted(live.bodies.names[picked])}.{key}"]
     if place < len(scene.movers):
         pairs = _pairs(scene, scene.movers[place] if picked is not None else None)
         if pairs:
@@ -174,6 +178,11 @@ def _part(discs: Sequence[Mover], index: int) -> str:
     name = discs[index].name
     if name is None or all(disc.name != str(index) for disc in discs):
         return str(index)
+    return _quoted(name)
+
+
+def _quoted(name: str) -> str:
+    """Return a name as a part of a path."""
     if "." not in name and name[0] not in "\"'":
         return name
     quote = "'" if '"' in name else '"'

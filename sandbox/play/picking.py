@@ -77,6 +77,38 @@ def overlapping(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
     return found & there
 
 
+def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer: str) -> bool:
+    """Tell whether nothing solid of a layer overlaps some hulls, m; what just touches does not."""
+    bit, layers = 1 << scene.layers.index(layer), scene.layers
+    for plane in scene.planes:
+        normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
+        if mask_of(plane.layers, layers) & bit:
+            depth = min(float(((hull.corners - plane.point) @ normal).min()) - hull.radius for hull in hulls)
+            if depth < 0.0:
+                return False
+    fixed = [
+        Hull(np.asarray(ends), wall.thickness / 2.0)
+        for wall in scene.walls
+        if wall.solid and mask_of(wall.layers, layers) & bit
+        for ends in pairwise((*wall.points, wall.points[0]) if wall.closed else wall.points)
+    ]
+    fixed += [
+        Hull(np.asarray((post.position,)), post.radius)
+        for post in scene.posts
+        if post.solid and mask_of(post.layers, layers) & bit
+    ]
+    low = np.min([hull.corners.min(axis=0) - hull.radius for hull in hulls], axis=0)
+    high = np.max([hull.corners.max(axis=0) + hull.radius for hull in hulls], axis=0)
+    middle, reach = (low + high) / 2.0, float(np.hypot(*(high - low))) / 2.0
+    count = min(len(bodies), len(frame.position))
+    solid = np.asarray([each.collides != "none" for each in bodies.elements])[bodies.element[:count]]
+    with np.errstate(all="ignore"):
+        near = np.hypot(*(frame.position[:count] - middle).T) < reach + bodies.radius[:count]
+    near &= frame.present[:count] & solid & (bits_of(frame.layer, count) & bit != 0)
+    others = [hull for number in np.flatnonzero(near).tolist() for hull in hulls_of(bodies, frame, number)]
+    return all(meeting(hull, other)[0] >= 0.0 for hull in hulls for other in (*fixed, *others))
+
+
 def _meet_fixed(found: BoolArray, near: BoolArray, solids: dict[int, list[Hull]], fixed: Hull) -> None:
     """Note which bodies near a fixed thing overlap it."""
     for number, hulls in solids.items():

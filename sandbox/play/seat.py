@@ -1,6 +1,8 @@
 """Seat: what a player has before him: the stage, the desk, the camera, and what is kept of them."""
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +14,7 @@ from sandbox.play.desk import Desk
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.footage.taking import Taking
 from sandbox.play.framing import Corners, around, framing, lies_down
+from sandbox.play.instruments.plates import largest_room
 from sandbox.play.instruments.thumbnail import frame_in_flight
 from sandbox.play.sight import Sight
 from sandbox.play.stage import Stage
@@ -19,6 +22,10 @@ from sandbox.scene.model import Scene
 from sandbox.trajectory import FloatArray
 
 TITLE = "sandbox"
+CLOSER = 1.5
+"""A camera that follows all that moves is at most so many times as close as at first."""
+FIELD_MARGIN = 0.02
+"""of what plates leave free, so much is left on each side of a table or the field of a game"""
 BESIDE_BODIES = 12.0
 """radii: what the camera shows at least of where bodies are"""
 
@@ -48,6 +55,7 @@ class Seat:
         self.following: int | Literal["all"] | None = None
         """number of the body that the camera follows, or all that move"""
         self._window_size: tuple[int, int] | None = None  # before it filled the screen
+        self._taken: list[pygame.Rect] = []  # what plates covered as it came home
         self._covered = (0, 0)  # px at the top and bottom that the score panel took as it came home
         self.leaving: int | None = None
         """the exit status, once the window is to close"""
@@ -132,7 +140,9 @@ class Seat:
             chosen = frame.present[:count] & ~bodies.fixed[:count] & np.isfinite(frame.position[:count]).all(axis=1)
             box = around(frame.position[:count][chosen], bodies.radius[:count][chosen])
             if box is not None:
-                self.camera = self.camera.eased(self._fitting(_widened(box, bodies.radius[:count][chosen])), elapsed)
+                target = self._fitting(_widened(box, bodies.radius[:count][chosen]))
+                closest = CLOSER * self._fitting(framing(show.scene, self.stage.reach)).scale
+                self.camera = self.camera.eased(target.zoomed_to(min(target.scale, closest)), elapsed)
         elif self.following < len(frame.position) and frame.present[self.following]:
             place = frame.position[self.following]
             if np.isfinite(place).all():
@@ -153,6 +163,8 @@ class Seat:
             surface = pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
         else:
             surface = pygame.display.set_mode(self._window_size, pygame.RESIZABLE)
+            if surface.get_size() != self._window_size:  # some drivers only leave full screen at first
+                surface = pygame.display.set_mode(self._window_size, pygame.RESIZABLE)
             self._window_size = None
         self.resize(surface)
 
@@ -174,17 +186,41 @@ class Seat:
 
     def _fitting(self, box: Box) -> Camera:
         """Return the camera that shows a box whole."""
-        size, inset = self.surface.get_size(), self.desk.panel.width
+        size, room, show = self.surface.get_size(), self.desk.free, self.stage.show
         self._covered = head, foot = self.desk.covered(self.stage)
-        foot += self.desk.foot
+        lies = show is not None and lies_down(show.scene, room.size)
+        if self._has_field:  # every part of it counts: plates lie beside it
+            (left, bottom), (right, top) = box
+            shape = max(right - left, 1e-9), max(top - bottom, 1e-9)
+            room = largest_room(shape[::-1] if lies else shape, room, self.desk.taken(self.stage))
+            camera = replace(Camera.fitting(box, room.size, FIELD_MARGIN, turned=lies), size=size)
+            return camera.panned((room.centerx - size[0] / 2.0, room.centery - size[1] / 2.0))
+        inset = self.desk.panel.width
+        return Camera.fitting(box, size, inset=inset, foot=foot + self.desk.foot, turned=lies, head=head)
+
+    @property
+    def _has_field(self) -> bool:
+        """Whether all of what is seen counts: a table, the field of a game, or a view that the scene states."""
         show = self.stage.show
-        lies = show is not None and lies_down(show.scene, (size[0] - inset, size[1] - foot))
-        return Camera.fitting(box, size, inset=inset, foot=foot, turned=lies, head=head)
+        if show is None:
+            return False
+        play = show.scene.play
+        return play.area is not None or play.view is not None or play.game is not None
 
     def make_room(self) -> None:
-        """Come home again where the score panel has grown, with another row or with how the game ended."""
-        covered = self.desk.covered(self.stage)
-        if self.at_home and any(now > then for now, then in zip(covered, self._covered, strict=True)):
+        """Come home again where a plate has grown, with another row or with how the game ended."""
+        if not self.at_home or self.following is not None:
+            return
+        covered, show = self.desk.covered(self.stage), self.stage.show
+        grown = any(now > then for now, then in zip(covered, self._covered, strict=True))
+        if self._has_field and show is not None:
+            taken = self.desk.taken(self.stage)
+            if taken != self._taken:
+                corners = self.camera.to_screen(np.asarray(framing(show.scene)))
+                (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+                field = pygame.Rect(math.ceil(left), math.ceil(top), int(right - left), int(bottom - top))
+                grown, self._taken = field.collidelist(taken) >= 0, taken
+        if grown:
             self.home()
 
     def resize(self, surface: pygame.Surface) -> None:
@@ -205,7 +241,7 @@ def _steered(scene: Scene) -> int | None:
 def _widened(box: Corners, radius: FloatArray) -> Box:
     """Return a box that is at least some bodies wide: of one body, its surroundings are seen too."""
     low, high = box
-    least = BESIDE_BODIES * float(np.median(radius))
+    least = BESIDE_BODIES * float(np.median(radius)) if len(radius) else 1.0
     grown = np.maximum(least - (high - low), 0.0) / 2.0
     low, high = low - grown, high + grown
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))

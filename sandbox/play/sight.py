@@ -81,6 +81,8 @@ class Sight:
     """what is drawn of a game of artillery besides its bodies"""
     lit: frozenset[str] = frozenset()
     """names of the parts, `[[play.part]]`, whose lamps are lit"""
+    below: float = 0.0
+    """px at the upper left that words over the picture cover"""
     flames: tuple[Flame, ...] = ()
     """of the thrusts that fire"""
 

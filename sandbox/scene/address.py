@@ -14,7 +14,7 @@ import re
 import tomllib
 from typing import Any
 
-from sandbox.scene.faults import Location
+from sandbox.scene.faults import Location, quoted
 from sandbox.scene.model import default_name
 
 EVERY = "*"
@@ -144,6 +144,8 @@ def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Locat
         last = k == len(parts) - 1
         if isinstance(here, dict):
             if not last and part not in here:
+                if k == 0 and _is_list(part):
+                    raise AddressError(f"{path}: the scene has no [[{part}]]")
                 meant = _meant(here, parts[k:])
                 if k > 0 and k == len(parts) - 2 and parts[-1].isdecimal() and part in _keys(location):
                     whole = ".".join(parts[: k + 1])
@@ -209,21 +211,23 @@ def element_names(elements: list[Any], kind: str) -> list[str | None]:
     return names
 
 
-def quoted(name: str) -> str:
-    """Write a name as a part of a path, in quotes where it needs them."""
-    if re.fullmatch(r"[^\s.\"'\[\]=]+", name):
-        return name
-    return f'"{name}"' if '"' not in name else f"'{name}'"
-
-
 def _keys(location: Location) -> list[str]:
     """Return the keys of a table by where it is; none where there is no such table."""
-    from sandbox.scene.explain import keys_of, model_at  # only what cannot be followed needs these
+    from sandbox.scene.explain import TAGGED, keys_of, model_at  # only what cannot be followed needs these
 
+    if location[:-1] == () and location[-1] in TAGGED:  # of several kinds
+        return [key for model in TAGGED[str(location[-1])][0].values() for key in keys_of(model)]
     try:
         return keys_of(model_at(location))
     except (KeyError, StopIteration):
         return []
+
+
+def _is_list(table: str) -> bool:
+    """Tell whether a scene has many of a table."""
+    from sandbox.scene.explain import list_tables  # as above
+
+    return table in list_tables()
 
 
 def _meant(document: Any, parts: tuple[str, ...]) -> str:

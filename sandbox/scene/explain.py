@@ -229,7 +229,7 @@ def _known_keys(location: Location) -> str:
         if key in keys_of(model_at((table,))):
             return f"did you mean {table}.{key}?"
     if len(location) == 1:
-        homes = [table for table in _tables() if key in keys_of(model_at((table, 0)))]
+        homes = [table for table in list_tables() if key in keys_of(model_at((table, 0)))]
         if homes:
             some = ", ".join(f"[[{table}]]" for table in homes[:3])
             return f"it is a key of {some}{' and others' if len(homes) > 3 else ''}, and stands below such a heading"
@@ -241,7 +241,7 @@ _COMMON_TABLES = ("solver", "world")
 """The tables that every scene has: a key of theirs may be looked for in any other."""
 
 
-def _tables() -> list[str]:
+def list_tables() -> list[str]:
     """Return the tables of which a scene may have many, those of bodies first."""
     lists = [str(field.alias) for field in Scene.model_fields.values() if field.alias is not None]
     return sorted(lists, key=lambda table: table not in Scene().kinds)

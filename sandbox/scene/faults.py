@@ -51,8 +51,15 @@ def path_of(location: Location, document: Any) -> str:
             parts.append(f".{key}" if parts else key)
             continue
         name = here.get("name") if isinstance(here, dict) else None
-        parts.append(f".{name}" if isinstance(name, str) and name.isprintable() and name else f"[{key}]")
+        parts.append(f".{quoted(name)}" if isinstance(name, str) and name.isprintable() and name else f"[{key}]")
     return "".join(parts)
+
+
+def quoted(name: str) -> str:
+    """Write a name as a part of a path, in quotes where it would be read as several parts."""
+    if not any(sign in name for sign in ".\"'[]="):
+        return name
+    return f'"{name}"' if '"' not in name else f"'{name}'"
 
 
 def _child(value: Any, key: Key) -> Any:

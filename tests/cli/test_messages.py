@@ -18,6 +18,8 @@ BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
         ("run bounce --set dt=0.01", 2, "dt (set): unknown key; did you mean solver.dt?"),
         ("run bounce --set gravity=[0,1]", 2, "did you mean world.gravity?"),
         ("run bounce --set ball.radius=1", 2, "name an element, such as ball.ball.radius, or all by ball.*.radius"),
+        ("run double_pendulum --set joint.length=3", 2, "such as joint.upper rod.length, or all by joint.*.length"),
+        ("run bounce --set scatter.count=3", 2, "scatter.count: the scene has no [[scatter]]"),
         ("run bounce --set ball.bal.radius=1", 2, "no element 'bal'; did you mean 'ball'?"),
         ("run bounce --set ground.restitution=1", 2, "that is an element: plane.ground.restitution"),
         ("run bounce --set wrold.bounds.x.y=1", 2, "did you mean world.bounds.x.y?"),

@@ -5,8 +5,9 @@ import re
 import pytest
 
 from sandbox.measure.forecast import notes, warnings
-from sandbox.scene.address import AddressError, assign
+from sandbox.scene.address import AddressError, assign, parse_assignment
 from sandbox.scene.document import to_document
+from sandbox.scene.faults import path_of
 from sandbox.scene.file import loads
 from sandbox.scene.model import Scene
 
@@ -150,3 +151,11 @@ def test_name_without_its_table_is_answered_with_the_path(scene: Scene, path: st
     key, _, value = path.partition("=")
     with pytest.raises(AddressError, match=re.escape(words)):
         assign(to_document(scene), key, value)
+
+
+@pytest.mark.parametrize("name", ["a", "two words", "a.b", "a[0]", 'say "a"', "it's", "a=b", "8"])
+def test_path_of_a_fault_can_be_set_as_it_is_shown(name: str) -> None:
+    document = {"ball": [{"name": "other"}, {"name": name, "radius": -1.0, "position": [0.0, 0.0]}]}
+    shown = path_of(("ball", 1, "radius"), document)
+    key, value = parse_assignment(f"{shown}=2")
+    assert assign(document, key, value)[1] == ("ball", 1, "radius")

@@ -530,3 +530,19 @@ def test_notes_tell_of_concave_outlines_and_of_what_an_audit_counts() -> None:
     (audit,) = [note for note in notes(scene) if note.kind == "audit"]
     assert audit.figures["bodies"] == 3
     assert notes(loads("[[ball]]\nposition = [0, 0]\nradius = 1\n")) == []
+
+
+def test_flight_of_first_order_is_noted_with_its_error() -> None:
+    scene = loads(
+        "[world]\ngravity = [0, -10]\nduration = 2.0\n[solver]\ndt = 0.08\n[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n"
+        "[[ball]]\nname = 'b'\nposition = [0, 20.5]\nradius = 0.5\n"
+    )
+    (note,) = [each for each in notes(scene) if each.kind == "flight"]
+    assert note.figures == {"body": "b", "error": pytest.approx(0.5 * 10 * 0.08 * 2.0, rel=1e-12)}  # a root's rounding
+    flown = loads(
+        "[world]\ngravity = [0, -10]\nduration = 2.0\n[solver]\ndt = 0.08\n[[ball]]\nposition = [0, 0]\nradius = 1\n"
+    )
+    off = run(flown, audit=False).position[-1, 0, 1] + 0.5 * 10 * 2.0**2
+    assert off == pytest.approx(float(note.figures["error"]), rel=1e-9)  # explicit Euler: exactly g·h·t/2
+    exact = scene.model_copy(update={"solver": scene.solver.replace(integrator="velocity_verlet", detection="bisect")})
+    assert "flight" not in [each.kind for each in notes(exact)]

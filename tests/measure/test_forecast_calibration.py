@@ -9,14 +9,14 @@ import pytest
 from sandbox.scene.file import from_document
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
-from forecast_calibration import Observation, confusion, halves, observe, shares, summary  # noqa: E402, see above
-from random_scenes import KINDS, document  # noqa: E402, see above
+from forecast_calibration import Observation, confusion, halves, observe, shares, summary
+from random_scenes import KINDS, document
 
 
 def row(foretold: bool, happened: bool, formulas: bool = False) -> Observation:
     return Observation(
         "kind", 0, "pymunk", "tunnelling",
-        formulas=formulas, foretold=foretold, half_foretold=formulas, happened=happened, covered=True,
+        formulas=formulas, foretold=foretold, half_foretold=formulas, happened=happened, elsewhere=None, covered=True,
     )  # fmt: skip
 
 

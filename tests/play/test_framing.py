@@ -48,7 +48,7 @@ def test_bodies_of_shipped_scenes_are_in_sight_at_the_start(name: str) -> None:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_bodies_of_shipped_scenes_stay_in_the_first_view(name: str) -> None:
-    """For all of a scene's duration, as far as 4,000 steps and 60,000 body-steps go; none but a diverging one leaves."""
+    """For all of its duration, as far as 4,000 steps and 60,000 body-steps go; only one that diverges leaves."""
     scene = load(find(name))
     engine = usual(scene)
     if scene.play.view is not None or scene.play.area is not None:

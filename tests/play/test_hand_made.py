@@ -3,15 +3,25 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pygame
 import pytest
 from pressing import key, key_up, move
 from windowed import turned, window_on
 
-from sandbox.action import Action, Impulse, Move, Remove, SetParameter, Spawn
-from sandbox.play.hands import count_changes
+from sandbox.action import Action, ActionError, Impulse, Move, Remove, SetParameter, Spawn
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.replay import rerun
+from sandbox.play.hands import Hands, count_changes
+from sandbox.play.knobs import Knobs
+from sandbox.play.knobs import turned as turned_knob
+from sandbox.play.picking import overlapping
+from sandbox.play.running.live import Live
+from sandbox.play.running.session import Session
 from sandbox.play.window import Window
 from sandbox.scene.discs import Ball
+from sandbox.scene.file import from_document, load
+from sandbox.scene.shipped import find
 
 REST = """
 title = "Rest"
@@ -148,3 +158,73 @@ def test_picker_asks_before_another_scene_takes_the_place(window: Window) -> Non
     strike(window, pygame.K_RETURN)
     assert window.desk.picker is None
     assert window.stage.live is not live
+
+
+@pytest.mark.parametrize("box", [False, True], ids=["ball", "box"])
+@pytest.mark.parametrize("name", ["bounce", "pyramid", "rube_goldberg", "bridge"])
+def test_new_bodies_overlap_nothing_wherever_they_are_put(name: str, box: bool) -> None:
+    live, hands, rng = Live(Session(load(find(name)))), Hands(), np.random.default_rng(1)
+    before = overlapping(live.scene, live.bodies, live.frame).sum()
+    low, high = live.frame.position.min(axis=0) - 0.5, live.frame.position.max(axis=0) + 0.5
+    for x, y in rng.uniform(low, high, (20, 2)).tolist():
+        hands.add(live, (x, y), 5.0, box=box)
+    assert len(live.bodies) >= 20
+    assert overlapping(live.scene, live.bodies, live.frame).sum() <= before  # those of the file may
+    live.close()
+
+
+def test_new_body_goes_where_it_is_pointed_if_there_is_room_and_is_refused_in_a_full_place() -> None:
+    full = [{"position": [0.0, 0.0], "radius": 0.9}]
+    live = Live(Session(from_document({"ball": full})))
+    hands = Hands()
+    hands.add(live, (5.0, 5.0), 1.0)
+    assert live.frame.position[-1] == pytest.approx((5.0, 5.0), abs=0.0)
+    hands.add(live, (0.1, 0.0), 1.0)
+    assert np.hypot(*live.frame.position[-1]) >= 1.8
+    live.close()
+    ground = Live(Session(from_document({"plane": [{"point": [0, 0], "normal": [0, 1]}]})))
+    with pytest.raises(ActionError, match="no room"):
+        hands.add(ground, (0.0, -100.0), 40.0)  # a ball of 1 m, 100 m below the ground
+    ground.close()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("key", "value"), [("restitution", 0.25), ("friction", 0.75)])
+def test_knob_sets_the_surface_of_a_body_added_by_hand(engine: str, key: str, value: float) -> None:
+    scene = from_document(
+        {
+            "world": {"gravity": [0, -10.0]},
+            "plane": [{"point": [0, 0], "normal": [0, 1]}],
+            "ball": [{"name": "a", "position": [0, 2], "radius": 0.5, "restitution": 1.0}],
+        }
+    )
+    live = Live(Session(scene, engine))
+    Hands().add(live, (5.0, 2.0), 1.0)
+    knob = next(each for each in Knobs().of(live, scene, 1) if each.key == key)
+    assert knob.enabled
+    for action in turned_knob(live, key, value, 1):
+        live.act(action)
+    assert next(each for each in Knobs().of(live, scene, 1) if each.key == key).value == value
+    assert next(each for each in Knobs().of(live, scene, 0) if each.key == key).value == (key == "restitution")
+    live.session.advance(100)  # 1 s: it has fallen 1.5 m at 5.5 m/s, and come up again
+    if key == "restitution":
+        up = live.session.frame.velocity[:, 1]
+        assert up[1] < 0.5 * up[0]  # the other one keeps its own
+    recording = live.session.recording()
+    assert rerun(recording, audit=False).info["state_hash"] == recording.state_hash
+    live.close()
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [("ball.spawned-1.restitution", 1.5), ("box.spawned-1.friction", 0.5), ("ball.none.friction", 0.5)],
+)
+def test_surface_of_a_spawned_body_is_checked(path: str, value: float) -> None:
+    session = Session(from_document({"ball": [{"name": "a", "position": [0, 2], "radius": 0.5}]}))
+    session.act(Spawn(time=0.0, ball=Ball(position=(5.0, 0.0), radius=1.0, name="spawned-1")))
+    before = session.frame.state_hash()
+    with pytest.raises(ActionError):
+        session.act(SetParameter(time=0.0, path=path, value=value))
+    assert session.frame.state_hash() == before
+    assert len(session.actions) == 1
+    session.close()

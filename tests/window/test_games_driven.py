@@ -7,6 +7,12 @@ from sandbox.measure.replay import rerun
 
 def test_keys_fly_the_ship_and_the_session_keeps_the_game(drive: Play) -> None:
     window = drive("play", "landing")
+    assert window.step_number() == 0
+    window.hold("Up")  # the game has not begun: that is not played
+    window.let_go("Up")
+    window.key("space")
+    window.wait_for(window.step_number, "the game")
+    assert not window.session().presses
     window.hold("Up")
     window.wait_for(lambda: window.session().presses, "the engine")
     window.let_go("Up")

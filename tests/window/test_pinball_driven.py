@@ -51,6 +51,7 @@ def test_keys_flip_and_plunge_and_the_session_is_the_same_game_again(drive: Play
     left, number, box = bat("left")
     _, other, other_box = bat("right")
     window = drive("play", str(CLASSIC))
+    window.key("space")
     # At first messages lie over them.
     window.wait_until(
         lambda shot: all(count(shot, COLOUR, each) > WHOLE for each in (box, other_box)), "both bats, uncovered"

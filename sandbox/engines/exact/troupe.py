@@ -11,6 +11,7 @@ from sandbox.engines.floor.pockets import caught
 from sandbox.engines.roster import ALL, FIXED, MEETS, NOTHING, Roster
 from sandbox.scene.demands import curls, on_floor
 from sandbox.scene.model import Ball, Scene, Single
+from sandbox.scene.surfaced import Mover
 from sandbox.trajectory import BoolArray, FloatArray
 
 
@@ -78,7 +79,7 @@ class Troupe(Roster):
         super().put(number, position)
         self.moved.add(number)
 
-    def change(self, scene: Scene) -> None:
+    def change(self, scene: Scene, spawned: tuple[Mover, ...] | None = None) -> None:
         """Go on with a scene that differs alone in gravity, coefficients, the course of walls, or in what is solid.
 
         Raises:
@@ -98,7 +99,7 @@ class Troupe(Roster):
             if found is not None:
                 raise ActionError(told(self.bodies.names[meets[found[0]]], scene.fixed_names[found[1]], found[2]))
         reshaped = [wall.points for wall in scene.walls] != [wall.points for wall in self.scene.walls]
-        super().change(scene)
+        super().change(scene, spawned)
         self.renewed, self.reshaped = True, reshaped
 
     def add(self, single: Single, name: str) -> int:

@@ -11,6 +11,7 @@ from sandbox.engines.native.meeting import MeetingBodies
 from sandbox.engines.native.population import Population
 from sandbox.scene.bodies import Bodies
 from sandbox.scene.model import Collides, Scene, Single
+from sandbox.scene.surfaced import Mover
 from sandbox.trajectory import BoolArray, FloatArray
 
 
@@ -40,9 +41,9 @@ class NativeCast:
         """(N,) which bodies are there."""
         return self._all.present
 
-    def change(self, scene: Scene) -> None:
+    def change(self, scene: Scene, spawned: tuple[Mover, ...] | None = None) -> None:
         """Go on with a changed scene, as `Population.change`."""
-        self._all.change(scene)
+        self._all.change(scene, spawned)
 
     def add(self, single: Single, name: str) -> int:
         """Add a body and return its number, as `Population.add`."""

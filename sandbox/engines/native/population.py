@@ -22,6 +22,7 @@ from sandbox.scene.bodies import Bodies
 from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Scene, Single
 from sandbox.scene.settings import Settings
+from sandbox.scene.surfaced import Mover
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 UNCORRECTED = 1e9
@@ -175,7 +176,7 @@ class Population:
         driven = self.meeting.drives.holds
         return np.asarray([field.thrusted(name) or driven(name) for name in self.bodies.names], dtype=np.bool_)
 
-    def change(self, scene: Scene) -> None:
+    def change(self, scene: Scene, spawned: tuple[Mover, ...] | None = None) -> None:
         """Go on with a scene that differs alone in air, gravity, coefficients, courses of walls, or in what is solid.
 
         Raises:
@@ -184,12 +185,12 @@ class Population:
         if self._half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             raise ActionError("drag cannot come up in a run that was started with half_kick, which knows none")
         bodies, meet = self.bodies, self._meet
-        same = is_matter_same(scene, self.scene)
+        same = spawned is None and is_matter_same(scene, self.scene)
         checked = same and scene.world is self.scene.world
         if self.felt is not None and not checked and (lacks := next(of_floors(scene), None)):
             raise ActionError(lacks)
         if not same:
-            spawned = bodies.elements[len(self.scene.elements) :]
+            spawned = bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
             bodies = replace(bodies, elements=(*scene.elements, *spawned))
             meet = derived(scene, bodies)
         self.refresh()

@@ -7,6 +7,7 @@ from sandbox.engines.roster import Roster
 from sandbox.engines.visiting import Visiting
 from sandbox.scene.model import Scene, Single
 from sandbox.scene.part import Point
+from sandbox.scene.surfaced import Mover
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
 NOT_AHEAD = np.zeros(2)
@@ -126,9 +127,9 @@ class ZonedRoster(Roster):
         self.visiting.free(number)
         self.visiting.put(number)
 
-    def change(self, scene: Scene) -> None:
+    def change(self, scene: Scene, spawned: tuple[Mover, ...] | None = None) -> None:
         """Go on with a changed scene, as `Roster.change`."""
-        super().change(scene)
+        super().change(scene, spawned)
         self._renew()
 
     def add(self, single: Single, name: str) -> int:

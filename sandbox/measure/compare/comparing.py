@@ -109,11 +109,15 @@ def timed(scene: Scene, engine: str, settings: Settings) -> Trajectory:
 def judged(
     scene: Scene, engine: str, settings: Settings, found: Trajectory, truth: Truth | None, tolerance: float
 ) -> Row:
-    """Score a run against the truth."""
+    """Score a run against the truth; without one, only by what is conserved."""
     seconds = None if found.status == "refused" else float(found.info["seconds"])
     told = engine, found.status, found.reason, found.info["settings"]
-    if truth is None or found.status == "refused":
-        return Row(*told, Score(None, None, None, None), None, None, None, None, None, seconds)
+    nothing = Score(None, None, None, None)
+    if found.status == "refused":
+        return Row(*told, nothing, None, None, None, None, None, seconds)
+    if truth is None:  # what is conserved needs none
+        drift = energy_drift(found, scene, None, False)
+        return Row(*told, nothing, *drift, momentum_drift(found, scene), None, None, seconds)
     until, whole = truth.trusted_until, truth.trusted_until == scene.world.duration
     off = errors(found, truth.trajectory, ~scene.bodies.fixed)
     first = off.first_above(tolerance, until)

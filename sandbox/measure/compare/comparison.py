@@ -128,7 +128,7 @@ class Comparison:
     def sentence(self) -> str:
         """Say what the truth is, and how far it goes."""
         if self.best is None:
-            return f"truth: none; {self.doubt}"
+            return f"truth: none: {self.doubt}"
         whole = self.scene.world.duration
         name = self.best.kind.replace("_", " ")
         until = f"trusted until {self.best.trusted_until:.4g} s of {whole:.4g} s"

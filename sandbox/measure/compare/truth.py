@@ -93,14 +93,15 @@ def seek_truth(scene: Scene, settings: Settings, tolerance: float) -> Truth | st
     until = min(finest.agrees_until, finest.horizon)
     cause = f"; {finest.about}" if until == finest.agrees_until else _limit(scene, until)
     confirmation = confirmed(scene, finest, settings, tolerance, until)
-    if confirmation.until < until:
-        until, cause = confirmation.until, f"; {confirmation.about}, so there is no truth after that"
     times = "once" if finest.halvings == 1 else f"{finest.halvings} times"
     method = f"{finest.engine}, dt halved {times}"
-    if confirmation.by is not None and until > 0.0:
-        method = f"{method}, confirmed by {confirmation.by}"
+    if confirmation.until < until:
+        until = confirmation.until
+        cause = f"; there is no truth beyond {until:.4g} s: {confirmation.about}"
     if until == 0.0 and scene.world.duration > 0.0:
-        return f"{method}{cause}{note}"
+        return f"{confirmation.about or finest.about} (the answer in question: {method}){note}"
+    if confirmation.by is not None:
+        method = f"{method}, confirmed by {confirmation.by}"
     return Truth("refined", f"{method}{cause}{note}", finest.trajectory, until, confirmation.by)
 
 

@@ -106,11 +106,13 @@ def confirmed(scene: Scene, found: Refined, settings: Settings, tolerance: float
         if testimony.until >= until:
             return Confirmation(until, by, limit)
         if testimony.contradicts:
-            what = f"{by} comes to another answer, {testimony.apart:.2g} m away"
+            what = f"{found.engine} and {by} converge to different answers, {testimony.apart:.2g} m apart"
             return Confirmation(testimony.until, by if testimony.until > 0.0 else None, what)
         if best is None or testimony.until > best.until:
-            best = Confirmation(testimony.until, by, f"{by} confirms no more, and has not converged")
-    return best or Confirmation(0.0, None, "no second method can run the scene to confirm it")
+            best = Confirmation(testimony.until, by, f"{by} has not converged and confirms no more")
+    return best or Confirmation(
+        0.0, None, "no second engine or method can run the scene and confirm what the first one says"
+    )
 
 
 def _witnesses(scene: Scene, found: Refined, settings: Settings) -> Iterator[tuple[str, Settings]]:
@@ -229,7 +231,7 @@ def _lawful_until(scene: Scene, run: Trajectory, tolerance: float) -> tuple[floa
     end = scene.world.duration
     drift = momentum_drift(run, scene)
     if drift is not None and abs(drift) > GROWTH:
-        return 0.0, f"its momentum changes by {abs(drift):.2g} of all there is, without a cause"
+        return 0.0, f"the momentum in {run.info['engine']} changes by {abs(drift):.1%} without a cause"
     if demands(scene) & SOURCES or (scene.bodies.born > scene.began).any():
         return end, ""
     energy = energies(run, scene)
@@ -242,4 +244,4 @@ def _lawful_until(scene: Scene, run: Trajectory, tolerance: float) -> tuple[floa
         return end, ""
     first = int(broken[0])
     until = float(run.time[first - 1]) if first else 0.0
-    return until, f"its energy grows by {float(grown[first]):.2g} J without a source"
+    return until, f"the energy in {run.info['engine']} grows by {float(grown[first]):.2g} J without a source"

@@ -7,6 +7,7 @@ import numpy as np
 
 from sandbox.measure.forecast.breaks import break_notes
 from sandbox.measure.forecast.horizon import horizon_notes
+from sandbox.measure.forecast.speeds import top_speeds
 from sandbox.measure.forecast.warning import Warning
 from sandbox.scene.meetings import meetings
 from sandbox.scene.model import Mover, Scene
@@ -19,7 +20,14 @@ MOST_TOLD = 20
 
 def notes(scene: Scene) -> list[Warning]:
     """Return notes: units that look like pixels, concave outlines, what an audit cannot count, predictability."""
-    return [*_pixels(scene), *_outlines(scene), *_audit(scene), *horizon_notes(scene), *break_notes(scene)]
+    return [
+        *_pixels(scene),
+        *_flight(scene),
+        *_outlines(scene),
+        *_audit(scene),
+        *horizon_notes(scene),
+        *break_notes(scene),
+    ]
 
 
 def _pixels(scene: Scene) -> Iterator[Warning]:
@@ -40,6 +48,31 @@ def _pixels(scene: Scene) -> Iterator[Warning]:
 
 WIDE, STRONG = 5.0, 100.0
 """Median width of bodies, m, and gravity, m/s², from which on figures look like pixels."""
+
+
+FIRST_ORDER = (None, "explicit_euler", "semi_implicit_euler")
+"""Integrators whose flight under gravity is off by g·h·t/2 after t; without one stated, engines take explicit Euler."""
+
+
+def _flight(scene: Scene) -> Iterator[Warning]:
+    """Yield a note where a first-order integrator puts a body off by more than its half width within one flight."""
+    bodies, solver, pull = scene.bodies, scene.solver, math.hypot(*scene.world.gravity)
+    meet = meetings(scene)
+    able = np.flatnonzero(meet.touches & ~bodies.fixed & (bodies.thin > 0.0))
+    if pull == 0.0 or not len(able) or solver.half_kick or solver.integrator not in FIRST_ORDER:
+        return
+    time = np.minimum(scene.world.duration, top_speeds(scene, meet)[able] / pull)
+    off = 0.5 * pull * solver.h * time
+    k = int(np.argmax(off / bodies.thin[able]))
+    if off[k] <= float(bodies.thin[able[k]]):
+        return
+    body, scheme = bodies.names[able[k]], solver.integrator or "explicit_euler"
+    message = (
+        f"{scheme} puts {body!r} off by g·h·t/2 = up to {off[k]:.3g} m within one flight of {time[k]:.3g} s, more than "
+        f"its half width, {bodies.thin[able[k]]:.3g} m; solver.half_kick on pymunk, velocity_verlet on the reference, "
+        "and `exact` have no such error"
+    )
+    yield Warning("flight", message, {"body": body, "error": float(off[k])})
 
 
 def _outlines(scene: Scene) -> Iterator[Warning]:

@@ -1,6 +1,7 @@
 """Head-up display: what the window tells in words, over the picture."""
 
 import math
+from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import pygame
@@ -20,6 +21,11 @@ FULL = 460, 320
 """px at unit 1: a smaller picture gets smaller letters."""
 SMALLEST = 9.0
 """px, letters that can still be read"""
+
+TALLEST = 0.4
+"""of a picture, that the state of things takes from above at most"""
+LEAST_MESSAGE = 14.0
+"""heights of a letter: a message gets no narrower to find room beside something"""
 
 ESSENTIAL = 2
 """The rank of what is shown even beside the faults of a file."""
@@ -95,7 +101,62 @@ def _doubts(status: Status) -> list[Row]:
     return found
 
 
-def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int = 0, bottom: int = 0) -> pygame.Rect:
+class Told(NamedTuple):
+    """The lines at the upper left, as they are laid out."""
+
+    rect: pygame.Rect
+    """of their plate; empty where none fits"""
+    lines: tuple[tuple[Row, str], ...]
+    """each with as much of its text as there is room for"""
+
+
+def _scaled(free: pygame.Rect, unit: float) -> tuple[pygame.Rect, float]:
+    """Return what words may cover of a picture, and the size of their letters, px: small pictures get small ones."""
+    scale = unit * min(max(min(free.width / (FULL[0] * unit), free.height / (FULL[1] * unit)), 0.4), 1.0)
+    margin = -2 * round(max(10 * scale, 3))
+    return free.inflate(margin, margin), max(13.5 * scale, SMALLEST)
+
+
+def lay_rows(status: Status, free: pygame.Rect, unit: float, taken: Sequence[pygame.Rect] = ()) -> Told:
+    """Lay out the state of things at the upper left of what is free, beside what takes some of the top.
+
+    It is no higher than `TALLEST` of the picture: the least important lines are left out.
+    """
+    free, size = _scaled(free, unit)
+    shown = rows(status)
+    if status.faults:
+        shown = tuple(row for row in shown if row.rank <= ESSENTIAL)
+    pad, line = _pad(size), round(1.42 * size)
+    room = pygame.Rect(free.topleft, (free.width, min(free.height, max(round(TALLEST * free.height), 5 * line))))
+    for each in taken:
+        if each.top < room.bottom and each.left > free.left + 8 * size:
+            room.width = min(room.width, each.left - round(0.5 * size) - free.left)
+    count = (room.height - 2 * pad) // line
+    if count < 1 or free.width < 2 * size or free.height < size:
+        return Told(pygame.Rect(free.topleft, (0, 0)), ())
+    least = sorted(row.rank for row in shown)[:count][-1]
+    kept = [row for row in shown if row.rank <= least][:count]
+    indent, wide = round(1.3 * size), room.width - 2 * pad
+    texts = [shortened(row.text, size, wide - (indent if row.mark else 0), row.bold, row.mono) for row in kept]
+    widest = max(
+        measure(text, size, row.bold, row.mono)[0] + (indent if row.mark else 0)
+        for row, text in zip(kept, texts, strict=True)
+    )
+    grain = round(2 * size)  # so that the plate does not tremble with its figures
+    rect = pygame.Rect(free.topleft, (min(-(-widest // grain) * grain, wide) + 2 * pad, len(kept) * line + 2 * pad))
+    return Told(rect, tuple(zip(kept, texts, strict=True)))
+
+
+def draw_hud(
+    surface: pygame.Surface,
+    status: Status,
+    unit: float,
+    *,
+    right: int = 0,
+    bottom: int = 0,
+    taken: Sequence[pygame.Rect] = (),
+    plates: dict[str, pygame.Rect] | None = None,
+) -> pygame.Rect:
     """Draw the state of things over a picture; what finds no room is left out, the least important first.
 
     Return what the faults of the scene file cover, if there are any.
@@ -106,33 +167,32 @@ def draw_hud(surface: pygame.Surface, status: Status, unit: float, *, right: int
         unit: px of a pixel at 1080 lines.
         right: px at the right that something else covers.
         bottom: px at the bottom that something else covers.
+        taken: what else lies over the picture; words go beside it.
+        plates: filled with what each plate covers.
     """
-    width, height = surface.get_width() - right, surface.get_height() - bottom
-    scale = unit * min(max(min(width / (FULL[0] * unit), height / (FULL[1] * unit)), 0.4), 1.0)
-    size = max(13.5 * scale, SMALLEST)
-    margin = round(max(10 * scale, 3))
-    free, nothing = pygame.Rect(margin, margin, width - 2 * margin, height - 2 * margin), pygame.Rect(0, 0, 0, 0)
+    plates, nothing = {} if plates is None else plates, pygame.Rect(0, 0, 0, 0)
+    whole = pygame.Rect(0, 0, max(surface.get_width() - right, 0), max(surface.get_height() - bottom, 0))
+    free, size = _scaled(whole, unit)
     if free.width < 2 * size or free.height < size:
         return nothing
-    shown, room = rows(status), free.copy()
+    told = lay_rows(status, whole, unit, taken)
+    _draw_rows(surface, told, size)
+    plates["state"] = told.rect
+    plates["rate"] = _draw_rate(surface, status, free, [told.rect, *taken], size)
     if status.faults:
-        shown = tuple(row for row in shown if row.rank <= ESSENTIAL)
-    elif status.messages:
-        room.height -= round(4.4 * size)  # the newest finds its place
-    block = _draw_rows(surface, shown, room, size)
-    _draw_rate(surface, status, free, block, size)
-    if status.faults:
-        top = block.bottom + _pad(size)
+        top = told.rect.bottom + _pad(size)
         below = pygame.Rect(free.left, top, free.width, free.bottom - top)
         return _draw_faults(surface, status.faults, below if below.height > 6 * size else free, size)
+    plates["picked"] = _draw_picked(surface, status.picked, free, [told.rect, plates["rate"], *taken], size)
+    others = [told.rect, plates["rate"], plates["picked"], *taken]
+    for k, rect in enumerate(_draw_messages(surface, status.messages, free, others, size)):
+        plates[f"message {k}"] = rect
     if status.question is not None:
         _draw_notice(surface, status.question, free, size, WARNING)
     elif status.waits_for_start:
         _draw_notice(surface, "Press Space to start", free, 1.5 * size, SKY)
     elif status.out_of_sight is not None:
         _draw_notice(surface, status.out_of_sight, free, size, SKY)
-    box = _draw_picked(surface, status.picked, free, block, size)
-    _draw_messages(surface, status.messages, free, (block, box), size)
     return nothing
 
 
@@ -146,33 +206,18 @@ def _pad(size: float) -> int:
     return round(0.6 * size)
 
 
-def _draw_rows(surface: pygame.Surface, shown: tuple[Row, ...], free: pygame.Rect, size: float) -> pygame.Rect:
-    """Draw lines on a plate at the upper left, as many as fit, and return the plate."""
-    pad, line = _pad(size), round(1.42 * size)
-    count = (free.height - 2 * pad) // line
-    if count < 1:
-        return pygame.Rect(free.topleft, (0, 0))
-    least = sorted(row.rank for row in shown)[:count][-1]
-    kept = [row for row in shown if row.rank <= least][:count]
-    indent = round(1.3 * size)
-    room = free.width - 2 * pad
-    texts = [shortened(row.text, size, room - (indent if row.mark else 0), row.bold, row.mono) for row in kept]
-    widest = max(
-        measure(text, size, row.bold, row.mono)[0] + (indent if row.mark else 0)
-        for row, text in zip(kept, texts, strict=True)
-    )
-    grain = round(2 * size)  # so that the plate does not tremble with its figures
-    rect = pygame.Rect(free.topleft, (min(-(-widest // grain) * grain, room) + 2 * pad, len(kept) * line + 2 * pad))
+def _draw_rows(surface: pygame.Surface, told: Told, size: float) -> None:
+    """Draw the lines at the upper left on their plate."""
+    pad, line, rect = _pad(size), round(1.42 * size), told.rect
     plate(surface, rect, 0.5 * size)
-    for k, (row, text) in enumerate(zip(kept, texts, strict=True)):
+    for k, (row, text) in enumerate(told.lines):
         middle = rect.top + pad + (k + 0.5) * line
         left = rect.left + pad
         if row.mark:
             draw_mark(surface, row.mark, (left + 0.42 * size, middle), 0.4 * size, row.colour)
-            left += indent
+            left += round(1.3 * size)
         colour = INK if row.colour == GREEN else row.colour
         write(surface, text, (left, middle), size, colour, "midleft", row.bold, row.mono)
-    return rect
 
 
 def draw_mark(surface: pygame.Surface, mark: Mark, at: tuple[float, float], radius: float, colour: Colour) -> None:
@@ -206,21 +251,27 @@ def _draw_notice(surface: pygame.Surface, text: str, free: pygame.Rect, size: fl
         write(surface, each, at, size, INK, "center", bold=True)
 
 
-def _draw_rate(surface: pygame.Surface, status: Status, free: pygame.Rect, block: pygame.Rect, size: float) -> None:
+def _draw_rate(
+    surface: pygame.Surface, status: Status, free: pygame.Rect, taken: Sequence[pygame.Rect], size: float
+) -> pygame.Rect:
+    """Draw how many pictures there are a second, at the upper right; return what that covers."""
+    nothing = pygame.Rect(0, 0, 0, 0)
     if not (math.isfinite(status.frames_per_second) and status.frames_per_second > 0):
-        return
+        return nothing
     text, small = f"{status.frames_per_second:.0f} fps", max(0.8 * size, SMALLEST)
     wide, high = measure(text, small, mono=True)
     rect = pygame.Rect(free.right - wide, free.top, wide, high).inflate(_pad(size), 0)
-    if rect.left >= free.left and rect.bottom <= free.bottom and not rect.colliderect(block.inflate(size, 0)):
-        plate(surface, rect, 0.3 * size, opacity=120, edge=None)
-        write(surface, text, rect.center, small, FAINT, "center", mono=True)
+    if rect.left < free.left or rect.bottom > free.bottom or rect.inflate(size, 0).collidelist(list(taken)) >= 0:
+        return nothing
+    plate(surface, rect, 0.3 * size, opacity=120, edge=None)
+    write(surface, text, rect.center, small, FAINT, "center", mono=True)
+    return rect
 
 
 def _draw_picked(
-    surface: pygame.Surface, lines: tuple[str, ...], free: pygame.Rect, block: pygame.Rect, size: float
+    surface: pygame.Surface, lines: tuple[str, ...], free: pygame.Rect, taken: Sequence[pygame.Rect], size: float
 ) -> pygame.Rect:
-    """Draw the figures of the picked body at the upper right, or below the block; return what they cover."""
+    """Draw the figures of the picked body at the upper right, or below what lies there; return what they cover."""
     nothing = pygame.Rect(0, 0, 0, 0)
     if not lines:
         return nothing
@@ -228,12 +279,17 @@ def _draw_picked(
     line = round(1.4 * small)
     texts = [shortened(text, small, free.width - 2 * pad, k == 0, k > 0) for k, text in enumerate(lines)]
     wide = max(measure(text, small, k == 0, k > 0)[0] for k, text in enumerate(texts)) + 2 * pad
-    top = free.top + round(1.6 * size)
-    rect = pygame.Rect(free.right - wide, top, wide, len(texts) * line + 2 * pad)
-    if rect.colliderect(block.inflate(size, size)):
-        rect.topleft = block.left, block.bottom + pad
-    if rect.bottom > free.bottom:
+    rect = pygame.Rect(free.right - wide, free.top + round(1.6 * size), wide, len(texts) * line + 2 * pad)
+    tops = sorted({rect.top, *(each.bottom + pad for each in taken if each.height)})
+    places = [rect.move(aside, top - rect.top) for aside in (0, free.left - rect.left) for top in tops]
+    found = [
+        each
+        for each in places
+        if each.bottom <= free.bottom and each.inflate(pad, pad // 2).collidelist(list(taken)) < 0
+    ]
+    if not found:
         return nothing
+    rect = found[0]
     plate(surface, rect, 0.5 * size)
     for k, text in enumerate(texts):
         at = rect.left + pad, rect.top + pad + (k + 0.5) * line
@@ -245,27 +301,37 @@ def _draw_messages(
     surface: pygame.Surface,
     messages: tuple[tuple[str, str], ...],
     free: pygame.Rect,
-    taken: tuple[pygame.Rect, pygame.Rect],
+    taken: Sequence[pygame.Rect],
     size: float,
-) -> None:
-    """Draw the newest messages at the lower left, as many as there is room for."""
-    pad, line = _pad(size), round(1.35 * size)
+) -> list[pygame.Rect]:
+    """Draw the newest messages at the lower left, beside or above what lies there; return what they cover."""
+    pad, line, mark_room = _pad(size), round(1.35 * size), round(1.6 * size)
+    drawn: list[pygame.Rect] = []
     bottom = free.bottom
     for level, text in reversed(messages[-MESSAGES:]):
         colour = {"warning": ORANGE, "error": WARNING}.get(level, SKY)
         mark: Mark = "triangle" if level in ("warning", "error") else "disc"
-        room = min(free.width, round(44 * size)) - 2 * pad - round(1.6 * size)
+        reach = pygame.Rect(free.left, 0, min(free.width, round(44 * size)), 2 * line + 2 * pad)
+        reach.bottom = bottom
+        for each in taken:
+            if each.colliderect(reach) and each.left - free.left >= round(LEAST_MESSAGE * size):
+                reach.width = min(reach.width, each.left - pad - free.left)
+        room = reach.width - 2 * pad - mark_room
         lines = wrapped(text, size, room, 2)
         wide = max((measure(part, size)[0] for part in lines), default=0)
-        rect = pygame.Rect(free.left, 0, wide + 2 * pad + round(1.6 * size), len(lines) * line + 2 * pad)
+        rect = pygame.Rect(free.left, 0, wide + 2 * pad + mark_room, len(lines) * line + 2 * pad)
         rect.bottom = bottom
-        if not lines or rect.top < free.top or rect.collidelist(taken) >= 0:
-            return
+        while (hit := rect.collidelist(list(taken))) >= 0 and rect.top >= free.top:
+            rect.bottom = taken[hit].top - round(0.4 * size)
+        if not lines or rect.top < free.top:
+            return drawn
         plate(surface, rect, 0.5 * size)
         draw_mark(surface, mark, (rect.left + pad + 0.5 * size, rect.top + pad + line / 2), 0.42 * size, colour)
         for k, part in enumerate(lines):
             write(surface, part, (rect.right - pad - wide, rect.top + pad + (k + 0.5) * line), size, INK, "midleft")
         bottom = rect.top - round(0.4 * size)
+        drawn.append(rect)
+    return drawn
 
 
 def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], free: pygame.Rect, size: float) -> pygame.Rect:

@@ -17,6 +17,8 @@ WIDTH = 264
 """px at unit 1"""
 WIDEST = 0.6
 """share of a small window that it covers, at most"""
+FOLDS = 0.45
+"""share of a window beyond which it is folded away at first"""
 SCROLL = 48
 """px at unit 1, a notch of the wheel"""
 
@@ -46,7 +48,7 @@ class Panel:
         self.on_toggle: Callable[[str, bool], None] = _nothing
         self.on_button: Callable[[str], None] = _nothing
         self.size, self.unit = size, unit
-        self._visible = True
+        self._wanted: bool | None = None  # whether it was asked for, or to be hidden; else a small window hides it
         self._dials: dict[str, Dial] = {}
         self._switches: dict[str, Switch] = {}
         self._buttons: list[PushButton] = []
@@ -63,7 +65,7 @@ class Panel:
     @property
     def width(self) -> int:
         """What it covers at the right of the window, px; 0 while it is hidden."""
-        return self._full if self._visible else 0
+        return self._full if self.visible else 0
 
     @property
     def _full(self) -> int:
@@ -71,12 +73,15 @@ class Panel:
 
     @property
     def visible(self) -> bool:
-        """Whether it is shown. Hiding it ends what is being dragged."""
-        return self._visible
+        """Whether it is shown: in a window that it would cover much of, only once it is asked for.
+
+        Hiding it ends what is being dragged.
+        """
+        return self._wanted if self._wanted is not None else round(WIDTH * self.unit) <= FOLDS * self.size[0]
 
     @visible.setter
     def visible(self, visible: bool) -> None:
-        self._visible = visible
+        self._wanted = visible
         if not visible:
             self.release()
 
@@ -153,7 +158,7 @@ class Panel:
             if event.type == pygame.WINDOWFOCUSLOST or not self._pressed:
                 self.release()
             return False
-        if not self._visible:
+        if not self.visible:
             return False
         if event.type == pygame.MOUSEWHEEL:
             return self._wheel(event)
@@ -222,7 +227,7 @@ class Panel:
 
     def draw(self, surface: pygame.Surface) -> None:
         """Draw it at the right of the window, if it is visible."""
-        if not self._visible:
+        if not self.visible:
             return
         look = (self._scroll, self._bar_held, self._layout.headings, *(widget.look for widget in self.widgets))
         if look != self._drawn:

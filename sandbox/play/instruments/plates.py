@@ -1,6 +1,8 @@
 """Plates: translucent backings that keep words readable over any picture, and lines fitted to a width."""
 
+from collections.abc import Sequence
 from functools import lru_cache
+from itertools import product
 
 import pygame
 
@@ -33,6 +35,27 @@ def _plate(size: tuple[int, int], radius: int, colour: Colour, opacity: int, edg
     if edge is not None:
         pygame.draw.rect(made, (*edge, opacity), made.get_rect(), 1, border_radius=radius)
     return made
+
+
+def largest_room(shape: tuple[float, float], free: pygame.Rect, taken: Sequence[pygame.Rect]) -> pygame.Rect:
+    """Return the part of what is free, beside all that is taken, in which a rectangle of a shape is largest.
+
+    Args:
+        shape: width and height, in any unit.
+        free: px.
+        taken: px; where nothing else is left, they are not minded.
+    """
+    taken = [each.clip(free) for each in taken if each.clip(free).size > (0, 0) and free.colliderect(each)]
+    lefts, rights = {free.left, *(each.right for each in taken)}, {free.right, *(each.left for each in taken)}
+    tops, bottoms = {free.top, *(each.bottom for each in taken)}, {free.bottom, *(each.top for each in taken)}
+    best, most = free, 0.0
+    for left, right in product(sorted(lefts), sorted(rights, reverse=True)):
+        for top, bottom in product(sorted(tops), sorted(bottoms, reverse=True)):
+            scale = min((right - left) / shape[0], (bottom - top) / shape[1])
+            room = pygame.Rect(left, top, max(right - left, 0), max(bottom - top, 0))
+            if scale > most and room.collidelist(taken) < 0:
+                best, most = room, scale
+    return best
 
 
 @lru_cache(maxsize=1024)

@@ -16,6 +16,8 @@ NARROWEST = 300.0
 LETTERS = (14.0, 12.5, 11.0)
 """px at unit 1: the largest at which all stands in one row; else the smallest"""
 MOST_LINES = 8
+MOST_ROWS = 3
+"""beside the state of things; of more, it lies at the bottom, where it is wider"""
 
 
 Cell = tuple[str, str]
@@ -51,14 +53,10 @@ def laid(board: Board, free: pygame.Rect, left: int, unit: float) -> Laid:
     margin = round(10 * scale)
     right = free.right - round(RIGHT * unit)
     above = right - left >= NARROWEST * unit
-    if not above:
-        left, right = free.left + margin, free.right - margin
-    for letters in LETTERS:
-        size = letters * scale
-        gap, room = round(1.1 * size), right - left - 2 * _pad(size)
-        rows = _rows(board, room, size, gap)
-        if len(rows) == 1:
-            break
+    rows, size, gap, room = _fitted(board, right - left, scale)
+    if not above or len(rows) > MOST_ROWS:  # at the bottom it has the whole width
+        above, left, right = False, free.left + margin, free.right - margin
+        rows, size, gap, room = _fitted(board, right - left, scale)
     end = wrapped(_told(board), size, room - 1.4 * size, 2, bold=True) if board.over is not None else ()
     wide = max(max(sum(cells) + gap * (len(cells) - 1) for _, cells in rows), *(_wide(line, size) for line in end), 0)
     high = _tall(size) * len(rows) + round(1.5 * size) * len(end) + round(0.9 * size)
@@ -67,6 +65,17 @@ def laid(board: Board, free: pygame.Rect, left: int, unit: float) -> Laid:
     if not above:
         rect.bottomleft = left, free.bottom - margin
     return Laid(rect, above, rows, tuple(end), size, gap)
+
+
+def _fitted(board: Board, width: int, scale: float) -> tuple[list[tuple[list[Cell], list[int]]], float, int, int]:
+    """Return the rows, the size of their letters, the gap between cells and the room in a row, px."""
+    for letters in LETTERS:
+        size = letters * scale
+        gap, room = round(1.1 * size), width - 2 * _pad(size)
+        rows = _rows(board, room, size, gap)
+        if len(rows) == 1:
+            break
+    return rows, size, gap, room
 
 
 def draw_score(surface: pygame.Surface, board: Board, free: pygame.Rect, left: int, unit: float) -> pygame.Rect:

@@ -32,32 +32,45 @@ class Drawn(NamedTuple):
     """where the decisions are that can be clicked"""
 
 
-def draw_scoreboard(surface: pygame.Surface, person: Person, free: pygame.Rect, left: int, unit: float) -> Drawn:
-    """Draw it at the top of what is free, or where that is too narrow, at the bottom.
+class Laid(NamedTuple):
+    """Where a scoreboard lies, and what it says."""
+
+    rect: pygame.Rect
+    lines: tuple[str, ...]
+    """what happened, and what is to be done"""
+
+
+def lay_scoreboard(person: Person, free: pygame.Rect, left: int, unit: float, aside: int = 0) -> Laid:
+    """Lay it at the top of what is free, or where that is too narrow, at the bottom.
 
     Args:
-        surface: the picture.
         person: who plays.
         free: px, what it may cover.
         left: px, what else covers the top.
         unit: px of a pixel at 1080 lines.
+        aside: px at the right that something else covers at the bottom.
     """
     size, pad, margin = 13.0 * unit, round(9 * unit), round(10 * unit)
     right = free.right - round(RIGHT * unit)
     above = right - left >= NARROWEST * unit
     if not above:
-        left, right = free.left + margin, free.right - margin
+        left, right = free.left + margin, free.right - max(margin, aside)
     width = min(right - left, round(WIDEST * unit))
-    game = person.game
-    match, line = game.match, round(1.5 * size)
-    told = status_line(person)
-    choices = _choices(person)
-    down = _down(match)
-    lines = wrapped(told, size, width - 2 * pad - 1.3 * size, 2)
-    rows = 1 + len(lines) + bool(down) + bool(choices)
-    rect = pygame.Rect((left + right - width) // 2, free.top + margin, width, rows * line + 2 * pad)
+    lines = wrapped(status_line(person), size, width - 2 * pad - 1.3 * size, 2)
+    rows = 1 + len(lines) + bool(_down(person.game.match)) + bool(_choices(person))
+    rect = pygame.Rect((left + right - width) // 2, free.top + margin, width, rows * round(1.5 * size) + 2 * pad)
     if not above:
         rect.bottomleft = left, free.bottom - margin
+    return Laid(rect, lines)
+
+
+def draw_scoreboard(
+    surface: pygame.Surface, person: Person, free: pygame.Rect, left: int, unit: float, aside: int = 0
+) -> Drawn:
+    """Draw it where it is laid; as `lay_scoreboard`."""
+    rect, lines = lay_scoreboard(person, free, left, unit, aside)
+    size, pad, game, match = 13.0 * unit, round(9 * unit), person.game, person.game.match
+    line, choices, down = round(1.5 * size), _choices(person), _down(match)
     plate(surface, rect, 8 * unit)
     y = rect.top + pad + line / 2
     _players(surface, game, rect, y, size)

@@ -21,7 +21,7 @@ MARKS = 5
 def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: Cue, unit: float) -> None:
     """Draw the ball, the circle beyond which a tip slips, and the tip's mark."""
     (x, y), radius = (rect.centerx, rect.centery), rect.width / 2.0
-    plate(surface, rect.inflate(round(10 * unit), round(10 * unit)), 10 * unit, opacity=170)
+    plate(surface, plate_of(rect, unit), 10 * unit, opacity=170)
     _disc(surface, (x, y), radius, Look(IVORY, mixed(IVORY, PANEL, 0.45), 1.5 * unit))
     faint = mixed(IVORY, PANEL, 0.28)
     for a, b in (((x - radius, y), (x + radius, y)), ((x, y - radius), (x, y + radius))):
@@ -38,9 +38,14 @@ def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: Cue, unit: float) 
         write(surface, text, (x, rect.top - 8 * unit), 11 * unit, FAINT, "midbottom", mono=True)
 
 
+def plate_of(rect: pygame.Rect, unit: float) -> pygame.Rect:
+    """Return what a dial covers with its plate."""
+    return rect.inflate(round(10 * unit), round(10 * unit))
+
+
 def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: Cue, unit: float) -> None:
     """Draw the power as a bar, with the speed of the cue above it."""
-    plate(surface, rect.inflate(round(10 * unit), round(10 * unit)), 10 * unit, opacity=170)
+    plate(surface, plate_of(rect, unit), 10 * unit, opacity=170)
     round_off = round(0.3 * rect.width)
     pygame.draw.rect(surface, LINE, rect, border_radius=round_off)
     high = max(round(rect.height * cue.power), 2)

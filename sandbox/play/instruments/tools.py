@@ -7,8 +7,8 @@ import pygame
 from sandbox.games.billiards.rules.call import Decision
 from sandbox.play.billiards.cue import Cue
 from sandbox.play.billiards.person import Person
-from sandbox.play.instruments.scoreboard import draw_scoreboard
-from sandbox.play.instruments.tip import draw_power, draw_tip
+from sandbox.play.instruments.scoreboard import draw_scoreboard, lay_scoreboard
+from sandbox.play.instruments.tip import draw_power, draw_tip, plate_of
 from sandbox.play.running.live import Live
 
 SIDE, GAP = 92.0, 14.0
@@ -28,6 +28,8 @@ class Tools:
         self._choices: tuple[tuple[pygame.Rect, Decision], ...] = ()
         self.foot = 0
         """px that they cover at the bottom left, where messages are told"""
+        self.board = pygame.Rect(0, 0, 0, 0)
+        """where the scores stand"""
         self._held = ""
 
     def draw(self, surface: pygame.Surface, person: Person, free: pygame.Rect, left: int, unit: float) -> None:
@@ -40,24 +42,34 @@ class Tools:
             left: px, what is told at the upper left.
             unit: px of a pixel at 1080 lines.
         """
-        scale = unit * min(1.0, free.width / (640.0 * unit), free.height / (520.0 * unit))
         self._tip = self._power = pygame.Rect(0, 0, 0, 0)
-        self._choices, self.foot = (), 0
+        self._choices, self.foot, self.board = (), 0, pygame.Rect(0, 0, 0, 0)
         if free.width < LEAST[0] * unit or free.height < LEAST[1] * unit:
             return
-        game = person.game
-        side, gap, bar = round(SIDE * scale), round(GAP * scale), round(BAR * scale)
-        beside = pygame.Rect(free.left, free.top, free.width - (side + bar + 2 * gap), free.height)
-        board = draw_scoreboard(surface, person, free if left < free.centerx else beside, left, scale)
-        self._choices = board.choices
+        scale = _scale(free, unit)
+        board = draw_scoreboard(surface, person, free, left, scale, _aside(scale))
+        self._choices, self.board = board.choices, board.rect
         if board.rect.top > free.centery:
             self.foot = free.bottom - board.rect.top
-        if not game.aiming:
+        if not person.game.aiming:
             return
-        self._power = pygame.Rect(free.right - gap - bar, free.bottom - gap - side, bar, side)
-        self._tip = pygame.Rect(self._power.left - gap - side, self._power.top, side, side)
-        draw_power(surface, self._power, game.cue, scale)
-        draw_tip(surface, self._tip, game.cue, scale)
+        self._tip, self._power = _dials(free, scale)
+        draw_power(surface, self._power, person.game.cue, scale)
+        draw_tip(surface, self._tip, person.game.cue, scale)
+
+    def taken(self, person: Person, free: pygame.Rect, left: int, unit: float) -> list[pygame.Rect]:
+        """Return what they cover, or will as soon as somebody aims; as `draw`."""
+        if free.width < LEAST[0] * unit or free.height < LEAST[1] * unit:
+            return []
+        scale = _scale(free, unit)
+        board = lay_scoreboard(person, free, left, scale, _aside(scale)).rect
+        return [board, *(plate_of(dial, scale) for dial in _dials(free, scale))]
+
+    def plates(self, free: pygame.Rect, unit: float) -> dict[str, pygame.Rect]:
+        """Return what each of them covers, as they were last drawn."""
+        scale = _scale(free, unit)
+        dials = {name: plate_of(rect, scale) for name, rect in self._rects() if rect.width}
+        return {"score": self.board, **dials}
 
     def handle(self, event: pygame.event.Event, person: Person, act: Act) -> bool:
         """Take an event in; return whether it was used up."""
@@ -87,3 +99,19 @@ class Tools:
             cue.tip_at((at[0] - self._tip.centerx) / half, (self._tip.centery - at[1]) / half)
         elif self._power.height:
             cue.power = (self._power.bottom - at[1]) / self._power.height
+
+
+def _scale(free: pygame.Rect, unit: float) -> float:
+    return unit * min(1.0, free.width / (640.0 * unit), free.height / (520.0 * unit))
+
+
+def _dials(free: pygame.Rect, scale: float) -> tuple[pygame.Rect, pygame.Rect]:
+    """Return where the tip and the power are set."""
+    side, gap, bar = round(SIDE * scale), round(GAP * scale), round(BAR * scale)
+    power = pygame.Rect(free.right - gap - bar, free.bottom - gap - side, bar, side)
+    return pygame.Rect(power.left - gap - side, power.top, side, side), power
+
+
+def _aside(scale: float) -> int:
+    """Return what the dials cover at the right, px."""
+    return round(SIDE * scale) + round(BAR * scale) + 3 * round(GAP * scale)

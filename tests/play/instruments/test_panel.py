@@ -235,6 +235,7 @@ def test_widgets_keep_apart_and_inside(size: tuple[int, int], unit: float) -> No
 @settings(max_examples=40, deadline=None)
 def test_panel_is_drawn_on_any_size(width: int, height: int, unit: float, count: int) -> None:
     panel = Panel((width, height), unit)
+    panel.visible = True  # a small window folds it away
     panel.show(KNOBS[:count], TOGGLES, BUTTONS)
     surface = pygame.Surface((width, height))
     panel.handle(move(width - 1, height // 2))

@@ -122,7 +122,7 @@ def _back(view: View, middle: tuple[float, float], size: tuple[float, float]) ->
 def _wind(view: View, wind: float) -> None:
     """Draw which way the wind blows, and how hard, at the left, below what is told of the run."""
     size = 13.0 * view.unit
-    middle, top = 96.0 * view.unit, 150.0 * view.unit
+    middle, top = 96.0 * view.unit, max(view.sight.below, 24.0 * view.unit) + 20.0 * view.unit
     half = min(max(7.0 * abs(wind), 8.0), 84.0) * view.unit
     told = f"wind {abs(wind):.1f} m/s" if wind else "no wind"
     _back(view, (middle, top + 7.0 * view.unit), (172.0 * view.unit, 44.0 * view.unit))

@@ -1,0 +1,132 @@
+"""A camera that follows: what is followed stays in the picture, whichever way it goes."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+from pressing import key, key_up, press, release
+from windowed import turned, window_on
+
+from sandbox.play.camera import Camera
+from sandbox.play.stage import Stage
+from sandbox.play.window import Window
+from sandbox.scene.shipped import find
+
+LEAVING = """
+title = "Leaving"
+[world]
+gravity = [0.0, -10.0]
+duration = 1.0
+[solver]
+dt = 0.01
+[[ball]]
+name = "a"
+position = [0.0, 0.0]
+velocity = [5.0, 5.0]
+radius = 0.2
+collides = "none"
+[[ball]]
+name = "b"
+position = [1.0, 0.0]
+velocity = [-5.0, 0.0]
+radius = 0.2
+collides = "none"
+"""
+F, HOME = pygame.K_f, pygame.K_HOME
+
+
+@pytest.fixture
+def window(tmp_path: Path) -> Iterator[Window]:
+    with window_on(LEAVING, tmp_path) as opened:
+        pygame.event.clear()  # those of its opening
+        yield opened
+
+
+def seen(window: Window) -> list[bool]:
+    """Return which bodies are in the part of the picture that nothing covers."""
+    assert window.stage.show is not None
+    free = window.desk.free
+    return [free.collidepoint(place) for place in window.camera.to_screen(window.stage.show.drawn.position).tolist()]
+
+
+def strike(window: Window, code: int) -> None:
+    turned(window, key(code), key_up(code), elapsed=0.0)
+
+
+@pytest.mark.parametrize("elapsed", [0.01, 0.1])
+def test_all_that_moves_stays_in_the_picture(window: Window, elapsed: float) -> None:
+    strike(window, F)
+    for _ in range(round(4.0 / elapsed)):  # they are 40 m apart then, and have fallen 80 m
+        turned(window, elapsed=elapsed)
+        assert all(seen(window))
+
+
+def test_picked_body_stays_in_the_picture_at_the_same_scale(window: Window) -> None:
+    x, y = window.camera.to_screen(np.zeros(2)).tolist()
+    turned(window, press(x, y), release(x, y), elapsed=0.0)
+    strike(window, F)
+    scale = window.camera.scale
+    for _ in range(40):
+        turned(window, elapsed=0.1)
+        assert seen(window)[0]
+    assert window.camera.scale == scale
+    assert not seen(window)[1]
+    strike(window, HOME)
+    assert window.following is None
+    assert window.at_home
+
+
+def test_that_nothing_is_in_sight_is_said_until_something_is(window: Window) -> None:
+    home = window.camera
+    for _ in range(40):
+        turned(window, elapsed=0.1)
+    assert window.camera == home
+    assert window.loses_sight
+    text = window.desk._describe_absence(window.stage)
+    assert text is not None
+    assert "Home" in text
+    strike(window, HOME)
+    assert not window.loses_sight
+    assert window.desk._describe_absence(window.stage) is None
+
+
+def test_spent_fireworks_say_that_space_launches_them(tmp_path: Path) -> None:
+    window = Window(Stage(), size=(640, 480), folder=tmp_path, say=lambda _: None)
+    try:
+        assert window.stage.open(find("fireworks"))
+        window.camera = Camera((1e6, 0.0), 10.0, (640, 480))
+        window.at_home = False
+        window.turn(0.0)
+        assert "Space launches" in str(window.desk._describe_absence(window.stage))
+    finally:
+        window.close()
+
+
+def test_ship_that_a_key_drives_is_followed_from_the_start(tmp_path: Path) -> None:
+    window = Window(Stage(), size=(640, 480), folder=tmp_path, say=lambda _: None)
+    try:
+        assert window.stage.open(find("spaceship"))
+        pygame.event.clear()
+        scene = window.stage.file
+        assert scene is not None
+        ship = scene.bodies.names.index(scene.thrusts[0].body)
+        assert window.following == ship
+        turned(window, key(pygame.K_UP), elapsed=0.0)
+        for _ in range(60):
+            turned(window, elapsed=0.1)
+            assert seen(window)[ship]
+    finally:
+        window.close()
+
+
+def test_full_screen_and_back(window: Window) -> None:
+    turned(window, elapsed=0.0)
+    size = window.surface.get_size()
+    strike(window, pygame.K_F11)
+    assert window.surface.get_flags() & pygame.FULLSCREEN
+    strike(window, pygame.K_F11)
+    assert not window.surface.get_flags() & pygame.FULLSCREEN
+    assert window.surface.get_size() == size
+    assert window.camera.size == size

@@ -1,0 +1,112 @@
+"""Plates: no two lie over each other in any shipped scene at any size, and the scene has most of the window."""
+
+import math
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+
+from sandbox.games.artillery.rules import ArtilleryRules
+from sandbox.play.framing import framing
+from sandbox.play.instruments import score_panel
+from sandbox.play.instruments.plates import largest_room
+from sandbox.play.sight import OVERLAYS
+from sandbox.play.stage import Stage
+from sandbox.play.window import Window
+from sandbox.scene.shipped import find, shipped
+
+SIZES = [(400, 300, 1.0), (800, 600, 1.0), (1024, 700, 1.0), (1280, 720, 1.0), (1920, 1080, 1.0), (1280, 720, 2.0)]
+"""Width and height, px, and by how much letters and widgets are larger."""
+SHIPPED = [each.name for each in shipped()]
+FIELD_SCENES = [name for name in SHIPPED if name.split("/")[0] in ("billiards", "pinball", "artillery", "games")]
+
+
+def overlaps(window: Window) -> list[str]:
+    """Return the pairs of plates that lie over each other."""
+    plates = window.desk.plates.items()
+    return [f"{a}{p} {b}{q}" for (a, p), (b, q) in combinations(plates, 2) if p.colliderect(q)]
+
+
+def opened(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Window:
+    # What is laid out does not depend on what flies where: the look ahead is left out.
+    monkeypatch.setattr("sandbox.play.stage.look_ahead", lambda *_: None)
+    window = Window(Stage(), size=(1280, 720), folder=folder, say=lambda _: None)
+    assert window.stage.open(find(name))
+    pygame.event.clear()
+    return window
+
+
+def resize(window: Window, width: int, height: int, unit: float) -> None:
+    window.desk.unit = unit
+    surface = pygame.display.set_mode((width, height), pygame.RESIZABLE)
+    pygame.event.clear()
+    window.resize(surface)
+    window.turn(0.0)
+    pygame.event.clear()
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_no_two_plates_overlap(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    window = opened(name, tmp_path, monkeypatch)
+    try:
+        window.turn(0.0)
+        window.stage.paused = True  # from here on all that can be told at once
+        window.desk.overlays = set(OVERLAYS)
+        window.stage.hands.picked = 0
+        window.stage.messages.tell("a message that is long enough to need more than one line of a small window")
+        window.stage.messages.tell("another one", "warning")
+        for width, height, unit in SIZES:
+            resize(window, width, height, unit)
+            assert overlaps(window) == [], (width, height, unit)
+            free = window.desk.free
+            assert 2 * free.width * free.height > width * height, (width, height, unit)
+    finally:
+        window.close()
+
+
+@pytest.mark.parametrize("name", FIELD_SCENES)
+def test_plates_leave_the_field_free(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of tables and games: what their files state as the view, which is all that counts there."""
+    window = opened(name, tmp_path, monkeypatch)
+    try:
+        scene = window.stage.show.scene if window.stage.show is not None else None
+        assert scene is not None
+        if scene.play.view is None and scene.play.area is None and scene.play.game is None:
+            pytest.skip("it has no field")
+        for width, height, unit in SIZES[1:]:  # at 400 × 300 there is room for either alone
+            resize(window, width, height, unit)
+            corners = window.camera.to_screen(np.asarray(framing(scene)))
+            (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+            field = pygame.Rect(math.ceil(left), math.ceil(top), int(right - left), int(bottom - top))
+            covering = {k: r for k, r in window.desk.plates.items() if not k.startswith(("message", "rate", "inset"))}
+            assert [k for k, rect in covering.items() if rect.colliderect(field)] == [], (width, height, unit)
+            assert field.width * field.height > 0.08 * width * height  # it is not driven into a corner either
+    finally:
+        window.close()
+
+
+def test_last_shot_is_told_whole_beside_four_tanks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    window = opened("four", tmp_path, monkeypatch)
+    told = "at 172.07 m, exactly 171.94 m: off by 148 mm"
+    lines = ArtilleryRules.lines
+    monkeypatch.setattr(ArtilleryRules, "lines", lambda self: [*lines(self), ("last shot", told)])
+    try:
+        resize(window, 1024, 700, 1.0)
+        assert window.stage.host is not None
+        assert window.stage.show is not None
+        laid = score_panel.laid(window.stage.host.shown().board, window.desk.free, 300, 1.0)
+        texts = [text for cells, _ in laid.rows for _, text in cells]
+        assert told in texts
+        assert len(laid.rows) <= 4
+    finally:
+        window.close()
+
+
+def test_largest_room_lies_beside_what_is_taken() -> None:
+    free = pygame.Rect(0, 0, 100, 80)
+    assert largest_room((1, 1), free, []) == free
+    assert largest_room((1, 1), free, [pygame.Rect(0, 0, 30, 20)]) == pygame.Rect(30, 0, 70, 80)
+    assert largest_room((2, 1), free, [pygame.Rect(0, 0, 30, 20)]) == pygame.Rect(0, 20, 100, 60)
+    assert largest_room((1, 1), free, [free]) == free  # nothing is left: it is not minded
