@@ -53,17 +53,17 @@ def test_what_happened_is_judged_apart_from_what_was_foretold() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)  # 84 scenes, each run five to seven times
 def test_warnings_on_the_held_out_half_are_right() -> None:
     kinds, parity = halves()["held-out"]
     rows = [
         each for kind in kinds for seed in (parity, parity + 2) for each in observe(kind, seed, ["pymunk", "reference"])
     ]
     found = summary(rows)
-    # README has the figures of four seeds; half as many scenes may come out a little worse.
+    # README has the figures of eight seeds.
     assert found["foretold"]["all"]["precision"] >= 0.95
     assert found["foretold"]["all"]["recall"] >= 0.95
-    assert found["trial run of half"]["all"]["recall"] >= LEAST_RECALL_OF_HALF
-
-
-LEAST_RECALL_OF_HALF = 0.8
-"""Of what happens in any part of a scene, by formulas and a trial run of its first half."""
+    # Of these some forty troubles each one weighs 2 to 6 %: the two below may lose one or two more than in README.
+    assert found["trial run on another engine"]["all"]["precision"] >= 0.85
+    assert found["trial run on another engine"]["all"]["recall"] >= 0.85
+    assert found["trial run of half"]["all"]["recall"] >= 0.85
