@@ -65,7 +65,10 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Compare many scenes and write one page that needs no network. SCENES: files or shipped; else all benchmarks."""
+    """Compare many scenes and write one page that needs no network. SCENES: files or shipped; else all benchmarks.
+
+    Takes about 10 s of processor time a scene (11 benchmarks took 107 s), a quarter of it without the trade-offs.
+    """
     faults: list[Fault] = []
     names = engines_in(engines, faults)
     read: list[tuple[str, Scene]] = []

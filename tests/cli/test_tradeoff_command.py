@@ -40,7 +40,7 @@ def test_table_has_the_front_and_the_answers(tmp_path: Path, capfd: pytest.Captu
     scene = written(tmp_path)
     status, out, err = lines_of(capfd, "tradeoff", scene, *FEW, "--tolerance", "0.01", "--budget", "4")
     assert (status, err) == (0, [])
-    assert out[0].startswith(f"{scene} (Drop): errors are max_position, the largest distance from the truth, because ")
+    assert out[0].startswith(f"{scene} (Drop): errors are max_position (largest distance from the truth), because ")
     assert "closed form" in out[0]
     assert re.fullmatch("[456] settings tried", out[1])
     assert out[2].split()[:4] == ["engine", "dt", "substeps", "iterations"]

@@ -99,7 +99,7 @@ class Tradeoff:
     @property
     def error_about(self) -> str:
         """What errors are counted in, and why, in one sentence."""
-        return f"errors are {self.metric.name}, the {self.metric.about}, because {self.metric_reason}"
+        return f"errors are {self.metric.name} ({self.metric.about}), because {self.metric_reason}"
 
     def fronts(self) -> dict[str, list[Point]]:
         """Return the Pareto front of each engine by itself, cheapest first."""

@@ -57,7 +57,7 @@ def answers(document: Document) -> Markup | None:
 def metric_of(document: Document) -> str:
     """Say what errors are counted in, and why."""
     name = str(document["metric"]).replace("_", " ")
-    about = f", the {document['metric_about']}" if document.get("metric_about") else ""
+    about = f" ({document['metric_about']})" if document.get("metric_about") else ""
     reason = f", because {document['metric_reason']}" if document.get("metric_reason") else ""
     return f"Errors are {name}{about}{reason}."
 
