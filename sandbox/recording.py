@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -46,6 +46,8 @@ class Recording:
     """what was pressed, of a game; what came of it is among the actions"""
     score: float | None = None
     """of a game at the end, where it is known"""
+    at: float | None = field(default=None, compare=False)
+    """s, the earlier moment that the session had gone back to when it was saved; None at its end"""
 
     @property
     def whole_scene(self) -> Scene:
@@ -81,6 +83,8 @@ class Recording:
         }
         if self.presses or self.score is not None:
             document |= {"presses": [list(press) for press in self.presses], "score": self.score}
+        if self.at is not None:
+            document["at"] = self.at
         return json.dumps(document, indent=1, ensure_ascii=False)
 
     @classmethod
@@ -97,6 +101,9 @@ class Recording:
             duration = _part(document, "duration", (int, float))
             if not 0 <= duration <= MAX_DURATION:
                 raise ValueError(f"a `duration` is 0 to {MAX_DURATION:g} s")
+            at = _part(document, "at", (int, float, type(None)), None)
+            if at is not None and not 0 <= at <= duration:
+                raise ValueError("`at` is a time of the session, 0 to its `duration`")
             return cls(
                 scene=from_document(_part(document, "scene", dict), file),
                 engine=_part(document, "engine", str),
@@ -106,6 +113,7 @@ class Recording:
                 state_hash=_part(document, "state_hash", (str, type(None))),
                 presses=presses_from(_part(document, "presses", list, [])),
                 score=_part(document, "score", (int, float, type(None)), None),
+                at=None if at is None else float(at),
             )
         except ActionError as error:
             raise SceneError([Fault(file, None, "actions", line) for line in str(error).splitlines()]) from None

@@ -27,7 +27,7 @@ from sandbox.scene.model import Scene
     metavar="M",
     help="position error that is too much, m; by default 1 % of the smallest ball's radius",
 )
-@click.option("--why", is_flag=True, help="rerun with one knob changed at a time, and say which one matters")
+@click.option("--why", is_flag=True, help="rerun with other settings, one and two at a time; say which lower the error")
 @click.option(
     "--minimise",
     is_flag=False,

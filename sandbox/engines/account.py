@@ -38,7 +38,8 @@ class Cause(StrEnum):
     """Motion in steps: what the energy changed by, less the work of drag, dampers and drives; with how positions follow
     what contacts and joints do to velocities within a step"""
     PHANTOM = "phantom"
-    """Energy given at once by what can only take: contacts, all together, or joints"""
+    """Energy given at once by what can only take: contacts, all together, or joints. Newton's restitution with friction
+    gives some at the corners of polygons; so do iterations that end unconverged"""
     PARTED = "parted"
     """Stored in springs that broke"""
     ACTIONS = "actions"

@@ -94,6 +94,7 @@ class Seat:
         turned = lies_down(scene, free)
         camera = Camera.fitting(framing(scene), size, inset=self.desk.panel.width, foot=self.desk.foot, turned=turned)
         Picture().draw(made, camera, Sight(scene, scene.bodies, frame_in_flight(scene)), unit=self.desk.unit)
+        self.desk.panel.draw(made)
         return made
 
     def home(self) -> None:

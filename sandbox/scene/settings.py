@@ -9,6 +9,7 @@ from sandbox.scene.part import Part
 Integrator = Literal["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]
 Detection = Literal["discrete", "bisect", "swept", "shrink"]
 Response = Literal["impulse", "penalty"]
+Impact = Literal["newton", "dissipative"]
 Joints = Literal["impulses", "relaxation", "xpbd", "rattle"]
 BroadPhase = Literal["all_pairs", "circles", "sweep", "grid", "oriented"]
 
@@ -47,6 +48,9 @@ class Settings(Part):
     """How contacts are found: at the end of a step, by bisection, by a time of impact, or with shorter steps."""
     response: Response | None = None
     """How contacts are resolved: by impulses, or by penalty springs."""
+    impact: Impact | None = None
+    """How impacts rebound: by Newton's law, e times the approach, or by that law cut where it would create energy with
+    friction."""
     broad_phase: BroadPhase | None = None
     """How candidate pairs are found; the result is the same, the cost is not."""
     joints: Joints | None = None

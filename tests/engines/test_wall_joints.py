@@ -1,6 +1,7 @@
 """Joints of a wall: where its segments meet there is no edge, and a straight wall in pieces is one straight wall."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from sandbox.scene.model import Scene, Wall
 
 ENGINES = "pymunk", "reference"
 
-SHAPES = {
+SHAPES: dict[str, dict[str, Any]] = {
     "box": {"size": [0.6, 0.4]},
     "ball": {"radius": 0.2},
     "capsule": {"length": 0.6, "radius": 0.2},
@@ -32,6 +33,7 @@ def sliding(
     speed: float = 3.0,
     size: float = 1.0,
     above: float = 1.0,
+    thickness: float = 0.0,
     dt: float = 0.004,
     duration: float = 2.0,
     spin: float = 0.0,
@@ -39,7 +41,7 @@ def sliding(
     **wall: object,
 ) -> Scene:
     """A body without friction that slides along a wall on the x axis from x = −4, on either side of it."""
-    half = wall.get("thickness", 0.0) / 2.0
+    half = thickness / 2.0
     shape = {}
     for key, value in SHAPES[kind].items():
         shape[key] = (np.asarray(value) * size).tolist()
@@ -52,7 +54,7 @@ def sliding(
             "title": "sliding",
             "world": {"gravity": [0.0, -9.81 * above], "duration": duration},
             "solver": {"dt": dt},
-            "wall": [{"name": "floor", "points": points, **wall}],
+            "wall": [{"name": "floor", "points": points, "thickness": thickness, **wall}],
             kind: [body],
         }
     )
@@ -96,9 +98,11 @@ def test_a_straight_wall_in_pieces_is_one_wall_bit_for_bit(
     backwards: bool,
     one_way: bool,
 ) -> None:
-    wall = {"thickness": thickness, "one_way": one_way}
     runs = [
-        sandbox.run(sliding(kind, divided(n, 0.0, backwards), speed, size, above, duration=0.3, **wall), engine=engine)
+        sandbox.run(
+            sliding(kind, divided(n, 0.0, backwards), speed, size, above, thickness, duration=0.3, one_way=one_way),
+            engine=engine,
+        )
         for n in (1, pieces)
     ]
     for name in ("position", "velocity", "angle", "angular_velocity", "contact_pair", "contact_impulse"):
@@ -112,7 +116,8 @@ def test_a_straight_wall_in_pieces_is_one_wall_bit_for_bit(
 def test_joints_that_are_nearly_in_line_catch_nothing(engine: str, kind: str, above: float, pieces: int) -> None:
     for thickness in (0.0, 0.1):
         run = sandbox.run(
-            sliding(kind, divided(pieces, 1e-6, pieces % 2 == 0), above=above, thickness=thickness, duration=1.0), engine=engine
+            sliding(kind, divided(pieces, 1e-6, pieces % 2 == 0), above=above, thickness=thickness, duration=1.0),
+            engine=engine,
         )
         assert run.velocity[-1, 0, 0] == pytest.approx(3.0, rel=FLAT_LOSS)
         assert run.position[-1, 0, 0] == pytest.approx(-1.0, abs=3.0 * FLAT_LOSS)  # 3 m of way

@@ -191,9 +191,10 @@ class Driven:
         return self.shot()
 
     def step_number(self) -> int:
-        """Return how many steps were made, as the session has it."""
+        """Return how many steps were made up to the moment that is shown, as the session has it."""
         session = self.session()
-        return round(session.duration / session.settings.dt)
+        moment = session.duration if session.at is None else session.at
+        return round(moment / session.settings.dt)
 
     # Waiting
 

@@ -79,9 +79,9 @@ def test_scene_that_diverges_is_told_and_the_window_stays(drive: Play, tmp_path:
 def test_what_a_hand_cannot_do_is_told_and_the_window_stays(drive: Play, tmp_path: Path) -> None:
     path = written(tmp_path, AT_REST)
     window = drive("play", str(path), "--paused", "--engine", "exact")
-    window.mouse(on_screen(laid_out(path).camera, (-1.0, 0.0)))
-    window.key("b")
-    window.wait_until(lambda shot: count(shot, ORANGE, MESSAGES) > 30, "that there is no room for another ball")
+    window.mouse(on_screen(laid_out(path).camera, (1.0, 0.0)))
+    window.key("shift+b")
+    window.wait_until(lambda shot: count(shot, ORANGE, MESSAGES) > 30, "that the exact engine has no boxes")
     window.key("o")
     assert window.step_number() == 1
     assert window.session().actions == ()

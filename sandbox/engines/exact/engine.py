@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from sandbox.engines.exact.rolling.simulation import RollingSimulation
     from sandbox.engines.exact.simulation import ExactSimulation
 
-STEPS = ("integrator", "detection", "response", "broad_phase", "joints", "stretch")
+STEPS = ("integrator", "detection", "response", "impact", "broad_phase", "joints", "stretch")
 """Choices of solvers that step."""
 
 OVERLAP = ("slop", "bias", "persistence")

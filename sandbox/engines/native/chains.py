@@ -1,10 +1,9 @@
 """Chains: contacts of polygons near the joints of a wall, which are no edges of it.
 
-`Segment.set_neighbors` has Munk2D refuse contacts with an end of a segment beyond which the wall comes nearer. For discs
-that is exact. For other shapes Munk2D compares the nearest point with the end bit by bit, which rounding defeats once the
-two overlap: then a box that slides is stopped by the end of the next segment. What it has let through is mended here, as
-`reference/chains.py` does: a normal that leans over an end, towards where the wall runs on, is turned to the nearest that
-the whole wall would give.
+`Segment.set_neighbors` makes Munk2D refuse contacts with an end of a segment beyond which the wall comes nearer. For
+discs that is exact. For other shapes Munk2D compares the nearest point with the end bit by bit, which rounding defeats
+once the two overlap: then the end of the next segment stops a box that slides. Such contacts are mended here: a normal
+that leans over an end, towards where the wall runs on, is turned to the nearest that the whole wall would give.
 """
 
 from collections.abc import Mapping

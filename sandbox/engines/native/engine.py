@@ -12,7 +12,7 @@ from sandbox.scene.settings import Settings
 if TYPE_CHECKING:
     from sandbox.engines.native.simulation import NativeSimulation
 
-PYMUNK_WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
+PYMUNK_WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse", "impact": "newton"}
 """The one word of each choice that describes what pymunk does."""
 
 OWN = frozenset({Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.LAYERS, Demand.ZONES, Demand.DRIVES})

@@ -1,10 +1,12 @@
 """Chains: contacts near the joints of a wall, which are no edges of it.
 
-The segment that a contact belongs to knows how the wall runs on from its ends. A normal that leans over an end, towards
-where the wall runs on, is none that the whole wall would give: the neighbour comes nearer to what touches. A disc is then
-left to the neighbour. So is a polygon whose normal is nearer to the neighbour's, and that lies deeper in the face of the
-segment itself; else its contact is found anew on that face, as if the segment were longer (internal edges: Bullet's `btInternalEdgeUtility`, the ghost vertices
-of Box2D's chain shapes; for discs as Munk2D's `cpSegmentShapeSetNeighbors`, in the same arithmetic).
+Each segment stores how its wall runs on from its ends. A normal that leans over an end, towards where the wall runs on,
+is none that the whole wall would give: the neighbour comes nearer. The contact of a disc is then left to the neighbour.
+So is that of a polygon whose normal is nearer to the neighbour's, and that lies deeper in the segment's own face; else
+its contact is found anew on that face, as if the segment were longer.
+
+Internal edges: Bullet's `btInternalEdgeUtility`, the ghost vertices of Box2D's chain shapes; for discs the rule is that
+of Munk2D's `cpSegmentShapeSetNeighbors`, in the same arithmetic.
 """
 
 import math
@@ -139,7 +141,7 @@ def _meet_face(
     reach: float,
     out: FloatArray,
 ) -> int:
-    """Write where a piece touches a face that runs from one corner to two, solid to the left; return at how many points."""
+    """Write where a piece touches a face that runs from `one` to `two`, solid to the left; return how many points."""
     nx, ny = corner[two, 1] - corner[one, 1], corner[one, 0] - corner[two, 0]
     length = math.sqrt(nx * nx + ny * ny)
     nx, ny = nx / length, ny / length

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from sandbox.engines.reference.dissipation import ROUNDING, Bilinear, largest_shares
 from sandbox.engines.reference.driven.drives import Drives
-from sandbox.engines.reference.impulses import approach, solve_once, solve_velocities
+from sandbox.engines.reference.impulses import approach, solve_once, solve_velocities, start_with
 from sandbox.engines.reference.joints.solver import JointSolver
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.engines.reference.parting import Bounce, Parting
@@ -27,6 +28,7 @@ class ContactSolver:
         joints: what holds the scene's links, if it has any.
         drives: what drives bodies, if any are driven.
         work: counts the iterations.
+        dissipative: whether restitution is cut where it would create energy; for contacts alone.
     """
 
     def __init__(
@@ -36,9 +38,11 @@ class ContactSolver:
         joints: JointSolver | None,
         drives: Drives | None,
         work: dict[str, int],
+        dissipative: bool,
     ) -> None:
         self._inverse, self._iterations = (roster.inverse_mass, roster.inverse_moment), iterations
         self._joints, self._drives, self._work = joints, drives, work
+        self._dissipative = dissipative
         self._no_spin: FloatArray = np.zeros((len(roster.position), 3))
         self.parting = Parting(roster) if Parting.needed(roster) else None
         """how fast what kicks, or bounces less the faster it is hit, lets go; none where all goes by the coefficient"""
@@ -81,20 +85,105 @@ class ContactSolver:
             solve_velocities(contacts, bounce, velocity, self._spin(velocity), *self._inverse, impulse, times)
 
     def settle(self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray) -> None:
-        """Change velocities and impulses as `solve` does, of an impact: until they no longer change.
+        """Change velocities and impulses as `solve` does, until a pass changes nothing.
 
-        A single contact is solved at once. The two corners of a box that falls flat agree the later the taller it is.
+        A single contact takes one pass. The two corners of a box that falls flat take more, the taller it is.
         """
         if contacts.size == 1:
             self.solve(contacts, bounce, velocity, impulse)
             return
         spin = self._spin(velocity)
+        start_with(contacts, velocity, spin, *self._inverse, impulse)
         for _ in range(MOST_PASSES):
             before = impulse.copy()
             solve_once(contacts, bounce, velocity, spin, *self._inverse, impulse)
             self._work["contact_iterations"] += contacts.size
             if np.abs(impulse - before).max(initial=0.0) <= SETTLED * np.abs(impulse).max(initial=0.0):
                 break
+
+    def resolve(
+        self,
+        contacts: Manifolds,
+        bounce: Bounce,
+        start: FloatArray,
+        velocity: FloatArray,
+        impulse: FloatArray,
+        joined: bool = False,
+        settled: bool = False,
+    ) -> None:
+        """Change velocities and impulses as `solve` or, if settled, `settle` does, by the chosen law of impact.
+
+        Args:
+            contacts: what touches.
+            bounce: how fast each is to part.
+            start: (N, D) velocities at the beginning of the substep, to which energy is compared.
+            velocity: (N, D), changed.
+            impulse: (K, 2) N·s to begin with, changed.
+            joined: whether joints take turns with contacts.
+            settled: whether to iterate until nothing changes.
+        """
+        limited = self._dissipative and contacts.size > 0
+        kicked, warm = (velocity.copy(), impulse.copy()) if limited else (velocity, impulse)
+        if settled:
+            self.settle(contacts, bounce.speed, velocity, impulse)
+        else:
+            self.solve(contacts, bounce.speed, velocity, impulse, joined)
+        if limited:
+            self._limit(contacts, bounce, start, kicked, warm, velocity, impulse)
+
+    def _limit(
+        self,
+        contacts: Manifolds,
+        bounce: Bounce,
+        start: FloatArray,
+        kicked: FloatArray,
+        warm: FloatArray,
+        velocity: FloatArray,
+        impulse: FloatArray,
+    ) -> None:
+        """Cut the restitution of groups of bodies whose contacts would give energy.
+
+        Args:
+            contacts: what touches.
+            bounce: how fast each is to part.
+            start: (N, D) velocities at the beginning of the substep.
+            kicked: (N, D) velocities before the solution by Newton's law; overwritten.
+            warm: (K, 2) N·s, the impulses that this started with; overwritten.
+            velocity: (N, D) after it, changed.
+            impulse: (K, 2) N·s after it, changed.
+        """
+        spin, works = self._spin, Bilinear(contacts, *self._inverse)
+        kicks = np.zeros(contacts.size) if bounce.worth is None else bounce.worth
+
+        def work(push: FloatArray, rates: FloatArray) -> FloatArray:
+            return works.work(push, rates, spin(rates))[0]
+
+        def kicked_by(push: FloatArray) -> FloatArray:
+            return np.asarray(np.bincount(works.of_contact, push[:, 0] * kicks, len(works.group)), np.float64)
+
+        given, turnover = works.work(impulse, mean := 0.5 * (start + velocity), spin(mean))
+        gains = given - kicked_by(impulse) > ROUNDING * turnover
+        if not gains.any():
+            return
+        free = kicked.copy()
+        self.settle(contacts, np.zeros(contacts.size), kicked, warm)
+        # The passes may end unconverged, and gravity kicks within the substep: both can give energy at s = 0 too.
+        least = largest_shares(0.0 * given, work(warm, 0.5 * (start + free)), work(warm, 0.5 * (kicked - free)))
+        least = np.where(gains, least, 1.0)
+        warm *= least[works.of_contact][:, None]
+        kicked[:] = free + least[works.group][:, None] * (kicked - free)
+        push, change = impulse - warm, velocity - kicked
+        share = largest_shares(
+            work(warm, 0.5 * (start + kicked)) - kicked_by(warm),
+            work(push, 0.5 * (start + kicked)) + work(warm, 0.5 * change) - kicked_by(push),
+            work(push, 0.5 * change),
+        )
+        share = np.where(gains, share, 1.0)
+        of_contact, of_body = share[works.of_contact][:, None], share[works.group][:, None]
+        cut = of_contact[:, 0] < 1.0
+        impulse[cut] = (warm + of_contact * push)[cut]
+        cut = of_body[:, 0] < 1.0
+        velocity[cut] = (kicked + of_body * change)[cut]
 
     def _spin(self, velocity: FloatArray) -> FloatArray:
         """Return the spins (N,) among rates (N, D): zeros where nothing turns."""

@@ -73,10 +73,16 @@ class ReferenceEngine:
             lacks.append("stretch is for joints held by relaxation; solver.joints is not 'relaxation'")
         if settings.half_kick:
             lacks.append("half_kick is a remedy for pymunk's scheme; integrator 'velocity_verlet' has it built in")
+        if settings.impact == "dissipative" and (wanted & HELD or Demand.DRIVES in wanted):
+            lacks.append(
+                "impact 'dissipative' weighs the energy of contacts alone, without joints and drives; 'newton' works"
+            )
         if settings.persistence not in (None, 1):
             lacks.append(f"persistence {settings.persistence}: it remembers contacts for 1 substep")
         if settings.response == "penalty":
             lacks += self._penalty_lacks(scene, settings)
+            if settings.impact is not None:
+                lacks.append("impact is a law of impulses; solver.response is not 'impulse'")
             for demand in (Demand.FALLOFF, Demand.KICKS):
                 if demand in wanted:
                     lacks.append(
@@ -127,6 +133,8 @@ class ReferenceEngine:
 
             own["integrator"] = "semi_implicit_euler"  # explicit Euler makes springs gain energy
             own["stiffness"] = suited(scene, settings)
+        else:
+            own["impact"] = "newton"
         own["broad_phase"] = _suitable(scene)
         return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
 

@@ -121,7 +121,8 @@ class Stage:
             self._memory = np.empty(0, np.int64), np.empty((0, 2)), self._settings.h
         self.finder.population_changed()
         times = self._settings.iterations
-        self._solver = ContactSolver(roster, times, self._joints, self.drives, self.finder.work)
+        dissipative = self._settings.impact == "dissipative"
+        self._solver = ContactSolver(roster, times, self._joints, self.drives, self.finder.work, dissipative)
         if self._sieve is not None and self._sieve.gates is not None:
             overlaps = self.finder.at_gates(self.x[0])
             self._sieve.gates.begin(overlaps, self.closing(overlaps, self.x))
@@ -243,7 +244,7 @@ class Stage:
         held = self._held(moved, lasting, h)
         struck = np.zeros((clash.size, 2))
         bounce = self._solver.bounce(clash, moved[1])
-        self._solver.settle(clash, bounce.speed, moved[1], struck)
+        self._solver.resolve(clash, bounce, moved[1].copy(), moved[1], struck, settled=True)
         self.books.struck(moved, clash, struck, bounce.worth)
         self._done(moved, lasting.joined(clash), np.concatenate((held, struck)), h)
 
@@ -266,7 +267,7 @@ class Stage:
         # What rests takes impulses in proportion to the time. Never more: a blow does not grow with it.
         impulse *= min(h / old_h, 1.0)
         kicked = moved[1].copy()
-        self._solver.solve(contacts, bounce.speed, moved[1], impulse, joined)
+        self._solver.resolve(contacts, bounce, self.x[1], moved[1], impulse, joined)
         self.books.held(moved, contacts, impulse, bounce.worth)
         if share:
             change = moved[1] - (kicked if self.drives is None else self.drives.released(kicked))

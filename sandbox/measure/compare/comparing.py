@@ -50,7 +50,7 @@ def compare(
         engines: their names; by default all there are. One that cannot run the scene is a row that says why.
         tolerance: of positions, m: beyond it a run has diverged from the truth. By default 1 % of the radius of
             the smallest ball that moves, or of the half width of what is thinner.
-        why: rerun each engine that is off with one knob changed at a time, and say which one matters.
+        why: rerun each engine that is off with other settings (`why`), and say which lower the error.
         truth: of this scene, its frames and the tolerance, where it is known already.
         told: who is told what is being done.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.

@@ -41,7 +41,7 @@ class Row:
     seconds: float | None
     """s, of the steps alone"""
     why: tuple[Knob, ...] = ()
-    """what one knob at a time does to the error"""
+    """what other settings do to the error"""
     verdict: str | None = None
     """the sentence that follows from it"""
 

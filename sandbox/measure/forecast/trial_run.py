@@ -206,8 +206,20 @@ class Trial:
         gain = gained(self.run, self.scene)
         if gain > GAINED:
             springs = len(self.scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)) > 0
-            message = f"energy rises by {gain:.3g} of all that is at stake in {self.said}"
+            message = f"energy rises by {gain:.3g} of all that is at stake in {self.said}{self._by_impacts()}"
             yield Warning("spring" if springs else "energy", message, {"gained": min(gain, 1e300)})
+
+    def _by_impacts(self) -> str:
+        """Say that impacts may be the cause: Newton's restitution with friction, off the centre of mass."""
+        meet = meetings(self.scene)
+        surfaces = meet.surfaces
+        rough = bool((meet.touching & (surfaces.restitution > 0.0) & (surfaces.friction > 0.0)).any())
+        if not (meet.solids and rough) or self.run.info["settings"].get("impact") != "newton":
+            return ""
+        return (
+            "; restitution with friction can create energy where shapes are no balls: the reference does not with "
+            "solver.impact 'dissipative'"
+        )
 
 
 def gained(run: Trajectory, scene: Scene) -> float:

@@ -28,7 +28,7 @@ class Trial:
     cost: float
     """counted, s; over several seeds the largest. Of a run that was given up, what it was allowed"""
     spent: float
-    """counted, s, over all seeds"""
+    """counted, s, over all seeds, without a run that was made already"""
     seconds: float
     """of the run that was recorded, on this machine"""
     work: Mapping[str, int]
@@ -72,7 +72,8 @@ def tried(
             return Trial(variant, filled, "stopped", str(error), nothing, limit, spent + limit, seconds, {})
         except TooLargeError as error:
             return Trial(variant, filled, "failed", str(error), nothing, 0.0, spent, seconds, {})
-        seconds, cost, spent = max(seconds, float(run.info["seconds"])), max(cost, counted), spent + counted
+        seconds, cost = max(seconds, float(run.info["seconds"])), max(cost, counted)
+        spent += 0.0 if run is known else counted
         work = dict(run.info["work"])
         if run.status != "ok":
             return Trial(variant, filled, run.status, run.reason, nothing, cost, spent, seconds, work)

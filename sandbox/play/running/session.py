@@ -199,7 +199,7 @@ class Session(Course):
         A state that only a way from a checkpoint has led to is recorded by that way.
         """
         if self._whole is not None and self._step < self._whole[0]:
-            return self._whole[1]
+            return replace(self._whole[1], at=self.time)
         recording, mark = super().recording(), self._mark
         if mark is None or not self._unsure:
             return recording

@@ -373,7 +373,9 @@ def test_a_box_that_falls_flat_on_a_box_or_a_polygon_stays_flat(e):
 
 def test_a_bouncing_box_keeps_its_energy():
     box = {"position": [0, 1.0], "size": [0.6, 0.4], "angle": 0.3, "restitution": 1.0}
-    simulation = running(scene_of(world=EARTH, box=[box], plane=[FLOOR]), detection="bisect", integrator="velocity_verlet")
+    simulation = running(
+        scene_of(world=EARTH, box=[box], plane=[FLOOR]), detection="bisect", integrator="velocity_verlet"
+    )
     moment = (0.6**2 + 0.4**2) / 12
     energies = []
     for _ in range(300):

@@ -311,7 +311,7 @@ def test_truth_that_is_known_is_not_sought_again(monkeypatch: pytest.MonkeyPatch
         raise AssertionError("the truth is known")
 
     monkeypatch.setattr("sandbox.measure.compare.comparing.seek_truth", sought)
-    monkeypatch.setattr("sandbox.measure.tradeoff.weighing.truth_of", sought)
+    monkeypatch.setattr("sandbox.measure.tradeoff.weighing.seek_truth", sought)
     judged = compare(BOUNCE, ("pymunk",), truth=known)
     assert judged.best is known
     weighed = sandbox.tradeoff(BOUNCE, ("pymunk",), truth=known, most=1, repeats=1)

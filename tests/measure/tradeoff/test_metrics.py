@@ -8,6 +8,7 @@ from runs_by_hand import BALLS, run_of, scene_of
 from trials_by_hand import judge_of, shifted
 
 from sandbox.measure.run import run as run_scene
+from sandbox.measure.tradeoff.aim import choose_metric
 from sandbox.measure.tradeoff.judge import strayed, zoom_of
 from sandbox.measure.tradeoff.metrics import METRICS, measured
 from sandbox.scene.file import loads
@@ -136,6 +137,17 @@ def test_drift_of_what_stands_in_truth_from_the_start_counts_from_there(scene: S
     judge = judge_of(scene, run_of(scene))
     fallen = shifted(run_of(scene), slice(5, None), 0, (0.3, -0.4))
     assert measured(run_of(scene, fallen), judge)["drift"] == pytest.approx(0.5, rel=1e-12)
+
+
+def test_stack_whose_truth_is_trusted_for_a_short_time_is_scored_by_drift_and_not_by_overlaps(scene: Scene) -> None:
+    metric, reason = choose_metric(judge_of(scene, run_of(scene), until=0.5))
+    assert metric.name == "drift"
+    assert reason == "positions are predictable for 0.5 s of 2 s only, and 2 bodies should lie still"
+    tumbling = run_of(scene).position + np.linspace(0.0, 1.0, 21)[:, None, None]
+    metric, _ = choose_metric(judge_of(scene, run_of(scene, tumbling), until=0.5))
+    assert metric.name == "penetration"
+    metric, reason = choose_metric(judge_of(scene, run_of(scene)))
+    assert (metric.name, reason) == ("max_position", "the truth (exact) is trusted to the end, 2 s")
 
 
 def test_nothing_drifts_where_all_moves(scene: Scene) -> None:

@@ -18,6 +18,7 @@ from sandbox.play.running import history as history_module
 from sandbox.play.running.history import Mark
 from sandbox.play.running.session import Session, WrongWayError
 from sandbox.play.running.switching import switch
+from sandbox.recording import Recording
 from sandbox.scene.file import from_document, load, loads
 from sandbox.scene.model import Ball, Scene
 from sandbox.scene.shipped import find
@@ -79,6 +80,9 @@ def test_recording_keeps_what_came_after_the_moment_it_has_gone_back_to(name: st
     for step in (60, 20, 0, 50):
         go(session, step)
         assert session.recording() == whole
+        assert session.recording().at == pytest.approx(step * session.settings.dt)
+        assert Recording.from_json(session.recording().to_json()).at == session.recording().at
+    assert whole.at is None
     assert_replays(session)
     assert session.replaced is None
     session.act(Impulse(time=0.0, body=FIRST[name], impulse=(0.0, 0.0)))

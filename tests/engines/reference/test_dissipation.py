@@ -1,0 +1,142 @@
+"""Dissipation: an impact never creates energy, and is Newton's where that creates none."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+import sandbox
+from sandbox.engines.account import Cause
+from sandbox.engines.reference.dissipation import largest_shares
+from sandbox.measure.forecast import forecast
+from sandbox.measure.ledger import ledger
+from sandbox.scene.file import from_document
+from sandbox.scene.model import Scene
+
+ROOM = [
+    {"point": [0, -2], "normal": [0, 1]},
+    {"point": [0, 2], "normal": [0, -1]},
+    {"point": [-2, 0], "normal": [1, 0]},
+    {"point": [2, 0], "normal": [-1, 0]},
+]
+
+
+def thrown(seed: int, count: int, e: float, mu: float, **solver: object) -> Scene:
+    """Boxes and capsules thrown about a room without gravity."""
+    random = np.random.default_rng(seed)
+    bodies: dict[str, list[dict[str, object]]] = {"box": [], "capsule": []}
+    for k in range(count):
+        own = {
+            "name": f"body {k}",
+            "position": [-1.0 + 2.0 * (k % 2), -1.0 + 2.0 * (k // 2)],
+            "angle": random.uniform(0, 6.28),
+            "velocity": random.uniform(-5, 5, 2).tolist(),
+            "angular_velocity": random.uniform(-20, 20),
+            "restitution": e,
+            "friction": mu,
+        }
+        shape = {"size": random.uniform(0.1, 0.8, 2).tolist()}
+        if k % 3 == 2:
+            shape = {"length": random.uniform(0.2, 0.6), "radius": random.uniform(0.05, 0.2)}
+        bodies["capsule" if k % 3 == 2 else "box"].append({**own, **shape})
+    planes = [{**plane, "restitution": 1.0, "friction": 1.0} for plane in ROOM]
+    return from_document(
+        {"title": "", "world": {"duration": 1.0}, "solver": {"dt": 0.002, **solver}, "plane": planes, **bodies}
+    )
+
+
+def kinetic(run: sandbox.Trajectory, scene: Scene) -> np.ndarray:
+    mass, moment = scene.bodies.mass, scene.bodies.moment
+    return np.asarray(0.5 * ((run.velocity**2).sum(axis=2) @ mass + run.angular_velocity**2 @ moment))
+
+
+@given(st.integers(0, 10**6), st.integers(1, 4), st.floats(0, 1), st.floats(0, 2))
+@example(seed=4, count=4, e=0.0, mu=1.0)  # whose passes without restitution end before they agree
+@example(seed=4, count=2, e=0.0, mu=1.0)
+@settings(max_examples=15, deadline=None)
+def test_no_impact_creates_energy(seed: int, count: int, e: float, mu: float) -> None:
+    scene = thrown(seed, count, e, mu, impact="dissipative")
+    for integrator, detection in (("explicit_euler", "discrete"), ("velocity_verlet", "bisect")):
+        energy = kinetic(sandbox.run(scene, engine="reference", integrator=integrator, detection=detection), scene)
+        assert (
+            np.diff(energy) <= 1e-11 * energy[0]
+        ).all()  # rounding of some impacts a step, each 1e-13 of its turnover
+
+
+def test_newtons_law_does_create_energy() -> None:
+    """The law above is no empty one: the same bodies by Newton's law."""
+    gains = []
+    for seed in range(8):
+        scene = thrown(seed, 2, 0.9, 0.8)
+        energy = kinetic(sandbox.run(scene, engine="reference"), scene)
+        gains.append(float(np.diff(energy).max() / energy[0]))
+    assert max(gains) > 0.01
+
+
+@pytest.mark.parametrize("kind", ["frictionless", "balls"])
+def test_where_newtons_law_creates_none_both_are_the_same_bit_for_bit(kind: str) -> None:
+    if kind == "frictionless":
+        scene = thrown(3, 4, 0.8, 0.0)
+    else:
+        ball = {"radius": 0.3, "restitution": 0.8, "friction": 0.6, "velocity": [2.0, 1.0]}
+        balls = [{**ball, "position": [x, 0.0], "angular_velocity": 30.0 * x} for x in (-1.0, 0.0, 1.0)]
+        planes = [{**plane, "friction": 1.0} for plane in ROOM]
+        scene = from_document({"title": "", "world": {"duration": 2.0}, "plane": planes, "ball": balls})
+    runs = [sandbox.run(scene, engine="reference", impact=impact) for impact in ("newton", "dissipative")]
+    for name in ("position", "velocity", "angular_velocity"):
+        assert np.array_equal(getattr(runs[0], name), getattr(runs[1], name))
+
+
+def test_the_ledger_names_what_impacts_create() -> None:
+    """A box thrown onto rough ground: what Newton's law creates is phantom energy, on both engines alike."""
+    box = {"position": [0, 1], "size": [0.2447, 0.1003], "velocity": [-1.6, -5.0], "angular_velocity": -12.0}
+    gains = []
+    for angle in (1.2, 1.3, 1.36, 1.4, 1.5):
+        scene = from_document(
+            {
+                "title": "",
+                "world": {"gravity": [0.0, -9.81], "duration": 1.0},
+                "solver": {"dt": 0.002},
+                "plane": [{"point": [0, 0], "normal": [0, 1], "restitution": 0.99, "friction": 1.2}],
+                "box": [{**box, "angle": angle}],
+            }
+        )
+        books = [ledger(scene, "pymunk"), ledger(scene, "reference"), ledger(scene, "reference", impact="dissipative")]
+        assert all(book.closes_to < 1e-9 for book in books)  # rounding of the works of 500 substeps
+        gains.append([book.of(Cause.PHANTOM) / book.total[0] for book in books])
+    pymunk, newton, cut = np.array(gains).T
+    assert pymunk.max() > 0.05 and newton.max() > 0.05
+    assert cut.max() < 1e-12  # rounding
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_check_foretells_what_impacts_create(engine: str) -> None:
+    box = {"position": [0, 1], "size": [0.2447, 0.1003], "velocity": [-1.6, -5.0], "angular_velocity": -12.3}
+    scene = from_document(
+        {
+            "title": "",
+            "world": {"gravity": [0.0, -9.81], "duration": 1.0},
+            "solver": {"dt": 0.002},
+            "plane": [{"point": [0, 0], "normal": [0, 1], "restitution": 0.99, "friction": 1.2}],
+            "box": [{**box, "angle": 1.36}],
+        }
+    )
+    (told,) = [each for each in forecast(scene, engine=engine).warnings if each.kind == "energy"]
+    assert "dissipative" in told.message
+    cut = scene.solver.replace(impact="dissipative")
+    assert not [each for each in forecast(scene, cut, "reference").warnings if each.kind == "energy"]
+
+
+def test_largest_share_is_where_the_work_ends_to_take() -> None:
+    work, slope, curve = (
+        np.array([-1.0, -1.0, -2.0, 0.5, 0.0]),
+        np.array([0.0, 3.0, 0.5, 1.0, 0.0]),
+        np.array([4.0, 0, 0.5, 0, 0]),
+    )
+    assert largest_shares(work, slope, curve) == pytest.approx([0.5, 1 / 3, 1.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "exact"])
+def test_other_engines_refuse_the_choice(engine: str) -> None:
+    run = sandbox.run(thrown(0, 1, 0.5, 0.5), engine=engine, impact="dissipative")
+    assert run.status == "refused"
