@@ -11,7 +11,6 @@ from sandbox.scene.bodies import Bodies
 from sandbox.scene.faults import Fault, Lines, SceneError
 from sandbox.scene.model import Scene
 
-
 REAL_TIME = frozenset({"landing", "pinball"})
 """Games in which time matters from the first step: a window starts them at a key press."""
 

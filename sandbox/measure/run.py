@@ -63,8 +63,8 @@ def run(
 
     Returns:
         What was recorded, also of a run that ended early: its `status` is then `diverged` (the physics left all
-        bounds) or `failed` (an action could not be done, such as one for a body that is not there; contacts outgrew memory), with the reason; `refused`,
-        with no frames, where the engine lacks something.
+        bounds) or `failed` (an action could not be done, such as one for a body that is not there; contacts outgrew
+        memory), with the reason; `refused`, with no frames, where the engine lacks something.
 
     Raises:
         UnknownEngineError: no engine has that name.

@@ -1,4 +1,4 @@
-"""Joints that start away from what they hold, and anchors in the wrong order: `check` warns of both, and of no others."""
+"""Joints that start away from what they hold, and anchors in the wrong order: `check` warns of both."""
 
 import pytest
 

@@ -20,7 +20,7 @@ from sandbox.trajectory import Trajectory
 LIMIT = 120.0
 """Counted cost, s, that `exact` may have; beyond, the refined truth is used."""
 DOUBTFUL = 10.0
-"""Counted cost, s, that it may have where the forecast is that it will give up: what has not come to rest by then may get there."""
+"""Counted cost, s, that it may have where the forecast is that it will give up: bodies may come to rest by then."""
 
 TruthKind = Literal["closed_form", "exact", "refined"]
 

@@ -1,4 +1,4 @@
-"""Timed cost of settings on this machine, in milliseconds per simulated second; nothing is recorded while it is timed."""
+"""Cost of settings, timed on this machine in milliseconds per simulated second; nothing is recorded meanwhile."""
 
 import statistics
 from collections.abc import Sequence

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.compare.closed import solved
 from sandbox.measure.bounded_run import TookTooLongError, bounded_run, working
+from sandbox.measure.compare.closed import solved
 from sandbox.measure.tradeoff.cost import seconds_of, warm_up
 from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.judge import Judge

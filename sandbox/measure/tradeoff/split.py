@@ -13,8 +13,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.compare.errors import errors
 from sandbox.measure.bounded_run import TookTooLongError, bounded_run
+from sandbox.measure.compare.errors import errors
 from sandbox.measure.finite import finite
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.scene.settings import Settings
