@@ -27,5 +27,5 @@ def test_replace_is_as_strict_as_a_file(changes: dict[str, object]) -> None:
 
 def test_choices_left_to_the_engine_are_none() -> None:
     left = {key for key, value in Settings().model_dump().items() if value is None}
-    words = {"integrator", "detection", "response", "broad_phase", "joints"}
+    words = {"integrator", "detection", "response", "impact", "broad_phase", "joints"}
     assert left == words | {"slop", "bias", "persistence", "stiffness", "damping", "stretch"}
