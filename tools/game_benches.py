@@ -3,7 +3,7 @@
 import drawing
 import pooltool_shots
 from bench_row import Bench
-from workloads import fanning, playing, scene, shooting, simulated
+from workloads import fanning, playing, scene, setting, shooting, simulated, stepping
 
 from sandbox.scene.file import load
 
@@ -41,6 +41,19 @@ GAMES = (
             rate=True,
         )
         for name in ("classic", "full")
+    ),
+    *(
+        Bench(
+            f"set-{name.partition('/')[2]}",
+            f"{path} set while {name} runs / a step of it",
+            lambda name=name, path=path, values=values: setting(scene(name), 100, path, values),
+            lambda name=name: stepping(scene(name), 100, record=False),
+            5.0,
+        )
+        for name, path, values in (
+            ("pinball/full", "world.gravity", ([0.0, -1.0], [0.0, -1.1])),
+            ("games/curling", "surface.sliding_friction", (0.015, 0.014)),
+        )
     ),
     Bench(
         "pinball-frames",

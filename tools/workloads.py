@@ -4,11 +4,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import peers
 
 import sandbox
+from sandbox.action import SetParameter
 from sandbox.engines.reference.engine import ReferenceEngine
 from sandbox.engines.reference.stage import Stage
 from sandbox.engines.registry import start
@@ -81,6 +83,24 @@ def stepping(
                 simulation.step()
                 if record:
                     simulation.frame()
+
+        return timed(go)
+
+    return work
+
+
+def setting(which: Scene, steps: int, path: str, values: tuple[Any, Any]) -> Timed:
+    """Time some changes of a value, one to the other and back, of a scene that has run for as many steps."""
+
+    def work() -> float:
+        simulation = start(which)
+        simulation.contacts()
+        for _ in range(steps):
+            simulation.step()
+
+        def go() -> None:
+            for k in range(steps):
+                simulation.apply(SetParameter(time=0.0, path=path, value=values[k % 2]))
 
         return timed(go)
 

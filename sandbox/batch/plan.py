@@ -9,6 +9,7 @@ from typing import Any
 
 from sandbox.games.player import Player
 from sandbox.games.registry import RULES
+from sandbox.measure.seeds import same_chances
 from sandbox.recording import Recording
 from sandbox.scene.address import AddressError, parse_assignment, parse_value, split_assignment
 from sandbox.scene.document import to_document
@@ -41,6 +42,8 @@ class Job:
     """who plays the game of the scene, where it has one with rules"""
     score: float | None = None
     """of that session, where this run is to end alike"""
+    seeds: int = 1
+    """for how many seeds, from its own on, it stands: nothing in its scene is random where there are several"""
 
 
 def plan(
@@ -52,6 +55,8 @@ def plan(
     player: Player | None = None,
 ) -> list[Job]:
     """Lay out every run, in order: scene by scene, the last sweep changing fastest, then seeds, then engines.
+
+    Where nothing in a scene is random, all seeds are one run, of the first.
 
     Args:
         scenes: label and path of each; a `.json` is a recorded session.
@@ -67,28 +72,38 @@ def plan(
         AddressError: a sweep cannot be understood.
     """
     axes: list[list[tuple[str, Any]]] = [[(key, value) for value in values] for key, values in map(parse_sweep, sweeps)]
+    seeding: list[tuple[tuple[str, Any], ...]] = [()]
     if seeds is not None:
-        axes.append([("world.seed", seed) for seed in range(1, seeds + 1)])
-    if math.prod(len(axis) for axis in axes) > MOST_POINTS:
+        seeding = [(("world.seed", seed),) for seed in range(1, seeds + 1)]
+    if math.prod(len(axis) for axis in axes) * len(seeding) > MOST_POINTS:
         raise AddressError(f"the sweeps multiply to more than {MOST_POINTS:,} runs")
     jobs: list[Job] = []
     set_values = [_assignment(override) for override in overrides]
     faults: dict[Fault, None] = {}
     for label, path in scenes:
         for point in product(*axes):
-            values = (*set_values, *point)
-            try:
-                session = _read(path, (*overrides, *point))
-                plays = _player(session, path, player)
-            except SceneError as error:
-                faults |= dict.fromkeys(error.faults)
-                continue
-            for engine in engines or (session.engine,):
-                played = session if engine == session.engine else session.on(engine)
-                same = not (overrides or point)
-                known, score = (played.state_hash, played.score) if same else (None, None)
-                recorded = _is_recording(path)
-                jobs.append(Job(label, played.scene, engine, played.actions, values, recorded, known, plays, score))
+            found: list[tuple[Recording, Player | None, tuple[tuple[str, Any], ...]]] = []
+            alike = 1
+            for seed in seeding:
+                try:
+                    session = _read(path, (*overrides, *point, *seed))
+                    plays = _player(session, path, player)
+                except SceneError as error:
+                    faults |= dict.fromkeys(error.faults)
+                    continue
+                if len(found) == 1 and plays is None and same_chances(found[0][0].scene, session.scene):
+                    alike = len(seeding)
+                    break
+                found.append((session, plays, (*point, *seed)))
+            for session, plays, where in found:
+                for engine in engines or (session.engine,):
+                    played = session if engine == session.engine else session.on(engine)
+                    same = not (overrides or where)
+                    known, score = (played.state_hash, played.score) if same else (None, None)
+                    recorded = _is_recording(path)
+                    values = (*set_values, *where)
+                    job = Job(label, played.scene, engine, played.actions, values, recorded, known, plays, score, alike)
+                    jobs.append(job)
     if faults:
         raise SceneError(tuple(faults))
     return jobs

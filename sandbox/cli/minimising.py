@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from sandbox.measure.compare import Comparison
 from sandbox.measure.compare.disagreement import Disagreement
 from sandbox.measure.compare.minimise import Minimised, minimise
-from sandbox.measure.compare.patience import TookTooLongError
+from sandbox.measure.bounded_run import TookTooLongError
 from sandbox.measure.told import Told
 from sandbox.scene.faults import Fault
 from sandbox.scene.file import dumps, loads

@@ -36,7 +36,9 @@ from sandbox.scene.faults import Fault, SceneError
 )
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
 @click.option("--sweep", "sweeps", multiple=True, metavar="KEY=A,B,C", help="run each value; or KEY=LOW:HIGH:N[:log]")
-@click.option("--seeds", type=click.IntRange(1, 1_000_000), metavar="N", help="run the seeds 1 to N")
+@click.option(
+    "--seeds", type=click.IntRange(1, 1_000_000), metavar="N", help="run the seeds 1 to N; once where nothing is random"
+)
 @click.option(
     "--player",
     metavar="WHO",
@@ -182,6 +184,13 @@ def _tell_if_nothing_is_random(jobs: list[Job]) -> None:
         # Seeds change fastest: the first two that differ in it have every other value in common.
         if any(job.label == label and job.player is not None for job in jobs):
             continue  # the game and who plays it have chances of their own
+        alike = max(job.seeds for job in jobs if job.label == label)
+        if alike > 1:
+            where = (
+                "" if all(job.seeds > 1 for job in jobs if job.label == label) else "with some of the swept values, "
+            )
+            click.echo(f"{label}: {where}nothing in it is random: seeds 1 to {alike} are one run, made once", err=True)
+            continue
         first, *others = (job.scene for job in jobs if job.label == label)
         other = next((scene for scene in others if scene.world.seed != first.world.seed), first)
         if other is first:

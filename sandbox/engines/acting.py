@@ -34,6 +34,9 @@ from sandbox.scene.meetings import Meetings, meetings
 from sandbox.scene.model import Ball, Box, Capsule, Collides, Compound, Polygon, Post, Scene, Single, Wall, default_name
 from sandbox.scene.part import BACKING, MAX_BODIES
 
+AROUND = {"world", "surface"}
+"""The fields of a scene that say nothing about bodies and fixed things."""
+
 
 def perform(action: Action, cast: Cast) -> int | None:
     """Do what an action says; return the number of a body that is to be taken out, if any.
@@ -70,6 +73,14 @@ def perform(action: Action, cast: Cast) -> int | None:
         case _:
             raise ActionError(f"{action!r} is no action")
     return None
+
+
+def is_matter_same(scene: Scene, running: Scene) -> bool:
+    """Tell whether two scenes differ in their world and floor alone, so that what can meet what is the same.
+
+    Parts that are equal but not the same objects count as different.
+    """
+    return all(getattr(scene, key) is getattr(running, key) for key in Scene.model_fields if key not in AROUND)
 
 
 def derived(scene: Scene, bodies: Bodies) -> Meetings:

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from sandbox.engines.acting import derived
+from sandbox.engines.acting import derived, is_matter_same
 from sandbox.engines.driving.plunger import asked
 from sandbox.engines.expiry import Expiry
 from sandbox.engines.fixtures import Fixtures, fixtures_of
@@ -188,6 +188,9 @@ class Roster:
         Raises:
             ActionError: it has more surfaces than a scene may have.
         """
+        if spawned is None and is_matter_same(scene, self.scene):
+            self.scene = scene
+            return
         spawned = self.bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
         meet = derived(scene, bodies)

@@ -21,9 +21,10 @@ from sandbox.engines.cast import Cast
 from sandbox.scene.address import AddressError, assign, parse_path
 from sandbox.scene.crosscheck import course
 from sandbox.scene.demands import on_floor
-from sandbox.scene.document import to_document
+from sandbox.scene.document import change_value, to_document
 from sandbox.scene.faults import SceneError
 from sandbox.scene.file import from_document
+from sandbox.scene.floored import floored
 from sandbox.scene.model import Post, Scene, Wall
 from sandbox.scene.surfaced import Mover
 
@@ -41,20 +42,34 @@ def set_parameter(action: SetParameter, cast: Cast) -> None:
         cast.change(cast.scene, spawned)
         return
     try:
-        document, _ = assign(to_document(cast.scene), action.path, action.value)
-        world = cast.scene.world
-        if world.duration == 0.0:  # of a session that has only just begun, as no scene's is
-            document["world"]["duration"] = cast.scene.solver.dt
-        scene = from_document(document)
-        if world.duration == 0.0:
-            scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.0})})
+        scene = change_value(cast.scene, action.path, action.value)
+        wrong = action.path.startswith("surface.") and any(floored(scene, scene.bodies))
+    except (ValueError, RecursionError):
+        wrong = True
+    if wrong:  # the whole scene is read again, which finds every fault and says it as of a file
+        scene = _read_again(action, cast.scene)
+    if on_floor(scene) != on_floor(cast.scene):
+        raise ActionError(f"{action.path}: a floor cannot begin to rub, nor cease to, while a scene runs")
+    cast.change(_going_on(scene, cast.scene))
+
+
+def _read_again(action: SetParameter, scene: Scene) -> Scene:
+    """Return a scene with a value changed, as a file would be read that says so.
+
+    Raises:
+        ActionError: with all that is wrong then.
+    """
+    try:
+        document, _ = assign(to_document(scene), action.path, action.value)
+        begun = scene.world.duration > 0.0  # a session that has only just begun has a duration that no scene has
+        if not begun:
+            document["world"]["duration"] = scene.solver.dt
+        read = from_document(document)
     except AddressError as error:
         raise ActionError(str(error)) from None
     except SceneError as error:
         raise ActionError("; ".join(f"{f.path}: {f.message}" for f in error.faults)) from None
-    if on_floor(scene) != on_floor(cast.scene):
-        raise ActionError(f"{action.path}: a floor cannot begin to rub, nor cease to, while a scene runs")
-    cast.change(_going_on(scene, cast.scene))
+    return read if begun else read.model_copy(update={"world": read.world.model_copy(update={"duration": 0.0})})
 
 
 def _with_coefficient(action: SetParameter, cast: Cast) -> tuple[Mover, ...] | None:

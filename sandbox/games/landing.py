@@ -18,6 +18,7 @@ from sandbox.scene.forces import Thrust
 from sandbox.scene.model import Plane, Post, Scene, Wall, default_name
 from sandbox.scene.part import Point
 from sandbox.scene.shapes import form_of
+from sandbox.scene.streams import Stream, draws
 from sandbox.trajectory import Frame
 
 SHIP, PAD = "ship", "pad"
@@ -36,8 +37,6 @@ FOR_A_CRASH, FAR, FAST = 50, 50.0, 15.0
 """points for a crash on the pad at no speed; there are none so far from its middle, m, nor so fast, m/s"""
 ELSEWHERE, FASTER = 18.0, 3.0
 """m and m/s, to either side: by how much more or less than in the scene a game begins aside, by its seed"""
-STREAM = 0x6C616E64
-"""Sets the beginning apart from all else that the seed decides: the letters of `land`."""
 PADS = {"up": "a rt up", "left": "left -leftx", "right": "right +leftx"}
 """what of a gamepad goes with a thrust's key"""
 
@@ -210,7 +209,7 @@ def _place(scene: Scene) -> Point:
 
 def _start(scene: Scene, bodies: Bodies, ship: int) -> Move:
     """Return where the ship begins, as the scene's seed has it."""
-    chance = np.random.default_rng([STREAM, scene.world.seed])
+    chance = draws(Stream.LANDING, scene.world.seed)
     (x, y), (vx, vy) = bodies.position[ship].tolist(), bodies.velocity[ship].tolist()
     x, vx = x + chance.uniform(-ELSEWHERE, ELSEWHERE), vx + chance.uniform(-FASTER, FASTER)
     return Move(time=0.0, body=SHIP, position=(x, y), velocity=(vx, vy))

@@ -9,6 +9,7 @@ from sandbox.games.pinball.hand import PinballHand
 from sandbox.games.rules import Control, Policy, Press, Rules, Seen, UnfitError
 from sandbox.scene.curling import CurlingMatch
 from sandbox.scene.model import Scene
+from sandbox.scene.streams import Stream, draws
 
 RATES = 0.2, 2.0
 """1/s, how often a random player presses a usual control: one rate for each, drawn evenly by factors between these"""
@@ -16,8 +17,6 @@ HOLDS = 0.05, 1.6
 """s, how long it holds a control: drawn likewise, for each press anew; what takes a second to draw is drawn at times"""
 FULL = 0.5
 """of the presses of what can be pressed by halves, those all the way, as keys do; others are even from 0 to 1"""
-STREAM = 0x706C6179
-"""Sets the player's chances apart from all else that the scene's seed decides: the letters of `play`."""
 
 
 class Nobody:
@@ -32,7 +31,7 @@ class Chance:
     """Presses each control at random times, exponentially distributed at a rate of its own, and holds it a while."""
 
     def __init__(self, seed: int) -> None:
-        self._chance = np.random.default_rng([STREAM, seed])
+        self._chance = draws(Stream.KEYS, seed)
         self._turns: dict[str, tuple[float, bool]] = {}  # by control: when it changes next, and whether it is down
         self._pauses: dict[str, float] = {}  # s between presses, on average
         self._next = -math.inf  # when anything changes, s

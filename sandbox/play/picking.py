@@ -101,7 +101,7 @@ def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer
     high = np.max([hull.corners.max(axis=0) + hull.radius for hull in hulls], axis=0)
     middle, reach = (low + high) / 2.0, float(np.hypot(*(high - low))) / 2.0
     count = min(len(bodies), len(frame.position))
-    solid = np.asarray([each.collides != "none" for each in bodies.elements])[bodies.element[:count]]
+    solid = np.asarray([each.collides != "none" for each in bodies.elements], np.bool_)[bodies.element[:count]]
     with np.errstate(all="ignore"):
         near = np.hypot(*(frame.position[:count] - middle).T) < reach + bodies.radius[:count]
     near &= frame.present[:count] & solid & (bits_of(frame.layer, count) & bit != 0)

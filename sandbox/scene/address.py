@@ -102,10 +102,10 @@ def assign(document: dict[str, Any], path: str, value: Any) -> tuple[dict[str, A
         result = copy.deepcopy(document)
     except RecursionError:
         raise AddressError(f"{path}: the scene's values are nested too deeply") from None
-    return result, _assign_all(result, parts, path, value)
+    return result, assign_all(result, parts, path, value)
 
 
-def _assign_all(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Location:
+def assign_all(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Location:
     """Set a value in place wherever a path leads, and return the location."""
     if EVERY not in parts[1:-1]:
         return _assign(result, parts, path, value)
@@ -116,7 +116,7 @@ def _assign_all(result: Any, parts: tuple[str, ...], path: str, value: Any) -> L
     if not elements:
         raise AddressError(f"{path}: the scene has no [[{'.'.join(parts[:place])}]]")
     for element in elements:
-        _assign_all(element, parts[place + 1 :], path, value)
+        assign_all(element, parts[place + 1 :], path, value)
     return location
 
 
@@ -127,7 +127,7 @@ def _followed(here: Any, parts: tuple[str, ...]) -> tuple[Any, Location]:
         key: str | int = part
         if isinstance(here, list):
             try:
-                key = _index(here, parts[: len(location) + 1], "")
+                key = index_of(here, parts[: len(location) + 1], "")
             except AddressError:
                 return None, ()
         elif not isinstance(here, dict) or part not in here:
@@ -159,7 +159,7 @@ def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Locat
             else:
                 here = here[part]
         elif isinstance(here, list):
-            index = _index(here, parts[: k + 1], path)
+            index = index_of(here, parts[: k + 1], path)
             location += (index,)
             if last:
                 here[index] = value
@@ -170,7 +170,7 @@ def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Locat
     return location
 
 
-def _index(elements: list[Any], parts: tuple[str, ...], path: str) -> int:
+def index_of(elements: list[Any], parts: tuple[str, ...], path: str) -> int:
     """Return the index of a list's element, which the last part of a path names, or numbers."""
     part, kind = parts[-1], next((each for each in reversed(parts[:-1]) if not each.isdecimal()), "")
     names = element_names(elements, kind)

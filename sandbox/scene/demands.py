@@ -223,7 +223,12 @@ def _count(n: int, one: str, many: str, none: str) -> str:
 
 def on_floor(scene: Scene) -> bool:
     """Tell whether a scene has what only spheres on a floor have; of one that asks for none of it, they only turn."""
-    return bool(demands(scene) & FLOOR)
+    return any(on and demand in FLOOR for demand, on, _ in _floor(scene))
+
+
+def curls(scene: Scene) -> bool:
+    """Tell whether a scene has a floor on which the ways of pucks bend."""
+    return any(on and demand is Demand.CURL for demand, on, _ in _floor(scene))
 
 
 def unmodelled(scene: Scene, capabilities: frozenset[Demand]) -> list[str]:

@@ -3,7 +3,13 @@
 import json
 from typing import Any
 
+from pydantic import BaseModel
+
+from sandbox.scene.address import EVERY, AddressError, assign_all, index_of, parse_path
 from sandbox.scene.model import Scene
+
+_FIELDS = {field.alias or name: name for name, field in Scene.model_fields.items()}
+"""The fields of a scene by the headings of their tables."""
 
 
 def read_model(document: dict[str, Any]) -> Scene:
@@ -14,11 +20,64 @@ def read_model(document: dict[str, Any]) -> Scene:
         ValueError: a number is too large to be written.
         RecursionError: the document is nested too deeply.
     """
-    text = json.dumps(document, default=lambda value: {"a date or time": str(value)})
-    return Scene.model_validate_json(text, by_alias=True, by_name=False)
+    return Scene.model_validate_json(_text(document), by_alias=True, by_name=False)
+
+
+def _text(document: dict[str, Any]) -> str:
+    return json.dumps(document, default=lambda value: {"a date or time": str(value)})
 
 
 def to_document(scene: Scene) -> dict[str, Any]:
     """Return a scene as nested dicts and lists, defaults left out."""
     document = scene.model_dump(mode="json", by_alias=True, exclude_defaults=True)
     return document or {"title": scene.title}
+
+
+def change_value(scene: Scene, path: str, value: Any) -> Scene:
+    """Return a scene with one value changed, of which the part that holds it is validated, and nothing else.
+
+    That takes a time that does not grow with the scene. Parts that stay are the same objects as before, and the bodies
+    are those that the scene had: whatever the value decides of them is the caller's affair, as is what parts say about
+    each other (`crosscheck`). Faults are told as pydantic has them; `from_document` says them in full.
+
+    Args:
+        scene: stays as it is.
+        path: such as `world.gravity` or `ball.*.friction`.
+        value: as TOML or JSON would hold it.
+
+    Raises:
+        ValueError: the path leads nowhere, or the value is not right there.
+        RecursionError: the value is nested too deeply.
+    """
+    heading, *rest = parse_path(path)
+    part = getattr(scene, _FIELDS.get(heading, ""), None)
+    if isinstance(part, BaseModel) and rest:
+        changed: Any = _with(part, rest, path, value)
+    elif isinstance(part, tuple) and part and len(rest) > 1:
+        names = [{} if each.name is None else {"name": each.name} for each in part if hasattr(each, "name")]
+        names = names or [{} for _ in part]
+        every = rest[0] == EVERY and {"name": EVERY} not in names
+        those = range(len(part)) if every else [index_of(names, (heading, rest[0]), path)]
+        elements = list(part)
+        for k in those:
+            elements[k] = _with(elements[k], rest[1:], path, value)
+        changed = tuple(elements)
+    else:
+        raise AddressError(f"{path}: the scene has no such value")
+    result = scene.model_copy(update={_FIELDS[heading]: changed})
+    result.__dict__.pop("elements", None)  # where cached_property looks first
+    return result
+
+
+def _with(part: BaseModel, rest: list[str], path: str, value: Any) -> BaseModel:
+    """Return a part of a scene with the value changed to which the rest of a path leads."""
+    document = part.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+    assign_all(document, tuple(rest), path, value)
+    if len(rest) > 1:
+        return type(part).model_validate_json(_text(document), by_alias=True, by_name=False)
+    # Only the one value is taken over: a session that has only just begun has a duration that no file may have.
+    if "duration" in document:
+        document["duration"] = 1.0
+    read = type(part).model_validate_json(_text(document), by_alias=True, by_name=False)
+    name = next(name for name, field in type(part).model_fields.items() if (field.alias or name) == rest[0])
+    return part.model_copy(update={name: getattr(read, name)})

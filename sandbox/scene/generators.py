@@ -12,6 +12,7 @@ import numpy as np
 
 from sandbox.scene.model import Emitter, Generator, Grid, Scatter
 from sandbox.scene.near import FloatArray, IntArray, near_pairs
+from sandbox.scene.streams import Stream, bits, draws
 
 ROUNDS = 400
 """Rounds of placing what is still missing before a scatter gives up."""
@@ -45,14 +46,13 @@ def expand(generator: Generator, seed: int, index: int) -> tuple[FloatArray, Flo
     Raises:
         GeneratorError: the balls do not fit.
     """
-    random = np.random.Generator(_stream(generator, seed, index))
     match generator:
         case Grid():
-            return _grid(generator, random)
+            return _grid(generator, draws(Stream.GRID, seed, index))
         case Scatter():
-            return _scatter(generator, random, index)
+            return _scatter(generator, draws(Stream.SCATTER, seed, index), index)
         case Emitter():
-            return _emitter(generator, random)
+            return _emitter(generator, draws(Stream.EMITTER, seed, index))
 
 
 def lifetimes(emitter: Emitter, seed: int, index: int) -> FloatArray:
@@ -63,14 +63,10 @@ def lifetimes(emitter: Emitter, seed: int, index: int) -> FloatArray:
     """
     if emitter.lifetime is None:
         return np.full(emitter.count, np.inf)
-    stream = _stream(emitter, seed, index)
+    stream = bits(Stream.EMITTER, seed, index)
     stream.advance(2 * emitter.count)  # past the velocities: a draw is one step of the stream
     random = np.random.Generator(stream).random(emitter.count)
     return np.sort(emitter.lifetime + (random * 2.0 - 1.0) * emitter.lifetime_jitter)
-
-
-def _stream(generator: Generator, seed: int, index: int) -> np.random.PCG64:
-    return np.random.PCG64([seed, (Grid, Scatter, Emitter).index(type(generator)), index])
 
 
 def _spread(random: np.random.Generator, count: int, half_width: float) -> FloatArray:

@@ -1,11 +1,9 @@
 """Layouts: where the bodies of every generator start, and how many each has.
 
-Each generator draws from a stream of its own, keyed by the seed, its kind and its place among its kind.
+Each generator draws from a stream of its own: see `streams.py`.
 """
 
 from dataclasses import replace
-
-import numpy as np
 
 from sandbox.scene.discs import Emitter, Grid, Scatter
 from sandbox.scene.generators import expand, lifetimes, size
@@ -15,12 +13,10 @@ from sandbox.scene.part import Point
 from sandbox.scene.ragdoll import Ragdoll, segments
 from sandbox.scene.stacking import stacked
 from sandbox.scene.stacks import Stack
+from sandbox.scene.streams import Stream, draws
 from sandbox.scene.surfaced import Mover
 from sandbox.scene.weaves import Cloth, Rope
 from sandbox.scene.weaving import cloth_layout, node_count, rope_layout
-
-STACK_STREAM = 3
-"""The kinds before are grids, scatters and emitters."""
 
 
 def count_of(mover: Mover) -> int:
@@ -60,7 +56,7 @@ def layout_of(generator: Mover, seed: int, index: int, gravity: Point) -> Layout
                 return replace(layout, lifetime=lifetimes(generator, seed, index))
             return layout
         case Stack():
-            return stacked(generator, np.random.Generator(np.random.PCG64([seed, STACK_STREAM, index])))
+            return stacked(generator, draws(Stream.STACK, seed, index))
         case Rope():
             return rope_layout(generator, gravity)
         case Cloth():

@@ -15,6 +15,14 @@ from sandbox.scene.shipped import find
 
 BALL = '[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 1\n'
 
+SPARKS = """
+[[emitter]]
+position = [0.0, 3.0]
+count = 3
+velocity_min = [-1.0, -1.0]
+velocity_max = [1.0, 1.0]
+"""
+
 
 @pytest.fixture
 def scene(tmp_path: Path) -> tuple[str, str]:
@@ -125,7 +133,8 @@ def test_listed_values_are_read_as_toml_has_them(values: list[object]) -> None:
 
 def test_plan_multiplies_in_its_order(scene: tuple[str, str], tmp_path: Path) -> None:
     second = tmp_path / "second.toml"
-    second.write_text(BALL.replace("1\n", "2\n"))
+    second.write_text(BALL.replace("1\n", "2\n") + SPARKS)
+    Path(scene[1]).write_text(BALL + SPARKS)
     jobs = plan(
         [scene, ("second", str(second))],
         ["pymunk", "other"],
@@ -178,6 +187,16 @@ def test_too_many_runs_are_refused_before_any_is_laid_out(scene: tuple[str, str]
 
 def test_jobs_tell_the_swept_values() -> None:
     jobs = plan([("bounce", str(find("bounce")))], ["pymunk"], sweeps=["ball.ball.restitution=0,1"], seeds=2)
-    assert [dict(job.point) for job in jobs] == [
-        {"ball.ball.restitution": e, "world.seed": seed} for e in (0, 1) for seed in (1, 2)
+    assert [dict(job.point) for job in jobs] == [{"ball.ball.restitution": e, "world.seed": 1} for e in (0, 1)]
+    assert [job.seeds for job in jobs] == [2, 2]  # nothing is random
+
+
+def test_seeds_are_one_run_only_where_nothing_is_random(scene: tuple[str, str]) -> None:
+    Path(scene[1]).write_text(BALL + SPARKS)
+    jobs = plan([scene], ["pymunk"], sweeps=["emitter.0.velocity_max=[1.0,1.0],[-1.0,-1.0]"], seeds=3)
+    assert [(job.scene.emitters[0].velocity_max[0], job.scene.world.seed, job.seeds) for job in jobs] == [
+        (1.0, 1, 1),
+        (1.0, 2, 1),
+        (1.0, 3, 1),
+        (-1.0, 1, 3),
     ]

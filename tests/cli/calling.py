@@ -31,6 +31,15 @@ restitution = 0.5
 """
 """Half a metre above the ground: it is reached after 0.32 s."""
 
+SPARKS = """
+[[emitter]]
+position = [0.0, 3.0]
+count = 3
+velocity_min = [-1.0, -1.0]
+velocity_max = [1.0, 1.0]
+"""
+"""What follows from the seed of a scene."""
+
 FAULTY = '[[ball]]\nname = "a"\nposition = [0.0]\nradius = -1.0\n'
 """Two faults, on lines 3 and 4."""
 

@@ -208,7 +208,7 @@ def test_recording_that_is_refused_exports_nothing(tmp_path: Path, capfd: pytest
 
 
 def test_folder_of_several_runs_lists_them(stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    call(["run", written(tmp_path), "--seeds", "2", "--out", str(stored), "--quiet"])
+    call(["run", written(tmp_path), "--sweep", "solver.dt=0.01,0.02", "--out", str(stored), "--quiet"])
     ids = sorted(path.stem for path in stored.glob("*.npz"))
     status, out, err = lines_of(capfd, "export", str(stored), "--to", str(tmp_path / "a.csv"))
     assert (status, out) == (2, [])

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from calling import DIVERGING, DROP, FAULTY, json_of, lines_of, process, written
+from calling import DIVERGING, DROP, FAULTY, SPARKS, json_of, lines_of, process, written
 
 from sandbox.action import Impulse
 from sandbox.engines.registry import ENGINES
@@ -91,7 +91,7 @@ def test_process_in_another_folder_finds_both_kinds_of_scene(tmp_path: Path) -> 
 
 
 def test_several_scenes_sweeps_and_seeds_multiply(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    first, second = written(tmp_path), written(tmp_path, name="other.toml")
+    first, second = written(tmp_path, DROP + SPARKS), written(tmp_path, DROP + SPARKS, "other.toml")
     status, document, _ = json_of(
         capfd,
         "run",
@@ -110,21 +110,17 @@ def test_several_scenes_sweeps_and_seeds_multiply(tmp_path: Path, capfd: pytest.
     assert len({r["id"] for r in document["runs"]}) == 8  # the two files say the same, so they are the same runs
 
 
-SPARKS = """
-[[emitter]]
-position = [0.0, 3.0]
-count = 3
-velocity_min = [-1.0, -1.0]
-velocity_max = [1.0, 1.0]
-"""
-
-
 def test_seeds_of_a_scene_without_chance_are_told_to_be_one_run(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    scene = written(tmp_path)
+    scene, folder = written(tmp_path), tmp_path / "runs"
+    words = ("run", scene, "--seeds", "3", "--sweep", "solver.dt=0.01,0.02", "--out", str(folder))
+    status, document, err = json_of(capfd, *words)
+    assert (status, err) == (0, [f"{scene}: nothing in it is random: seeds 1 to 3 are one run, made once"])
+    assert [(run["settings"]["dt"], run["seed"]) for run in document["runs"]] == [(0.01, 1), (0.02, 1)]
+    assert len(list(folder.glob("*.npz"))) == 2
     told = f"{scene}: nothing in it is random: all seeds are the same run"
-    assert lines_of(capfd, "run", scene, "--seeds", "2", "--sweep", "solver.dt=0.01,0.02")[2] == [told]
+    assert lines_of(capfd, "run", scene, "--sweep", "world.seed=1,2")[2] == [told]
     assert lines_of(capfd, "run", scene, "--seeds", "1")[2] == []
     random = written(tmp_path, DROP + SPARKS, "sparks.toml")
     assert lines_of(capfd, "run", random, "--seeds", "2")[2] == []
@@ -200,7 +196,7 @@ def test_fault_of_several_points_of_a_sweep_is_told_once(tmp_path: Path, capfd: 
         ),
         (("--plot", "x.gif"), "--plot: x.gif: the name ends in .png, .svg or .pdf"),
         (("--plot", "nowhere/x.png"), "--plot: nowhere/x.png: there is no folder nowhere"),
-        (("--plot", "x.png", "--seeds", "2"), "--plot: draws one run, but this makes 2"),
+        (("--plot", "x.png", "--sweep", "solver.dt=0.01,0.02"), "--plot: draws one run, but this makes 2"),
         (("--plot", "x.png", "--body", "b"), "--body: no body is named 'b'; there are 'a'"),
         (("--body", "a"), "--body: says what is drawn, but nothing is; give --plot FILE too"),
         (("--out", "drop.toml"), "--out: drop.toml: is or lies in a file; runs are stored in a folder"),

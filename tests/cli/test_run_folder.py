@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from calling import DROP, document_of, json_of, lines_of, written
+from calling import DROP, SPARKS, document_of, json_of, lines_of, written
 from interruptible import interrupted
 
 from sandbox.batch.store import Store
@@ -148,7 +148,7 @@ def test_damaged_file_is_told_in_one_line(tmp_path: Path, capfd: pytest.CaptureF
 
 @pytest.mark.parametrize("flags", ["--json", "--quiet", ""])
 def test_interrupt_keeps_what_is_finished(flags: str, tmp_path: Path) -> None:
-    scene, folder = written(tmp_path, DROP.replace("duration = 0.5", "duration = 20.0")), tmp_path / "runs"
+    scene, folder = written(tmp_path, DROP.replace("duration = 0.5", "duration = 20.0") + SPARKS), tmp_path / "runs"
     words = ["run", scene, "--seeds", "500", "--out", str(folder), *shlex.split(flags)]
     status, out, err = interrupted(words, lambda: len(list(folder.glob("*.npz"))) >= 3)
     assert status == 130, err
@@ -170,7 +170,7 @@ def test_interrupt_keeps_what_is_finished(flags: str, tmp_path: Path) -> None:
 
 
 def test_interrupted_command_goes_on_where_it_was(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    arguments = ("run", written(tmp_path), "--out", str(tmp_path / "runs"))
+    arguments = ("run", written(tmp_path, DROP + SPARKS), "--out", str(tmp_path / "runs"))
     json_of(capfd, *arguments, "--seeds", "2")
     _, document, _ = json_of(capfd, *arguments, "--seeds", "4")
     assert [run["repeated"] for run in document["runs"]] == [True, True, False, False]

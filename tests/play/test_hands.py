@@ -7,6 +7,7 @@ import pytest
 
 from sandbox.action import ActionError, Impulse, Move, Pull, Remove, Spawn
 from sandbox.play.hands import Hands
+from sandbox.play.picking import overlapping
 from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
 from sandbox.scene.file import from_document
@@ -179,11 +180,11 @@ def test_new_ball_of_an_empty_scene_suits_the_view() -> None:
     assert len(show.bodies) == 2
 
 
-def test_new_ball_that_overlaps_is_refused_by_exact() -> None:
+def test_new_ball_that_would_overlap_is_put_beside_so_that_exact_takes_it() -> None:
     show, hands = live("exact"), Hands()
-    with pytest.raises(ActionError, match=r"\w"):
-        hands.add(show, (0.2, 0.0), 10.0)
-    assert len(show.bodies) == 3
+    hands.add(show, (0.2, 0.0), 10.0)
+    assert len(show.bodies) == 4
+    assert not overlapping(show.scene, show.bodies, show.frame)[-1]
 
 
 def test_removed_body_is_gone_and_no_longer_picked_or_held() -> None:

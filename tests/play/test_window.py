@@ -381,7 +381,8 @@ def test_home_once_more_finds_the_bodies_where_they_are_now(opened: Open) -> Non
 
 
 def test_ball_is_added_under_the_mouse_or_before_it_came_in_the_middle(window: Window) -> None:
-    for place, told in ((window.camera.centre, ()), (THERE, (move(*on_screen(window, THERE)),))):
+    beside = (1.2, 1.0)  # of the first one
+    for place, told in ((window.camera.centre, ()), (beside, (move(*on_screen(window, beside)),))):
         turn(window, *told, key(pygame.K_b, unicode="b"), key_up(pygame.K_b))
         spawn = live(window).session.actions[-1]
         assert isinstance(spawn, Spawn)

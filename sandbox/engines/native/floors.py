@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 
 from sandbox.engines.floor.level import unlevel
+from sandbox.scene import demands
 from sandbox.scene.bodies import Bodies
-from sandbox.scene.demands import FLOOR, demands
 from sandbox.scene.model import Scene
 
 
 def on_floor(scene: Scene) -> bool:
     """Tell whether a scene has what only balls on a floor have; of one that asks for nothing of it, they are discs."""
-    return (scene.surface is not None or bool(scene.pockets)) and bool(demands(scene) & FLOOR)
+    return (scene.surface is not None or bool(scene.pockets)) and demands.on_floor(scene)
 
 
 def of_floors(scene: Scene, bodies: Bodies | None = None) -> Iterator[str]:

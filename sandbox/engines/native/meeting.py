@@ -219,16 +219,13 @@ class MeetingBodies(Members):
         return self._ground.several or any(len(member.shapes) > 1 for member in self._members.values())
 
     def renew(self, scene: Scene, meet: Meetings) -> None:
-        """Go on with a scene's changed air, gravity, coefficients or walls, or with more surfaces."""
+        """Go on with a scene's changed coefficients or walls, or with more surfaces, and with its air."""
         if self._ground.reshape(self._scene, scene):
             self._single = False  # who leant on what was there before is remembered no more, and no listing tells
-        self._scene = scene
-        self._dragged = is_dragged(scene.world)
-        self.field.shares.clear()
+        self.renew_air(scene)
         self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
         self._touches, self._noted = meet.touches, meet.noted
         self._setter.renew(meet, jointed_surfaces(scene, self._surface_of_fixed))
-        self._space.gravity = gravity_of(scene)
         for number, (_, own) in self._members.items():
             for piece, shape in own:
                 self._setter.dress(shape, int(self._surface_of[piece]))
@@ -236,9 +233,17 @@ class MeetingBodies(Members):
             if heavy and number not in self.drives.numbers:
                 self.give_moment(number, float(self._moments[number]))
         if self.drives.axles:
-            self.drives.weigh(scene.world.gravity, gravity_of(scene))
             self.drives.watch(self._kinds)
         self._ground.renew(scene, self._surface_of_fixed)
+
+    def renew_air(self, scene: Scene) -> None:
+        """Go on with a scene's changed gravity, drag and wind."""
+        self._scene = scene
+        self._dragged = is_dragged(scene.world)
+        self.field.shares.clear()
+        self._space.gravity = gravity_of(scene)
+        if self.drives.axles:
+            self.drives.weigh(scene.world.gravity, gravity_of(scene))
 
     def step(self, time: float) -> None:
         """Advance by one substep, from a time, s."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from sandbox.action import ActionError
-from sandbox.engines.acting import derived
+from sandbox.engines.acting import derived, is_matter_same
 from sandbox.engines.native.felt import Felt, State
 from sandbox.engines.native.floors import of_floors, on_floor
 from sandbox.engines.native.free import FreeFlight
@@ -62,14 +62,17 @@ class Population:
         if self.visiting is not None:
             self.visiting.begin(np.flatnonzero(self._meet.noted), anew=scene.began == 0.0)
 
-    def _renew(self, scene: Scene, meet: Meetings) -> None:
-        """Go on with a scene, and with what can meet what in it."""
+    def _renew(self, scene: Scene, meet: Meetings, same: bool = False) -> None:
+        """Go on with a scene, and with what can meet what in it, which may be the same as before."""
         self._meet = meet
         if self.felt is not None:  # hits are the felt's, not pymunk's
             self.felt.renew(scene, meet)
             nothing = np.zeros_like(meet.surfaces.restitution)
             meet = replace(meet, surfaces=replace(meet.surfaces, restitution=nothing, friction=nothing))
-        self.meeting.renew(scene, meet)
+        if same:
+            self.meeting.renew_air(scene)
+        else:
+            self.meeting.renew(scene, meet)
         if self.visiting is not None:
             self._premises.renew(scene, self.bodies)
             self.visiting.renew(meet)
@@ -181,11 +184,15 @@ class Population:
         """
         if self._half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             raise ActionError("drag cannot come up in a run that was started with half_kick, which knows none")
-        if self.felt is not None and (lacks := next(of_floors(scene), None)):
+        bodies, meet = self.bodies, self._meet
+        same = spawned is None and is_matter_same(scene, self.scene)
+        checked = same and scene.world is self.scene.world
+        if self.felt is not None and not checked and (lacks := next(of_floors(scene), None)):
             raise ActionError(lacks)
-        spawned = self.bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
-        bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
-        meet = derived(scene, bodies)
+        if not same:
+            spawned = bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
+            bodies = replace(bodies, elements=(*scene.elements, *spawned))
+            meet = derived(scene, bodies)
         self.refresh()
         self.velocity[self.moving] -= self.ahead
         self.scene, self.bodies = scene, bodies
@@ -195,7 +202,7 @@ class Population:
                 self.meeting.set_velocity(number, self.velocity[number])
         self.free.world = scene.world
         self.free.forces_changed()
-        self._renew(scene, meet)
+        self._renew(scene, meet, same)
         self._live()
 
     def pocketed(self, number: int) -> bool:

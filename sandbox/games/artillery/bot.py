@@ -9,9 +9,8 @@ from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.tanks import Tank, Tanks
 from sandbox.games.artillery.weapons import WEAPONS
 from sandbox.scene.model import World
+from sandbox.scene.streams import Stream, draws
 
-STREAM = 12
-"""of the scene's seed; ground has another"""
 ANGLE_ERROR, SPEED_ERROR = math.radians(6.0), 0.08
 """Standard deviations of angle, rad, and speed, as a share of it, of who has no skill at all."""
 NEAR = 0.2
@@ -24,7 +23,7 @@ WORK = 6_000
 
 def chances(seed: int, turn: int) -> np.random.Generator:
     """Return the chances of a turn, which are those of no other."""
-    return np.random.Generator(np.random.PCG64([seed, STREAM, turn]))
+    return draws(Stream.SHELL, seed, turn)
 
 
 def choose(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tuple[Tank, int]:

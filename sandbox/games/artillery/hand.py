@@ -3,8 +3,6 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from sandbox.games.artillery.aim import Aim
 from sandbox.games.artillery.bot import Thought
 from sandbox.games.artillery.gunner import PER_SECOND, POWER, TURN
@@ -12,9 +10,8 @@ from sandbox.games.artillery.rules import ArtilleryRules
 from sandbox.games.artillery.tanks import Tank
 from sandbox.games.rules import Rules, Seen, UnfitError
 from sandbox.games.skill import checked_skill
+from sandbox.scene.streams import Stream, draws
 
-STREAM = 0x61696D73
-"""Sets these chances apart from all else that the seed decides: the letters of `aims`."""
 NEAR = 12.0
 """Taps, from which on a key is no longer held but tapped."""
 
@@ -55,7 +52,7 @@ class ArtilleryHand:
     def _thought_of(self, rules: ArtilleryRules) -> Aim | None:
         """Think on about this turn; return the shot once there is one."""
         if self._thought is None or self._turn != rules.turn:
-            random = np.random.default_rng([STREAM, self._seed, rules.turn])
+            random = draws(Stream.AIM, self._seed, rules.turn)
             self._thought = Thought(rules.world, rules.field, rules.shooter, random, self.skill)
             self._turn = rules.turn
         return self._thought.go_on()

@@ -13,9 +13,8 @@ from sandbox.games.curling.count import counted, in_house
 from sandbox.games.curling.delivery import Delivery, Ice
 from sandbox.games.curling.sheet import RELEASE, STONE
 from sandbox.scene.part import Point
+from sandbox.scene.streams import Stream, draws
 
-STREAM = 0x6375726C
-"""Sets the team's chances apart from all else that the scene's seed decides: the letters of `curl`."""
 LENGTH, LINE = 0.006, 0.0025
 """Of the speed, and rad: standard errors of a delivery at error 1."""
 PAST = 7.0
@@ -39,7 +38,7 @@ class Team:
 
     def __init__(self, team: int, ice: Ice, error: float, seed: int) -> None:
         self._team, self._ice, self._error = team, ice, error
-        self._chance = np.random.default_rng([STREAM, team, seed])
+        self._chance = draws(Stream.CURLER, seed, team)
 
     def delivery(self, stones: Stones, thrown: int, last: bool) -> Delivery:
         """Return how the next stone is let go.

@@ -1,8 +1,7 @@
 """Coil: how evenly a solenoid throws a ball."""
 
-import numpy as np
-
 from sandbox.scene.part import Vector
+from sandbox.scene.streams import Stream, draws
 
 WEAKEST = 0.95
 """of its whole speed: no coil throws alike each time, and a ball that flew alike each time might fly in a ring"""
@@ -18,7 +17,7 @@ class Coil:
             seed: of the scene.
             stream: sets this coil's chances apart from those of others.
         """
-        self._chance = np.random.default_rng((0xC011, stream, seed))
+        self._chance = draws(Stream.COIL, seed, stream)
 
     def throw(self, velocity: Vector) -> Vector:
         """Return a velocity, m/s, that is at most the one that is stated."""

@@ -3,14 +3,13 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from sandbox.games.pinball.board import Element
 from sandbox.games.pinball.controls import FLIPPERS, PLUNGER
 from sandbox.games.pinball.pinball import Pinball
 from sandbox.games.pinball.trough import SLOW
 from sandbox.games.rules import Rules, Seen, UnfitError
 from sandbox.games.skill import checked_skill
+from sandbox.scene.streams import Stream, draws
 
 LEAD = 0.03
 """s, that a flipper takes to get up, and so ahead of which a player looks. Source: Visual Pinball's stroke of 34 ms"""
@@ -33,9 +32,6 @@ JITTER = 0.05
 IDLE = 0.7
 """1/s, how often a player without any skill flips for nothing"""
 
-STREAM = 0x68616E64
-"""Sets these chances apart from all else that the seed decides: the letters of `hand`."""
-
 
 class PinballHand:
     """Flips when a ball is about to be within reach, plunges when one waits.
@@ -51,7 +47,7 @@ class PinballHand:
             ValueError: the skill is not from 0 to 1.
         """
         self.skill = checked_skill(skill)
-        self._chance = np.random.default_rng([STREAM, seed])
+        self._chance = draws(Stream.FLIPPERS, seed)
         self._due: dict[str, float] = {}  # by control: when it is pressed, s
         self._until: dict[str, float] = {}  # by control: when it is let go, s
         self._rests: dict[str, float] = {}  # by control: until when it is not pressed again, s

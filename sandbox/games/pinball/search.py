@@ -3,8 +3,6 @@
 import math
 from collections.abc import Iterator
 
-import numpy as np
-
 from sandbox.action import Drive, Impulse
 from sandbox.games.pinball.board import Board
 from sandbox.games.pinball.drops import Drops
@@ -12,6 +10,7 @@ from sandbox.games.pinball.effects import Cue, Effect, Machine, Now, Save, Say, 
 from sandbox.games.pinball.holes import Holes
 from sandbox.games.pinball.switches import Hit
 from sandbox.games.pinball.trough import SLOW
+from sandbox.scene.streams import Stream, draws
 
 PATIENCE = 10.0
 """s without a switch, the balls slow"""
@@ -42,7 +41,7 @@ class Search(Machine):
         """the coil that is next in this round, and when, s"""
         self.off: dict[str, float] = {}
         """drive that is on → when it goes off, s"""
-        self.chance = np.random.default_rng((board.seed, 0x5EA2C4))
+        self.chance = draws(Stream.BALL_SEARCH, board.seed)
 
     def hit(self, hit: Hit, now: Now) -> Iterator[Effect]:
         """Be content: the ball is about."""

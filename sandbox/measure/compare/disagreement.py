@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.measure.bounded_run import bounded_run, working
 from sandbox.measure.compare.errors import errors
 from sandbox.measure.compare.horizon import agree_until, perturb
-from sandbox.measure.compare.patience import patient_run
 from sandbox.measure.compare.runs import common_frames, there
 from sandbox.measure.compare.truth import truth_of
 from sandbox.scene.model import Scene
@@ -66,10 +65,10 @@ class Disagreement:
             TookTooLongError: it took longer.
             TooLargeError: the frames would not fit into memory.
         """
-        began = perf_counter()
+        deadline = working() + patience
 
         def ran(which: Scene, engine: str) -> Trajectory:
-            return patient_run(which, engine, which.solver, patience - (perf_counter() - began))
+            return bounded_run(which, engine, which.solver, math.inf, deadline, audit=False)[0]
 
         if len(self.engines) == 1:
             truth = truth_of(scene, scene.solver, self.tolerance)

@@ -19,7 +19,7 @@ from sandbox.measure.compare.delta import least
 from sandbox.measure.compare.disagreement import Disagreement, Parting
 from sandbox.measure.compare.gaps import close_pairs
 from sandbox.measure.compare.horizon import TOUCH
-from sandbox.measure.compare.patience import TookTooLongError
+from sandbox.measure.bounded_run import TookTooLongError
 from sandbox.measure.compare.simpler import fewer, optional, rounded, shorter, unused, without_keys
 from sandbox.measure.compare.spelled import BONDS, FIXED, Document, Spelled, spelled
 from sandbox.measure.recorder import TooLargeError

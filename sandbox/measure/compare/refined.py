@@ -1,15 +1,14 @@
 """Refined: a fixed step, halved until the answer stays the same."""
 
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.bounded_run import TookTooLongError, bounded_run
 from sandbox.measure.compare.errors import errors
 from sandbox.measure.compare.horizon import agree_until, perturb
-from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.joint_error import HOLDING
 from sandbox.measure.recorder import frame_count
 from sandbox.scene.links import LinkKind
@@ -21,9 +20,9 @@ from sandbox.trajectory import Trajectory
 
 WORK = 5e6
 """Bodies × steps that all halvings together may take."""
-PATIENCE = 20.0
-"""s that all halvings of one choice of settings may take; the first run a fifth of it, else the next is tried.
-Where this ends it, a slower machine refines less: how often dt was halved is told."""
+LIMIT = 20.0
+"""Counted cost, s, that all halvings of one choice of settings may have; the first run a fifth of it, else the next
+choice is tried."""
 HALVINGS = 8
 """At most; the time step is 1/256 then."""
 AGREE = 0.1
@@ -107,10 +106,7 @@ def preferences(scene: Scene) -> tuple[dict[str, object], ...]:
 def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> Refined | None:
     """Refine one choice of settings; None where not even the first run gets to its end."""
     try:
-        try:
-            coarse = patient_run(scene, engine, settings, PATIENCE / 5.0)
-        except TookTooLongError:  # once more: it may have compiled on the way
-            coarse = patient_run(scene, engine, settings, PATIENCE / 5.0)
+        coarse, _ = bounded_run(scene, engine, settings, LIMIT / 5.0, audit=False)
         if coarse.status != "ok":
             return None
         # Beyond the time at which a perturbation matters, agreement is not to be had, nor of use.
@@ -118,7 +114,7 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
         enough, _ = _horizon(scene, other, engine, settings, coarse, tolerance)
     except TookTooLongError:
         return None
-    began = perf_counter()
+    left = LIMIT
     work = each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
     agrees, halvings, about = 0.0, 0, "it was halved no further"
     horizon: float | None = None
@@ -132,7 +128,8 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
             about = "dt cannot be halved further"
             break
         try:
-            fine = patient_run(scene, engine, finer, PATIENCE - (perf_counter() - began), audit=True)
+            fine, counted = bounded_run(scene, engine, finer, left)
+            left -= counted
             if fine.status != "ok":
                 about = f"the next halving {fine.status}: {fine.reason}"
                 break
@@ -149,7 +146,7 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
                     about = f"agrees with the halving before within {AGREE * tolerance:.2g} m"
                     break
         except TookTooLongError:
-            about = f"more halvings would take longer than {PATIENCE:g} s"
+            about = "more halvings would be too much work"
             break
     try:
         if horizon is None:
@@ -168,7 +165,7 @@ def _horizon(
     """
     if other is None:
         return scene.world.duration, False
-    again = patient_run(other, engine, settings, PATIENCE)
+    again, _ = bounded_run(other, engine, settings, LIMIT, audit=False)
     apart = errors(found, again, ~scene.bodies.fixed).position
     above = np.flatnonzero(apart > tolerance)
     jumps = bool(len(above)) and bool(apart[: above[0]].max(initial=0.0) < JUMP * tolerance)

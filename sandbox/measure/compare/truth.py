@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.bounded_run import TookTooLongError, bounded_run
 from sandbox.measure.closed_form import solution
 from sandbox.measure.compare.closed import as_run
 from sandbox.measure.compare.horizon import NUDGE, agree_until, perturb
-from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.measure.compare.refined import refined
 from sandbox.measure.compare.witness import confirmed
 from sandbox.measure.forecast.events import event_warnings
@@ -17,10 +17,10 @@ from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
-PATIENCE = 120.0
-"""s that `exact` may take; longer, and the refined truth is used."""
+LIMIT = 120.0
+"""Counted cost, s, that `exact` may have; beyond, the refined truth is used."""
 DOUBTFUL = 10.0
-"""s that it may take where the forecast is that it will give up: what has not come to rest by then may get there."""
+"""Counted cost, s, that it may have where the forecast is that it will give up: what has not come to rest by then may get there."""
 
 TruthKind = Literal["closed_form", "exact", "refined"]
 
@@ -76,9 +76,9 @@ def seek_truth(scene: Scene, settings: Settings, tolerance: float) -> Truth | st
     if exact is not None and not exact.missing(scene, bare(settings)):
         doubtful = next(event_warnings(scene, meetings(scene)), None) is not None
         try:
-            found = patient_run(scene, "exact", bare(settings), DOUBTFUL if doubtful else PATIENCE)
+            found, _ = bounded_run(scene, "exact", bare(settings), DOUBTFUL if doubtful else LIMIT, audit=False)
         except TookTooLongError as error:
-            note = f"; exact was {error}"
+            note = f"; exact was given up: {error}"
         else:
             if found.status == "ok":
                 until = _horizon(scene, "exact", bare(settings), found, tolerance)

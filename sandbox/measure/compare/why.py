@@ -9,8 +9,8 @@ from typing import Any, get_args
 from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.bounded_run import TookTooLongError, bounded_run
 from sandbox.measure.compare.errors import errors
-from sandbox.measure.compare.patience import TookTooLongError, patient_run
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
@@ -21,8 +21,8 @@ SUFFICES = 0.01
 """Where one change leaves no more of the error than this, no two are tried together."""
 PAIRED = 4
 """Choices that alone leave least, and are tried two at a time whatever they are."""
-PATIENCE = 30.0
-"""s that one rerun may take."""
+LIMIT = 30.0
+"""Counted cost, s, that one rerun may have."""
 ALIKE = 1.01
 """Changes whose remaining errors differ by no more than this factor do equally well."""
 ROUNDING = 1e-9
@@ -130,7 +130,7 @@ def turned(
         if missing:
             return Knob(knob, value, "refused", "; ".join(missing), None, None, changes)
         try:
-            again = patient_run(scene, engine, settings, PATIENCE)
+            again, _ = bounded_run(scene, engine, settings, LIMIT, audit=False)
         except TookTooLongError as error:
             return Knob(knob, value, "stopped", str(error), None, None, changes)
         after = errors(again, truth, ~scene.bodies.fixed).until(until).max_position

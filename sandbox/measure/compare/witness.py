@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.bounded_run import TookTooLongError, bounded_run
 from sandbox.measure.compare.drift import momentum_drift
 from sandbox.measure.compare.errors import Errors, errors
-from sandbox.measure.compare.patience import TookTooLongError, patient_run, working
 from sandbox.measure.compare.refined import Refined, half, preferences
 from sandbox.measure.energy import energies
 from sandbox.measure.recorder import frame_count
@@ -25,8 +25,8 @@ from sandbox.trajectory import FloatArray, Trajectory
 
 SHARE = 0.5
 """Of the work of the answer, what one witness may take, if three runs do not take more; all may take twice that."""
-PATIENCE = 20.0
-"""s that all witnesses may take."""
+LIMIT = 20.0
+"""Counted cost, s, that all witnesses together may have."""
 CLOSE = 10.0
 """Tolerances: a witness whose last halving changes more than that has not converged, and confirms nothing."""
 CONVERGES = 2.0
@@ -94,12 +94,12 @@ def confirmed(scene: Scene, found: Refined, settings: Settings, tolerance: float
     else:
         limit = ""
     best: Confirmation | None = None
-    end, work = working() + PATIENCE, 0
+    left, work = LIMIT, 0
     for name, wanted in _witnesses(scene, found, settings):
         if best is not None and work >= 2.0 * SHARE * found.work:
             break
-        testimony, took = _testimony(scene, name, wanted, found, tolerance, until, end)
-        work += took
+        testimony, took, counted = _testimony(scene, name, wanted, found, tolerance, until, left)
+        work, left = work + took, left - counted
         if testimony is None:
             continue
         by = _method(scene, name, wanted, found)
@@ -154,24 +154,26 @@ def _method(scene: Scene, name: str, wanted: Settings, found: Refined) -> str:
 
 
 def _testimony(
-    scene: Scene, engine: str, settings: Settings, found: Refined, tolerance: float, until: float, end: float
-) -> tuple[_Testimony | None, int]:
-    """Refine a witness until it agrees, contradicts, has worked enough, or its time ends; return also its work.
+    scene: Scene, engine: str, settings: Settings, found: Refined, tolerance: float, until: float, limit: float
+) -> tuple[_Testimony | None, int, float]:
+    """Refine a witness until it agrees, contradicts, or has worked enough; return also its work and its counted cost.
 
-    None where it does not get to its end.
+    The testimony is None where the witness does not get to its end.
     """
     moving = ~scene.bodies.fixed
     each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
-    allowed, work = max(SHARE * found.work, (2**RUNS - 1) * each), 0
+    allowed, work, cost = max(SHARE * found.work, (2**RUNS - 1) * each), 0, 0.0
     coarse: Trajectory | None = None
     changed: list[FloatArray] = []
     """by each halving, at each frame, m"""
     testimony: _Testimony | None = None
     while work + each <= allowed:
         try:
-            run = patient_run(scene, engine, settings, end - working(), audit=True)
+            run, counted = bounded_run(scene, engine, settings, limit - cost)
         except TookTooLongError:
+            cost = limit
             break
+        cost += counted
         if run.status != "ok":
             break
         away = errors(run, found.trajectory, moving)
@@ -187,13 +189,13 @@ def _testimony(
                 break
             changed.append(step)
         elif not (away.position[away.time <= until] > tolerance).any() and not len(run.missed_time):
-            return _Testimony(until, False, 0.0), work + each
+            return _Testimony(until, False, 0.0), work + each, cost
         coarse, work, each = run, work + each, 2 * each
         finer = half(settings)
         if finer is None:
             break
         settings = finer
-    return testimony, work
+    return testimony, work, cost
 
 
 def _heard(

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from sandbox.scene.cue import Stroke, miscues
+from sandbox.scene.streams import Stream, draws
 from sandbox.trajectory import BoolArray, FloatArray
 
 
@@ -32,7 +33,7 @@ class Spread:
 
         The first of many are those of few.
         """
-        units = np.random.default_rng(seed).standard_normal((count, 4))
+        units = draws(Stream.SHOTS, seed).standard_normal((count, 4))
         return np.asarray(units * [self.aim, self.speed, self.side, self.height])
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.closed import solved
-from sandbox.measure.compare.patience import TookTooLongError, working
-from sandbox.measure.tradeoff.cost import bounded_run, seconds_of, warm_up
+from sandbox.measure.bounded_run import TookTooLongError, bounded_run, working
+from sandbox.measure.tradeoff.cost import seconds_of, warm_up
 from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS

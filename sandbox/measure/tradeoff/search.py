@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import cycle
 
-from sandbox.measure.compare.patience import working
+from sandbox.measure.bounded_run import working
 from sandbox.measure.told import Told
 from sandbox.measure.tradeoff.front import outdone
 from sandbox.measure.tradeoff.judge import Judge

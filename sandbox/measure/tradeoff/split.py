@@ -14,9 +14,8 @@ from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.errors import errors
-from sandbox.measure.compare.patience import TookTooLongError
+from sandbox.measure.bounded_run import TookTooLongError, bounded_run
 from sandbox.measure.finite import finite
-from sandbox.measure.tradeoff.cost import bounded_run
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory

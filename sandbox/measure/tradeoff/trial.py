@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.compare.patience import TookTooLongError
+from sandbox.measure.bounded_run import TookTooLongError, bounded_run, counted_cost
 from sandbox.measure.recorder import TooLargeError
-from sandbox.measure.tradeoff.cost import bounded_run, counted_cost
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS, measured
 from sandbox.measure.tradeoff.variant import Space, Variant

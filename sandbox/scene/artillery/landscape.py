@@ -10,9 +10,7 @@ import numpy as np
 
 from sandbox.scene.artillery.columns import settled
 from sandbox.scene.artillery.described import Terrain
-
-STREAM = 11
-"""of the scene's seed; generators, racks and stacks have others"""
+from sandbox.scene.streams import Stream, draws
 
 
 def heights_of(terrain: Terrain, seed: int) -> tuple[float, ...]:
@@ -27,7 +25,7 @@ def heights_of(terrain: Terrain, seed: int) -> tuple[float, ...]:
 
 def displaced(count: int, shrink: float, seed: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Return `count` ≥ 2 points of a random line; each halving displaces by `shrink` times the halving before."""
-    random = np.random.Generator(np.random.PCG64([seed, STREAM]))
+    random = draws(Stream.LANDSCAPE, seed)
     line, spread = random.standard_normal(3), 1.0
     while len(line) < count:
         spread *= shrink

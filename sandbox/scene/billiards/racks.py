@@ -12,12 +12,10 @@ import numpy as np
 
 from sandbox.scene.billiards.described import RackName
 from sandbox.scene.part import Point, Vector
+from sandbox.scene.streams import Stream, draws
 
 HAIR = 1e-10
 """m, between balls that are frozen: less than touching allows, more than rounding takes away"""
-
-STREAM = 3
-"""of the scene's seed; grids, scatters and emitters have those before it"""
 
 NEEDED: dict[RackName, tuple[str, ...]] = {
     "8-ball": ("head", "foot"),
@@ -48,7 +46,7 @@ def racked(rack: RackName, spots: dict[str, Point], radius: float, gap: float, s
         gap: the most that neighbours are apart, m.
         seed: the scene's.
     """
-    random = np.random.Generator(np.random.PCG64([seed, STREAM]))
+    random = draws(Stream.RACK, seed)
     match rack:
         case "8-ball":
             return {"cue": spots["head"], **_pyramid(_eight_ball(random), spots, radius, gap, random)}

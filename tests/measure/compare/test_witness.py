@@ -126,16 +126,16 @@ def test_another_method_of_the_same_engine_is_a_witness(monkeypatch: pytest.Monk
 def test_a_witness_takes_half_the_work_of_the_answer_or_three_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     steps: dict[str, int] = {}
     for module in (refined, witness):
-        honest = module.patient_run
+        honest = module.bounded_run
 
         def counted(
-            scene: Scene, engine: str, settings: Settings, seconds: float,
+            scene: Scene, engine: str, settings: Settings, limit: float,
             *, name: str = module.__name__, honest: Any = honest, **options: Any,
         ) -> Any:  # fmt: skip
             steps[name] = steps.get(name, 0) + round(scene.world.duration / settings.h)
-            return honest(scene, engine, settings, seconds, **options)
+            return honest(scene, engine, settings, limit, **options)
 
-        monkeypatch.setattr(module, "patient_run", counted)
+        monkeypatch.setattr(module, "bounded_run", counted)
     install(monkeypatch, pymunk=PymunkEngine(), another=Another(restitution=0.9))
     assert truth_of(loads(DROP), loads(DROP).solver, TOLERANCE) is not None
     assert 0 < steps[witness.__name__] <= max(0.5 * steps[refined.__name__], (1 + 2 + 4) * 100)

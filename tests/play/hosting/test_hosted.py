@@ -235,13 +235,12 @@ def test_panel_is_drawn_and_tells_the_end(window: Window) -> None:
 
 
 def lies_clear(window: Window) -> bool:
-    """Tell whether the whole scene is seen between what the score panel covers at the top and at the bottom."""
+    """Tell whether the whole scene is seen beside the score panel and the state of things."""
     assert window.stage.show is not None
-    head, foot = window.desk.covered(window.stage)
-    rows = window.camera.to_screen(np.asarray(framing(window.stage.show.scene)))[:, 1]
-    return (
-        head + foot > 0 and rows.min() >= head and rows.max() <= window.surface.get_height() - window.desk.foot - foot
-    )
+    corners = window.camera.to_screen(np.asarray(framing(window.stage.show.scene)))
+    (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    field = pygame.Rect(round(left), round(top), int(right - left), int(bottom - top))
+    return window.desk.free.contains(field) and field.collidelist(window.desk.taken(window.stage)) < 0
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (1000, 300), (640, 480)])  # the last has the score at the bottom

@@ -3,8 +3,6 @@
 import math
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from sandbox.engines.exact.rolling.table import Table
 from sandbox.games.billiards.bot.aims import all_around, breaks, pots_of
 from sandbox.games.billiards.bot.trial import Trial, ease, straight
@@ -15,6 +13,7 @@ from sandbox.games.billiards.rules.call import Call, Decision
 from sandbox.games.billiards.rules.happening import GameError
 from sandbox.scene.cue import Stroke
 from sandbox.scene.part import Point
+from sandbox.scene.streams import Stream, draws
 
 WORST, BEST = 0.03, 0.0003
 """rad: the error of the aim, one standard deviation, at skill 0 and 1; in between by its logarithm"""
@@ -95,7 +94,7 @@ class Bot:
 
     def erred(self, stroke: Stroke, number: int) -> Stroke:
         """Return a stroke as it is really played, the number-th of a frame."""
-        random = np.random.Generator(np.random.PCG64([self.seed, number]))
+        random = draws(Stream.STROKE, self.seed, number)
         aside, faster = random.standard_normal(2).tolist()
         return _off(stroke, aside * self.sigma, faster * self.off)
 
@@ -121,7 +120,7 @@ class Bot:
 
     def _steadiest(self, trial: Trial, ranked: list[tuple[float, Stroke, Call]]) -> tuple[Stroke, Call]:
         """Return the stroke that is worth most on average, with errors as this player makes them."""
-        random = np.random.Generator(np.random.PCG64([self.seed, trial.match.shots, 1]))
+        random = draws(Stream.TRIAL, self.seed, trial.match.shots)
         errors = random.standard_normal((ERRORS, 2)) * (self.sigma, self.off)
         best, top = ranked[0], -math.inf
         for good, stroke, call in ranked:
