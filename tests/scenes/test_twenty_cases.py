@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from sandbox.measure.compare.comparing import usual_tolerance
+from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.compare.truth import Truth, TruthKind, truth_of
 from sandbox.measure.energy import energies
 from sandbox.scene.faults import SceneError

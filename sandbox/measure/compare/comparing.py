@@ -11,7 +11,7 @@ from sandbox.engines.registry import ENGINES, engine_named
 from sandbox.measure.compare.alignment import aligned
 from sandbox.measure.compare.comparison import Comparison, Row
 from sandbox.measure.compare.drift import energy_drift, momentum_drift
-from sandbox.measure.compare.errors import Score, errors
+from sandbox.measure.compare.errors import Score, errors, usual_tolerance
 from sandbox.measure.compare.truth import Truth, seek_truth
 from sandbox.measure.compare.why import turned, verdict
 from sandbox.measure.recorder import require_memory
@@ -21,8 +21,6 @@ from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
-TOLERANCE = 0.01
-"""The share of the smallest radius, or half width, of what moves that is the tolerance where none is given."""
 WORTH_REPEATING = 5.0
 """s: a run no longer than this is timed a second time, as the first may have read compiled code from disk."""
 NEGLIGIBLE = 1e-6
@@ -88,13 +86,6 @@ def compare(
         if len(found.time):
             runs[name] = found
     return Comparison(scene, truth, tolerance, tuple(rows), runs, doubt)
-
-
-def usual_tolerance(scene: Scene) -> float:
-    """Return 1 % of the smallest radius, or half width, of the bodies that move, m; where none does, 1 mm."""
-    bodies = scene.bodies
-    thin = bodies.thin[~bodies.fixed]
-    return TOLERANCE * float(thin.min()) if len(thin) else 1e-3
 
 
 def timed(scene: Scene, engine: str, settings: Settings) -> Trajectory:

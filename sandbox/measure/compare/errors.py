@@ -6,10 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.measure.compare.runs import common_frames, there
+from sandbox.scene.model import Scene
 from sandbox.trajectory import BoolArray, FloatArray, Trajectory
 
 CHUNK = 2_000_000
 """Frames × bodies worked on at once."""
+TOLERANCE = 0.01
+"""The share of the smallest radius, or half width, of what moves that is the tolerance where none is given."""
 
 
 class Score(NamedTuple):
@@ -98,3 +101,10 @@ def errors(run: Trajectory, truth: Trajectory, moving: BoolArray) -> Errors:
                 away = np.where(both, np.where(np.isnan(away), np.inf, away), 0.0)
                 largest[k, rows], squares[k, rows] = away.max(axis=1), np.square(away).sum(axis=1)
     return Errors(run.time[mine], largest[0], largest[1], squares, count)
+
+
+def usual_tolerance(scene: Scene) -> float:
+    """Return 1 % of the smallest radius, or half width, of the bodies that move, m; where none does, 1 mm."""
+    bodies = scene.bodies
+    thin = bodies.thin[~bodies.fixed]
+    return TOLERANCE * float(thin.min()) if len(thin) else 1e-3

@@ -14,7 +14,7 @@ import numpy as np
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.bounded_run import TookTooLongError, bounded_run
 from sandbox.measure.compare.drift import momentum_drift
-from sandbox.measure.compare.errors import Errors, errors
+from sandbox.measure.compare.errors import Errors, errors, usual_tolerance
 from sandbox.measure.compare.refined import Refined, half, preferences
 from sandbox.measure.energy import energies
 from sandbox.measure.recorder import frame_count
@@ -25,10 +25,13 @@ from sandbox.trajectory import FloatArray, Trajectory
 
 SHARE = 0.5
 """Of the work of the answer, what one witness may take, if three runs do not take more; all may take twice that."""
+LEAST = 50_000
+"""Bodies × steps that one witness may always take: some tenths of a second."""
 LIMIT = 20.0
 """Counted cost, s, that all witnesses together may have."""
 CLOSE = 10.0
-"""Tolerances: a witness whose last halving changes more than that has not converged, and confirms nothing."""
+"""Tolerances: a witness whose last halving changes more than that, and more than the usual tolerance, has not
+converged, and confirms nothing."""
 CONVERGES = 2.0
 """The error left by a method of the first order is what its last halving has changed; twice that is allowed."""
 CONTRADICTS = 4.0
@@ -49,7 +52,7 @@ METHODS: tuple[dict[str, object], ...] = (
 CHOICES = ("integrator", "detection", "joints", "half_kick")
 """Settings by which two methods of one engine differ."""
 SOURCES = frozenset({Demand.THRUST, Demand.MOTORS, Demand.DRIVES, Demand.KICKS, Demand.ZONES})
-"""What may bring energy into a scene."""
+"""What may bring energy into a scene, beside wind and the bodies that are launched."""
 
 
 class Confirmation(NamedTuple):
@@ -96,7 +99,7 @@ def confirmed(scene: Scene, found: Refined, settings: Settings, tolerance: float
     best: Confirmation | None = None
     left, work = LIMIT, 0
     for name, wanted in _witnesses(scene, found, settings):
-        if best is not None and work >= 2.0 * SHARE * found.work:
+        if best is not None and work >= 2.0 * max(SHARE * found.work, LEAST):
             break
         testimony, took, counted = _testimony(scene, name, wanted, found, tolerance, until, left)
         work, left = work + took, left - counted
@@ -160,9 +163,9 @@ def _testimony(
 
     The testimony is None where the witness does not get to its end.
     """
-    moving = ~scene.bodies.fixed
+    moving, converged = ~scene.bodies.fixed, max(CLOSE * tolerance, usual_tolerance(scene))
     each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
-    allowed, work, cost = max(SHARE * found.work, (2**RUNS - 1) * each), 0, 0.0
+    allowed, work, cost = max(SHARE * found.work, (2**RUNS - 1) * each, LEAST), 0, 0.0
     coarse: Trajectory | None = None
     changed: list[FloatArray] = []
     """by each halving, at each frame, m"""
@@ -182,7 +185,7 @@ def _testimony(
             before = 0.5 * changed[-1] if changed else step
             fastest = float(np.hypot(*np.moveaxis(run.velocity[run.time <= until], 2, 0)).max(initial=0.0))
             slack = tolerance + CONTRADICTS * np.maximum(step, before) + IMPACT * fastest * settings.h
-            testimony = _heard(run, away, step, slack, tolerance, until)
+            testimony = _heard(run, away, step, slack, tolerance, converged, until)
             contradicts = testimony.contradicts and len(changed) + 2 >= RUNS
             testimony = testimony._replace(contradicts=contradicts)
             if testimony.until >= until or contradicts:
@@ -199,7 +202,13 @@ def _testimony(
 
 
 def _heard(
-    run: Trajectory, away: Errors, step: FloatArray, slack: FloatArray, tolerance: float, until: float
+    run: Trajectory,
+    away: Errors,
+    step: FloatArray,
+    slack: FloatArray,
+    tolerance: float,
+    converged: float,
+    until: float,
 ) -> _Testimony:
     """Return what a witness says.
 
@@ -209,11 +218,12 @@ def _heard(
         step: (K,) what its last halving has changed, m.
         slack: (K,) m, by how much it may be away before it is sure to converge to something else.
         tolerance: of positions, m.
+        converged: m, up to which its last halving may change it.
         until: s, beyond which it is not heard.
     """
     end = min(until, float(np.min(run.missed_time, initial=np.inf)))
     apart, heard = away.position, away.time <= end
-    agrees = (apart <= tolerance) | ((apart <= CONVERGES * step) & (step <= CLOSE * tolerance))
+    agrees = (apart <= tolerance) | ((apart <= CONVERGES * step) & (step <= converged))
     against = np.flatnonzero(~agrees & heard)
     if not len(against):
         return _Testimony(end, False, 0.0)
@@ -234,7 +244,9 @@ def _lawful_until(scene: Scene, run: Trajectory, tolerance: float) -> tuple[floa
     drift = momentum_drift(run, scene)
     if drift is not None and abs(drift) > GROWTH:
         return 0.0, f"the momentum in {run.info['engine']} changes by {abs(drift):.1%} without a cause"
-    if demands(scene) & SOURCES or (scene.bodies.born > scene.began).any():
+    needed = demands(scene)
+    windy = Demand.DRAG in needed and any(scene.world.wind)
+    if windy or needed & SOURCES or (scene.bodies.born > scene.began).any():
         return end, ""
     energy = energies(run, scene)
     kept = run.time < np.nanmin(run.retired_time, initial=np.inf)  # what is retired takes its energy along

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.measure.compare.comparing import usual_tolerance
+from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.joint_error import HOLDING
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS, Metric

@@ -12,7 +12,7 @@ from typing import Any
 
 from sandbox.engines.registry import ENGINES, engine_named
 from sandbox.measure.bounded_run import working
-from sandbox.measure.compare.comparing import usual_tolerance
+from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.compare.truth import Truth, seek_truth
 from sandbox.measure.recorder import require_memory
 from sandbox.measure.seeds import is_random, seeded

@@ -16,7 +16,7 @@ from sandbox.engines.compiling import COMPILING
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.relay import Relay
-from sandbox.measure.compare.comparing import usual_tolerance
+from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.compare.horizon import perturb
 from sandbox.scene.settings import COMMON
 from sandbox.trajectory import Frame

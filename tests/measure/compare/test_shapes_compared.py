@@ -8,8 +8,9 @@ import pytest
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.closed_form import closed_form
 from sandbox.measure.compare.closed import solved
-from sandbox.measure.compare.comparing import compare, usual_tolerance
+from sandbox.measure.compare.comparing import compare
 from sandbox.measure.compare.drift import energy_drift, momentum_drift
+from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.compare.gaps import gap
 from sandbox.measure.compare.horizon import NUDGE, perturb
 from sandbox.measure.compare.refined import refined

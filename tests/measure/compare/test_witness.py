@@ -10,7 +10,7 @@ from sandbox.engines.contract import Simulation
 from sandbox.engines.native.engine import PymunkEngine
 from sandbox.measure.compare import compare, refined, witness
 from sandbox.measure.compare.truth import seek_truth, truth_of
-from sandbox.scene.file import loads
+from sandbox.scene.file import from_document, loads
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -124,6 +124,7 @@ def test_another_method_of_the_same_engine_is_a_witness(monkeypatch: pytest.Monk
 
 
 def test_a_witness_takes_half_the_work_of_the_answer_or_three_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(witness, "LEAST", 0)
     steps: dict[str, int] = {}
     for module in (refined, witness):
         honest = module.bounded_run
@@ -139,3 +140,32 @@ def test_a_witness_takes_half_the_work_of_the_answer_or_three_runs(monkeypatch: 
     install(monkeypatch, pymunk=PymunkEngine(), another=Another(restitution=0.9))
     assert truth_of(loads(DROP), loads(DROP).solver, TOLERANCE) is not None
     assert 0 < steps[witness.__name__] <= max(0.5 * steps[refined.__name__], (1 + 2 + 4) * 100)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
+def test_a_method_of_the_first_order_confirms_what_it_converges_to(tolerance: float) -> None:
+    scene = from_document(
+        {
+            "world": {"gravity": [0.0, -9.81], "duration": 1.5, "linear_drag": 1e-4},
+            "solver": {"dt": 0.01},
+            "plane": [{"point": [0.0, 0.0], "normal": [0.0, 1.0], "restitution": 0.8}],
+            "ball": [{"name": "a", "position": [0.0, 5.5], "radius": 0.5}],
+        }
+    )
+    truth = truth_of(scene, scene.solver, tolerance)
+    assert truth is not None
+    assert truth.witness is not None
+    assert truth.trusted_until == 1.5
+
+
+def test_energy_that_wind_brings_has_a_source() -> None:
+    scene = from_document(
+        {
+            "world": {"duration": 1.0, "linear_drag": 1.0, "quadratic_drag": 0.1, "wind": [4.0, 0.0]},
+            "solver": {"dt": 0.01},
+            "ball": [{"name": "a", "position": [0.0, 0.0], "radius": 0.5}],
+        }
+    )
+    truth = truth_of(scene, scene.solver, 1e-3)
+    assert truth is not None
+    assert (truth.kind, truth.trusted_until) == ("refined", 1.0)

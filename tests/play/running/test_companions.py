@@ -7,7 +7,7 @@ import pytest
 
 from sandbox.action import ActionError, Force, Impulse, Pull, Remove, Spawn, Switch
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.compare.comparing import usual_tolerance
+from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.compare.truth import truth_of
 from sandbox.play.running import companions
 from sandbox.play.running.companions import Companion, Trust, apart, follows, ghost_of
