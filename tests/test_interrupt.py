@@ -140,6 +140,6 @@ def test_interrupt_while_a_space_is_freed_is_not_lost(monkeypatch: pytest.Monkey
 
 def test_command_interrupted_within_numpy_tells_so(capfd: pytest.CaptureFixture[str]) -> None:
     with falling_into("_promote_fields") as fell:
-        status = call(["run", "bounce", "--seeds", "3", "--quiet"])
+        status = call(["run", "bounce", "--quiet"])
     assert fell
-    assert (status, capfd.readouterr().err) == (130, "interrupted: 0 of 3 runs are finished and kept\n")
+    assert (status, capfd.readouterr().err) == (130, "interrupted: 0 of 1 runs are finished and kept\n")

@@ -183,7 +183,7 @@ def test_table_is_whole_or_not_there(suffix: str, tmp_path: Path, monkeypatch: p
 
 def test_parquet_without_its_extra_names_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tables, "can_write_parquet", lambda: False)
-    with pytest.raises(MissingExtraError, match=r'pip install "sandbox2d\[parquet\]"'):
+    with pytest.raises(MissingExtraError, match=r'pip install -e "\.\[parquet\]"'):
         write_states(made(), tmp_path / "states.parquet")
     with pytest.raises(ValueError, match=r"ends in \.csv or \.parquet, not '\.txt'"):
         write_states(made(), tmp_path / "states.txt")

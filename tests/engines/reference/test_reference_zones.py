@@ -86,7 +86,9 @@ def test_every_choice_knows_layers_and_gates(how: str, kind: str) -> None:
     out = run.time < 1.95  # through all this nothing has touched it
     assert (run.velocity[out, 0] == [1.0, 0.0]).all()
     # Back and forth between 2.05 and 2.45 m, elastic; a spring lets go within a step, and each time acts to its end.
-    assert np.abs(run.velocity[-1, 0]) == pytest.approx([1.0, 0.0], abs=0.05 if "penalty" in how else 1e-12)
+    assert np.abs(run.velocity[-1, 0]) == pytest.approx(
+        [1.0, 0.0], abs=0.05 if "penalty" in how else 1e-11
+    )  # 1e-12 an impact
     assert 2.05 - 0.01 < run.position[-1, 0, 0] < 2.45 + 0.01
     residual = run.energy - run.energy[0] - run.account.sum(axis=1)
     assert np.abs(residual).max() < 1e-12  # J, rounding; it has 0.5 J
@@ -108,7 +110,9 @@ def test_every_choice_holds_and_lets_go(how: str) -> None:
     frame = relay.frame()
     assert frame.visits is not None and frame.visits[0].tolist() == [HELD, 0]
     assert frame.position[0].tolist() == [0.5, 0.0]
-    assert frame.velocity[1] == pytest.approx([0.0, 1.0], abs=0.05 if "penalty" in how else 1e-12)  # as above
+    assert frame.velocity[1] == pytest.approx(
+        [0.0, 1.0], abs=0.05 if "penalty" in how else 1e-11
+    )  # 1e-12 an impact  # as above
     relay.apply(Impulse(time=0.0, body="it", impulse=(-1.0, 0.0)))
     advance(relay, 2.2)
     assert relay.frame().velocity[0, 0] < -1.0 + 2.0 * 0.2 + 0.01

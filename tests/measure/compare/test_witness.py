@@ -58,7 +58,7 @@ class Another:
 def install(monkeypatch: pytest.MonkeyPatch, **engines: Any) -> None:
     """Leave only these engines in the registry, and no formula."""
     monkeypatch.setattr("sandbox.measure.compare.truth.solution", lambda _: None)
-    for name in list(registry.ENGINES):
+    for name in [*reversed(registry.ENGINES)]:  # put back in the opposite order: that of the registry
         monkeypatch.delitem(registry.ENGINES, name)
     for name, engine in engines.items():
         monkeypatch.setitem(registry.ENGINES, name, engine)

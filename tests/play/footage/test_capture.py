@@ -245,7 +245,7 @@ def test_mp4_of_odd_size_loses_a_row_and_a_column(tmp_path: Path) -> None:
 def test_mp4_without_its_extra_names_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setattr(capture, "can_make_mp4", lambda: False)
-    with pytest.raises(CaptureError, match=r'pip install "sandbox2d\[video\]"'):
+    with pytest.raises(CaptureError, match=r'pip install -e "\.\[video\]"'):
         recorder_for(tmp_path / "film.mp4", SIZE, 30.0)
     assert left_in(tmp_path) == []
 
