@@ -21,11 +21,12 @@ GAMES = ["8-ball", "9-ball", "snooker", "three-cushion", "straight-rail"]
 def sound(turn: Turn, now: Match) -> None:
     """Check what holds after every turn: what is on the table lies there and apart, what is down in a pocket."""
     here = now.on_table
-    for name, (x, y, _) in here.items():
+    for name, (x, y, r) in here.items():
         assert now.layout.pocket_at((x, y)) is None, name
         (x0, y0), (x1, y1) = now.layout.area
-        assert x0 < x < x1
-        assert y0 < y < y1
+        # Between the jaws of a pocket a ball may come to rest beyond the noses of the cushions, but not behind them.
+        jaws = any((x - u) ** 2 + (y - v) ** 2 < (s + r) ** 2 for u, v, s in now.layout.pockets.values())
+        assert jaws or (x0 < x < x1 and y0 < y < y1), (name, x, y)
     for name in set(now.layout.names) - set(here):
         assert now.layout.pocket_at(now.position[now.layout.number[name]]) is not None, name
     discs = list(here.values())
