@@ -42,7 +42,7 @@ from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 from sandbox.trajectory import Trajectory
 
-EFFORT = 30.0
+EFFORT = 10.0
 """Counted work that the search may do where nothing else is asked for, about seconds; truth and timing come on top."""
 REPEATS = 5
 POINTS = 120
