@@ -44,8 +44,8 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True)
     type=POSITIVE,
     default=EFFORT,
     metavar="N",
-    help="counted work of the search: the same settings are tried on every machine; the whole command takes some 5 s for "
-    f"each 1 of it; by default {EFFORT:g}",
+    help="counted work of the search: the same settings are tried on every machine; the whole command takes some 5 s "
+    f"for each 1 of it; by default {EFFORT:g}",
 )
 @click.option(
     "--time-limit",

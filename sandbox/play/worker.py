@@ -6,9 +6,10 @@ it draw a progress note and take events in; it touches nothing of what is being 
 
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from queue import SimpleQueue
 from time import perf_counter
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from sandbox.engines.compiling import COMPILING
 
@@ -38,16 +39,14 @@ class Worker:
 
         Args:
             on_wait: called on the owner's thread when a job compiles or takes long. It has to call its argument, which
-                waits for some seconds and tells whether the job is done, until that is so.
+                waits for some seconds and returns whether the job is done, until that is so.
         """
         self._on_wait = on_wait
-        self._jobs: SimpleQueue[Callable[[], object] | None] = SimpleQueue()
+        self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._stirred, self._done = threading.Event(), threading.Event()
-        self._result: Any = None
-        self._error: BaseException | None = None
         self.kernels = 0
         """kernels that the present job has begun to compile"""
-        # A daemon: who interrupts twice does not wait for it.
+        # A daemon: a second Ctrl+C ends the process without waiting for it.
         self._thread = threading.Thread(target=self._work, name="sandbox worker", daemon=True)
         self._thread.start()
 
@@ -58,15 +57,19 @@ class Worker:
         self._stirred.clear()
         self._done.clear()
         self.kernels = 0
-        self._jobs.put(job)
+        found: Future[T] = Future()
+
+        def run() -> None:
+            try:
+                found.set_result(job())
+            except BaseException as error:  # noqa: BLE001, raised again where the owner waits
+                found.set_exception(error)
+
+        self._jobs.put(run)
         self._stirred.wait(LONG)
         if not self._done.is_set():
             self._on_wait(self._done.wait)
-        self._done.wait()
-        result, error, self._result, self._error = self._result, self._error, None, None
-        if error is not None:
-            raise error
-        return result  # type: ignore[no-any-return]  # of this job
+        return found.result()
 
     def note_compiling(self, _: str) -> None:
         """Take note that a kernel is about to be compiled; `COMPILING.on_begin`."""
@@ -76,10 +79,7 @@ class Worker:
 
     def _work(self) -> None:
         while (job := self._jobs.get()) is not None:
-            try:
-                self._result = job()
-            except BaseException as error:  # noqa: BLE001  # raised again where the owner waits
-                self._error = error
+            job()
             self._done.set()
             self._stirred.set()
 
@@ -89,7 +89,7 @@ class Worker:
 
 
 class Wait:
-    """How long the window has waited for a job, in words."""
+    """How long the window has waited for a job."""
 
     def __init__(self, worker: Worker) -> None:
         self._worker, self._began, self._compiled = worker, perf_counter(), COMPILING.seconds

@@ -14,6 +14,7 @@ give none. All the p(s) lie within the friction cones, which are convex, and lea
 import numpy as np
 
 from sandbox.engines.kernel import kernel
+from sandbox.engines.reference.impulses import work_at
 from sandbox.engines.reference.manifolds import Manifolds
 from sandbox.trajectory import BoolArray, FloatArray, IntArray
 
@@ -76,16 +77,6 @@ def sum_work(
 ) -> None:
     """Add the work of each contact's impulse to that of its group, as `impulses.contact_work` does for all."""
     for k in range(len(now.key)):
-        i, j = now.first[k], now.second[k]
-        nx, ny = now.normal[k, 0], now.normal[k, 1]
-        vx, vy = -velocity[i, 0], -velocity[i, 1]
-        rub, turn = -spin[i] * now.arm[k, 0], spin[i] * now.offset[k, 0]
-        if j >= 0:
-            vx += velocity[j, 0]
-            vy += velocity[j, 1]
-            rub -= spin[j] * now.arm[k, 1]
-            turn -= spin[j] * now.offset[k, 1]
-        along = impulse[k, 0] * (vx * nx + vy * ny + turn)
-        across = impulse[k, 1] * (vy * nx - vx * ny + rub)
+        along, across = work_at(now, k, impulse, velocity, spin)
         out[group[k]] += along + across
         turnover[group[k]] += abs(along) + abs(across)

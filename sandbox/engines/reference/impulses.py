@@ -143,6 +143,23 @@ def _push(
 
 
 @kernel
+def work_at(now: Manifolds, k: int, impulse: FloatArray, velocity: FloatArray, spin: FloatArray) -> tuple[float, float]:
+    """Return the work of the impulses of one contact, J, along its normal and across it; see `contact_work`."""
+    i, j = now.first[k], now.second[k]
+    nx, ny = now.normal[k, 0], now.normal[k, 1]
+    vx, vy = -velocity[i, 0], -velocity[i, 1]
+    rub, turn = -spin[i] * now.arm[k, 0], spin[i] * now.offset[k, 0]
+    if j >= 0:
+        vx += velocity[j, 0]
+        vy += velocity[j, 1]
+        rub -= spin[j] * now.arm[k, 1]
+        turn -= spin[j] * now.offset[k, 1]
+    along = impulse[k, 0] * (vx * nx + vy * ny + turn)
+    across = impulse[k, 1] * (vy * nx - vx * ny + rub)
+    return along, across
+
+
+@kernel
 def contact_work(now: Manifolds, impulse: FloatArray, velocity: FloatArray, spin: FloatArray) -> tuple[float, float]:
     """Return the work of impulses (K, 2), J, along the normals and across them.
 
@@ -154,17 +171,9 @@ def contact_work(now: Manifolds, impulse: FloatArray, velocity: FloatArray, spin
     """
     along, across = 0.0, 0.0
     for k in range(len(now.key)):
-        i, j = now.first[k], now.second[k]
-        nx, ny = now.normal[k, 0], now.normal[k, 1]
-        vx, vy = -velocity[i, 0], -velocity[i, 1]
-        rub, turn = -spin[i] * now.arm[k, 0], spin[i] * now.offset[k, 0]
-        if j >= 0:
-            vx += velocity[j, 0]
-            vy += velocity[j, 1]
-            rub -= spin[j] * now.arm[k, 1]
-            turn -= spin[j] * now.offset[k, 1]
-        along += impulse[k, 0] * (vx * nx + vy * ny + turn)
-        across += impulse[k, 1] * (vy * nx - vx * ny + rub)
+        work = work_at(now, k, impulse, velocity, spin)
+        along += work[0]
+        across += work[1]
     return along, across
 
 
