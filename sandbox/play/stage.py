@@ -190,8 +190,7 @@ class Stage:
             except SceneError as error:
                 self.messages.tell(str(error), "error")
                 return
-            made, before = self.count_unsaved(restart=True), self.live
-            lost = before.session.recording() if made and before is not None and before.busy is None else None
+            lost = self._recorded() if self.count_unsaved(restart=True) else self._lost
             self._start(scene, self.path, self.file, self.show.engine, self.show.session.wanted, same=True)
             self._lost = lost
 
@@ -217,9 +216,20 @@ class Stage:
         if lost is None or live is None or self.file is None:
             self.messages.tell("there is nothing to bring back", "warning")
             return
-        known = lost
+        known, present = lost, self._recorded() if self.count_unsaved() else None
         self.put_on(self.compute(lambda: played_again(known)), self.path, self.file, same=True)
-        self.messages.tell("the session is back as it was")
+        self._lost = present
+        again = "" if present is None else "; Ctrl+Z again exchanges the two"
+        self.messages.tell(f"the session is back as it was{again}")
+
+    def _recorded(self) -> Recording | None:
+        """Return the session as it is, whole; one that is being replayed is first played to where it is wanted."""
+        live = self.live
+        if live is None:
+            return None
+        if live.busy is not None:
+            self.compute(live.arrive)
+        return live.session.recording()
 
     def reload(self) -> None:
         """Read the scene's file again, and start it at 0."""

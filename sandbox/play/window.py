@@ -22,7 +22,7 @@ from sandbox.play.mouse import Mouse
 from sandbox.play.screen import close_screen, open_screen, unit
 from sandbox.play.seat import TITLE, Seat
 from sandbox.play.stage import Stage
-from sandbox.play.worker import Wait, Worker
+from sandbox.play.worker import Wait, Worker, compute_here
 
 RATE = 60
 """pictures a second, at most"""
@@ -53,7 +53,7 @@ PRESSES = frozenset(
         pygame.JOYHATMOTION,
     }
 )
-"""What hands do while they wait for the scene; it is not meant for what comes then."""
+"""Input events that are discarded after a compile."""
 
 
 class Window(Seat):
@@ -134,6 +134,7 @@ class Window(Seat):
         What compiles takes seconds: keys and buttons that were pressed meanwhile are dropped. Other events come later.
         """
         wait, later = Wait(self._worker), []
+        asks = not self.stage.saves_at_end and self.stage.count_unsaved() > 0
         behind = self.preview() or self.surface.copy()
         while not done(1.0 / WAIT_RATE):
             surface = pygame.display.get_surface() or self.surface
@@ -142,14 +143,14 @@ class Window(Seat):
             pygame.display.flip()
             for event in pygame.event.get():
                 escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
-                asks = not self.stage.saves_at_end and self.stage.count_unsaved() > 0
                 if (escape or event.type == pygame.QUIT) and not asks:
                     self.leaving = 0
                 later.append(event)
             if self.leaving is not None:
                 pygame.display.iconify()
         for event in later:
-            if not (wait.compiled and event.type in PRESSES):
+            escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
+            if escape or not (wait.compiled and event.type in PRESSES):
                 pygame.event.post(event)
         if wait.compiled:
             self._clock.tick()
@@ -161,7 +162,7 @@ class Window(Seat):
             return
         self.desk.draw_wait(self.surface, what)
         pygame.display.flip()
-        pygame.event.pump()  # so that the desktop does not think that nobody is there
+        pygame.event.pump()  # keeps the window manager from marking the window as unresponsive
 
     def take(self, event: pygame.event.Event) -> None:
         """Take one event in."""
@@ -235,7 +236,7 @@ class Window(Seat):
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
-        """Close cleanly on Ctrl+C and SIGTERM; told a second time, do not wait for what is being computed."""
+        """Close cleanly on Ctrl+C and SIGTERM; at a second signal raise KeyboardInterrupt at once."""
 
         def leave(number: int, _: FrameType | None) -> None:
             if self.leaving is not None:
@@ -254,6 +255,8 @@ class Window(Seat):
         COMPILING.on_begin = None
         self.taking.end_film()
         self.desk.close()
-        self.stage.close()
+        self.stage.compute = compute_here
+        if not self._worker.is_busy:  # else the engine is in use, and the process ends anyway
+            self.stage.close()
         self._worker.close()
         close_screen()

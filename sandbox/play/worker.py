@@ -44,6 +44,7 @@ class Worker:
         self._on_wait = on_wait
         self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._stirred, self._done = threading.Event(), threading.Event()
+        self._done.set()
         self.kernels = 0
         """kernels that the present job has begun to compile"""
         # A daemon: a second Ctrl+C ends the process without waiting for it.
@@ -70,6 +71,11 @@ class Worker:
         if not self._done.is_set():
             self._on_wait(self._done.wait)
         return found.result()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a job is under way, as after its owner was interrupted while waiting."""
+        return not self._done.is_set()
 
     def note_compiling(self, _: str) -> None:
         """Take note that a kernel is about to be compiled; `COMPILING.on_begin`."""

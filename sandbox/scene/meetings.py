@@ -37,12 +37,17 @@ class Meetings:
     """Some two bodies can meet."""
     ball_ball: bool
     """Some two balls can meet."""
-    solids: bool
-    """Some body that is no ball can meet something."""
+    solid: BoolArray
+    """(S,) surfaces of pieces that are no balls and can meet something"""
     ball_fixed: dict[type[Plane] | type[Wall] | type[Post], bool]
     """Whether some ball can meet a plane, a wall, a post."""
     touching: BoolArray
     """(S, S) surfaces of which some bearer can meet some bearer, symmetric"""
+
+    @property
+    def solids(self) -> bool:
+        """Whether some body that is no ball can meet something."""
+        return bool(self.solid.any())
 
     @property
     def free(self) -> BoolArray:
@@ -121,7 +126,7 @@ def meetings(scene: Scene, bodies: Bodies | None = None) -> Meetings:
         turnable=(turnable | _thrust_turned(scene, bodies) | driven_in(scene, bodies, turning=True)) & ~bodies.fixed,
         mutual=bool(pair.any()),
         ball_ball=bool((pair & np.outer(kinds.ball, kinds.ball)).any()),
-        solids=bool((meets & ~kinds.ball).any()),
+        solid=np.isin(np.arange(size), surface[meets & ~kinds.ball]),
         ball_fixed={
             kind: any(
                 bool((able & kinds.ball).any()) and any(isinstance(scene.fixed[k], kind) for k in rows.tolist())

@@ -41,7 +41,7 @@ class Stream(Enum):
     COIL = 0xC011
     """speeds of a pinball coil, by the coil"""
     AIM = 0x61696D73
-    """thoughts of a hand in artillery, by the turn"""
+    """aiming of a skilled artillery player, by the turn"""
     CURLER = 0x6375726C
     """errors of a curling team, by the team"""
     FLIPPERS = 0x68616E64
@@ -52,9 +52,9 @@ class Stream(Enum):
     """keys of a random player"""
 
 
-NUMBER_FIRST = {Stream.COIL, Stream.AIM, Stream.CURLER, Stream.FLIPPERS, Stream.LANDING, Stream.KEYS}
-"""Keyed by number, index and seed, in this order, as the scores that were published with them are; the others by seed,
-number and index."""
+NUMBER_FIRST = {Stream.COIL, Stream.CURLER, Stream.FLIPPERS, Stream.LANDING, Stream.KEYS}
+"""Keyed by number, index and seed, in this order, as the scores that were published with them are, and `AIM` by number,
+seed and index; the others by seed, number and index."""
 
 
 def key_of(stream: Stream, seed: int, *index: int) -> list[int]:
@@ -65,6 +65,8 @@ def key_of(stream: Stream, seed: int, *index: int) -> list[int]:
         seed: of the scene, the player or the study, not negative.
         index: of the one of several that draws, as `Stream` says; always as many for one stream.
     """
+    if stream is Stream.AIM:
+        return [stream.value, seed, *index]
     return [stream.value, *index, seed] if stream in NUMBER_FIRST else [seed, stream.value, *index]
 
 

@@ -132,6 +132,30 @@ def test_undo_brings_back_what_a_restart_has_lost(window: Window) -> None:
     assert len(window.stage.live.bodies) == 2
 
 
+def test_what_undo_brings_back_is_unsaved_and_undo_exchanges_the_two(window: Window) -> None:
+    def bodies() -> int:
+        assert window.stage.live is not None
+        window.stage.live.arrive()
+        return len(window.stage.live.bodies)
+
+    strike(window, B)
+    for _ in range(3):  # the third restarts what has nothing to lose
+        strike(window, R)
+    strike(window, pygame.K_z, pygame.KMOD_CTRL)
+    assert bodies() == 2
+    assert window.stage.count_unsaved() == 1
+    strike(window, R)
+    strike(window, R)
+    turned(window, move(400, 300))
+    strike(window, B)
+    turned(window, move(250, 450))
+    strike(window, B)
+    assert bodies() == 3
+    for expected in (2, 3, 2):
+        strike(window, pygame.K_z, pygame.KMOD_CTRL)
+        assert bodies() == expected
+
+
 def test_undo_brings_back_what_was_replaced_at_an_earlier_moment(window: Window) -> None:
     for _ in range(4):
         live = turned(window)

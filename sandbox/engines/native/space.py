@@ -161,7 +161,8 @@ class SurfaceSetter:
             *wrong_pairs(surfaces.friction, touching, self._friction),
             *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
         }
-        mended = {(a, b) for a, b in _pairs(touching) if meet.solids and (a in jointed or b in jointed)}
+        solid = meet.solid
+        mended = {(a, b) for a, b in _pairs(touching) if (a in jointed and solid[b]) or (b in jointed and solid[a])}
         self.laws.renew(surfaces, wrong, mended)
         if surfaces.one_way.any():
             self.gates.renew(surfaces, touching)

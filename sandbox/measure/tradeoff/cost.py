@@ -68,8 +68,12 @@ def warm_up(scene: Scene, engine: str, settings: Settings) -> None:
     """
     simulation = start(scene, engine, settings)
     try:
-        for _ in range(min(WARM_UP_STEPS, schedule(scene.world.duration, settings.dt)[0].steps)):
+        stretches = schedule(scene.world.duration, settings.dt)
+        for _ in range(min(WARM_UP_STEPS, stretches[0].steps)):
             simulation.step()
+            simulation.frame()
+        if not stretches[0].steps:
+            simulation.finish(stretches[-1].part)
             simulation.frame()
     except (Divergence, Exhaustion):
         return

@@ -15,8 +15,12 @@ LONGER = 1.01
 """So many times a frame a step may last, such as 0.0167 s at 60 a second, and nobody sees."""
 
 NOISE = 1.5
-"""Times within this factor of the least count as equal, and counted work decides. The least of 5 repeats in turns
-varied by 2 to 7 % in 8 measurements of 8 settings on a machine at a load of 5; the rest is room for more load."""
+"""Times of engines within this factor of the least count as equal, and counted work decides. The least of 5 repeats in
+turns varied by 2 to 7 % in 8 measurements of 8 settings on a machine at a load of 5; the rest is room for more load."""
+
+FAR = 4.0
+"""Times the least of its engine: up to there counted work decides, which no noise changes; beyond, the time. Counted
+works are within a factor of 2.5 of the time (`bounded_run.SECONDS`)."""
 
 ALIKE = 1.05
 """Counted works within this factor of the least count as equal too, and the setting that changes less is taken: the
@@ -37,14 +41,26 @@ def cheapest(points: Sequence[Point], aim: Aim, fresh: Sequence[int], again: Aga
 
 
 def by_cost(points: Sequence[Point]) -> list[Point]:
-    """Return points from the cheapest on: by time, but by counted work where times are too close to tell.
+    """Return points from the cheapest on: of one engine by counted work, of several by time, where noise allows that.
 
     Points that were timed apart come first; the times of the others include keeping and auditing their frames.
     """
-    timed = sorted((p for p in points if p.repeats), key=lambda each: each.cost or 0.0)
-    close = [p for p in timed if (p.cost or 0.0) <= NOISE * (timed[0].cost or 0.0)]
-    others = sorted((p for p in points if not p.repeats), key=_counted)
-    return [*_by_work(close), *timed[len(close) :], *others]
+    timed = [p for p in points if p.repeats]
+    engines = [_ordered([p for p in timed if p.engine == name]) for name in dict.fromkeys(p.engine for p in timed)]
+    found = []
+    while engines:
+        least = min(own[0].cost or 0.0 for own in engines)
+        close = [own for own in engines if (own[0].cost or 0.0) <= NOISE * least]
+        found.append(min(close, key=lambda own: _counted(own[0])).pop(0))
+        engines = [own for own in engines if own]
+    return [*found, *sorted((p for p in points if not p.repeats), key=_counted)]
+
+
+def _ordered(points: Sequence[Point]) -> list[Point]:
+    """Return the points of one engine from the cheapest on."""
+    timed = sorted(points, key=lambda each: each.cost or 0.0)
+    near = [p for p in timed if (p.cost or 0.0) <= FAR * (timed[0].cost or 0.0)]
+    return [*_by_work(near), *timed[len(near) :]]
 
 
 def _by_work(points: Sequence[Point]) -> list[Point]:
@@ -67,9 +83,9 @@ def closest(points: Sequence[Point], aim: Aim, fresh: Sequence[int], again: Agai
 
 
 def nearest_to_tolerance(points: Sequence[Point], aim: Aim) -> Pick | None:
-    """Return the point of the least error, the cheapest of equals; None where no point has both figures."""
+    """Return the point of the least error, of equals the one that changes least; None where no point has figures."""
     able = _recommendable(points, aim)
-    point = min(able, key=lambda each: (each.error or 0.0, _counted(each)), default=None)
+    point = min(able, key=lambda each: (each.error or 0.0, len(each.changes), _counted(each)), default=None)
     return None if point is None else Pick(point, told(point, aim, None), (), None)
 
 

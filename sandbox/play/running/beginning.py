@@ -21,6 +21,7 @@ def played_again(recording: Recording) -> Live:
     session = Session(
         recording.scene, recording.engine, recording.settings, recording.actions, game, recording.duration
     )
+    session.note_unsaved()
     live = Live(session)
     live.seek(round(recording.duration / session.settings.dt))
     return live

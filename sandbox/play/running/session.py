@@ -193,6 +193,10 @@ class Session(Course):
         """Take note that all that was done has been saved."""
         self._saved = self._script.whole
 
+    def note_unsaved(self) -> None:
+        """Count all that was done as unsaved."""
+        self._saved = ()
+
     def recording(self) -> Recording:
         """Return the whole session, to be replayed: up to the last moment that it came to, also if it has gone back.
 

@@ -56,16 +56,20 @@ def test_none_is_picked_where_all_fail_on_fresh_seeds(fresh: float) -> None:
 
 
 def test_times_within_the_noise_are_decided_by_counted_work() -> None:
-    def picked(*costs: float) -> float | None:
-        points = [point_of(cost, 0.0, counted=counted) for cost, counted in zip(costs, (3.0, 2.0, 1.0), strict=True)]
+    def picked(engines: str, *costs: float) -> float | None:
+        figures = zip(engines, costs, (3.0, 2.0, 1.0), strict=True)
+        points = [point_of(cost, 0.0, engine, counted=counted) for engine, cost, counted in figures]
         found = cheapest(points, AIM, (), never)
         assert found is not None
         return found.point.counted
 
-    assert picked(10.0, 10.0, 10.0) == 1.0
-    assert picked(10.0, 11.0, 14.0) == picked(14.0, 11.0, 10.0) == 1.0
-    assert picked(10.0, 14.0, 16.0) == 2.0  # the third takes more than noise explains
-    assert picked(10.0, 16.0, 20.0) == 3.0
+    for engines in ("aaa", "abc"):
+        assert picked(engines, 10.0, 10.0, 10.0) == 1.0
+        assert picked(engines, 10.0, 11.0, 14.0) == picked(engines, 14.0, 11.0, 10.0) == 1.0
+    assert picked("abc", 10.0, 14.0, 16.0) == 2.0  # of another engine, the third takes more than noise explains
+    assert picked("abc", 10.0, 16.0, 20.0) == 3.0
+    assert picked("aaa", 10.0, 16.0, 39.0) == 1.0  # of one engine, the counters tell
+    assert picked("aaa", 10.0, 16.0, 41.0) == 2.0  # unless they are far off
 
 
 def test_of_settings_alike_in_time_and_work_the_one_that_changes_less_is_taken() -> None:

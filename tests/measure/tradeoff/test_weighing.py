@@ -19,8 +19,7 @@ from sandbox.measure.tradeoff import weighing as module
 from sandbox.measure.tradeoff.aim import UnknownMetricError
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.measure.tradeoff.picking import ALIKE, NOISE, called
-from sandbox.measure.tradeoff.point import Point
+from sandbox.measure.tradeoff.picking import ALIKE, FAR, Point, called
 from sandbox.scene.model import Scene
 from sandbox.scene.settings import Settings
 
@@ -75,7 +74,7 @@ def test_pick_keeps_to_the_tolerance_when_run_on_its_own() -> None:
     assert error_of(scene, point) == point.error
     able = [p for p in found.points if p.repeats and (p.error or 0.0) <= 4e-3]
     least = min(p.cost or 0.0 for p in able)
-    close = [p for p in able if (p.cost or 0.0) <= NOISE * least]
+    close = [p for p in able if (p.cost or 0.0) <= FAR * least]
     assert (point.counted or 0.0) <= ALIKE * min(p.counted or 0.0 for p in close)
 
 

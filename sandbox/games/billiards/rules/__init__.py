@@ -12,9 +12,9 @@ A frame goes like this:
         verdict = rules.settle(verdict.state, lie)  # how the balls lie now: who touches, who is snookered
         state = verdict.state
 
-States are frozen, so undo is keeping an earlier one. Rules know balls, cushions, pockets and spots by name alone; where
-those are is the matter of the `Match`, which also looks whether a cue ball in hand left the head string behind. The
-barred corners of straight rail and the third miss in clear sight of snooker are not modelled.
+States are frozen, so undo is keeping an earlier one. Rules know balls, cushions, pockets and spots by name alone. The
+`Match` knows their positions, and checks whether a cue ball in hand crosses the head string before its first contact.
+The barred corners of straight rail and the third miss in clear sight of snooker are not modelled.
 
 Not here, as they cannot happen on these tables: balls that leave the table, jump shots, double hits, pushes and every
 other fault of cue, foot or hand, balls played while others move, wrong cue balls, time.
