@@ -46,7 +46,7 @@ def set_parameter(action: SetParameter, cast: Cast) -> None:
         wrong = action.path.startswith("surface.") and any(floored(scene, scene.bodies))
     except (ValueError, RecursionError):
         wrong = True
-    if wrong:  # the whole scene is read again, which finds every fault and says it as of a file
+    if wrong:  # the whole scene is read again, to report every fault as for a file
         scene = _read_again(action, cast.scene)
     if on_floor(scene) != on_floor(cast.scene):
         raise ActionError(f"{action.path}: a floor cannot begin to rub, nor cease to, while a scene runs")
@@ -75,7 +75,7 @@ def _read_again(action: SetParameter, scene: Scene) -> Scene:
 def _with_coefficient(action: SetParameter, cast: Cast) -> tuple[Mover, ...] | None:
     """Return the elements that joined the scene, one with another restitution or friction; None if that is of none.
 
-    They are addressed as those of the file are: `ball.spawned-1.restitution`.
+    They are addressed by name, `ball.spawned-1.restitution`; `*` and numbers mean the elements of the file.
 
     Raises:
         ActionError: the value is out of range.

@@ -37,8 +37,8 @@ def change_value(scene: Scene, path: str, value: Any) -> Scene:
     """Return a scene with one value changed, of which the part that holds it is validated, and nothing else.
 
     That takes a time that does not grow with the scene. Parts that stay are the same objects as before, and the bodies
-    are those that the scene had: whatever the value decides of them is the caller's affair, as is what parts say about
-    each other (`crosscheck`). Faults are told as pydantic has them; `from_document` says them in full.
+    are those that the scene had: the caller updates them, and checks references between parts (`crosscheck`). Raises
+    pydantic's own errors; `from_document` gives the full messages.
 
     Args:
         scene: stays as it is.

@@ -1,7 +1,7 @@
 """Streams: the numbers that keep apart the random draws of one seed.
 
 A stream is keyed by its number, by the seed and, where there are several of a kind, by an index. numpy's seed sequence
-reads a key as 32-bit words and does not tell trailing zeros: [seed, 3] and [seed, 3, 0] are one stream. So each purpose
+reads a key as 32-bit words and ignores trailing zeros: [seed, 3] and [seed, 3, 0] are one stream. So each purpose
 has a number of its own here, and no other place draws by the seed of a scene, a player or a study. Pictures and sounds,
 and the order in which crowds are given to an engine, follow no seed.
 """

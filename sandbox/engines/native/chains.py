@@ -2,8 +2,8 @@
 
 `Segment.set_neighbors` makes Munk2D refuse contacts with an end of a segment beyond which the wall comes nearer. For
 discs that is exact. For other shapes Munk2D compares the nearest point with the end bit by bit, which rounding defeats
-once the two overlap: then the end of the next segment stops a box that slides. Such contacts are mended here: a normal
-that leans over an end, towards where the wall runs on, is turned to the nearest that the whole wall would give.
+once the two overlap: then the end of the next segment stops a box that slides. Such contacts are corrected here: a
+normal that leans over an end, towards where the wall runs on, is turned to the nearest that the whole wall would give.
 """
 
 from collections.abc import Mapping

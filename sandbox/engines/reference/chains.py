@@ -1,7 +1,7 @@
 """Chains: contacts near the joints of a wall, which are no edges of it.
 
 Each segment stores how its wall runs on from its ends. A normal that leans over an end, towards where the wall runs on,
-is none that the whole wall would give: the neighbour comes nearer. The contact of a disc is then left to the neighbour.
+cannot occur on the whole wall: the neighbour comes nearer. The contact of a disc is then left to the neighbour.
 So is that of a polygon whose normal is nearer to the neighbour's, and that lies deeper in the segment's own face; else
 its contact is found anew on that face, as if the segment were longer.
 

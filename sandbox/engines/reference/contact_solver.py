@@ -87,8 +87,10 @@ class ContactSolver:
     def settle(self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray) -> None:
         """Change velocities and impulses as `solve` does, until a pass changes nothing.
 
-        A single contact takes one pass. The two corners of a box that falls flat take more, the taller it is.
+        A single contact takes one pass. The two corners of a box that falls flat take more, the taller it is. Contacts
+        alone: engines refuse drives and joints with the detections that solve impacts one by one.
         """
+        assert self._drives is None
         if contacts.size == 1:
             self.solve(contacts, bounce, velocity, impulse)
             return

@@ -72,10 +72,10 @@ def minimise(
 
     Args:
         scene: what to make smaller.
-        disagreement: who parts, and by how much.
+        disagreement: which engines part, and by how much.
         most_runs: scenes that may be tried.
         patience: s that it all may take; a run beyond is given up. The result depends on it only where it is reached.
-        told: who is told what is being done.
+        told: progress callback.
 
     Raises:
         TookTooLongError: not even the scene given could be tried in that time.

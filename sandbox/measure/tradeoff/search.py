@@ -46,7 +46,7 @@ LEAST = 30.0
 
 @dataclass
 class Search:
-    """Trials so far, and who comes next."""
+    """Trials so far, and what is tried next."""
 
     space: Space
     judges: Sequence[Judge]
