@@ -114,6 +114,7 @@ print(status, *heavy, file=sys.stderr)
     [
         (("--help",), "numpy,pydantic,pymunk,matplotlib,rich"),
         (("scenes",), "numpy,pydantic,pymunk,matplotlib,rich"),
+        (("check", "bounce"), "matplotlib,rich,sqlite3,tomlkit"),
         (("check", "bounce", "--no-trial"), "pymunk,matplotlib,rich,sqlite3,tomlkit"),
         (("schema",), "numpy,pymunk,matplotlib,rich"),
         (("engines",), "pymunk,matplotlib,rich"),
