@@ -1,14 +1,14 @@
-"""A 2D game physics sandbox: a scene is a file, the engine is a choice, and the price of every choice is measured.
+"""2D game physics sandbox: one scene file, several engines, and a measured error and cost for every setting.
 
     import sandbox
 
-    scene = sandbox.load("bounce")  # or a file
+    scene = sandbox.load("bounce")  # or the path of a file
     run = sandbox.run(scene, engine="pymunk", dt=0.001)
     print(run.status, run.position[-1], run.missed_contacts)
 
     kicked = sandbox.run(scene, actions=[sandbox.Impulse(time=1.0, body="ball", impulse=(2.0, 0.0))])
 
-Importing the package costs nothing: each name is imported when it is first used.
+Each public name is imported when it is first used, so `import sandbox` takes a few milliseconds.
 """
 
 import importlib
@@ -32,9 +32,14 @@ if TYPE_CHECKING:
         Throttle,
         Toggle,
     )
-    from sandbox.engines.exact.rolling.table import Table
-    from sandbox.engines.registry import ENGINES
-    from sandbox.engines.relay import start
+    from sandbox.batch.run_table import run_table
+    from sandbox.batch.store import Store
+    from sandbox.engines.contract import Divergence, Refusal
+    from sandbox.engines.exact.tabletop.shots import Table
+    from sandbox.engines.reference.integrate import IntegrationResult, integrate
+    from sandbox.engines.reference.integrators import INTEGRATORS
+    from sandbox.engines.registry import ENGINES, UnknownEngineError
+    from sandbox.engines.switching import start
     from sandbox.measure.compare import compare
     from sandbox.measure.play_out import play_out
     from sandbox.measure.run import run
@@ -42,40 +47,49 @@ if TYPE_CHECKING:
     from sandbox.measure.shots.spread import Spread
     from sandbox.measure.tradeoff import tradeoff
     from sandbox.recording import Recording
-    from sandbox.scene.cue import Stroke
-    from sandbox.scene.demands import demands
-    from sandbox.scene.faults import Fault, SceneError
-    from sandbox.scene.file import dumps, load, loads
-    from sandbox.scene.model import Ball, Box, Capsule, Compound, Polygon, Scene
-    from sandbox.scene.settings import Settings
+    from sandbox.scene.compile.demands import demands
+    from sandbox.scene.compile.setup import Setup
+    from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
+    from sandbox.scene.description.discs import Ball
+    from sandbox.scene.description.surface import Stroke
+    from sandbox.scene.description.world import Settings, World
+    from sandbox.scene.errors import Fault, SceneError
+    from sandbox.scene.files.load import dumps, load, loads
+    from sandbox.scene.scene import Scene
     from sandbox.trajectory import Contacts, Frame, Trajectory
 
 __all__ = [
     "ENGINES",
+    "INTEGRATORS",
     "ActionError",
     "Ball",
     "Box",
     "Capsule",
     "Compound",
     "Contacts",
+    "Divergence",
     "Drive",
     "Fault",
     "Force",
     "Frame",
     "Impulse",
+    "IntegrationResult",
     "Launch",
     "Move",
     "Polygon",
     "Pull",
     "Recording",
+    "Refusal",
     "Remove",
     "Reshape",
     "Scene",
     "SceneError",
     "SetParameter",
     "Settings",
+    "Setup",
     "Spawn",
     "Spread",
+    "Store",
     "Strike",
     "Stroke",
     "Switch",
@@ -83,15 +97,19 @@ __all__ = [
     "Throttle",
     "Toggle",
     "Trajectory",
+    "UnknownEngineError",
+    "World",
     "compare",
     "demands",
     "dumps",
     "horizon",
+    "integrate",
     "load",
     "loads",
     "odds",
     "play_out",
     "run",
+    "run_table",
     "sensitivity",
     "start",
     "tradeoff",
@@ -100,55 +118,65 @@ __all__ = [
 
 _HOMES = {
     "ENGINES": "sandbox.engines.registry",
+    "INTEGRATORS": "sandbox.engines.reference.integrators",
     "ActionError": "sandbox.action",
-    "Ball": "sandbox.scene.model",
-    "Box": "sandbox.scene.model",
-    "Capsule": "sandbox.scene.model",
-    "Compound": "sandbox.scene.model",
+    "Ball": "sandbox.scene.description.discs",
+    "Box": "sandbox.scene.description.bodies",
+    "Capsule": "sandbox.scene.description.bodies",
+    "Compound": "sandbox.scene.description.bodies",
     "Contacts": "sandbox.trajectory",
+    "Divergence": "sandbox.engines.contract",
     "Drive": "sandbox.action",
-    "Fault": "sandbox.scene.faults",
+    "Fault": "sandbox.scene.errors",
     "Force": "sandbox.action",
     "Frame": "sandbox.trajectory",
     "Impulse": "sandbox.action",
+    "IntegrationResult": "sandbox.engines.reference.integrate",
     "Launch": "sandbox.action",
     "Move": "sandbox.action",
-    "Polygon": "sandbox.scene.model",
+    "Polygon": "sandbox.scene.description.bodies",
     "Pull": "sandbox.action",
     "Recording": "sandbox.recording",
+    "Refusal": "sandbox.engines.contract",
     "Remove": "sandbox.action",
     "Reshape": "sandbox.action",
-    "Scene": "sandbox.scene.model",
-    "SceneError": "sandbox.scene.faults",
+    "Scene": "sandbox.scene.scene",
+    "SceneError": "sandbox.scene.errors",
     "SetParameter": "sandbox.action",
-    "Settings": "sandbox.scene.settings",
+    "Settings": "sandbox.scene.description.world",
+    "Setup": "sandbox.scene.compile.setup",
     "Spawn": "sandbox.action",
     "Spread": "sandbox.measure.shots.spread",
     "Strike": "sandbox.action",
-    "Stroke": "sandbox.scene.cue",
+    "Store": "sandbox.batch.store",
+    "Stroke": "sandbox.scene.description.surface",
     "Switch": "sandbox.action",
-    "Table": "sandbox.engines.exact.rolling.table",
+    "Table": "sandbox.engines.exact.tabletop.shots",
     "Throttle": "sandbox.action",
     "Toggle": "sandbox.action",
     "Trajectory": "sandbox.trajectory",
+    "UnknownEngineError": "sandbox.engines.registry",
+    "World": "sandbox.scene.description.world",
     "compare": "sandbox.measure.compare",
-    "demands": "sandbox.scene.demands",
-    "dumps": "sandbox.scene.file",
+    "demands": "sandbox.scene.compile.demands",
+    "dumps": "sandbox.scene.files.load",
     "horizon": "sandbox.measure.shots",
-    "load": "sandbox.scene.file",
-    "loads": "sandbox.scene.file",
+    "integrate": "sandbox.engines.reference.integrate",
+    "load": "sandbox.scene.files.load",
+    "loads": "sandbox.scene.files.load",
     "odds": "sandbox.measure.shots",
     "play_out": "sandbox.measure.play_out",
     "run": "sandbox.measure.run",
+    "run_table": "sandbox.batch.run_table",
     "sensitivity": "sandbox.measure.shots",
-    "start": "sandbox.engines.relay",
+    "start": "sandbox.engines.switching",
     "tradeoff": "sandbox.measure.tradeoff",
     "windows": "sandbox.measure.shots",
 }
 
 
 _PACKAGE = "sandbox2d"
-"""What this is installed as."""
+"""Name of the distribution package."""
 
 
 def __getattr__(name: str) -> Any:

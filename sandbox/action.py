@@ -1,6 +1,6 @@
-"""Actions: everything that a player or a script does, as timed values applied between steps.
+"""Actions: timed changes of a running scene, made by a player or a script and applied between steps.
 
-A session is a scene and its actions; so it can be stored, replayed, and replayed on another engine.
+A session is a scene and its actions. It can be stored, and replayed on the same or another engine.
 """
 
 from collections.abc import Sequence
@@ -8,68 +8,86 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
-from sandbox.scene.cue import Stroke
-from sandbox.scene.model import Ball, Box, Capsule, Compound, Course, Polygon, Single
-from sandbox.scene.part import MAX_SPEED, Name, Part, Point, Velocity
+from sandbox.echo import MAX_NAMED, short_repr, shorten
+from sandbox.scene.description.base import MAX_SPEED, BodySpec, Name, Part, Point, Velocity
+from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.fixed import Course
+from sandbox.scene.description.surface import Stroke
 
 Amount = Annotated[float, Field(ge=-1e42, le=1e42)]
-"""Of an impulse or force: no more than the greatest mass at the greatest speed takes."""
+"""Component of an impulse or force; the bound is the greatest mass times the greatest speed."""
 
 Level = Annotated[float, Field(ge=0, le=1)]
-"""How far a thrust is opened, or what a drive is asked for."""
+"""Fraction of a thrust, or level of a drive."""
 
 Value = float | int | bool | str | None
-"""Of a setting."""
+"""Value of a setting."""
 
 
 SPAWNED = ("ball", "box", "capsule", "polygon", "body")
-"""What can be added to a running scene, by the headings of its tables."""
+"""Table headings of the bodies that can be added to a running scene."""
 
 
 class ActionError(ValueError):
-    """An action that cannot be applied; `str()` says why. The simulation is left as it was."""
+    """An action cannot be applied; `str()` gives the reason. The simulation is left unchanged."""
 
 
 class Timed(Part):
-    """An action takes effect before the first step that starts at `time` or later."""
+    """Base of all actions. An action is applied before the first step that starts at `time` or later."""
 
     time: Annotated[float, Field(ge=0, le=1e9)]
-    """s"""
+    """earliest simulated time at which it is applied, s"""
 
 
 class Impulse(Timed):
-    """Kick a body: its velocity changes by impulse / mass, its spin by angular / moment."""
+    """Apply an impulse to a body: v changes by impulse / mass, ω by angular / moment of inertia."""
 
     kind: Literal["impulse"] = "impulse"
     body: Name
+    """name of the body"""
     impulse: tuple[Amount, Amount]
-    """N·s, at the centre"""
+    """linear impulse at the centre of mass, N·s"""
     angular: Amount = 0.0
-    """N·m·s"""
+    """angular impulse, N·m·s"""
 
 
 class Force(Timed):
-    """Push a body steadily from now on; a zero force ends it."""
+    """Apply a constant force and torque to a body.
+
+    They replace those of an earlier `Force` on the body. Zero force and torque end it.
+    """
 
     kind: Literal["force"] = "force"
     body: Name
+    """name of the body"""
     force: tuple[Amount, Amount]
-    """N, at the centre"""
+    """force at the centre of mass, N"""
     torque: Amount = 0.0
-    """N·m"""
+    """torque, N·m"""
 
 
 class Move(Timed):
-    """Put a body somewhere else, and give it a velocity where one is stated."""
+    """Set the position of a body, and its velocity if one is given.
+
+    A fixed body can be moved but cannot have a velocity. A body held by a drive cannot be moved.
+    """
 
     kind: Literal["move"] = "move"
     body: Name
+    """name of the body"""
     position: Point
+    """new position of the centre of mass, m"""
     velocity: Velocity | None = None
+    """new velocity, m/s; default: unchanged"""
 
 
 class Spawn(Timed):
-    """Add a body; it gets the next number. Exactly one of the shapes is stated, as in a scene file."""
+    """Add a body, which gets the next body index.
+
+    Exactly one of the shapes `ball`, `box`, `capsule`, `polygon` and `body` must be given. Its fields are the keys of
+    that table in a scene file.
+    """
 
     kind: Literal["spawn"] = "spawn"
     ball: Ball | None = None
@@ -81,113 +99,146 @@ class Spawn(Timed):
     @model_validator(mode="after")
     def _one(self) -> Self:
         if sum(each is not None for each in self._shapes) != 1:
-            raise ValueError(f"state exactly one of {', '.join(SPAWNED)}")
+            raise ValueError(f"give exactly one of {', '.join(SPAWNED)}")
         return self
 
     @property
-    def _shapes(self) -> tuple[Single | None, ...]:
+    def _shapes(self) -> tuple[BodySpec | None, ...]:
         return tuple(getattr(self, key) for key in SPAWNED)
 
     @property
-    def single(self) -> Single:
-        """What is added."""
+    def single(self) -> BodySpec:
+        """The body that is added."""
         return next(each for each in self._shapes if each is not None)
 
     def named(self, name: str) -> Self:
-        """Return the same with a name for the body."""
+        """Return a copy of the action with a name for the body."""
         key = next(key for key in SPAWNED if getattr(self, key) is not None)
         return self.model_copy(update={key: self.single.model_copy(update={"name": name})})
 
 
 class Remove(Timed):
-    """Take a body out. It keeps its number, and stays where it was, without velocity."""
+    """Remove a body. It keeps its index and its last position, and its velocity becomes zero."""
 
     kind: Literal["remove"] = "remove"
     body: Name
+    """name of the body"""
 
 
 class SetParameter(Timed):
-    """Change a value of the scene: the air, gravity, a restitution or a friction, by its path."""
+    """Change a parameter of the running scene.
+
+    Parameters that can change are `world.gravity`, `world.wind`, `world.linear_drag`, `world.quadratic_drag`,
+    `surface.sliding_friction`, `surface.curl`, and every `restitution` and `friction`.
+    """
 
     kind: Literal["set"] = "set"
     path: Name
+    """path of the parameter, such as `world.gravity` or `ball.a.friction`"""
     value: float | int | bool | str | list[float] | None
+    """new value, in the unit of the scene file"""
 
 
 class Pull(Timed):
-    """Pull a body by a damped spring from now on, as a hand does; without a target, let it go.
+    """Pull a point of a body towards a target by a damped spring, as when dragging with the mouse.
 
-    The spring is 7.5 Hz, critically damped, its force at most 100 times the body's weight; it is a soft constraint,
-    stable at any dt. Where it holds is told in the body's own frame, so that it turns with the body.
+    The pull lasts until another `Pull` of the same body; one without a target releases the body. The spring has a
+    frequency of 7.5 Hz and is critically damped. Its force is at most 100 times the weight of the body, with g = 9.81
+    m/s² in a scene without gravity. It is a soft constraint (E. Catto, "Soft Constraints", GDC 2011), stable at any dt.
+    The grip is fixed in the frame of the body and turns with it.
     """
 
     kind: Literal["pull"] = "pull"
     body: Name
+    """name of the body"""
     grip: Point = (0.0, 0.0)
-    """from the centre of the body, in its own frame, m"""
+    """point at which the body is pulled, in its own frame about the centre of mass, m"""
     target: Point | None = None
-    """where the hand is, m"""
+    """point that the grip is pulled to, m; default: release the body"""
 
 
 class Launch(Timed):
-    """Start the bodies of a generator anew, laid out with another seed."""
+    """Put the bodies of a generator back to their start, laid out with another seed.
+
+    Bodies of the generator that were removed are added again, and finite lifetimes start again.
+    """
 
     kind: Literal["launch"] = "launch"
     generator: Name
+    """name of the generator"""
     seed: Annotated[int, Field(ge=0, lt=2**63)]
+    """seed of the new layout"""
 
 
 class Throttle(Timed):
-    """Open a thrust of the scene, or close it."""
+    """Set the throttle of a thrust of the scene."""
 
     kind: Literal["throttle"] = "throttle"
     thrust: Name
+    """name of the thrust"""
     level: Level
-    """share of its force, from now on"""
+    """fraction of the force of the thrust"""
 
 
 class Reshape(Timed):
-    """Change the course of a wall from now on: ground that is dug away or heaped up. Who stands in it is parted."""
+    """Replace the points of a wall, for example to dig a crater into terrain or to raise it.
+
+    Bodies that overlap the new wall are pushed out. Walls on a `[surface]` cannot be reshaped.
+    """
 
     kind: Literal["reshape"] = "reshape"
     thing: Name
-    """a wall"""
+    """name of the wall"""
     points: Course
-    """m, in place of those that it had"""
+    """new corners of the wall, m"""
 
 
 class Drive(Timed):
-    """Ask a drive of the scene for a level from now on."""
+    """Set the level of a drive of the scene."""
 
     kind: Literal["drive"] = "drive"
     drive: Name
+    """name of the drive"""
     level: Level
-    """0 is at rest; of a torque the part of it, of a pull how far, of a stroke anything above 0 all the way"""
+    """0 at rest; fraction of the torque of a flipper or of the pull of a plunger; any value above 0 is the full stroke
+    of a stroke drive"""
 
 
 class Toggle(Timed):
-    """Let a wall or post be met from now on, or let everything pass it: a drop target, a diverter."""
+    """Switch collisions with a wall or post on or off, as for a drop target or a diverter.
+
+    Walls and posts of a scene with a `[surface]` or pockets cannot be switched.
+    """
 
     kind: Literal["toggle"] = "toggle"
     thing: Name
+    """name of the wall or post"""
     solid: bool
+    """whether bodies collide with it"""
 
 
 class Strike(Timed, Stroke):
-    """Strike a ball on a floor with a cue: it has the velocity and the spin of the stroke, whatever it had before."""
+    """Strike a ball on a `[surface]` with a cue; its velocity and spin are replaced by those of the stroke.
+
+    Pucks cannot be struck. A stroke that would miscue cannot be applied.
+    """
 
     kind: Literal["strike"] = "strike"
     ball: Name
+    """name of the ball"""
 
 
 class Switch(Timed):
-    """Go on with another engine, or with other settings, from the state as it is."""
+    """Continue from the present state with another engine or other settings."""
 
     kind: Literal["switch"] = "switch"
     engine: Name | None = None
-    """none goes on with the same"""
+    """name of the new engine; default: the same engine"""
     settings: dict[str, Value] = Field(default_factory=dict)
-    """what changes of `[solver]`"""
+    """changes to `[solver]`"""
+    resumes: bool = False
+    """whether the same engine continues from a checkpoint; values that it derived from the initial positions of bodies
+    are then kept"""
 
 
 Action = Annotated[
@@ -220,11 +271,11 @@ _SETTABLE = (
 )
 
 SETTABLE = f"{', '.join(_SETTABLE)}, and any restitution or friction"
-"""What of a running scene may be changed, in words."""
+"""Parameters of a running scene that can be changed, as text for messages."""
 
 
 def is_settable(path: str) -> bool:
-    """Tell whether a running scene's value may be changed."""
+    """Return whether a parameter of a running scene can be changed."""
     return path in _SETTABLE or path.rpartition(".")[2] in ("restitution", "friction")
 
 
@@ -232,12 +283,12 @@ def actions_from_json(text: str) -> tuple[Action, ...]:
     """Read a JSON array of actions.
 
     Raises:
-        ActionError: one line for everything that is wrong.
+        ActionError: an action is invalid; the message has one line for each fault.
     """
     try:
         return _ACTIONS.validate_json(text, strict=True)
     except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
+        lines = [f"{'.'.join(map(str, e['loc']))}: {shorten(e['msg'], MAX_NAMED)}" for e in error.errors()]
         raise ActionError("\n".join(lines)) from None
 
 
@@ -247,32 +298,32 @@ def actions_to_json(actions: tuple[Action, ...]) -> Any:
 
 
 def heading_of(element: Any) -> str:
-    """Return the heading under which a scene file, or a `Spawn`, states an element that can be spawned."""
+    """Return the table heading, in a scene file or a `Spawn`, of an element that can be spawned."""
     kinds: dict[type, str] = {Ball: "ball", Box: "box", Capsule: "capsule", Polygon: "polygon", Compound: "body"}
     return kinds.get(type(element), "")
 
 
 def in_order(actions: tuple[Action, ...]) -> tuple[Action, ...]:
-    """Return actions by time; those of one time stay in the order in which they were given."""
+    """Return actions sorted by time; actions of equal time keep their order."""
     return tuple(sorted(actions, key=lambda action: action.time))
 
 
 def number_among(names: Sequence[str], name: str, kind: str) -> int:
-    """Return the place of a name among those of a kind.
+    """Return the index of a name among those of a kind.
 
     Raises:
-        ActionError: it is none of them.
+        ActionError: no element of the kind has that name.
     """
     if name not in names:
-        raise ActionError(f"no {kind} is named {name!r}; there are {', '.join(names) or 'none'}")
+        raise ActionError(f"no {kind} is named {short_repr(name)}; known names: {', '.join(names) or 'none'}")
     return names.index(name)
 
 
 def speed_limit(speed: float, what: str) -> None:
-    """Refuse a velocity that no body may have.
+    """Check a speed against `MAX_SPEED`.
 
     Raises:
-        ActionError: it is beyond `MAX_SPEED` or not a number.
+        ActionError: the speed is above `MAX_SPEED` or not a number.
     """
     if not speed <= MAX_SPEED:
-        raise ActionError(f"{what}: a speed of {speed:g} m/s is out of range; at most {MAX_SPEED:g}")
+        raise ActionError(f"{what}: a speed of {speed:g} m/s is out of range; the limit is {MAX_SPEED:g}")

@@ -1,12 +1,13 @@
-"""Gymnasium: a scene with a game as an environment to learn in. The only place that imports gymnasium.
+"""Gymnasium environments: a scene with a game as an environment for reinforcement learning.
 
     import gymnasium
     import sandbox.gym
 
     env = gymnasium.make("sandbox/Landing-v0")
 
-or `SandboxEnv(scene)` for any scene whose `[play] game` has rules. What an agent does are the game's controls, what it
-gets is what the score gained. An episode is a session: `recording()` returns it, to be replayed and seen in the window.
+`SandboxEnv(scene)` makes an environment of any scene whose `[play] game` has rules. Actions are the controls of the
+game, the reward is the increase of the score. An episode is a session: `recording()` returns it for replay in the
+window. This is the only module that imports gymnasium.
 """
 
 import operator
@@ -23,6 +24,7 @@ except ImportError:
     raise ImportError("sandbox.gym needs gymnasium: pip install -e '.[gym]'") from None
 
 from sandbox.action import ActionError
+from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import able, engine_named
 from sandbox.games.registry import required_rules
@@ -30,9 +32,8 @@ from sandbox.games.rules import Gauged, Rules
 from sandbox.measure.episode import Episode
 from sandbox.measure.seeds import seeded
 from sandbox.recording import Recording
-from sandbox.scene.file import load
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray
+from sandbox.scene.files.load import load
+from sandbox.scene.scene import Scene
 
 GAMES = {
     "ArtilleryDuel": ("artillery/duel", 10),
@@ -42,28 +43,45 @@ GAMES = {
     "PinballClassic": ("pinball/classic", 2),
     "PinballFull": ("pinball/full", 2),
 }
-"""By the name in an id, the shipped scene, and how many steps an action lasts."""
+"""Shipped scene and number of steps per action, by the name in the environment id."""
 LIMIT = 1e6
-"""of every number that is observed, which is cut off there: spaces without bounds are ill-suited to learning"""
+"""bound of each observed number, to which it is clipped: unbounded spaces are ill-suited to learning"""
 STATES = "x", "y", "vx", "vy", "angle", "ω", "present"
-"""Of a body, in m, m/s, rad and rad/s, and whether it is there: 1 or 0."""
+"""Observed state of a body, in m, m/s, rad and rad/s; `present` is 1, or 0 after removal."""
 SIZE = 640, 480
-"""px of a picture"""
+"""px, size of a rendered picture"""
 SEEDS = 2**31
 
 Observation = np.ndarray[tuple[int], np.dtype[np.float32]]
 
 
 class SandboxEnv(gymnasium.Env[Observation, Any]):
-    """A game.
+    """Gymnasium environment of a game.
 
-    Observed are the chosen bodies, `STATES` each, then what the rules show besides (fuel, wind, how a gun is set), the
-    time in s and the score; `observed` names each number. An action sets every control, where one is analogue by a
-    `Box` of 0 to 1 (of the others more than a half is on; what lies beyond is taken for 0 or 1), else by a
-    `MultiDiscrete` of 0 and 1. The reward is what the score gained. An episode is terminated as the game is over, and
-    truncated at the scene's duration, or where the physics cannot go on, which `info["failed"]` says.
+    Observation: for each observed body x, y, vx, vy, angle, ω and whether it is present; then the gauges of the game
+    (such as fuel, wind, or the setting of a gun), the time in s and the score. `observed` has the name of each number.
+    Numbers are clipped to ±1e6.
 
-    It can be pickled, and copied, as long as no episode has begun.
+    Action: one number for each control. If a control is analogue, the space is a `Box` from 0 to 1; other controls are
+    then on above 0.5, and values out of range are clipped. Otherwise the space is a `MultiDiscrete` of 0 and 1.
+
+    Reward: increase of the score. An episode is terminated when the game is over. It is truncated at the scene's
+    duration, or if the physics fails; `info["failed"]` then has the reason.
+
+    An environment can be pickled and copied before its first episode.
+
+    Args:
+        scene: scene, path of a scene file, or name of a shipped scene.
+        engine: name of the engine.
+        bodies: names of the observed bodies; default: all bodies that are not fixed.
+        every: number of steps per action.
+        render_mode: None, or `rgb_array`.
+
+    Raises:
+        SceneError: the file has faults, or no file and no shipped scene has that name.
+        UnfitError: the scene has no game with rules, or lacks an element that its game needs.
+        Refusal: the engine does not support the scene.
+        ValueError: an engine, body or render mode does not exist, or `every` is not an integer of at least 1.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012, as the base has it
@@ -76,22 +94,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         every: int = 1,
         render_mode: str | None = None,
     ) -> None:
-        """Make an environment; `reset` begins an episode.
-
-        Args:
-            scene: or its file, or the name of a shipped one.
-            engine: its name.
-            bodies: names of those that are observed; by default all that can move.
-            every: steps that an action lasts.
-            render_mode: None, or `rgb_array`.
-
-        Raises:
-            SceneError: the file has faults.
-            UnknownSceneError: there is no such file, nor a shipped scene of that name.
-            UnfitError: the scene has no game with rules, or lacks what its game needs.
-            Refusal: the engine lacks something that the scene needs.
-            ValueError: there is no such engine, body or mode, or `every` is no whole number from 1 on.
-        """
+        """Create an environment; `reset` begins an episode."""
         self.scene = scene if isinstance(scene, Scene) else load(scene)
         self.engine, self.every, self.render_mode = engine, _steps(every), render_mode
         rules = required_rules(self.scene)
@@ -100,11 +103,11 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         if missing:
             raise Refusal(engine, missing, able(self.scene))
         if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"there is no render mode {render_mode!r}; there is rgb_array")
+            raise ValueError(f"unknown render mode {render_mode!r}; use 'rgb_array'")
         self._numbers = _numbers(self.scene, bodies)
         states = [f"{self.scene.bodies.names[number]} {state}" for number in self._numbers for state in STATES]
         self.observed: tuple[str, ...] = (*states, *(name for name, _ in _gauges(rules)), "time", "score")
-        """what each number of an observation is"""
+        """name of each number of an observation"""
         count = len(self.controls)
         self.analogue = any(control.analogue for control in self.controls)
         self.action_space = (
@@ -122,14 +125,18 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         """Begin an episode.
 
         Args:
-            seed: of the scene; without, the first episode has the scene's own, and each later one another.
-            options: none are known.
+            seed: seed of the scene. Without it, the first episode has the seed of the scene file, and each later one a
+                new random seed.
+            options: not supported.
+
+        Returns:
+            The first observation, and the info dict.
 
         Raises:
             ValueError: options are given.
         """
         if options:
-            raise ValueError(f"reset knows no options, but was given {', '.join(map(repr, options))}")
+            raise ValueError(f"reset accepts no options, got {', '.join(map(repr, options))}")
         first = self._np_random is None
         super().reset(seed=self.scene.world.seed if seed is None and first else seed)
         number = seed if seed is not None else self.scene.world.seed if first else int(self.np_random.integers(SEEDS))
@@ -138,15 +145,21 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         return self._observation(), self._info()
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Set the controls, and make steps until the next decision, or to the end of the episode.
+        """Set the controls and advance by `every` steps, or to the end of the episode.
+
+        Args:
+            action: one number for each control.
+
+        Returns:
+            Observation, reward, terminated, truncated, and the info dict.
 
         Raises:
-            ValueError: the action is not one number for each control, finite, or 0 or 1; nothing has happened then.
-            ResetNeeded: no episode has begun, or it is over.
+            ValueError: the action does not have one valid number for each control. The environment is left unchanged.
+            ResetNeeded: no episode has begun, or the episode has ended.
         """
         episode = self._going()
         if self._ended:
-            raise gymnasium.error.ResetNeeded("the episode is over; call reset before the next step")
+            raise gymnasium.error.ResetNeeded("the episode has ended; call reset before the next step")
         levels = self._levels_of(action)
         before, failed = episode.rules.score, None
         try:
@@ -207,11 +220,11 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         }
 
     def recording(self) -> Recording:
-        """Return the episode up to now, to be replayed: `sandbox replay` shows it."""
+        """Return the episode so far as a recording, for `sandbox replay`."""
         return self._going().recording()
 
     def render(self) -> Any:
-        """Return a picture, (height, width, 3) of 0 to 255, or None without a render mode."""
+        """Return a picture, (height, width, 3) from 0 to 255; None without a render mode."""
         if self.render_mode is None:
             return None
         episode = self._going()
@@ -223,7 +236,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         return self._canvas.picture(relay.scene, relay.bodies, episode.frame(), episode.rules, relay.throttles)
 
     def close(self) -> None:
-        """Release the engine, and what pictures are drawn on."""
+        """Release the engine and the canvas."""
         self._release()
         self._canvas = None
 
@@ -244,7 +257,7 @@ def _steps(every: int) -> int:
     except TypeError:
         steps = 0
     if steps < 1:
-        raise ValueError(f"an action lasts 1 or more steps, a whole number, not {every!r}")
+        raise ValueError(f"every must be a whole number of steps, 1 or more, is {every!r}")
     return steps
 
 
@@ -264,7 +277,7 @@ def _numbers(scene: Scene, names: Sequence[str] | None) -> list[int]:
     names = (names,) if isinstance(names, str) else names
     unknown = [name for name in names if name not in bodies.names]
     if unknown:
-        raise ValueError(f"no body is named {', '.join(map(repr, unknown))}; there are {', '.join(bodies.names[:9])}")
+        raise ValueError(f"no body is named {', '.join(map(repr, unknown))}; bodies: {', '.join(bodies.names[:9])}")
     return [bodies.names.index(name) for name in names]
 
 

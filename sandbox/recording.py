@@ -1,4 +1,4 @@
-"""Recordings: a session as one JSON document, scene and actions, that any engine can replay."""
+"""Recordings: a session as one JSON document, with scene and actions, that any engine can replay."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -9,54 +9,71 @@ from typing import Any, NamedTuple, Self
 from pydantic import ValidationError
 
 from sandbox.action import Action, ActionError, Switch, actions_from_json, actions_to_json
-from sandbox.scene.document import to_document
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.whole import whole
+from sandbox.echo import short_repr
+from sandbox.resource_limits import SESSION_SIZE
+from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import from_session
+from sandbox.scene.files.nesting import check_text
+from sandbox.scene.scene import Scene
+from sandbox.whole import read_whole, whole
 
 FORMAT = 1
 MAX_DURATION = 1e9  # s, as of a scene
 
 
 class Press(NamedTuple):
-    """A control that was set at a time, before the step that starts then."""
+    """One change of a control of a game, before the step that starts at its time."""
 
     time: float
     """s"""
     control: str
+    """name of the control"""
     value: float
-    """0 lets it go"""
+    """new value of the control; 0 releases it"""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """What was played: with the same engine and versions it leads to the same state, bit for bit."""
+    """Recorded session: a scene and the actions applied to it.
+
+    A replay with the same engine and package versions ends in the same state, bit for bit.
+    """
 
     scene: Scene
+    """scene at the start of the session"""
     engine: str
+    """name of the engine at the start"""
     settings: Settings
+    """settings at the start"""
     actions: tuple[Action, ...]
+    """all actions, in order of time"""
     duration: float
-    """s"""
+    """s, simulated time of the session"""
     state_hash: str | None = None
-    """of the state at the end, where it is known"""
+    """hash of the state at the end; None if unknown"""
     presses: tuple[Press, ...] = ()
-    """what was pressed, of a game; what came of it is among the actions"""
+    """changes of the controls of a game; the actions that resulted are in `actions`"""
     score: float | None = None
-    """of a game at the end, where it is known"""
+    """score of a game at the end; None if unknown"""
     at: float | None = field(default=None, compare=False)
-    """s, the earlier moment that the session had gone back to when it was saved; None at its end"""
+    """s, time to which the session had been rewound when it was saved; None if it was saved at its end"""
 
     @property
     def whole_scene(self) -> Scene:
-        """The scene, with the session's duration."""
+        """The scene with the duration of the session."""
         world = self.scene.world.model_copy(update={"duration": self.duration})
         return self.scene.model_copy(update={"world": world})
 
     def on(self, engine: str) -> Self:
-        """Return the session as another engine is to play it, from start to end."""
+        """Return the session with another engine from start to end.
+
+        `state_hash` and `score` of the result are None, because they depend on the engine.
+
+        Args:
+            engine: name of the engine.
+        """
         actions = tuple(
             action.model_copy(update={"engine": None}) if isinstance(action, Switch) else action
             for action in self.actions
@@ -64,14 +81,23 @@ class Recording:
         return replace(self, engine=engine, actions=actions, state_hash=None, score=None)
 
     def save(self, path: str | Path) -> Path:
-        """Write it to a file, to a temporary name first: never half a file."""
+        """Write the recording to a JSON file.
+
+        The file is written under a temporary name and then renamed, so an interrupted save leaves no partial file.
+
+        Args:
+            path: path of the file.
+
+        Returns:
+            The path of the file.
+        """
         path = Path(path)
         with whole(path) as temporary:
             temporary.write_text(self.to_json(), encoding="utf-8")
         return path
 
     def to_json(self) -> str:
-        """Write it as a JSON document."""
+        """Return the recording as a JSON document."""
         document = {
             "format": FORMAT,
             "scene": to_document(self.scene),
@@ -89,23 +115,28 @@ class Recording:
 
     @classmethod
     def from_json(cls, text: str, file: str = "<recording>") -> Self:
-        """Read a recording.
+        """Read a recording from a JSON document.
+
+        Args:
+            text: the document.
+            file: name of the document in faults.
 
         Raises:
             SceneError: the document, its scene or its actions have faults.
         """
         try:
+            check_text(text)
             document = json.loads(text)
             if not isinstance(document, Mapping) or document.get("format") != FORMAT:
                 raise ValueError(_no_session(document))
             duration = _part(document, "duration", (int, float))
             if not 0 <= duration <= MAX_DURATION:
-                raise ValueError(f"a `duration` is 0 to {MAX_DURATION:g} s")
+                raise ValueError(f"`duration` must be 0 to {MAX_DURATION:g} s")
             at = _part(document, "at", (int, float, type(None)), None)
             if at is not None and not 0 <= at <= duration:
-                raise ValueError("`at` is a time of the session, 0 to its `duration`")
+                raise ValueError("`at` must be between 0 and the `duration` of the session")
             return cls(
-                scene=from_document(_part(document, "scene", dict), file),
+                scene=from_session(_part(document, "scene", dict), file),
                 engine=_part(document, "engine", str),
                 settings=Settings.model_validate_json(json.dumps(_part(document, "settings", dict))),
                 actions=actions_from_json(json.dumps(_part(document, "actions", list))),
@@ -120,20 +151,28 @@ class Recording:
         except ValidationError as error:
             faults = [Fault(file, None, ".".join(("settings", *map(str, e["loc"]))), e["msg"]) for e in error.errors()]
             raise SceneError(faults) from None
-        except (ValueError, RecursionError) as error:
+        except ValueError as error:
             raise SceneError([Fault(file, None, "", f"cannot be read as a session: {error}")]) from None
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a recording from a file.
 
+        Args:
+            path: path of the file.
+
         Raises:
-            SceneError: as `from_json`.
+            SceneError: the file cannot be read or is too large, or the document, its scene or its actions have faults.
         """
+        file, most = Path(path), SESSION_SIZE.value
         try:
-            text = Path(path).read_text(encoding="utf-8")
+            refusal = SESSION_SIZE.refusal("its size is", file.stat().st_size)  # a pipe states none
+            if refusal is not None:
+                raise SceneError([Fault(str(path), None, "", refusal)])
+            text = read_whole(file, most).decode("utf-8")
         except (OSError, ValueError) as error:
-            raise SceneError([Fault(str(path), None, "", f"cannot be read: {error}")]) from None
+            reason = (error.strerror if isinstance(error, OSError) else None) or error
+            raise SceneError([Fault(str(path), None, "", f"cannot be read: {reason}")]) from None
         return cls.from_json(text, str(path))
 
 
@@ -144,10 +183,10 @@ def _no_session(document: Any) -> str:
         for key, command in made.items():
             if key in document:
                 return f"it is the output of `sandbox {command}{'' if command == 'schema' else ' --json'}`"
-        return "it has no `format`; the window records sessions (Ctrl+S)"
+        return "it has no `format`; the window saves sessions with Ctrl+S"
     if isinstance(document, Mapping):
-        return f"its format is {document['format']!r}, and this program reads format {FORMAT}"
-    return "it is no JSON object; the window records sessions (Ctrl+S)"
+        return f"its format is {short_repr(document['format'])}, this program reads format {FORMAT}"
+    return "it is not a JSON object; the window saves sessions with Ctrl+S"
 
 
 def _part(document: Mapping[str, Any], key: str, kind: type | tuple[type, ...], without: Any = ...) -> Any:
@@ -162,7 +201,7 @@ def presses_from(values: Sequence[Any]) -> tuple[Press, ...]:
     """Read presses from JSON values, each `[time, control, value]`.
 
     Raises:
-        ValueError: one is none.
+        ValueError: a value is not a press.
     """
     return tuple(_press(value) for value in values)
 
@@ -171,4 +210,4 @@ def _press(value: Any) -> Press:
     match value:
         case [float() | int() as time, str() as control, float() | int() as level] if 0 <= time <= MAX_DURATION:
             return Press(float(time), control, level)
-    raise ValueError(f"`presses`: {value!r} is no [time, control, value]")
+    raise ValueError(f"`presses`: {short_repr(value)} is not [time, control, value]")

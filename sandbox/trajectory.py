@@ -1,9 +1,7 @@
-"""What comes out of a simulation: frames, contacts, and whole trajectories as arrays."""
+"""Results of a simulation: frames, contacts, and whole trajectories as arrays."""
 
 import hashlib
 import json
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -12,55 +10,63 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.echo import MAX_MESSAGE, short_repr, shorten
+from sandbox.html_repr import HtmlRepr
 from sandbox.whole import whole
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
-
-LATER = frozenset({"broken_time", "energy", "account", "spin", "layer"})
-"""Arrays of a trajectory that those stored by earlier versions lack."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Frame:
-    """The state of N bodies at one time, in scene order. The arrays cannot be written to."""
+    """State of N bodies at one time, in scene order. The arrays are read-only."""
 
     time: float
-    """s"""
+    """s, simulated time"""
     position: FloatArray
-    """(N, 2) m"""
+    """(N, 2) m, centres of mass"""
     velocity: FloatArray
     """(N, 2) m/s"""
     angle: FloatArray
-    """(N,) rad"""
+    """(N,) rad, counter-clockwise"""
     angular_velocity: FloatArray
     """(N,) rad/s"""
     present: BoolArray
-    """(N,) false once removed or retired: the body then stays where it was, with no velocity"""
+    """(N,) false once a body has been removed or retired; it then keeps its last position and has zero velocity"""
     roll: FloatArray | None = None
-    """(N, 2) rad/s, about x and y, of spheres on a floor; none where nothing rolls"""
+    """(N, 2) rad/s, angular velocity about x and y of spheres on a `[surface]`; None without a surface"""
     layer: IntArray | None = None
-    """(N,) on which each is, by its number in the scene's `layers`; none where there is one alone"""
+    """(N,) index of the collision layer of each body in `scene.layers`; None if the scene has a single layer"""
     visits: IntArray | None = None
-    """(N, Z) how each is with each zone, by the words of `scene.zone`; none where there are none"""
+    """(N, Z) state of each body in each zone: 0 outside, 1 inside, 2 held at the centre, 3 released but still inside;
+    None without zones"""
     drives: FloatArray | None = None
-    """(D, 3) of the scene's drives: level; torque, N·m, of a plunger its pull, m, and how fast that grows, m/s"""
+    """(D, 3) state of each drive: level; torque in N·m, or pull of a plunger in m; rate of that pull in m/s. None
+    without drives"""
     passing: IntArray | None = None
-    """(P, 2) who is being let through a one-way wall, and which, −1 − k; none where nobody is"""
+    """(P, 2) pairs of a body and a one-way wall that it is passing; the wall is −1 − k. None if there are no such pairs
+    """
 
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""
         for array in self._arrays():
             array.setflags(write=False)
 
+    def __repr__(self) -> str:
+        """Return the time, the number of bodies and the largest speed."""
+        there = int(np.count_nonzero(self.present))
+        gone = len(self.present) - there
+        with np.errstate(invalid="ignore", over="ignore"):
+            fastest = float(np.hypot(*self.velocity[self.present].T).max()) if there else 0.0
+        bodies = _bodies(len(self.present)) + (f", {gone:,} removed" if gone else "")
+        return f"<Frame at {self.time:g} s: {bodies}, largest speed {fastest:.4g} m/s>"
+
     @property
     def spin(self) -> FloatArray | None:
-        """(N, 3) rad/s, right-handed, z up, of spheres on a floor; none where nothing rolls."""
+        """(N, 3) rad/s, angular velocity of spheres on a `[surface]`, right-handed, z up; None without a surface."""
         return None if self.roll is None else np.column_stack((self.roll, self.angular_velocity))
 
     def state_hash(self) -> str:
-        """Return a SHA-256 of time, every body's state and every drive's, bit for bit."""
+        """Return a SHA-256 hash of the time and of the exact state of all bodies and drives."""
         digest = hashlib.sha256(np.float64(self.time).tobytes())
         for array in self._arrays():
             digest.update(array.tobytes())
@@ -72,51 +78,55 @@ class Frame:
         return arrays + [array for array in more if array is not None]
 
 
+def _bodies(count: int) -> str:
+    return f"{count:,} {'body' if count == 1 else 'bodies'}"
+
+
 class ContactEvent(NamedTuple):
-    """One contact, from its first touch on."""
+    """One contact of two bodies, or of a body and a fixed object."""
 
     time: float
-    """of the first touch, s"""
+    """s, time of the first touch"""
     pair: tuple[int, int]
-    """body numbers, the lower first; a fixed thing is −1 − k and stands second"""
+    """body indices, the lower first; a fixed object is −1 − k and comes second"""
     point: tuple[float, float]
-    """of the first touch, m"""
+    """m, contact point at the first touch"""
     normal: tuple[float, float]
-    """of the first touch, from the first of the pair to the second"""
+    """unit vector at the first touch, from the first of the pair to the second"""
     impulse: tuple[float, float]
-    """given by the first of the pair to the second while it lasted, N·s"""
+    """N·s, total impulse of the first of the pair on the second"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Contacts:
-    """C contacts as arrays, one row each, in the order of their first touch."""
+    """C contacts as arrays, one row each, ordered by the time of the first touch."""
 
     time: FloatArray
-    """(C,) s"""
+    """(C,) s, time of the first touch"""
     pair: IntArray
-    """(C, 2) body numbers; fixed things are −1 − k"""
+    """(C, 2) body indices; a fixed object is −1 − k"""
     point: FloatArray
-    """(C, 2) m"""
+    """(C, 2) m, contact point at the first touch"""
     normal: FloatArray
-    """(C, 2)"""
+    """(C, 2) unit vector from the first of the pair to the second"""
     impulse: FloatArray
-    """(C, 2) N·s"""
+    """(C, 2) N·s, impulse on the second of the pair"""
 
     @classmethod
     def none(cls) -> Self:
-        """Return no contacts."""
+        """Return an empty set of contacts."""
         return cls(np.empty(0), np.empty((0, 2), np.int64), *(np.empty((0, 2)) for _ in range(3)))
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return contacts one after the other."""
+        """Concatenate sets of contacts."""
         columns = ("time", "pair", "point", "normal", "impulse")
         return cls(*(np.concatenate([getattr(part, column) for part in parts]) for column in columns))
 
     def merged(self) -> Self:
-        """Return the same with one row a contact, its impulse summed, where one that lasted was told of many times.
+        """Return the contacts with rows of equal time and pair merged into one; their impulses are summed.
 
-        One that lasts keeps the time of its first touch: rows of one time and one pair are the same contact.
+        A contact that lasts for several steps has one row a step, each with the time of the first touch.
         """
         if len(self) < 2:
             return self
@@ -132,11 +142,12 @@ class Contacts:
         return type(self)(self.time[rows], self.pair[rows], self.point[rows], self.normal[rows], impulse[kept])
 
     def __repr__(self) -> str:
-        """Count them."""
-        return f"<Contacts: {len(self):,}>"
+        """Return the number of contacts, and the earliest and latest first touch."""
+        span = f", first touches from {self.time.min():.6g} to {self.time.max():.6g} s" if len(self) else ""
+        return f"<Contacts: {len(self):,}{span}>"
 
     def some(self, which: BoolArray) -> Self:
-        """Return some of them, (C,)."""
+        """Return the contacts selected by a boolean mask, (C,)."""
         vectors = (self.point[which], self.normal[which], self.impulse[which])
         return type(self)(self.time[which], self.pair[which], *vectors)
 
@@ -152,62 +163,77 @@ class Contacts:
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
-    """A whole run: T frames of N bodies, and its C contacts. Attributes bear the names of the stored arrays."""
+class Trajectory(HtmlRepr):
+    """Recorded run: T frames of N bodies, and C contacts. The attributes are the arrays of a stored run."""
 
     time: FloatArray
-    """(T,) s"""
+    """(T,) s, simulated time of each frame"""
     position: FloatArray
-    """(T, N, 2) m; a body that is not there yet is nan"""
+    """(T, N, 2) m, centres of mass; nan before a body is added"""
     velocity: FloatArray
     """(T, N, 2) m/s"""
     angle: FloatArray
-    """(T, N) rad"""
+    """(T, N) rad, counter-clockwise"""
     angular_velocity: FloatArray
     """(T, N) rad/s"""
     names: npt.NDArray[np.str_]
-    """(N,)"""
+    """(N,) names of the bodies"""
     contact_time: FloatArray
-    """(C,) s"""
+    """(C,) s, time of the first touch"""
     contact_pair: IntArray
-    """(C, 2) body numbers; −1 − k for the k-th fixed thing: planes, walls, posts, pockets, zones"""
+    """(C, 2) body indices from 0; −1 − k for the k-th fixed object, in the order planes, walls, posts, pockets, zones
+    """
     contact_point: FloatArray
-    """(C, 2) m"""
+    """(C, 2) m, contact point at the first touch"""
     contact_normal: FloatArray
-    """(C, 2) from the first of the pair to the second"""
+    """(C, 2) unit vector from the first of the pair to the second"""
     contact_impulse: FloatArray
-    """(C, 2) N·s, given by the first of the pair to the second"""
+    """(C, 2) N·s, impulse on the second of the pair, summed over the contact"""
     retired_time: FloatArray
-    """(N,) s, when a body left world.bounds or was removed; nan where it did neither"""
+    """(N,) s, time at which a body left `world.bounds`, reached the end of its lifetime or was removed; nan if it did
+    not"""
     missed_time: FloatArray
-    """(M,) s, start of the step in which the engine missed a contact"""
+    """(M,) s, start of the substep in which the engine missed a contact"""
     missed_pair: IntArray
-    """(M, 2) who should have touched, numbered as in `contact_pair`"""
+    """(M, 2) the pair whose contact was missed, with the indices of `contact_pair`"""
     broken_time: FloatArray = field(default_factory=lambda: np.empty(0))
-    """(J,) s, when a joint broke; nan where it did not. Empty where nothing is known of joints: none broke then"""
+    """(J,) s, time at which a joint broke; nan if it did not. Empty if the scene has no joints"""
     energy: FloatArray = field(default_factory=lambda: np.empty(0))
-    """(T,) J, of all bodies, under the gravity of each time; empty where no account was kept"""
+    """(T,) J, kinetic and potential energy of all bodies; empty without energy accounting"""
     account: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
-    """(T, K) J, what each cause, as in info's `causes`, has brought by then; empty where no account was kept"""
+    """(T, K) J, cumulative energy change by each cause in `info["causes"]`; empty without energy accounting"""
     spin: FloatArray = field(default_factory=lambda: np.empty((0, 0, 3)))
-    """(T, N, 3) rad/s, right-handed, z up, of spheres on a floor; empty where nothing rolls"""
+    """(T, N, 3) rad/s, angular velocity of spheres on a `[surface]`, right-handed, z up; empty without a surface"""
     layer: IntArray = field(default_factory=lambda: np.empty((0, 0), np.int16))
-    """(T, N) on which layer each body is, by its number in the scene's `layers`, −1 before it is there; empty where
-    there is one alone"""
+    """(T, N) index of the collision layer of each body in `scene.layers`; −1 before a body is added. Empty if the scene
+    has a single layer"""
     info: Mapping[str, Any] = field(default_factory=dict)
-    """What was run and how it went: scene (as a document), engine, settings, actions, seed, status, reason, steps,
-    seconds, work, energy_start, energy_end, joint_error (the largest, as a part of a length; None without joints),
-    broken (how many joints), audited, state_hash (of the end), versions; causes (names, where an account was
-    kept)."""
+    """scene, engine, settings, actions, seed, status, reason, steps, seconds, work, energy_start, energy_end,
+    joint_error (the largest constraint violation, relative to a length; None without joints), broken (number of broken
+    joints), audited, state_hash (of the last state), versions; causes (names of the columns of `account`)"""
 
     def __repr__(self) -> str:
-        """Name scene, engine and status, and count what the arrays hold."""
+        """Return scene, engine and status, the sizes of the arrays, and the key figures."""
         title, engine = self.info.get("scene", {}).get("title", ""), self.info.get("engine")
-        about = " ".join(part for part in (repr(title) if title else "", f"on {engine}" if engine else "") if part)
+        about = " ".join(
+            part for part in (short_repr(title) if title else "", f"on {engine}" if engine else "") if part
+        )
         end = f" to {self.time[-1]:g} s" if len(self.time) else ""
-        bodies = f"{len(self.names):,} {'body' if len(self.names) == 1 else 'bodies'}"
-        counts = f"{bodies}, {len(self.time):,} frames{end}, {len(self.contact_time):,} contacts"
-        return f"<Trajectory{about and ' ' + about}: {self.info.get('status', 'unknown')}, {counts}>"
+        counts = f"{_bodies(len(self.names))}, {len(self.time):,} frames{end}, {len(self.contact_time):,} contacts"
+        lines = [f"<Trajectory{about and ' ' + about}: {self.info.get('status', 'unknown')}, {counts}"]
+        if self.info.get("reason"):
+            lines.append(shorten(str(self.info["reason"]), MAX_MESSAGE))
+        figures = []
+        start, final = self.info.get("energy_start"), self.info.get("energy_end")
+        if start is not None and final is not None:
+            figures.append(f"energy {start:.4g} → {final:.4g} J")
+        if len(self.contact_time):
+            figures.append(f"first contact {self.contact_time.min():.6g} s")
+        if self.info.get("audited"):
+            figures.append(f"missed contacts {len(self.missed_time):,}")
+        if figures:
+            lines.append(", ".join(figures))
+        return "\n  ".join(lines) + ">"
 
     @property
     def status(self) -> str:
@@ -216,20 +242,23 @@ class Trajectory:
 
     @property
     def reason(self) -> str | None:
-        """Why the status is not `ok`."""
+        """Reason for a status other than `ok`; None if the status is `ok`."""
         reason = self.info["reason"]
         return None if reason is None else str(reason)
 
     @property
     def missed_contacts(self) -> int | None:
-        """How many contacts the engine missed; unknown (None) where the run was not audited."""
+        """Number of contacts that the engine missed; None if the run was not audited."""
         return len(self.missed_time) if self.info["audited"] else None
 
     def breaks(self, joints: int) -> FloatArray:
-        """Return when each of so many joints broke, (J,) s; inf where it never did.
+        """Return the time at which each joint broke, (J,) s; inf if it did not.
+
+        Args:
+            joints: J, the number of joints in the scene.
 
         Raises:
-            ValueError: the run had another number of joints.
+            ValueError: the run had a different number of joints.
         """
         if not len(self.broken_time):
             return np.full(joints, np.inf)
@@ -238,7 +267,10 @@ class Trajectory:
         return np.where(np.isnan(self.broken_time), np.inf, self.broken_time)
 
     def number(self, name: str) -> int:
-        """Return a body's number.
+        """Return the index of a body.
+
+        Args:
+            name: name of the body.
 
         Raises:
             KeyError: no body has that name.
@@ -249,7 +281,11 @@ class Trajectory:
         return int(found[0])
 
     def at(self, frames: list[int]) -> Self:
-        """Return the trajectory with only some of its frames, by their numbers."""
+        """Return a trajectory with the selected frames only. The contacts are kept.
+
+        Args:
+            frames: indices of the frames.
+        """
         keys = ["time", "position", "velocity", "angle", "angular_velocity"]
         if len(self.energy):
             keys += ["energy", "account"]
@@ -260,7 +296,16 @@ class Trajectory:
         return replace(self, **{key: getattr(self, key)[frames] for key in keys})
 
     def save(self, path: str | Path) -> Path:
-        """Write the arrays as one compressed `.npz`, to a temporary name first: never half a file."""
+        """Write the arrays to a compressed `.npz` file.
+
+        The file is written under a temporary name and then renamed, so an interrupted save leaves no partial file.
+
+        Args:
+            path: path of the file.
+
+        Returns:
+            The path of the file.
+        """
         path = Path(path)
         without = {"info", *(key for key in ("spin", "layer") if not len(getattr(self, key)))}
         arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in without}
@@ -271,19 +316,17 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read what `save` wrote.
+        """Read a trajectory that `save` wrote.
+
+        Args:
+            path: path of the file.
 
         Raises:
             OSError: the file cannot be opened.
-            ValueError: it is no stored trajectory, or damaged.
+            TooLargeError: the arrays would not fit into memory.
+            ValueError: the file is not a stored run, or is damaged.
         """
-        with Path(path).open("rb") as stream:
-            try:
-                with np.lib.npyio.NpzFile(stream, allow_pickle=False) as arrays:
-                    missing = {f.name for f in fields(cls)} - set(arrays.files) - LATER
-                    if missing:
-                        raise ValueError(f"it has no {', '.join(sorted(missing))}")
-                    values = {f.name: arrays[f.name] for f in fields(cls) if f.name in arrays.files}
-                return cls(**{**values, "info": json.loads(str(values["info"]))})
-            except (ValueError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
-                raise ValueError(f"{path} is no stored run: {error}") from None
+        from sandbox.run_file import read_run_file  # only reading a run needs the models of its scene and actions
+
+        arrays, info = read_run_file(Path(path))
+        return cls(**arrays, info=info)

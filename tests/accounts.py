@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from sandbox.action import Action
-from sandbox.engines.account import Cause
-from sandbox.engines.energy import total_energy
+from sandbox.engines.common.energy_balance import total_energy
+from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 Timed = Sequence[tuple[int, Action]]
 """What is done, and before which step."""

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.compare.runs import frames_as_run
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
-from sandbox.trajectory import Contacts, FloatArray, Trajectory
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Contacts, Trajectory
 
 BALLS = """
 [world]

@@ -25,7 +25,7 @@ from sandbox.action import (
     is_settable,
     speed_limit,
 )
-from sandbox.scene.model import Ball
+from sandbox.scene.description.discs import Ball
 
 GOOD: list[dict[str, Any]] = [
     {"kind": "impulse", "time": 0, "body": "a", "impulse": [1, 2]},

@@ -29,30 +29,36 @@ ACTIONS = [
 ]
 NAMES = [
     "ENGINES",
+    "INTEGRATORS",
     "ActionError",
     "Ball",
     "Box",
     "Capsule",
     "Compound",
     "Contacts",
+    "Divergence",
     "Drive",
     "Fault",
     "Force",
     "Frame",
     "Impulse",
+    "IntegrationResult",
     "Launch",
     "Move",
     "Polygon",
     "Pull",
     "Recording",
+    "Refusal",
     "Remove",
     "Reshape",
     "Scene",
     "SceneError",
     "SetParameter",
     "Settings",
+    "Setup",
     "Spawn",
     "Spread",
+    "Store",
     "Strike",
     "Stroke",
     "Switch",
@@ -60,15 +66,19 @@ NAMES = [
     "Throttle",
     "Toggle",
     "Trajectory",
+    "UnknownEngineError",
+    "World",
     "compare",
     "demands",
     "dumps",
     "horizon",
+    "integrate",
     "load",
     "loads",
     "odds",
     "play_out",
     "run",
+    "run_table",
     "sensitivity",
     "start",
     "tradeoff",
@@ -87,7 +97,7 @@ def test_names_are_those_promised() -> None:
 def test_name_is_importable_and_documented(name: str) -> None:
     value = getattr(sandbox, name)
     assert value is getattr(sandbox, name)
-    if name != "ENGINES":
+    if not name.isupper():
         assert value.__name__ == name
         assert value.__doc__
 
@@ -182,3 +192,27 @@ def test_run_works_without_assertions() -> None:
     code = f"import sandbox; print(sandbox.run(sandbox.loads({TEXT!r})).status)"
     done = subprocess.run([sys.executable, "-O", "-c", code], capture_output=True, text=True, check=True, timeout=120)
     assert done.stdout == "ok\n"
+
+
+def test_scene_is_run_by_its_name_or_path(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(TEXT)
+    assert sandbox.run(path).status == sandbox.run(str(path)).status == "ok"
+    simulation = sandbox.start("bounce")
+    assert repr(simulation) == f"<Simulation of {sandbox.load('bounce').title!r} on pymunk at 0 s, 1 body>"
+    simulation.close()
+    with pytest.raises(sandbox.SceneError, match="did you mean tutorial/bounce"):
+        sandbox.run("bounc")
+    assert [row.engine for row in sandbox.compare(path, "pymunk").rows] == ["pymunk"]
+    found = sandbox.tradeoff(path, "pymunk", most=1, repeats=1)
+    assert {point.engine for point in found.points} == {"pymunk"}
+
+
+@pytest.mark.parametrize(
+    ("name", "right"), [("Dt", "did you mean 'dt'"), ("seed", r"load\(…, \['world.seed=2'\]\)"), ("zzz", "known: dt, ")]
+)
+def test_setting_that_does_not_exist_is_refused_with_what_is_right(name: str, right: str) -> None:
+    scene = sandbox.loads(TEXT)
+    for call in (sandbox.run, sandbox.compare, sandbox.tradeoff):
+        with pytest.raises(ValueError, match=right):
+            call(scene, **{name: 0.1})

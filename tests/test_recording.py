@@ -14,10 +14,10 @@ from test_action import actions
 
 from sandbox.action import Action, Impulse
 from sandbox.recording import Recording
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 
 RECORDING = Recording(
     scene=loads('[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 1\n'),
@@ -112,6 +112,16 @@ def test_any_part_gives_a_recording_or_a_scene_error(key: str, value: Any) -> No
         assert isinstance(Recording.from_json(text), Recording)
     except SceneError as error:
         assert error.faults
+
+
+def test_recording_beyond_the_limit_is_read_once_the_limit_is_raised(tmp_path: Path, monkeypatch) -> None:
+    path = tmp_path / "session.json"
+    RECORDING.save(path)
+    monkeypatch.setenv("SANDBOX_MAX_SESSION_SIZE", "100B")
+    with pytest.raises(SceneError, match="set SANDBOX_MAX_SESSION_SIZE=1MiB to allow it"):
+        Recording.load(path)
+    monkeypatch.setenv("SANDBOX_MAX_SESSION_SIZE", "1MiB")
+    assert Recording.load(path) == RECORDING
 
 
 def test_recording_is_frozen() -> None:

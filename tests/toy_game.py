@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from sandbox.action import Action, Impulse, Spawn
 from sandbox.games.referee import Referee
 from sandbox.games.rules import Control, Seen
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.file import loads
-from sandbox.scene.model import Ball, Scene
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 
 TOY = """
 title = "Toy"

@@ -15,11 +15,11 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.engines.registry import start
 from sandbox.measure.versions import machine, versions
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 RADIUS, MASS = 0.028575, 0.170097
 WIDTH, LENGTH = 1.27, 2.54

@@ -7,9 +7,9 @@ import pymunk
 
 from sandbox.engines.registry import start
 from sandbox.measure.run import run
-from sandbox.scene.file import loads
-from sandbox.scene.links import WORLD
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.joint_arrays import WORLD
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 
 Timed = Callable[[], float]
 

@@ -21,7 +21,7 @@ from sandbox.play.drawing.palette import BACKGROUND, colour_of
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.framing import framing
 from sandbox.play.sight import Sight
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 SIZE = (1280, 720)
 PICTURES = 20

@@ -28,10 +28,11 @@ from sandbox.engines.registry import ENGINES
 from sandbox.measure.energy import energies
 from sandbox.measure.forecast import forecast, warnings
 from sandbox.measure.run import run
-from sandbox.scene.file import from_document
-from sandbox.scene.links import LinkKind
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Plane, Scene
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.description.fixed import Plane
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 TROUBLES = {
@@ -116,7 +117,7 @@ def judge(scene: Scene, done: Trajectory, engine: str) -> dict[str, bool]:
         return {"events": done.status == "failed"}
     ended = done.status == "ok" and bool(np.isfinite(done.position).all())
     found = {"energy": not ended or gained(scene, done) > ENERGY_GAIN}
-    if meetings(scene).touches.any():
+    if contact_matrix(scene).touches.any():
         found["tunnelling"] = len(done.missed_time) > 0
     if scene.planes and ended:
         found["depth"] = sunk(scene, done)

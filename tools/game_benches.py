@@ -5,7 +5,7 @@ import pooltool_shots
 from bench_row import Bench
 from workloads import fanning, playing, scene, setting, shooting, simulated, stepping
 
-from sandbox.scene.file import load
+from sandbox.scene.files.load import load
 
 GAMES = (
     *(

@@ -8,14 +8,14 @@ import numpy as np
 import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies
 
+from sandbox.arrays import FloatArray
+from sandbox.engines.common.base import BIAS, SLOP_PER_RADIUS
 from sandbox.engines.contract import Simulation
-from sandbox.engines.native.engine import PERSISTENCE
-from sandbox.engines.overlap import BIAS, SLOP_PER_RADIUS
+from sandbox.engines.pymunk_adapter.engine import PERSISTENCE
 from sandbox.engines.registry import start
 from sandbox.measure.closed_form import bounces
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 TOUCH = (
@@ -160,9 +160,9 @@ def copied(count: int) -> Callable[[], float]:
 
 def give_moments(simulation: Simulation, scene: Scene) -> None:
     """Give every body of a pymunk simulation the moment that the engine left out as nothing can turn it."""
-    half = simulation._population.meeting  # type: ignore[attr-defined]
+    space_bodies = simulation._population.space_bodies  # type: ignore[attr-defined]
     for number, moment in enumerate(scene.bodies.moment.tolist()):
-        half.give_moment(number, moment)
+        space_bodies.give_moment(number, moment)
 
 
 def gas(count: int, speed: float, **more: object) -> Scene:

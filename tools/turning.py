@@ -13,7 +13,7 @@ from workloads import timed
 
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
-from sandbox.scene.shipped import find
+from sandbox.scene.files.shipped_scenes import find
 
 TURNS = 30
 """Timed at once."""

@@ -11,14 +11,15 @@ import peers
 
 import sandbox
 from sandbox.action import SetParameter
+from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.reference.engine import ReferenceEngine
-from sandbox.engines.reference.stage import Stage
+from sandbox.engines.reference.step import WorldState
 from sandbox.engines.registry import start
-from sandbox.engines.roster import Roster
 from sandbox.measure.run import run
-from sandbox.scene.file import from_document, load
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 Timed = Callable[[], float]
 """Does the work once and returns what it took."""
@@ -154,11 +155,11 @@ def command(*arguments: str) -> Timed:
 
 
 def events(count: int) -> Timed:
-    """Return the events a second of `exact` in an elastic gas of so many balls, between frames 10 s apart."""
+    """Return the events a second of `exact` in an elastic gas of so many balls, in steps of many thousand events."""
 
     def work() -> float:
         gas = peers.gas(count, 100.0)
-        simulation = start(gas, "exact", gas.solver.replace(dt=10.0))
+        simulation = start(gas, "exact", gas.solver.replace(dt=160.0 / count))
         simulation.step()
         began, before = time.perf_counter(), simulation.work["events"]
         while simulation.work["events"] < before + 100_000:
@@ -187,13 +188,20 @@ def staged(which: Scene, name: str, steps: int = 2000) -> Timed:
 
     def work() -> float:
         simulation = ReferenceEngine().start(which)
-        stage = Stage(Roster(which, which.solver.h), simulation.settings)
-        moved = stage.moved(which.solver.h)
-        contacts = stage.overlaps(moved)
+        h = which.solver.h
+        world = WorldState(BodyStore(Setup.of(which), h), simulation.settings)
+        motion = world.advance(h)
+        contacts = world.solver.detect(motion.placed)
+
+        def resolve() -> None:
+            solution = world.solver.solve(motion, contacts, h)
+            world.solver.correct(solution, h)
+            world.commit(motion, solution, h)
+
         stages = {
-            "move": lambda: stage.moved(which.solver.h),
-            "look": lambda: stage.overlaps(moved),
-            "resolve": lambda: stage.resolve(moved, contacts, which.solver.h),
+            "move": lambda: world.advance(h),
+            "look": lambda: world.solver.detect(motion.placed),
+            "resolve": resolve,
             "step": simulation.step,
         }
         return timed(lambda: [stages[name]() for _ in range(steps)])

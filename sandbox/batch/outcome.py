@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sandbox.action import actions_to_json, in_order
 from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError, run_id
 from sandbox.engines.registry import engine_named
@@ -12,8 +13,11 @@ from sandbox.interrupt import heeded, uninterrupted
 from sandbox.measure.collisions import collisions, first_collision
 from sandbox.measure.finite import finite
 from sandbox.measure.ledger import ledger_of
-from sandbox.measure.run import Progress, run
+from sandbox.measure.run import Progress, run, run_without_frames
 from sandbox.measure.versions import versions
+from sandbox.resource_limits import TooLargeError
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.document import to_document
 from sandbox.trajectory import Trajectory
 
 GAME = ("score", "over", "player", "otherwise")
@@ -31,6 +35,8 @@ class Outcome:
     """of the stored arrays"""
     repeated: bool
     """It was in the store already, and was not run again."""
+    damaged: str | None = None
+    """file and fault of the stored run that this one replaces; None where there was no such file"""
 
     @property
     def replayed(self) -> bool | None:
@@ -92,6 +98,7 @@ class Outcome:
             **({"final": self._final()} if final else {}),
             "path": None if self.path is None else str(self.path),
             "repeated": self.repeated,
+            **({} if self.damaged is None else {"damaged": self.damaged}),
         }
 
     def _ledger(self) -> dict[str, Any] | None:
@@ -143,6 +150,8 @@ def execute(
 ) -> Outcome:
     """Make a run, and store it where there is a store; one that is stored already is read, not repeated.
 
+    A stored run that is damaged, or is another run than its id says, is made again and replaced.
+
     Args:
         job: what to run.
         store: where to look it up and put it.
@@ -152,40 +161,100 @@ def execute(
         done: who is told of the outcome, with no interrupt between storing and telling.
 
     Raises:
-        TooLargeError: the frames would not fit into memory.
-        StoreError: the store cannot be used, or what it holds of this run cannot be read.
+        TooLargeError: the frames would not fit into memory, or those of the stored run do not.
+        StoreError: the store cannot be used, or the file of this run cannot be opened.
         SceneError: the game of the scene cannot be played so.
     """
-    engine = engine_named(job.engine)
-    settings = job.scene.solver
-    if not engine.missing(job.scene, settings):
-        settings = engine.resolve(job.scene, settings)
-    game = None if job.player is None else job.player.document(job.scene)
-    number = run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions, game)
+    settings, number = _identified(job)
     found = store.find(number) if store is not None else None
+    damaged: str | None = None
     if store is not None and found is not None:
-        file = store.file(found)
         try:
-            outcome = Outcome(job, number, Trajectory.load(file), file, repeated=True)
-        except (ValueError, OSError) as error:
-            raise StoreError(f"{error}; remove the file, and the run is made again") from None
-        if len(outcome.trajectory.energy) or not account or outcome.trajectory.status == "refused":
-            if done is not None:
-                done(outcome)
-            return outcome
-        audit = audit or bool(outcome.trajectory.info.get("audited"))  # what was known stays known
+            stored = _stored(store.file(found), job, settings)
+        except TooLargeError:
+            raise
+        except ValueError as error:
+            damaged = str(error)
+        else:
+            accounted = len(stored.energy) or not account or stored.status == "refused"
+            if accounted and not _was_given_up(stored):
+                outcome = Outcome(job, number, stored, store.file(found), repeated=True)
+                if done is not None:
+                    done(outcome)
+                return outcome
+            audit = audit or bool(stored.info["audited"])  # what was known stays known
     bout = None if job.player is None else job.player.bout(job.scene, job.label)
     trajectory = run(
         job.scene, job.engine, actions=job.actions, audit=audit, account=account, progress=progress, bout=bout
     )
     with uninterrupted():
-        path = store.file(store.add(trajectory, number)) if store is not None else None
-        if found is not None and path is not None:
-            try:
-                trajectory.save(path)
-            except OSError as error:
-                raise StoreError(f"{path}: {error.strerror or error}") from None
-        outcome = Outcome(job, number, trajectory, path, repeated=False)
+        path = None if store is None else store.file(store.add(trajectory, number, replace=found is not None))
+        outcome = Outcome(job, number, trajectory, path, repeated=False, damaged=damaged)
         if done is not None:
             done(outcome)
     return outcome
+
+
+def _stored(file: Path, job: Job, settings: Settings) -> Trajectory:
+    """Read the stored run of a job.
+
+    Args:
+        file: of its arrays.
+        job: what was run.
+        settings: the resolved ones.
+
+    Raises:
+        StoreError: the file cannot be opened.
+        TooLargeError: its arrays would not fit into memory.
+        ValueError: it is damaged, or another run; `str()` names the file and the fault.
+    """
+    try:
+        run = Trajectory.load(file)
+    except TooLargeError as error:
+        raise TooLargeError(f"{error}; delete the file to repeat the run") from None
+    except OSError as error:
+        raise StoreError(f"{file}: {error.strerror or error}; the file must be readable") from None
+    scene, stated = to_document(job.scene), dict(run.info["scene"])
+    for table in ("solver", "play") if job.player is None else ("solver",):  # which do not decide how a run goes
+        scene.pop(table, None)
+        stated.pop(table, None)
+    wanted: dict[str, Any] = {"engine": job.engine, "seed": job.scene.world.seed, "versions": dict(versions())}
+    if run.status != "refused":  # an engine that refuses a run need not have resolved its settings
+        wanted["settings"] = settings.model_dump(mode="json")
+    if job.player is None:  # else the actions of the game are among them
+        wanted["actions"] = actions_to_json(in_order(job.actions))
+    different = [] if scene == stated else ["scene"]
+    different += [key for key, value in wanted.items() if run.info.get(key) != value]
+    if len(run.time) and bool(run.info.get("game")) != (job.player is not None):
+        different.append("game")
+    if different:
+        raise ValueError(f"{file} is not the run of its id: its info.{different[0]} is different")
+    return run
+
+
+def give_up(job: Job, store: Store | None, reason: str) -> Outcome:
+    """Return a failed run without frames, for a job that its process does not survive; the next call makes it again.
+
+    Raises:
+        StoreError: the store cannot be used.
+    """
+    settings, number = _identified(job)
+    trajectory = run_without_frames(job.scene, job.engine, settings, in_order(job.actions), "failed", reason)
+    with uninterrupted():
+        path = store.file(store.add(trajectory, number)) if store is not None else None
+    return Outcome(job, number, trajectory, path, repeated=False)
+
+
+def _was_given_up(trajectory: Trajectory) -> bool:
+    """Tell whether a stored run is one of `give_up`: a run that failed by itself has its first frame at least."""
+    return trajectory.status == "failed" and not len(trajectory.time)
+
+
+def _identified(job: Job) -> tuple[Settings, str]:
+    """Return the settings that a job is run with, resolved where its engine can run it, and the id of its run."""
+    engine = engine_named(job.engine)
+    settings = job.scene.solver
+    if not engine.missing(job.scene, settings):
+        settings = engine.resolve(job.scene, settings)
+    game = None if job.player is None else job.player.document(job.scene)
+    return settings, run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions, game)

@@ -1,23 +1,35 @@
 """Plans: which runs a command asks for. Scenes, sweeps, seeds and engines multiply."""
 
 import math
-import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Any
 
+from sandbox.echo import short_count, short_repr, shorten
 from sandbox.games.player import Player
-from sandbox.games.registry import RULES
+from sandbox.games.registry import has_rules
+from sandbox.measure.replay import read_session
 from sandbox.measure.seeds import same_chances
+from sandbox.measure.told import Told
 from sandbox.recording import Recording
-from sandbox.scene.address import AddressError, parse_assignment, parse_value, split_assignment
-from sandbox.scene.document import to_document
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import Override, from_document, load
-from sandbox.scene.model import Scene
+from sandbox.resource_limits import PLAN_MEMORY, RUNS
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import Override, from_session, load
+from sandbox.scene.files.overrides import (
+    AddressError,
+    combinations,
+    parse_assignment,
+    parse_path,
+    parse_value,
+    split_assignment,
+)
+from sandbox.scene.scene import Scene
 
-MOST_POINTS = 1_000_000
+MAX_FAILED = 100
+"""Runs that cannot be made, after which the check ends with their faults."""
+_BYTES_A_SCENE, _BYTES_AN_ELEMENT, _BYTES_A_BODY = 16_000, 4_000, 500
+"""What a scene takes at most, as measured: an element is a table of the file, a body one that may be generated."""
 
 USUAL = "pymunk"
 """The engine that runs what nobody has chosen one for."""
@@ -53,6 +65,7 @@ def plan(
     sweeps: Sequence[str] = (),
     seeds: int | None = None,
     player: Player | None = None,
+    told: Told | None = None,
 ) -> list[Job]:
     """Lay out every run, in order: scene by scene, the last sweep changing fastest, then seeds, then engines.
 
@@ -65,48 +78,97 @@ def plan(
         sweeps: `KEY=A,B,C` or `KEY=LOW:HIGH:N[:log]`.
         seeds: how many, from 1 on; without, each scene's own.
         player: who plays where a scene has a game with rules; by default chance, and of a session who played it.
+        told: called with how far it is.
 
     Raises:
         SceneError: scenes have faults, as they stand or with a value set; all of them are told, each once. Or a game
             cannot be played so.
-        AddressError: a sweep cannot be understood.
+        AddressError: a sweep cannot be understood, or there would be too many runs.
     """
-    axes: list[list[tuple[str, Any]]] = [[(key, value) for value in values] for key, values in map(parse_sweep, sweeps)]
-    seeding: list[tuple[tuple[str, Any], ...]] = [()]
-    if seeds is not None:
-        seeding = [(("world.seed", seed),) for seed in range(1, seeds + 1)]
-    if math.prod(len(axis) for axis in axes) * len(seeding) > MOST_POINTS:
-        raise AddressError(f"the sweeps multiply to more than {MOST_POINTS:,} runs")
+    axes: list[tuple[str, Sequence[Any]]] = [parse_sweep(sweep) for sweep in sweeps]
+    keys = [key for key, _ in axes]
+    seeding: Sequence[int | None] = [None] if seeds is None else range(1, seeds + 1)
+    points = combinations(axes, len(seeding))
+    count = len(points) * len(seeding)
     jobs: list[Job] = []
     set_values = [_assignment(override) for override in overrides]
     faults: dict[Fault, None] = {}
+    planned = failed = 0
     for label, path in scenes:
-        for point in product(*axes):
+        recorded = _is_recording(path)
+        known: Recording | None = None
+        for point in points:
             found: list[tuple[Recording, Player | None, tuple[tuple[str, Any], ...]]] = []
             alike = 1
             for seed in seeding:
+                where = (*point, *(() if seed is None else (("world.seed", seed),)))
                 try:
-                    session = _read(path, (*overrides, *point, *seed))
+                    known = read_session(path) if recorded and known is None else known
+                    session = _read(path, known, (*overrides, *where))
                     plays = _player(session, path, player)
                 except SceneError as error:
-                    faults |= dict.fromkeys(error.faults)
+                    faults |= dict.fromkeys(relabelled(fault, keys) for fault in error.faults)
+                    failed += 1
+                    if failed == MAX_FAILED:
+                        raise SceneError(tuple(faults)) from None
                     continue
                 if len(found) == 1 and plays is None and same_chances(found[0][0].scene, session.scene):
                     alike = len(seeding)
                     break
-                found.append((session, plays, (*point, *seed)))
+                if len(found) < 2:  # by the second it is known that seeds differ
+                    before, each = planned, _bytes_of(session.scene)
+                    planned += each * (len(seeding) - 1 if found else 1)
+                    if planned > PLAN_MEMORY.value:
+                        subject = f"{count:,} runs of {len(session.scene.bodies):,} bodies take"
+                        reason = PLAN_MEMORY.refusal(subject, max(planned, before + each * count))
+                        raise SceneError([Fault(label, None, "", str(reason))])
+                found.append((session, plays, where))
             for session, plays, where in found:
                 for engine in engines or (session.engine,):
                     played = session if engine == session.engine else session.on(engine)
-                    same = not (overrides or where)
-                    known, score = (played.state_hash, played.score) if same else (None, None)
-                    recorded = _is_recording(path)
+                    state, score = (None, None) if overrides or where else (played.state_hash, played.score)
                     values = (*set_values, *where)
-                    job = Job(label, played.scene, engine, played.actions, values, recorded, known, plays, score, alike)
+                    job = Job(label, played.scene, engine, played.actions, values, recorded, state, plays, score, alike)
                     jobs.append(job)
+            if told is not None:
+                told(f"checking {label}: runs so far: {len(jobs):,}")
     if faults:
         raise SceneError(tuple(faults))
     return jobs
+
+
+def _bytes_of(scene: Scene) -> int:
+    """Return about how many bytes a scene takes."""
+    elements = sum(len(part) for _, part in scene if isinstance(part, tuple))
+    return _BYTES_A_SCENE + _BYTES_AN_ELEMENT * elements + _BYTES_A_BODY * len(scene.bodies)
+
+
+def repeated_keys(overrides: Sequence[str], sweeps: Sequence[str], seeds: int | None = None) -> list[Fault]:
+    """Return a fault for each key that `--set`, `--sweep` and `--seeds` give more than one value of a single run.
+
+    Values that cannot be read are left to `parse_sweep` and `load`.
+    """
+    set_keys, swept = ([key for key in map(_path, texts) if key] for texts in (overrides, sweeps))
+    faults: dict[Fault, None] = {}
+    for k, (path, key) in enumerate(swept):
+        if any(path == other for other, _ in swept[:k]):
+            faults[Fault("--sweep", None, key, "is swept twice; give all its values in one --sweep")] = None
+        if any(path == other for other, _ in set_keys):
+            faults[Fault("--sweep", None, key, "is given by --set too; leave out one of them")] = None
+    for option, keys in (("--sweep", swept), ("--set", set_keys)) if seeds is not None else ():
+        for path, key in keys:
+            if path == ("world", "seed"):
+                faults[Fault(option, None, key, "is given by --seeds too; leave out one of them")] = None
+    return list(faults)
+
+
+def _path(assignment: str) -> tuple[tuple[str, ...], str] | None:
+    """Return the path of an assignment's key, one for all its spellings, and the key; None if it cannot be read."""
+    try:
+        key, _ = parse_assignment(assignment)
+        return parse_path(key), key
+    except AddressError:
+        return None
 
 
 def _assignment(override: Override) -> tuple[str, Any]:
@@ -117,19 +179,24 @@ def _assignment(override: Override) -> tuple[str, Any]:
         return str(override), None
 
 
-def _read(path: str, overrides: Sequence[Override]) -> Recording:
-    """Return what a file holds as a session; a scene is one in which nobody does anything.
+def relabelled(fault: Fault, keys: Sequence[str]) -> Fault:
+    """Return a fault of an override, named by `--sweep` where the path that leads nowhere is one that is swept."""
+    is_swept = fault.path == "--set" and any(fault.message.startswith((f"{key}:", f"{key!r}")) for key in keys)
+    return replace(fault, path="--sweep") if is_swept else fault
+
+
+def _read(path: str, known: Recording | None, overrides: Sequence[Override]) -> Recording:
+    """Return a scene as a session without actions, or the session that was read from the file, with values set.
 
     Raises:
         SceneError: it has faults.
     """
-    if not _is_recording(path):
+    if known is None:
         scene = load(path, overrides)
         return Recording(scene, USUAL, scene.solver, (), scene.world.duration)
-    session = Recording.load(path)
-    document = to_document(session.whole_scene)
-    document["solver"] = session.settings.model_dump(mode="json", exclude_defaults=True)
-    return replace(session, scene=from_document(document, path, overrides))
+    document = to_document(known.whole_scene)
+    document["solver"] = known.settings.model_dump(mode="json", exclude_defaults=True)
+    return replace(known, scene=from_session(document, path, overrides))
 
 
 def _player(session: Recording, path: str, player: Player | None) -> Player | None:
@@ -138,7 +205,7 @@ def _player(session: Recording, path: str, player: Player | None) -> Player | No
     Raises:
         SceneError: the game cannot be played so.
     """
-    if session.scene.play.game not in RULES:
+    if not has_rules(session.scene):
         return None
     plays = Player.of(session) if _is_recording(path) else player or Player()
     plays.bout(session.scene, path)
@@ -149,8 +216,8 @@ def _is_recording(path: str) -> bool:
     return path.lower().endswith(".json")
 
 
-def parse_sweep(text: str) -> tuple[str, list[Any]]:
-    """Read `KEY=A,B,C` or `KEY=LOW:HIGH:N[:log]` into the key and its values.
+def parse_sweep(text: str) -> tuple[str, Sequence[Any]]:
+    """Read `KEY=A,B,C` or `KEY=LOW:HIGH:N[:log]` into the key and its values, each once.
 
     Between whole ends, what is whole stays an integer: `solver.substeps=1:8:4:log` is 1, 2, 4, 8.
 
@@ -159,17 +226,20 @@ def parse_sweep(text: str) -> tuple[str, list[Any]]:
     """
     key, _ = parse_assignment(text)
     values = split_assignment(text)[2].strip()
-    parts = values.split(":")
+    parts = values.split(":", 5)
     if len(parts) in (3, 4) and not values.startswith(('"', "'", "[")):
-        return key, list(_range(text, parts))
+        return key, _range(text, parts)
     if len(parts) > 4 and all(_is_number(part) for part in parts[:-1]):
-        raise AddressError(f"{text!r}: a range is LOW:HIGH:N or LOW:HIGH:N:log")
+        raise AddressError(f"{short_repr(text)}: a range is LOW:HIGH:N or LOW:HIGH:N:log")
     if len(parts) == 2 and all(_is_number(part) for part in parts):
-        raise AddressError(f"{text!r}: a range needs a count: {key}={values}:N, such as {key}={values}:10")
-    found = [parse_value(value) for value in _split(values)]
+        asked = f"{shorten(key)}={shorten(values)}"
+        raise AddressError(f"{short_repr(text)}: a range needs a count: {asked}:N, such as {asked}:10")
+    found = [parse_value(value) for value in dict.fromkeys(_split(values))]
     if not values or "" in found:
-        raise AddressError(f"{text!r}: a value is missing; KEY=A,B,C or KEY=LOW:HIGH:N or KEY=LOW:HIGH:N:log")
-    return key, found
+        raise AddressError(
+            f"{short_repr(text)}: a value is missing; use KEY=A,B,C or KEY=LOW:HIGH:N or KEY=LOW:HIGH:N:log"
+        )
+    return key, list({f"{type(value).__name__} {value!r}": value for value in found}.values())  # 1, 1.0 and true differ
 
 
 def _is_number(text: str) -> bool:
@@ -180,43 +250,67 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _range(text: str, parts: list[str]) -> Iterator[float]:
-    whole = all(part.strip().removeprefix("-").isdecimal() for part in parts[:2])
+@dataclass(frozen=True)
+class _Range(Sequence[float]):
+    """Evenly spaced values, made one by one: how many there are is known, and may be refused, before there is any."""
+
+    low: float
+    high: float
+    size: int
+    is_log: bool
+    is_whole: bool
+    """The ends are integers, and what is whole in between is one too."""
+
+    def __len__(self) -> int:
+        return self.size
+
+    def __getitem__(self, index: Any) -> Any:
+        """Return a value by its index from 0, or from the end."""
+        k = range(self.size)[index]
+        low, high = self.low, self.high
+        fraction = k / (self.size - 1) if self.size > 1 else 0.0
+        value = low * (high / low) ** fraction if self.is_log else low + (high - low) * fraction
+        if k and k == self.size - 1:
+            value = high  # not a rounding beside it
+        near = round(value) if self.is_whole else 0
+        return near if self.is_whole and abs(value - near) <= 1e-12 * abs(value) else value  # powers and sums round
+
+
+def _range(text: str, parts: list[str]) -> _Range:
+    is_whole = all(part.strip().removeprefix("-").isdecimal() for part in parts[:2])
     try:
         low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
     except ValueError:
-        raise AddressError(f"{text!r}: a range is LOW:HIGH:N, two numbers and how many values") from None
-    log = len(parts) == 4
-    if log and parts[3] != "log":
-        raise AddressError(f"{text!r}: {parts[3]!r} is unknown; KEY=LOW:HIGH:N:log spaces by equal factors")
-    if not (1 <= count <= MOST_POINTS and math.isfinite(high - low)):
-        raise AddressError(f"{text!r}: a range has finite ends and 1 to {MOST_POINTS:,} values")
-    if log and not (0.0 < low <= high and math.isfinite(high / low)):
-        raise AddressError(f"{text!r}: equal factors need 0 < LOW <= HIGH")
-    for k in range(count):
-        share = k / (count - 1) if count > 1 else 0.0
-        value = low * (high / low) ** share if log else low + (high - low) * share
-        if k and k == count - 1:
-            value = high  # not a rounding beside it
-        near = round(value) if whole else 0
-        yield near if whole and abs(value - near) <= 1e-12 * abs(value) else value  # powers and sums round
+        raise AddressError(f"{short_repr(text)}: a range is LOW:HIGH:N, two numbers and a count") from None
+    is_log = len(parts) == 4
+    if is_log and parts[3] != "log":
+        unknown = short_repr(parts[3])
+        raise AddressError(f"{short_repr(text)}: {unknown} is unknown; KEY=LOW:HIGH:N:log gives logarithmic spacing")
+    if not (count >= 1 and math.isfinite(high - low)):
+        raise AddressError(f"{short_repr(text)}: a range needs finite ends and at least 1 value")
+    if count > RUNS.value:
+        raise AddressError(f"{short_repr(text)}: a range of {short_count(count)} values; {RUNS.remedy(count)}")
+    if is_log and not (0.0 < low <= high and math.isfinite(high / low)):
+        raise AddressError(f"{short_repr(text)}: logarithmic spacing needs 0 < LOW <= HIGH")
+    return _Range(low, high, count if low != high else 1, is_log, is_whole)
 
 
 def _split(values: str) -> list[str]:
-    """Split at the commas that separate TOML values, not at those within arrays or texts."""
-    parts, start = [], 0
+    """Split at the commas that separate TOML values, not at those within arrays, tables or texts."""
+    parts, start, depth, quote, escaped = [], 0, 0, "", False
     for k, letter in enumerate(values):
-        if letter == "," and _is_whole(values[start:k]):
+        if escaped:
+            escaped = False
+        elif quote:
+            escaped = letter == "\\" and quote == '"'
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        elif letter in "[{":
+            depth += 1
+        elif letter in "]}":
+            depth -= 1
+        elif letter == "," and depth <= 0:
             parts.append(values[start:k].strip())
             start = k + 1
     return [*parts, values[start:].strip()]
-
-
-def _is_whole(text: str) -> bool:
-    if not any(mark in text for mark in "[\"'{"):
-        return True
-    try:
-        tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
-        return False
-    return True

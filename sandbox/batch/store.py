@@ -1,35 +1,45 @@
-"""The run store: a folder with one row a run in `runs.sqlite`, and the arrays of each in `<id>.npz`.
+"""Run store: a folder with one row per run in `runs.sqlite`, and the arrays of each run in `<id>.npz`.
 
-A run is known by a hash of all that decides its outcome, so the store keeps each once. The row is written
-after the file is in place: what a crash leaves is at worst a file without a row, which the next add replaces.
+The id of a run is a hash of everything that determines its outcome, so the store has each run once. The row is written
+after the file. A crash can leave a file without a row, which the next `add` replaces.
 """
 
+import errno
 import hashlib
 import json
 import math
 import re
 import sqlite3
 import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import astuple, dataclass, fields
 from datetime import UTC, datetime
 from pathlib import Path
+from time import monotonic
 from types import TracebackType
-from typing import Self
+from typing import Any, Self, get_type_hints
 
 from sandbox.action import Action, actions_to_json
+from sandbox.interrupt import pass_on_held
 from sandbox.measure.collisions import collisions
-from sandbox.scene.document import to_document
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.document import to_document
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
+from sandbox.whole import remove_stale, temporary_in
 
 DATABASE = "runs.sqlite"
 VERSION = 2
 """Of the table below. A store of an earlier one is brought up to date, a later one is refused."""
 WAIT = 60.0
 """s, for another process to finish its write; each takes milliseconds, for files are written before."""
+NOTICE = 1.0
+"""s of waiting, after which it is reported; a multiple of any write."""
+ECHO = 40
+"""characters of a damaged value that a message repeats"""
+STATUSES = ("ok", "diverged", "refused", "failed")
+NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 ID = re.compile(r"[0-9a-f]{20}")
 
 TABLE = """
@@ -60,40 +70,56 @@ LATER = {2: "ALTER TABLE runs ADD COLUMN score REAL"}
 
 
 class StoreError(Exception):
-    """A folder cannot serve as a store; `str()` names it and says what would be right."""
+    """A folder cannot be used as a store; `str()` names the folder and the remedy."""
 
 
 @dataclass(frozen=True)
 class StoredRun:
-    """A row of the store. The fields are the columns, in their order."""
+    """Row of the store. The fields are the columns, in their order."""
 
     id: str
+    """20 hex digits: hash of everything that determines the outcome"""
     scene_hash: str
+    """20 hex digits: hash of the scene"""
     scene_title: str
+    """title of the scene"""
     engine: str
+    """name of the engine"""
     settings: str
-    """a JSON object"""
+    """JSON object: settings as the engine resolved them"""
     seed: int
+    """seed of the scene"""
     versions: str
-    """a JSON object"""
+    """JSON object: versions of Python, sandbox and the packages used"""
     status: str
+    """`ok`, `diverged`, `refused` or `failed`"""
     reason: str | None
+    """reason for a status other than `ok`"""
     created: str
-    """ISO 8601, UTC"""
+    """time of creation, ISO 8601, UTC"""
     steps: int
+    """number of steps of dt"""
     seconds: float | None
+    """s, computing time of the steps"""
     energy_start: float | None
-    """J; None where it is not a number"""
+    """J, energy at the start; null if it is not finite"""
     energy_end: float | None
-    """J; None where it is not a number"""
+    """J, energy at the end; null if it is not finite"""
     contacts: int
+    """number of contacts with an impulse"""
     missed_contacts: int | None
-    """None where the run was not audited"""
+    """number of contacts that the engine missed; null if the run was not audited"""
     path: str
     """file name of the arrays, in the store's folder"""
     score: float | None = None
-    """of a game; None where none was played"""
+    """score of the game; null if no game was played"""
 
+
+Notice = Callable[[str], None]
+"""Callback with a message for the user."""
+
+_REMEDY = "name a folder with write permission"
+_REMOVE = "name another folder, or remove the file if it is not needed"
 
 COLUMNS = ", ".join(column.name for column in fields(StoredRun))
 MARKS = ", ".join("?" for _ in fields(StoredRun))
@@ -108,10 +134,10 @@ def run_id(
     actions: tuple[Action, ...] = (),
     game: Mapping[str, object] | None = None,
 ) -> str:
-    """Return the id of a run, 20 hex digits: a hash of everything that decides how it goes.
+    """Return the id of a run, 20 hex digits: a hash of everything that determines its outcome.
 
-    The settings are the resolved ones; what the scene's own `[solver]` says does not count beside them. What `[play]`
-    says does not either, unless a game is played: then it may say how; `game` tells which, and who plays.
+    `settings` are the resolved settings; the scene's own `[solver]` is ignored. `[play]` is ignored unless a game is
+    played; `game` then has the game and its player.
     """
     document = to_document(scene)
     document.pop("solver", None)
@@ -138,25 +164,32 @@ def _json(document: object) -> str:
 
 
 class Store:
-    """A folder of runs. Several processes may add to one folder at the same time.
+    """Folder of stored runs. Several processes may add to one folder at the same time.
 
     Args:
-        directory: made where it does not exist.
+        directory: path of the folder, which is created if it does not exist. Partial files of killed processes are
+            removed.
+        notice: callback with messages that need no reaction: waiting for another process, damaged rows. Each message is
+            given once.
 
     Raises:
-        StoreError: the folder or its database cannot be used. Every method raises it where that comes to
-            be so later.
+        StoreError: the folder or its database cannot be used. Every method raises it if that happens later.
     """
 
-    def __init__(self, directory: str | Path) -> None:
+    def __init__(self, directory: str | Path, notice: Notice | None = None) -> None:
         self.directory = Path(directory)
         self._database = self.directory / DATABASE
+        self._notice = notice
+        self._noticed: set[str] = set()
         with self._faults():
             self.directory.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=self.directory):
                 pass  # a folder that cannot be written to shows now, not after the run
+            remove_stale(self.directory)
             # Without an isolation level, transactions begin and end where this module says so.
-            self._connection = sqlite3.connect(self._database, timeout=WAIT, isolation_level=None)
+            self._connection = sqlite3.connect(self._database, timeout=NOTICE, isolation_level=None)
+        # Text that is not UTF-8 is an error of the row that holds it, which a decoding error would not name.
+        self._connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
         try:
             with self._writing():  # looking and setting up are one, or two processes would both set up
                 self._set_up()
@@ -177,76 +210,120 @@ class Store:
         self._connection.close()
 
     def find(self, run: str) -> StoredRun | None:
-        """Return the run of an id, or None where it is not stored or its file is gone."""
-        with self._faults():
-            rows = self._connection.execute(f"SELECT {COLUMNS} FROM runs WHERE id = ?", (run,)).fetchall()
-        stored = [StoredRun(*row) for row in rows]
-        return stored[0] if stored and self.file(stored[0]).is_file() else None
+        """Return the run with an id; None if it is not stored, its row is damaged, or its file is missing."""
+        found = self._select("WHERE id = ?", (run,))
+        return found[0] if found and self.file(found[0]).is_file() else None
 
     def file(self, run: StoredRun) -> Path:
-        """Return where a run's arrays lie; `Trajectory.load` reads them."""
+        """Return the path of a run's arrays, for `Trajectory.load`."""
         return self.directory / run.path
 
     def rows(self) -> tuple[StoredRun, ...]:
-        """Return every run in the order of adding, also those whose file is gone."""
-        with self._faults():
-            rows = self._connection.execute(f"SELECT {COLUMNS} FROM runs ORDER BY rowid").fetchall()
-        return tuple(StoredRun(*row) for row in rows)
+        """Return all runs in the order of adding, without damaged rows; the file of a run may be missing."""
+        return self._select("ORDER BY rowid")
 
-    def add(self, trajectory: Trajectory, run: str) -> StoredRun:
-        """Store a run under its id and return its row; one that is there already stays as it is.
+    def add(self, trajectory: Trajectory, run: str, replace: bool = False) -> StoredRun:
+        """Store a run under its id and return its row.
+
+        Args:
+            trajectory: the run.
+            run: its id.
+            replace: replace a run with the same id; otherwise that run is kept.
 
         Raises:
-            ValueError: the id is none of `run_id`'s; it becomes a file name.
+            ValueError: the id is not one of `run_id`; it becomes a file name.
             StoreError: the folder cannot be written to.
         """
         if not ID.fullmatch(run):
-            raise ValueError(f"{run!r} is no run id, which is 20 hex digits")
-        found = self.find(run)
+            raise ValueError(f"{run!r} is not a run id, which has 20 hex digits")
+        found = None if replace else self.find(run)
         if found is not None:
             return found
         row = _row(trajectory, run)
-        # The slow part comes first, in a folder of its own, and the lock is held for a rename and a row only.
-        with self._faults(), tempfile.TemporaryDirectory(dir=self.directory, prefix=f".{run}-") as staging:
-            staged = trajectory.save(Path(staging) / row.path)
+        # The slow part comes first, to a temporary file, and the lock is held for a rename and a row only.
+        with self._faults(), temporary_in(self.directory) as staged:
+            trajectory.save(staged)
             with self._writing():
-                found = self.find(run)  # another process may have been faster
+                found = None if replace else self.find(run)  # another process may have been faster
                 if found is not None:
                     return found
                 staged.replace(self.file(row))
-                insert = f"INSERT OR REPLACE INTO runs ({COLUMNS}) VALUES ({MARKS})"
-                self._connection.execute(insert, astuple(row))
+                self._execute(f"INSERT OR REPLACE INTO runs ({COLUMNS}) VALUES ({MARKS})", astuple(row))
         return row
 
+    def notice(self, message: str) -> None:
+        """Report a message, once."""
+        if self._notice is not None and message not in self._noticed:
+            self._noticed.add(message)
+            self._notice(message)
+
+    def _select(self, which: str, parameters: Sequence[Any] = ()) -> tuple[StoredRun, ...]:
+        """Return the sound rows of some, and give notice of the others."""
+        with self._faults():
+            rows = self._execute(f"SELECT {COLUMNS} FROM runs {which}", parameters)
+        sound = []
+        for values in rows:
+            fault = _fault_of(values)
+            if fault is None:
+                sound.append(StoredRun(*values))
+            else:
+                self.notice(f"{self._database}: a damaged row is ignored, and its run is repeated: {fault}")
+        return tuple(sound)
+
     def _set_up(self) -> None:
-        version = int(self._connection.execute("PRAGMA user_version").fetchone()[0])
+        version = int(self._execute("PRAGMA user_version")[0][0])
         if version > VERSION:
             raise StoreError(
-                f"{self._database}: written by a newer sandbox, version {version} where this one knows "
-                f"{VERSION}; update this one, or name another folder"
+                f"{self._database}: written by a newer version of sandbox (format {version}; this one "
+                f"reads {VERSION}); update sandbox, or name another folder"
             )
-        if version == VERSION:
-            return
-        if version:
-            for later in range(version + 1, VERSION + 1):
-                self._connection.execute(LATER[later])
-        elif self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
-            raise StoreError(f"{self._database}: a database of something else; name another folder")
-        else:
-            self._connection.execute(TABLE)
-        self._connection.execute(f"PRAGMA user_version = {VERSION}")
+        if version == 0 and self._execute("SELECT count(*) FROM sqlite_master")[0][0]:
+            raise StoreError(f"{self._database}: not a database of runs; name another folder")
+        if version == 0:
+            self._execute(TABLE)
+        for later in range(version + 1, VERSION + 1) if version > 0 else ():
+            self._execute(LATER[later])
+        if version < 0 or _layout(self._connection) != _layout_of_table():
+            raise StoreError(
+                f"{self._database}: damaged, or not a database of runs: its table does not have "
+                f"format {version}; {_REMOVE}"
+            )
+        if version != VERSION:
+            self._execute(f"PRAGMA user_version = {VERSION}")
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
         """Hold the database's write lock; what was done inside counts as a whole or not at all."""
         with self._faults():
-            self._connection.execute("BEGIN IMMEDIATE")
+            self._execute("BEGIN IMMEDIATE")
             try:
                 yield
-                self._connection.execute("COMMIT")
+                self._execute("COMMIT")
             except BaseException:
                 self._connection.rollback()
                 raise
+
+    def _execute(self, statement: str, parameters: Sequence[Any] = ()) -> list[Any]:
+        """Execute a statement and return its rows. While another process holds the lock, wait, heeding Ctrl-C.
+
+        Raises:
+            sqlite3.Error: it cannot be executed.
+            StoreError: the lock was held for too long.
+        """
+        until = monotonic() + WAIT
+        while True:
+            try:
+                return self._connection.execute(statement, parameters).fetchall()
+            except sqlite3.OperationalError as error:
+                if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY:  # the low byte is the kind of an error
+                    raise
+            pass_on_held()
+            if monotonic() >= until:
+                raise StoreError(
+                    f"{self._database}: another process has locked it for {WAIT:g} s; stop that process, or wait "
+                    "until it is done"
+                )
+            self.notice(f"{self._database}: waiting up to {WAIT:g} s for another process that has locked it")
 
     @contextmanager
     def _faults(self) -> Iterator[None]:
@@ -254,16 +331,17 @@ class Store:
         try:
             yield
         except (FileExistsError, NotADirectoryError):
-            raise StoreError(f"{self.directory}: is or lies in a file; runs are stored in a folder") from None
+            raise StoreError(f"{self.directory}: is a file or inside a file; runs need a folder") from None
         except OSError as error:
-            reason = error.strerror or error
-            raise StoreError(f"{self.directory}: {reason}; name a folder that you may write to") from None
+            remedy = "free some disk space, or name another folder" if error.errno in NO_ROOM else _REMEDY
+            raise StoreError(f"{self.directory}: {error.strerror or error}; {remedy}") from None
+        except UnicodeError:
+            raise StoreError(f"{self._database}: holds text that is not UTF-8; {_REMOVE}") from None
         except sqlite3.OperationalError as error:
-            message = f"{self._database}: {error}; a store needs a folder that you may write to, with room left"
+            message = f"{self._database}: {error}; the folder needs write permission and free disk space"
             raise StoreError(message) from None
-        except sqlite3.DatabaseError as error:
-            message = f"{self._database}: {error}; name another folder, or remove the file if it is not needed"
-            raise StoreError(message) from None
+        except sqlite3.Error as error:
+            raise StoreError(f"{self._database}: {error}; {_REMOVE}") from None
 
 
 def _row(trajectory: Trajectory, run: str) -> StoredRun:
@@ -289,6 +367,53 @@ def _row(trajectory: Trajectory, run: str) -> StoredRun:
         path=f"{run}.npz",
         score=_known((info.get("game") or {}).get("score")),
     )
+
+
+def _fault_of(values: Sequence[Any]) -> str | None:
+    """Return what is wrong with a row as the database holds it, whose columns may have values of any type."""
+    for (column, allowed), value in zip(get_type_hints(StoredRun).items(), values, strict=True):
+        if not isinstance(value, allowed) or (isinstance(value, str) and not _is_text(value)):
+            return f"{column} is {repr(value)[:ECHO]}"
+    row = StoredRun(*values)
+    if not ID.fullmatch(row.id):
+        return f"id is {row.id[:ECHO]!r}, not 20 hex digits"
+    if row.path != f"{row.id}.npz":
+        return f"path is {row.path[:ECHO]!r}, not {row.id}.npz"
+    if row.status not in STATUSES:
+        return f"status is {row.status[:ECHO]!r}, not one of {', '.join(STATUSES)}"
+    for name, text in (("settings", row.settings), ("versions", row.versions)):
+        if not _is_json_object(text):
+            return f"{name} is not a JSON object: {text[:ECHO]!r}"
+    return None
+
+
+def _is_text(value: str) -> bool:
+    """Tell whether all of a text was UTF-8: what was not has become surrogates."""
+    try:
+        value.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _is_json_object(text: str) -> bool:
+    try:
+        return isinstance(json.loads(text), dict)
+    except (ValueError, RecursionError):
+        return False
+
+
+def _layout(connection: sqlite3.Connection) -> tuple[list[Any], list[Any]]:
+    """Return the columns of the table of runs, and what else in a database could change what a statement does."""
+    columns = connection.execute("PRAGMA table_xinfo(runs)").fetchall()
+    others = connection.execute("SELECT type, name FROM sqlite_master WHERE type = 'trigger' OR type = 'view'")
+    return columns, others.fetchall()
+
+
+def _layout_of_table() -> tuple[list[Any], list[Any]]:
+    with closing(sqlite3.connect(":memory:")) as connection:
+        connection.execute(TABLE)
+        return _layout(connection)
 
 
 def _known(value: float | None) -> float | None:

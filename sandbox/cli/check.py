@@ -8,24 +8,26 @@ from typing import Any
 
 import click
 
-from sandbox.cli.reading import fault_rows, path_of, print_json, refused, scenes_of
+from sandbox.cli.reading import fault_rows, path_of, print_faults, print_json, refused, scenes_of
 from sandbox.engines.registry import ENGINES, UnknownEngineError, engine_named
 from sandbox.games.registry import fitting_rules
 from sandbox.measure.forecast import FAILED, Answer, at_most, forecast, largest_safe_dt, notes, unknown_speeds
-from sandbox.scene.demands import JOINTS, Item, bill
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import dumps, load
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.demands import JOINTS, Item, bill
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.load import dumps, load
+from sandbox.scene.scene import Scene
 
 
 @click.command(name="check")
 @click.argument("scenes", nargs=-1, required=True)
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene first")
-@click.option("--engine", metavar="NAME", help="warn of what concerns this engine, and try the scene out on it")
-@click.option("--no-trial", is_flag=True, help="formulas only: do not try the scene out by a short run")
+@click.option("--engine", metavar="NAME", help="print the warnings for this engine only, and use it for the trial run")
+@click.option("--no-trial", is_flag=True, help="predict by formulas only, without the short trial run")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("--quiet", is_flag=True, help="say only what is wrong")
-@click.option("--expand", is_flag=True, help="print the scene file of primitives that a scene stands for")
+@click.option("--quiet", is_flag=True, help="print faults and warnings only")
+@click.option(
+    "--expand", is_flag=True, help="print the scene as TOML with its presets (tables, racks) expanded to primitives"
+)
 def command(
     scenes: tuple[str, ...],
     overrides: tuple[str, ...],
@@ -35,32 +37,36 @@ def command(
     quiet: bool,
     expand: bool,
 ) -> int:
-    """Check scenes: faults, the physics they need, the engines that can run them, what would go wrong.
+    """Validate scenes and predict numerical problems: required physics, engines that can run the scene, warnings.
 
-    What would go wrong is predicted by formulas, and by a trial run of at most 10,000 substeps, on the engine given or
-    else on pymunk.
+    Warnings come from formulas and from a trial run of at most 10,000 substeps on --engine (default: pymunk). SCENES
+    are files, folders of files, or names of shipped scenes. Exit status 1: no engine can run a scene, or it fails.
     """
     if expand:
         if len(scenes) > 1 or as_json:
-            raise click.UsageError("--expand prints one scene as TOML; give one, without --json")
+            raise click.UsageError("--expand prints one scene as TOML: name one scene and leave out --json")
         return _expand(scenes[0], overrides)
     if engine is not None:
         try:
             engine_named(engine)
         except UnknownEngineError as error:
             return refused([Fault("--engine", None, "", str(error))], as_json)
-    documents = []
-    status = 0
-    for name in scenes_of(scenes):
+    documents: list[dict[str, Any]] = []
+    status, names = 0, scenes_of(scenes)
+    for name in names:
         try:
             scene = load(path_of(name), overrides)
             rules = fitting_rules(scene, path_of(name))
             document, items = _checked(name, scene, engine, 0.0 if no_trial else 1.0)
+        except KeyboardInterrupt:
+            status = 130
+            click.echo(f"interrupted: {len(documents):,} of {len(names):,} scenes were checked", err=True)
+            break
         except SceneError as error:
             status = 2
             documents.append(_faulty(name, error.faults))
             if not as_json:
-                click.echo(str(error), err=True)
+                print_faults(error.faults)
             continue
         except Exception as error:  # noqa: BLE001, one scene's failure must not cost the answers of the others
             message = f"check failed with {type(error).__name__}: {error}; please report this scene"
@@ -77,7 +83,7 @@ def command(
         if not as_json:
             _print(name, scene, document, items, quiet)
     if as_json:
-        print_json(documents[0] if len(documents) == 1 else {"scenes": documents})
+        print_json(documents[0] if len(documents) == len(names) == 1 else {"scenes": documents})
     return status
 
 
@@ -86,8 +92,7 @@ def _expand(name: str, overrides: tuple[str, ...]) -> int:
     try:
         click.echo(dumps(load(path_of(name), overrides)), nl=False)
     except SceneError as error:
-        click.echo(str(error), err=True)
-        return 2
+        return refused(error.faults)
     return 0
 
 
@@ -136,15 +141,18 @@ def _print(name: str, scene: Scene, document: dict[str, Any], items: tuple[Item,
             mark = click.style("on ", fg="green", bold=True) if on else click.style("off", dim=True)
             click.echo(f"  {mark}  {what:<14} {why}")
         for engine, verdict in document["engines"].items():
-            _tell(f"engine {engine}: {'; '.join(verdict['missing']) or 'models all of it'}")
+            _tell(f"engine {engine}: {'; '.join(verdict['missing']) or 'models everything in the scene'}")
         safe, step = document["safe_dt"], scene.solver
-        say = "at any dt nothing can tunnel" if safe is None else f"nothing can tunnel up to dt = {at_most(safe)} s"
+        say = "no dt lets a body tunnel" if safe is None else f"no body can tunnel up to dt = {at_most(safe)} s"
         if not document["safe_dt_known"]:
-            say = f"up to which dt nothing can tunnel is unknown: {', '.join(unknown_speeds(scene))} may add any speed"
-        own = f"dt × substeps is {step.dt:g} s × {step.substeps}, a step every {step.h:g} s"
-        _tell(f"{say}; the scene's {own if step.substeps > 1 else f'is {step.dt:g} s'}")
+            say = (
+                f"the largest dt without tunnelling is unknown, because {', '.join(unknown_speeds(scene))} "
+                "may add any speed"
+            )
+        own = f"dt is {step.dt:g} s with {step.substeps} substeps, so a step takes {step.h:g} s"
+        _tell(f"{say}; the scene's {own if step.substeps > 1 else f'dt is {step.dt:g} s'}")
         if (trial := document["trial"]) is not None and not trial["whole"]:
-            _tell(f"tried out on {trial['engine']} for {trial['duration']:.3g} s of {scene.world.duration:g} s")
+            _tell(f"the trial run on {trial['engine']} covered {trial['duration']:.3g} s of {scene.world.duration:g} s")
         if "game" in document:
             keys = (f"{each['name']} ({' or '.join(each['keys'])})" for each in document["game"]["controls"])
             _tell(f"game {document['game']['name']}: {', '.join(keys)}")

@@ -16,7 +16,7 @@ from sandbox.cli.reading import fault_rows, gathering, print_json, refused
 from sandbox.cli.stored import find_run, read_run
 from sandbox.measure.run import Progress
 from sandbox.recording import Recording
-from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -25,24 +25,41 @@ if TYPE_CHECKING:
 
 @click.command(name="export")
 @click.argument("run")
-@click.option("--to", "targets", multiple=True, metavar="FILE", help="where: .csv, .parquet, .gif, .mp4 or .png")
-@click.option("--contacts", is_flag=True, help="tables of the contacts instead of the states")
-@click.option("--fps", type=float, metavar="N", help="pictures a second of a film; by default 30")
-@click.option("--width", type=int, metavar="PX", help="of pictures, 16:9; by default 960")
-@click.option("--size", metavar="WxH", help="of pictures, px")
-@click.option("--speed", type=float, metavar="X", help="of a film; by default 1, real time")
-@click.option("--from", "start", type=float, metavar="SECONDS", help="leave out what was before")
-@click.option("--until", type=float, metavar="SECONDS", help="leave out what comes after")
-@click.option("--at", type=float, metavar="SECONDS", help="the moment of a png; by default the end")
-@click.option("--overlay", "overlays", multiple=True, metavar="NAME", help="draw this too, such as velocities")
+@click.option(
+    "--to",
+    "targets",
+    multiple=True,
+    metavar="FILE",
+    help="file to write: .csv, .parquet, .gif, .mp4 or .png; may be repeated",
+)
+@click.option("--runs", is_flag=True, help="write a table of all runs of the folder DIR, one row per run")
+@click.option("--contacts", is_flag=True, help="write tables of contacts instead of states")
+@click.option("--fps", type=float, metavar="N", help="frames per second of a film; default: 30")
+@click.option("--width", type=int, metavar="PX", help="width of the picture in pixels, at 16:9; default: 960")
+@click.option("--size", metavar="WxH", help="size of the picture in pixels, such as 960x540")
+@click.option("--speed", type=float, metavar="X", help="speed of a film; default: 1, real time")
+@click.option(
+    "--from", "start", type=float, metavar="SECONDS", help="start of the export; default: the start of the run"
+)
+@click.option("--until", type=float, metavar="SECONDS", help="end of the export; default: the end of the run")
+@click.option("--at", type=float, metavar="SECONDS", help="time of a png; default: the end of the run")
+@click.option(
+    "--overlay", "overlays", multiple=True, metavar="NAME", help="overlay to draw, such as velocities; may be repeated"
+)
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("--quiet", is_flag=True, help="print nothing, no progress")
+@click.option("--quiet", is_flag=True, help="print no file names and no progress")
 def command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
-    """Write a stored run as csv, parquet, gif, mp4 or png. RUN is DIR/<id>, a folder of one run, or a recording."""
+    """Export a stored run or a recorded session as csv, parquet, gif, mp4 or png.
+
+    RUN is DIR/ID, a folder that holds one run, a .npz file, or a session (.json). With --runs it is a folder with any
+    number of runs.
+    """
     options = Options(**given)
     faults: list[Fault] = []
     with gathering(faults):
         check_options(options)
+    if options.runs:
+        return _export_runs(run, options, faults, as_json, quiet)
     source: Trajectory | Recording | None = None
     with gathering(faults):
         source = read_run(find_run(run), run)
@@ -61,20 +78,59 @@ def command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
             if len(trajectory.time):
                 _export(run, options, trajectory, files, told)
             else:
-                click.echo(f"{run}: {trajectory.status}: {trajectory.reason}; there is nothing to export", err=True)
+                click.echo(
+                    f"{run}: {trajectory.status}: {trajectory.reason}; the run has no frames to export", err=True
+                )
                 status = 1
     except KeyboardInterrupt:
         status = 130
-        click.echo(f"interrupted: {len(files)} of {len(options.targets)} files are finished and kept", err=True)
+        click.echo(f"interrupted: {len(files)} of {len(options.targets)} files are complete and kept", err=True)
     for fault in faults:
         click.echo(str(fault), err=True)
+    _print_files(run, files, faults, as_json, quiet)
+    return 2 if faults else status
+
+
+def _print_files(run: str, files: list[dict[str, Any]], faults: list[Fault], as_json: bool, quiet: bool) -> None:
     if as_json:
         print_json({"run": run, "files": files} | ({"faults": fault_rows(faults)} if faults else {}))
     elif not quiet:
         for file in files:
             count = f"{file['rows']:,} rows" if "rows" in file else f"{file['frames']:,} frames"
             click.echo(f"written: {file['path']} ({count.removesuffix('s') if count[:2] == '1 ' else count})")
-    return 2 if faults else status
+
+
+def _export_runs(folder: str, options: Options, faults: list[Fault], as_json: bool, quiet: bool) -> int:
+    """Write a table of all runs of a folder, and return the exit status."""
+    from sandbox.batch.run_table import run_table
+    from sandbox.batch.store import DATABASE, Store, StoreError
+    from sandbox.report.tables import write_rows
+
+    if not (Path(folder) / DATABASE).is_file():
+        message = "is no folder of stored runs; `sandbox run SCENE --out DIR` makes one"
+        faults.append(Fault(folder, None, "", message))
+    if faults:
+        return refused(faults, as_json, run=folder, files=[])
+    files: list[dict[str, Any]] = []
+    try:
+        with Store(folder, notice=lambda message: click.echo(message, err=True)) as store:
+            rows = run_table(store)
+    except StoreError as error:
+        rows = []
+        faults.append(Fault(folder, None, "", str(error).removeprefix(f"{folder}: ")))
+    if not rows and not faults:
+        faults.append(Fault(folder, None, "", "contains no run"))
+    for target in options.targets if rows else ():
+        try:
+            count = write_rows(rows, Path(target))
+        except OSError as error:
+            faults.append(Fault("--to", None, "", f"{target}: {error.strerror or error}"))
+        else:
+            files.append({"path": target, "format": Path(target).suffix.lower()[1:], "rows": count})
+    for fault in faults:
+        click.echo(str(fault), err=True)
+    _print_files(folder, files, faults, as_json, quiet)
+    return 2 if faults else 0
 
 
 def _trajectory(run: str, source: Trajectory | Recording, told: "Told") -> tuple[int, Trajectory]:
@@ -86,12 +142,13 @@ def _trajectory(run: str, source: Trajectory | Recording, told: "Told") -> tuple
     if isinstance(source, Trajectory):
         return 0, source
     from sandbox.engines.registry import UnknownEngineError
+    from sandbox.games.rules import UnfitError
     from sandbox.measure.recorder import TooLargeError
     from sandbox.measure.replay import rerun
 
     try:
         trajectory = rerun(source, audit=False, progress=told(f"running {run}"))
-    except (UnknownEngineError, TooLargeError) as error:
+    except (UnknownEngineError, TooLargeError, UnfitError) as error:
         raise SceneError([Fault(run, None, "", str(error))]) from None
     if trajectory.status == "ok" or not len(trajectory.time):
         return 0, trajectory
@@ -131,20 +188,10 @@ def _write_table(run: str, options: Options, trajectory: Trajectory, path: Path)
 
 
 def _fixed_names(run: str, trajectory: Trajectory) -> tuple[str, ...]:
-    """Return the names of a run's fixed things.
+    """Return the names of a run's fixed things."""
+    from sandbox.scene.files.load import from_session
 
-    Raises:
-        SceneError: the run does not tell its scene, or has contacts of other things.
-    """
-    from sandbox.scene.file import from_document
-
-    document, pair = trajectory.info.get("scene"), trajectory.contact_pair
-    if not isinstance(document, dict):
-        raise SceneError([Fault(run, None, "info.scene", "the run does not say which scene it is of")])
-    fixed = from_document(document, run).fixed_names
-    if len(pair) and not -len(fixed) <= pair.min() <= pair.max() < len(trajectory.names):
-        raise SceneError([Fault(run, None, "contact_pair", "names a thing that the scene does not have")])
-    return fixed
+    return from_session(trajectory.info["scene"], run).fixed_names
 
 
 def _between(run: Trajectory, options: Options) -> Trajectory:

@@ -1,12 +1,14 @@
 """What `sandbox export` is asked for, and whether that can be: everything that is wrong, before the work."""
 
 import math
-import os
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
+from sandbox.cli.output import reasons_against
+from sandbox.echo import MAX_NAMED, short_repr, shorten
 from sandbox.play.sight import OVERLAYS
-from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.errors import Fault, SceneError
 
 TABLES = (".csv", ".parquet")
 FILMS = (".gif", ".mp4")
@@ -25,6 +27,7 @@ class Options:
 
     targets: tuple[str, ...]
     contacts: bool = False
+    runs: bool = False
     fps: float | None = None
     width: int | None = None
     size: str | None = None
@@ -50,7 +53,7 @@ class Options:
             width, _, height = self.size.lower().partition("x")
             return int(width), int(height)
         width_asked = 960 if self.width is None else self.width
-        return width_asked, 2 * round(width_asked * 9 / 32)
+        return width_asked, 2 * round(Fraction(9 * width_asked, 32))  # which has no largest number, as floats have
 
 
 def check_options(options: Options) -> None:
@@ -59,7 +62,7 @@ def check_options(options: Options) -> None:
     Raises:
         SceneError: with every fault found.
     """
-    messages = [*_of_targets(options), *_of_use(options), *_of_values(options)]
+    messages = [*_of_targets(options), *_of_use(options), *_of_values(options), *_of_runs(options)]
     if messages:
         raise SceneError([Fault(option, None, "", message) for option, message in messages])
 
@@ -77,15 +80,17 @@ def check_times(options: Options, end: float | None) -> None:
     faults: list[tuple[str, str]] = []
     for option, time in (("--from", options.start), ("--at", options.at)):
         if time is not None and end is not None and end < time < math.inf:
-            faults.append((option, f"{time:g} s; the run ends at {end:g} s"))
+            faults.append((option, f"is {time:g} s, but the run ends at {end:g} s"))
     if end is not None and not faults:
         last = end if options.until is None else min(options.until, end)
         pictures = (last - (options.start or 0.0)) / (options.speed or 1.0) * (options.fps or 30.0)
         most = _most_pictures(options)
         if most is not None and pictures > most:
-            remedy = "give a higher --speed, a lower --fps, or less by --from and --until"
+            remedy = "use a higher --speed, a lower --fps, or a shorter part by --from and --until"
             instead = "; an mp4 may be longer" if ".gif" in options.suffixes else ""
-            faults.append(("--to", f"{pictures:,.0f} pictures, and a film holds at most {most:,}: {remedy}{instead}"))
+            faults.append(
+                ("--to", f"the film would have {pictures:,.0f} frames, the limit is {most:,}: {remedy}{instead}")
+            )
     if faults:
         raise SceneError([Fault(option, None, "", message) for option, message in faults])
 
@@ -102,27 +107,18 @@ def _of_targets(options: Options) -> list[tuple[str, str]]:
     """Return what is wrong with the files to write."""
     found = []
     if not options.targets:
-        found.append(("--to", "says where the run goes; give --to FILE, once or several times"))
+        found.append(("--to", "is missing: give --to FILE, once or several times"))
     seen: set[Path] = set()
     for target in options.targets:
         path = Path(target)
         suffix = path.suffix.lower()
+        named = shorten(target, MAX_NAMED)
         if suffix not in (*TABLES, *PICTURES):
-            found.append(("--to", f"{target}: the name ends in .csv, .parquet, .gif, .mp4 or .png"))
-        try:
-            place = path.absolute()
-            if place in seen:
-                found.append(("--to", f"{target}: named twice"))
-            seen.add(place)
-            if not place.parent.is_dir():
-                found.append(("--to", f"{target}: there is no folder {path.parent}"))
-            elif path.is_dir():
-                found.append(("--to", f"{target}: is a folder"))
-            elif not os.access(place.parent, os.W_OK):
-                found.append(("--to", f"{target}: the folder {path.parent} cannot be written to"))
-        except (OSError, ValueError) as error:  # such as a name longer than any file's
-            reason = (error.strerror if isinstance(error, OSError) else None) or error
-            found.append(("--to", f"{target}: {reason}"))
+            found.append(("--to", f"{named}: the name must end in .csv, .parquet, .gif, .mp4 or .png"))
+        if path.absolute() in seen:
+            found.append(("--to", f"{named}: is given twice"))
+        seen.add(path.absolute())
+        found += [("--to", f"{named}: {reason}") for reason in reasons_against(path)]
     if ".parquet" in options.suffixes:
         from sandbox.report.tables import NEEDS_PARQUET, can_write_parquet
 
@@ -138,6 +134,7 @@ def _of_use(options: Options) -> list[tuple[str, str]]:
     """Return the options that say nothing of any of the files."""
     uses = (
         ("--contacts", options.contacts or None, TABLES),
+        ("--runs", options.runs or None, TABLES),
         ("--fps", options.fps, FILMS),
         ("--speed", options.speed, PICTURES),
         ("--width", options.width, PICTURES),
@@ -146,10 +143,20 @@ def _of_use(options: Options) -> list[tuple[str, str]]:
         ("--at", options.at, (".png",)),
     )
     return [
-        (option, f"is for {', '.join(suffixes)}, and no --to FILE is one")
+        (option, f"applies to {', '.join(suffixes)} only, and no --to FILE is one of these")
         for option, value, suffixes in uses
         if value is not None and options.targets and options.suffixes.isdisjoint(suffixes)
     ]
+
+
+def _of_runs(options: Options) -> list[tuple[str, str]]:
+    """Return the options that a table of runs has no use for."""
+    if not options.runs:
+        return []
+    others = (("--contacts", options.contacts or None), ("--from", options.start), ("--until", options.until))
+    found = [(option, "does not apply to a table of runs") for option, value in others if value is not None]
+    pictures = [target for target in options.targets if Path(target).suffix.lower() in PICTURES]
+    return found + [("--runs", f"{shorten(target, MAX_NAMED)}: is no table") for target in pictures]
 
 
 def _of_values(options: Options) -> list[tuple[str, str]]:
@@ -157,15 +164,17 @@ def _of_values(options: Options) -> list[tuple[str, str]]:
     found = []
     for option, time in (("--from", options.start), ("--until", options.until), ("--at", options.at)):
         if time is not None and not (math.isfinite(time) and time >= 0.0):
-            found.append((option, f"{time:g} s; a time is 0 or more"))
+            found.append((option, f"is {time:g} s; it must be 0 or more"))
     if options.start is not None and options.until is not None and options.until < options.start:
-        found.append(("--until", f"{options.until:g} s comes before --from, {options.start:g} s"))
+        found.append(("--until", f"is {options.until:g} s, before --from at {options.start:g} s"))
     if options.speed is not None and not 1e-6 <= options.speed <= 1e6:
-        found.append(("--speed", f"{options.speed:g}; 1 is real time, and it lies between 1e-6 and 1e6"))
+        found.append(("--speed", f"is {options.speed:g}; it must be between 1e-6 and 1e6 (1 is real time)"))
     found += _of_rate(options) + _of_size(options)
     unknown = [name for name in options.overlays if name not in OVERLAYS]
     if unknown:
-        found.append(("--overlay", f"{', '.join(map(repr, unknown))}; there are {', '.join(OVERLAYS)}"))
+        found.append(
+            ("--overlay", f"unknown: {', '.join(map(short_repr, unknown[:5]))}; overlays: {', '.join(OVERLAYS)}")
+        )
     return found
 
 
@@ -175,22 +184,27 @@ def _of_rate(options: Options) -> list[tuple[str, str]]:
     if options.fps is None:
         return []
     if not 0.01 <= options.fps <= FASTEST:
-        return [("--fps", f"{options.fps:g}; it lies between 0.01 and {FASTEST:g} pictures a second")]
+        return [("--fps", f"is {options.fps:g}; it must be between 0.01 and {FASTEST:g} frames per second")]
     if ".gif" in options.suffixes and options.fps > FASTEST_GIF:
-        return [("--fps", f"{options.fps:g}; a gif shows at most {FASTEST_GIF:g} pictures a second")]
+        return [("--fps", f"is {options.fps:g}; a gif shows at most {FASTEST_GIF:g} frames per second")]
     return []
 
 
 def _of_size(options: Options) -> list[tuple[str, str]]:
     option = "--width" if options.size is None else "--size"
     if options.width is not None and options.size is not None:
-        return [("--width", "gives the size, and so does --size; give one of them")]
+        return [("--width", "cannot be combined with --size; give one of them")]
     try:
         width, height = options.picture_size
     except ValueError:
-        return [(option, f"{options.size!r}; a size is written like 960x540")]
+        return [(option, f"{short_repr(options.size)} is not a size, such as 960x540")]
     if not (SMALLEST <= width <= WIDEST and SMALLEST <= height <= TALLEST):
-        return [(option, f"{width}x{height}; sizes go from {SMALLEST}x{SMALLEST} to {WIDEST}x{TALLEST} pixels")]
+        return [
+            (
+                option,
+                f"is {shorten(f'{width}x{height}')}; it must be {SMALLEST}x{SMALLEST} to {WIDEST}x{TALLEST} pixels",
+            )
+        ]
     if ".mp4" in options.suffixes and (width % 2 or height % 2):
-        return [(option, f"{width}x{height}; both sides of an mp4 are even")]
+        return [(option, f"is {width}x{height}; an mp4 needs an even width and height")]
     return []

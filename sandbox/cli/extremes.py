@@ -10,9 +10,10 @@ from pathlib import Path
 import click
 
 from sandbox.cli.extremes_table import print_extremes
-from sandbox.cli.naming import engines_in, names_in
+from sandbox.cli.naming import MAX_UNKNOWN, engines_in, further_unknown, names_in
 from sandbox.cli.output import make_folder, require_folder, write_json
 from sandbox.cli.reading import gathering, print_json, refused
+from sandbox.echo import short_repr
 from sandbox.measure.extremes import Extremes, Plan, extremes
 from sandbox.measure.extremes.axes import AXES, PAIRS
 from sandbox.measure.extremes.axis import Axis
@@ -20,29 +21,38 @@ from sandbox.measure.extremes.checking import check_overrides
 from sandbox.measure.extremes.matrix import MEMORY, SECONDS, Progress, Watch
 from sandbox.measure.extremes.stored import Change, StoredError, changes, read
 from sandbox.measure.extremes.warden import WorkerError
-from sandbox.scene.faults import Fault
+from sandbox.scene.errors import Fault
 
 LEAST_MEMORY = 1024
 """MiB: what the libraries of a worker take, and some more."""
 
 
 @click.command(name="extremes")
-@click.option("--axes", metavar="NAME[,NAME]", help=f"which axes; by default all: {', '.join(AXES)}")
-@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="which engine(s); by default all")
+@click.option("--axes", metavar="NAME[,NAME]", help=f"axes to vary; default: all, which are {', '.join(AXES)}")
+@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="engine or engines to test; default: all")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of every scene")
-@click.option("--quick", is_flag=True, help="few levels, no pairs, boundaries no finer than levels")
-@click.option("--pairs/--no-pairs", default=True, help="two axes at once")
-@click.option("--timeout", type=click.FloatRange(0.1, 86_400.0), default=SECONDS, metavar="S", help="of each cell")
-@click.option("--memory", type=click.IntRange(LEAST_MEMORY), default=MEMORY, metavar="MB", help="of each worker")
-@click.option("--workers", type=click.IntRange(1, 256), metavar="N", help="how many at once; by default one a core")
+@click.option("--quick", is_flag=True, help="few levels, no pairs, boundaries only as fine as the levels")
+@click.option("--pairs/--no-pairs", default=True, help="also vary two axes at once")
+@click.option(
+    "--timeout", type=click.FloatRange(0.1, 86_400.0), default=SECONDS, metavar="S", help="time limit of each cell, s"
+)
+@click.option(
+    "--memory", type=click.IntRange(LEAST_MEMORY), default=MEMORY, metavar="MB", help="memory limit of each worker, MiB"
+)
+@click.option(
+    "--workers", type=click.IntRange(1, 256), metavar="N", help="number of worker processes; default: one per core"
+)
 @click.option(
     "--out", type=click.Path(path_type=Path), metavar="DIR", help="write report.html, heat maps, extremes.json"
 )
 @click.option(
-    "--against", type=click.Path(path_type=Path), metavar="FILE", help="hold the boundaries against stored ones"
+    "--against",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="compare the boundaries with those stored in FILE (an extremes.json)",
 )
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("--quiet", is_flag=True, help="no tables, no progress")
+@click.option("--quiet", is_flag=True, help="print no tables and no progress")
 def command(
     axes: str | None,
     engines: str | None,
@@ -57,9 +67,9 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Drive every engine to its extremes, one axis at a time and two at once, and report where it breaks.
+    """Increase one parameter at a time, and pairs of them, until each engine fails, and report the boundaries.
 
-    Each cell runs in a process of its own, with limits of time and memory: nothing takes the run down.
+    Each cell runs in a worker process with a time and a memory limit, so a crash does not stop the command.
     """
     faults: list[Fault] = []
     chosen = _axes(axes, faults)
@@ -69,7 +79,7 @@ def command(
         with gathering(faults, "--against", (StoredError,)):
             stored = read(against)
     if not math.isfinite(timeout):
-        faults.append(Fault("--timeout", None, "", f"{timeout} s; a limit is finite"))
+        faults.append(Fault("--timeout", None, "", f"is {timeout} s; it must be finite"))
     with gathering(faults):
         check_overrides(overrides, chosen)
     with gathering(faults):
@@ -98,9 +108,10 @@ def _axes(text: str | None, faults: list[Fault]) -> tuple[Axis, ...]:
     if text is None:
         return tuple(AXES.values())
     names = names_in(text)
-    faults += [
-        Fault("--axes", None, "", f"no axis {name!r}; axes: {', '.join(AXES)}") for name in names if name not in AXES
-    ]
+    unknown = [name for name in names if name not in AXES]
+    axes = ", ".join(AXES)
+    faults += [Fault("--axes", None, "", f"no axis {short_repr(name)}; axes: {axes}") for name in unknown[:MAX_UNKNOWN]]
+    faults += further_unknown("--axes", len(unknown))
     return tuple(AXES[name] for name in names if name in AXES)
 
 
@@ -118,7 +129,7 @@ def _tell(
         click.echo(str(change), err=True)
         status = 1
     if result.interrupted:
-        click.echo(f"interrupted: {len(result.cells) + len(result.pairs)} cells are finished and kept", err=True)
+        click.echo(f"interrupted: {len(result.cells) + len(result.pairs)} cells are complete and kept", err=True)
         status = 130
     if as_json:
         print_json(document)
@@ -141,7 +152,7 @@ def _tell_changes(found: Sequence[Change], held: bool) -> None:
         if not change.worse:
             click.echo(str(change))
     if held and not found:
-        click.echo("every boundary is where it was")
+        click.echo("no boundary has moved")
 
 
 def _write(result: Extremes, document: dict[str, object], out: Path) -> None:

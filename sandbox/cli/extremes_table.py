@@ -4,6 +4,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 
+from sandbox.cli.naming import plural
 from sandbox.measure.extremes import Cell, Extremes
 from sandbox.measure.extremes.boundary import Limit
 from sandbox.measure.extremes.cell import WORDS
@@ -36,12 +37,12 @@ def print_extremes(result: Extremes) -> None:
         last = limit.axis
     if result.limits:
         legend = ", ".join(f"{letter} {word}" for word, letter in LETTERS.items())
-        console.print(f"levels, from the easiest to the hardest: {legend}", style="dim", soft_wrap=True)
+        console.print(f"one letter per level, from the easiest to the hardest: {legend}", style="dim", soft_wrap=True)
     scores = [score for score in result.predictions if score.precision is not None or score.recall is not None]
     if scores:
         table = Table(box=None, pad_edge=False, header_style="bold")
         table.add_column("forecast", no_wrap=True)
-        for head in ("came", "did not", "unforeseen", "rightly silent", "precision", "recall"):
+        for head in ("true alarms", "false alarms", "missed", "true negatives", "precision", "recall"):
             table.add_column(head, justify="right", no_wrap=True)
         for score in scores:
             counts = (score.true_positives, score.false_positives, score.false_negatives, score.true_negatives)
@@ -57,12 +58,12 @@ def _row(result: Extremes, limit: Limit) -> Iterator[Cell]:
 
 
 def _sums(result: Extremes) -> Iterator[str]:
-    for what, cells in (("one at a time", result.cells), ("boundaries", result.probes), ("pairs", result.pairs)):
+    for what, cells in (("single axes", result.cells), ("boundaries", result.probes), ("pairs", result.pairs)):
         if cells:
             count = Counter(cell.verdict for cell in cells)
             told = ", ".join(f"{count[word]:,} {word}" for word in WORDS if count[word])
             yield f"{what}: {len(cells):,} cells: {told}"
-    yield f"{result.seconds:.0f} s on {result.plan.workers} worker(s)"
+    yield f"{result.seconds:.0f} s on {plural(result.plan.workers, 'worker')}"
 
 
 def _reached(limit: Limit) -> str:
@@ -70,10 +71,10 @@ def _reached(limit: Limit) -> str:
     if limit.refused:
         return f"refused: {limit.reason}"
     if limit.first_failure is None:
-        return f"all of them, up to {_level(limit.limit)}"
+        return f"all levels pass, up to {_level(limit.limit)}"
     if limit.limit is None:
-        return f"none: {limit.rule}: {limit.reason}"
-    beyond = "" if limit.monotone else ", though more passes or fails than one boundary tells"
+        return f"no level passes: {limit.rule}: {limit.reason}"
+    beyond = "" if limit.monotone else " (levels beyond pass and fail in turn)"
     return f"up to {_level(limit.limit)}, fails at {_level(limit.first_failure)}{beyond}: {limit.rule}: {limit.reason}"
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from sandbox.cli.table import WIDE, Row
-from sandbox.engines.account import Cause
+from sandbox.engines.energy_ledger import Cause
 
 ABREAST = 5
 """Runs in one table; more stand below."""

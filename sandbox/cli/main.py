@@ -4,32 +4,54 @@ import difflib
 import gc
 import importlib
 import os
+import re
 import sys
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from sandbox import resource_limits
+from sandbox.cli.streams import OutputError, prepare_streams
+from sandbox.echo import MAX_MESSAGE, printable, short_repr, shorten
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 # Else pydantic searches every installed package for plugins, 20 ms of each command.
 
 COMMANDS = {
-    "run": "run scenes headless and print the results",
-    "play": "the window: play a scene, or pick one",
-    "compare": "one scene on several engines, against the best known truth",
-    "tradeoff": "error against cost over engines and settings, and the setting to take",
+    "run": "run scenes without a window and print the results",
+    "play": "open the window: play a scene, or pick one",
+    "compare": "run a scene on several engines and measure the error of each",
+    "tradeoff": "find the cheapest setting within an error, or the most accurate within a budget",
     "shots": "success odds, sensitivity and predictability horizon of a billiard shot",
-    "extremes": "how far each engine and setting goes before it breaks",
-    "report": "one page over many scenes: errors, costs, replays",
-    "check": "check scenes: faults, the physics they need, the engines that can run them, what would go wrong",
-    "scenes": "list the scenes that ship",
-    "engines": "list the engines",
-    "schema": "print the JSON Schema of a scene file",
-    "export": "a stored run as csv, parquet, gif, mp4 or png",
-    "replay": "a stored run or a recorded session in the window",
-    "miss": "by how much a shot misses, by engine, integrator and step",
-    "match": "frames of billiards between bots, and the score",
+    "extremes": "find the limits of each engine: mass ratio, speed, stack height, …",
+    "report": "compare many scenes and write one HTML page: errors, costs, replays",
+    "check": "validate scenes and predict numerical problems before a run",
+    "scenes": "list the shipped scenes",
+    "engines": "list the engines and the physics that each models",
+    "schema": "print the keys of a table of the scene file, or the whole JSON Schema",
+    "export": "export a stored run as csv, parquet, gif, mp4 or png",
+    "replay": "show a stored run or a recorded session in the window",
+    "miss": "measure how far a projectile lands off target, by engine, integrator and step",
+    "match": "play frames of billiards between bots and print the score",
 }
 """Each command's line of help stands here, so that help needs to import none of them."""
+
+COMPLETION = "_SANDBOX_COMPLETE"
+"""Environment variable of shell completion, as click names it."""
+
+GREETING = """\
+sandbox runs one physics scene on several engines and measures the error and the cost of each.
+
+  sandbox run bounce          run a scene and print the results
+  sandbox play 9-ball         play a scene in a window
+  sandbox compare bounce      measure the error of every engine
+
+All commands: sandbox --help. Shipped scenes: sandbox scenes."""
+"""What `sandbox` alone prints."""
 
 
 class Commands(click.Group):
@@ -47,6 +69,8 @@ class Commands(click.Group):
         gc.disable()  # imports make many objects and no garbage: looking for some takes a fifth of the time
         try:
             command: click.Command = importlib.import_module(f"sandbox.cli.{cmd_name}").command
+            if COMPLETION in os.environ:
+                importlib.import_module("sandbox.cli.completion").add_completions(command)
         finally:
             if collecting:
                 gc.enable()
@@ -61,14 +85,26 @@ class Commands(click.Group):
             click.UsageError: there is no such command.
         """
         name = args[0]
-        if name in COMMANDS or name.startswith("-"):
+        if name in COMMANDS or name.startswith("-") or ctx.resilient_parsing:
             return super().resolve_command(ctx, args)
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         if close:
-            raise click.UsageError(f"no command {name!r}; did you mean {close[0]!r}?", ctx)
+            raise click.UsageError(f"unknown command {short_repr(name)}; did you mean {close[0]!r}?", ctx)
         if _is_scene(name):
-            raise click.UsageError(f"{name!r} is a scene; `sandbox run {name}` or `sandbox play {name}`", ctx)
-        raise click.UsageError(f"no command {name!r}; commands: {', '.join(COMMANDS)}", ctx)
+            raise click.UsageError(
+                f"{short_repr(name)} is a scene, not a command; use `sandbox run {shorten(name)}` or `sandbox "
+                f"play {shorten(name)}`",
+                ctx,
+            )
+        raise click.UsageError(f"unknown command {short_repr(name)}; commands: {', '.join(COMMANDS)}", ctx)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list["CompletionItem"]:
+        """Return the commands that begin with what is typed, without importing them."""
+        from click.shell_completion import CompletionItem
+
+        found = click.Command.shell_complete(self, ctx, incomplete)
+        names = (name for name in COMMANDS if name.startswith(incomplete))
+        return [CompletionItem(name, help=COMMANDS[name]) for name in names] + found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List the commands without importing them."""
@@ -77,7 +113,8 @@ class Commands(click.Group):
 
 
 def _is_scene(text: str) -> bool:
-    from sandbox.scene.shipped import UnknownSceneError, find  # only what is no command needs it
+    # Needed only where a word is no command
+    from sandbox.scene.files.shipped_scenes import UnknownSceneError, find
 
     try:
         find(text)
@@ -89,7 +126,7 @@ def _is_scene(text: str) -> bool:
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="sandbox2d", prog_name="sandbox")
 def cli() -> None:
-    """A 2D game physics sandbox: a scene is a file, the engine a choice, and every price is measured."""
+    """2D game physics sandbox: run one scene file on several physics engines, and measure error and cost."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -97,28 +134,68 @@ def main(arguments: list[str] | None = None) -> None:
 
     Status: 0 done; 1 done, and something failed the question asked; 2 wrong input; 130 interrupted.
     """
+    prepare_streams()
     status = call(arguments)
     gc.freeze()  # nor is there garbage worth finding at exit
     sys.exit(status)
 
 
 def call(arguments: list[str] | None = None) -> int:
-    """Run the command line and return its exit status. A fault of the user's is one line, never a traceback."""
+    """Run the command line and return its exit status. A fault of the user's is one line, never a traceback.
+
+    Resource limits are to refuse what does not fit into memory; where memory runs out all the same, the status is 1.
+    """
+    faults = _unreadable(sys.argv[1:] if arguments is None else arguments)
+    if faults:
+        click.echo(f"sandbox: {faults}", err=True)
+        return 2
     try:
+        resource_limits.check_environment()
+        if COMPLETION in os.environ:
+            importlib.import_module("sandbox.cli.completion").register_shells()
         status: Any = cli.main(arguments, prog_name="sandbox", standalone_mode=False)
+        sys.stdout.flush()  # what cannot be written shows here, not at the exit of the interpreter
     except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.format_message(), err=True)
+        click.echo(GREETING if error.ctx.command is cli else error.format_message(), err=True)
         return 2
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         where = context.command_path if context is not None else "sandbox"
-        click.echo(f"{where}: {error.format_message()}", err=True)
+        click.echo(f"{where}: {_bounded(error.format_message())}", err=True)
         return 2
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         return 130
+    except OutputError as error:
+        click.echo(f"standard output: cannot be written: {error}", err=True)
+        return 1
+    except resource_limits.LimitValueError as error:
+        click.echo(f"sandbox: {error}", err=True)
+        return 2
+    except MemoryError:
+        click.echo(
+            "sandbox: out of memory; use fewer bodies, fewer frames (solver.record_every) or fewer workers", err=True
+        )
+        return 1
     except (BrokenPipeError, SystemExit):
         # The reader has gone, as `| head` does, and click and rich answer by an exit; leave nothing to flush.
         sys.stdout = None
         return 0
     return status if isinstance(status, int) else 0
+
+
+def _unreadable(arguments: Sequence[str]) -> str:
+    """Return which argument is no text, and why; "" where all are."""
+    for number, argument in enumerate(arguments, 1):
+        try:
+            argument.encode()
+        except UnicodeEncodeError:
+            return f"argument {number}, {short_repr(argument)}, is not UTF-8 text"
+        if "\0" in argument:
+            return f"argument {number}, {short_repr(argument)}, contains a NUL character"
+    return ""
+
+
+def _bounded(message: str) -> str:
+    """Return a message of click's, which quotes what was typed as it is, in one line of bounded length."""
+    return shorten(printable(re.sub(r"\S{81,}", lambda word: shorten(word[0]), message)), MAX_MESSAGE)

@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from sandbox.cli.output import reasons_against
+from sandbox.echo import MAX_NAMED, shorten
 from sandbox.measure.bounded_run import TookTooLongError
 from sandbox.measure.compare import Comparison
 from sandbox.measure.compare.disagreement import Disagreement
 from sandbox.measure.compare.minimise import Minimised, minimise
 from sandbox.measure.told import Told
-from sandbox.scene.faults import Fault
-from sandbox.scene.file import dumps, loads
+from sandbox.scene.errors import Fault
+from sandbox.scene.files.load import dumps, loads
 from sandbox.whole import whole
 
 
@@ -32,19 +34,13 @@ def faults_of(path: Path, scene: str, force: bool) -> list[Fault]:
         scene: the file that is to be made smaller.
         force: a file that exists may be replaced.
     """
-    reason = ""
-    try:
-        if path.is_dir():
-            reason = "is a folder; name a file, such as smallest.toml"
-        elif path.exists() and scene and Path(scene).exists() and path.samefile(scene):
+    reason = next(iter(reasons_against(path)), "")
+    if not reason and path.exists():
+        if scene and Path(scene).exists() and path.samefile(scene):
             reason = "is the scene itself; name another file"
-        elif path.exists() and not force:
-            reason = "exists; --force replaces it, or name another file: --minimise FILE"
-        elif not path.absolute().parent.is_dir():
-            reason = "there is no such folder to write it into"
-    except OSError as error:
-        reason = str(error.strerror or error)
-    return [Fault("--minimise", None, "", f"{path}: {reason}")] if reason else []
+        elif not force:
+            reason = "exists already; add --force to replace it, or name another file: --minimise FILE"
+    return [Fault("--minimise", None, "", f"{shorten(str(path), MAX_NAMED)}: {reason}")] if reason else []
 
 
 def minimised(scene: str, comparison: Comparison, names: Sequence[str] | None, path: Path, told: Told | None) -> Answer:
@@ -66,13 +62,13 @@ def minimised(scene: str, comparison: Comparison, names: Sequence[str] | None, p
     try:
         found = minimise(comparison.scene, asked, told=told)
     except TookTooLongError as error:
-        return _nothing(scene, comparison, f"the scene takes too long: {error}")
+        return _nothing(scene, comparison, f"a run of the scene takes too long: {error}")
     if found.parting is None:
-        reason = f"{asked} agree within {comparison.tolerance:.2g} m for as long as that can be told"
+        reason = f"{asked} agree within {comparison.tolerance:.2g} m for as long as the comparison is reliable"
         return _nothing(scene, comparison, reason, found.runs)
     document, text = _document(found, path), _text(scene, found, asked, path)
     if asked.of(loads(text)) is None:
-        return _nothing(scene, comparison, "the scene that was found does not show it again", found.runs)
+        return _nothing(scene, comparison, "the reduced scene does not reproduce the divergence", found.runs)
     try:
         with whole(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -82,7 +78,7 @@ def minimised(scene: str, comparison: Comparison, names: Sequence[str] | None, p
     interrupted = found.ended == "interrupted"
     sentence = f"{_counted(found)}, in {found.runs:,} tries\n{_sentence(found, asked)}\nwritten: {path}"
     if found.ended is not None:
-        sentence += f"\n{found.ended}: there may be a smaller one"
+        sentence += f"\n{found.ended}: a smaller scene may exist"
     return Answer(130 if interrupted else 0, sentence, document)
 
 
@@ -102,9 +98,9 @@ def _no_answer(comparison: Comparison, engines: Sequence[str]) -> str:
     if engines:
         return ""
     if comparison.best is None:
-        return "no engine here can run the scene"
+        return "no engine can run the scene"
     until = f"up to {comparison.trusted_until:.4g} s"
-    return f"no engine parts from the truth by more than {comparison.tolerance:.2g} m {until}"
+    return f"no engine differs from the truth by more than {comparison.tolerance:.2g} m {until}"
 
 
 def _nothing(scene: str, comparison: Comparison, reason: str, runs: int = 0) -> Answer:
@@ -138,7 +134,7 @@ def _document(found: Minimised, path: Path) -> dict[str, Any]:
 
 def _counted(found: Minimised) -> str:
     (before, after), (fixed_before, fixed_after) = found.bodies, found.fixed
-    fixed = f"{_several(fixed_before, 'fixed thing', 'fixed things')} to {fixed_after:,}"
+    fixed = f"{_several(fixed_before, 'fixed object', 'fixed objects')} to {fixed_after:,}"
     return f"minimised: {_several(before, 'body', 'bodies')} to {after:,}, {fixed}"
 
 
@@ -151,7 +147,7 @@ def _sentence(found: Minimised, asked: Disagreement) -> str:
     parting = found.parting
     assert parting is not None
     who = "" if parting.body is None else f", {json.dumps(parting.body, ensure_ascii=False)} first"
-    return f"{asked} differ by more than {asked.tolerance:.4g} m from {parting.time:.6g} s on{who}"
+    return f"{asked} differ by more than {asked.tolerance:.4g} m from t = {parting.time:.6g} s on{who}"
 
 
 def _text(scene: str, found: Minimised, asked: Disagreement, path: Path) -> str:
@@ -159,7 +155,11 @@ def _text(scene: str, found: Minimised, asked: Disagreement, path: Path) -> str:
     again = (
         f"sandbox compare {shlex.quote(path.name)} --engines {','.join(asked.engines)} --tolerance {asked.tolerance!r}"
     )
-    lines = f"{_sentence(found, asked)}.", f"{_counted(found).capitalize()}, of {Path(scene).name}.", f"See: {again}"
+    lines = (
+        f"{_sentence(found, asked)}.",
+        f"{_counted(found).capitalize()}, from {Path(scene).name}.",
+        f"Reproduce: {again}",
+    )
     shown = ("".join(letter if letter.isprintable() else " " for letter in line) for line in lines)
     words = {"title": f"{found.scene.title or Path(scene).stem}, minimised"[-200:], "about": lines[0]}
     return "".join(f"# {line}\n" for line in shown) + "\n" + dumps(found.scene.model_copy(update=words))

@@ -8,9 +8,10 @@ import click
 
 from sandbox.cli.reading import path_of, print_json, refused
 from sandbox.cli.table import WIDE
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import load
-from sandbox.scene.model import Scene
+from sandbox.cli.telling import telling
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.load import load
+from sandbox.scene.scene import Scene
 
 if TYPE_CHECKING:
     from sandbox.games.artillery.miss import Table as MissTable
@@ -35,19 +36,32 @@ ANGLE = Figure(0.0, 180.0, min_open=True, max_open=True)
 @click.command(name="miss")
 @click.argument("scene")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
-@click.option("--speed", type=SPEED, default=50.0, metavar="M/S", help="by default 50")
-@click.option("--angle", type=ANGLE, default=45.0, metavar="DEG", help="by default 45")
-@click.option("--dt", "dts", type=STEP, multiple=True, metavar="S", help="a step; by default 1/15, 1/60 and 1/240")
+@click.option("--speed", type=SPEED, default=50.0, metavar="M/S", help="launch speed, m/s; default: 50")
+@click.option(
+    "--angle", type=ANGLE, default=45.0, metavar="DEG", help="launch angle above the horizontal, degrees; default: 45"
+)
+@click.option(
+    "--dt",
+    "dts",
+    type=STEP,
+    multiple=True,
+    metavar="S",
+    help="time step, s; may be repeated; default: 1/15, 1/60 and 1/240",
+)
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 def command(
     scene: str, overrides: tuple[str, ...], speed: float, angle: float, dts: tuple[float, ...], as_json: bool
 ) -> int:
-    """Fly a shot over level ground in a scene's air on every engine, and print how far off each lands."""
+    """Compute the flight of a projectile over level ground on every engine, and print the error of each landing point.
+
+    Gravity, drag and wind are those of SCENE, a file or the name of a shipped scene.
+    """
     from sandbox.games.artillery.miss import STEPS, miss_table  # the engines, which help needs none of
 
     try:
         read = load(path_of(scene), overrides)
-        found = miss_table(read.world, speed, math.radians(angle), dts or STEPS)
+        with telling(as_json) as told:
+            found = miss_table(read.world, speed, math.radians(angle), dts or STEPS, told)
     except SceneError as error:
         return refused(error.faults, as_json, scene=scene)
     except ValueError as error:
@@ -56,10 +70,13 @@ def command(
     if as_json:
         rows = [row._asdict() for row in found.rows]
         refusals = [{"engine": engine, "reason": reason} for engine, reason in found.refused]
-        print_json({"scene": scene, "range": found.range, "time": found.time, "rows": rows, "refused": refusals})
-        return 0
-    _print(scene, read, found, f"{speed:g} m/s at {angle:g}°")
-    return 0
+        truth = {"range": found.range, "time": found.time}
+        print_json({"scene": scene, **truth, "rows": rows, "refused": refusals, "interrupted": found.interrupted})
+    else:
+        _print(scene, read, found, f"{speed:g} m/s at {angle:g}°")
+    if found.interrupted:
+        click.echo(f"interrupted: {len(found.rows)} flights are complete and kept", err=True)
+    return 130 if found.interrupted else 0
 
 
 def _print(name: str, scene: Scene, found: "MissTable", shot: str) -> None:
@@ -72,7 +89,7 @@ def _print(name: str, scene: Scene, found: "MissTable", shot: str) -> None:
 
     world = scene.world
     air = f"drag {world.linear_drag:g} 1/s and {world.quadratic_drag:g} 1/m, wind {world.wind[0]:g} m/s"
-    truth = f"{shot}, {air}: exactly {found.range:.4f} m, after {found.time:.5f} s"
+    truth = f"{shot}, {air}: exact range {found.range:.4f} m, time of flight {found.time:.5f} s"
     click.echo(f"{name}: {truth}")
     dts = list(dict.fromkeys(row.dt for row in found.rows))
     table = Table(box=None, pad_edge=False, header_style="bold")
@@ -82,7 +99,7 @@ def _print(name: str, scene: Scene, found: "MissTable", shot: str) -> None:
         table.add_column(f"dt {dt:.4g} s", justify="right", no_wrap=True)
     for engine, integrator in dict.fromkeys((row.engine, row.integrator) for row in found.rows):
         those = {row.dt: row.off for row in found.rows if (row.engine, row.integrator) == (engine, integrator)}
-        cells = [f"{'+' if those[dt] >= 0 else '−'}{length(abs(those[dt]))}" for dt in dts]
+        cells = [f"{'+' if those[dt] >= 0 else '−'}{length(abs(those[dt]))}" for dt in dts if dt in those]
         table.add_row(engine, integrator or "", *(cell if cell[1:2] != "l" else cell[1:] for cell in cells))
     console = Console(width=None if sys.stdout.isatty() else WIDE)
     console.print(table)

@@ -1,10 +1,13 @@
 """Where results go: folders, documents, pictures. What could not be written is refused before anything runs."""
 
 import json
+import os
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
-from sandbox.scene.faults import Fault, SceneError
+from sandbox.echo import MAX_NAMED, shorten
+from sandbox.scene.errors import Fault, SceneError
 from sandbox.whole import whole
 
 PICTURES = (".png", ".svg", ".pdf")
@@ -16,8 +19,12 @@ def require_folder(out: Path | None) -> None:
     Raises:
         SceneError: it is one.
     """
-    if out is not None and out.exists() and not out.is_dir():
-        raise SceneError([Fault("--out", None, "", f"{out}: is no folder")])
+    try:
+        reason = "is not a folder" if out is not None and out.exists() and not out.is_dir() else ""
+    except OSError as error:  # such as a name longer than any file's
+        reason = error.strerror or str(error)
+    if reason:
+        raise SceneError([Fault("--out", None, "", f"{shorten(str(out), MAX_NAMED)}: {reason}")])
 
 
 def make_folder(out: Path) -> None:
@@ -28,8 +35,11 @@ def make_folder(out: Path) -> None:
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=out):  # a folder that is there may still not be written to
+            pass
     except OSError as error:
-        raise SceneError([Fault("--out", None, "", f"{out}: {error.strerror or error}")]) from None
+        reason = error.strerror or error
+        raise SceneError([Fault("--out", None, "", f"{shorten(str(out), MAX_NAMED)}: {reason}")]) from None
 
 
 def require_picture(plot: Path | None) -> None:
@@ -42,16 +52,30 @@ def require_picture(plot: Path | None) -> None:
         return
     faults = []
     if plot.suffix.lower() not in PICTURES:
-        faults.append(f"{plot}: the name ends in .png, .svg or .pdf")
-    try:
-        if not plot.absolute().parent.is_dir():
-            faults.append(f"{plot}: there is no folder {plot.parent}")
-        elif plot.is_dir():
-            faults.append(f"{plot}: is a folder")
-    except OSError as error:  # such as a name longer than any file's
-        faults.append(f"{plot}: {error.strerror or error}")
+        faults.append("the name must end in .png, .svg or .pdf")
+    faults += reasons_against(plot)
     if faults:
-        raise SceneError([Fault("--plot", None, "", message) for message in faults])
+        raise SceneError([Fault("--plot", None, "", f"{shorten(str(plot), MAX_NAMED)}: {each}") for each in faults])
+
+
+def reasons_against(path: Path) -> list[str]:
+    """Return why a file cannot be written, or replaced, where a path says; nothing where it can.
+
+    A device or a pipe is not replaced: what reads from it would no longer find it by that name.
+    """
+    try:
+        folder = path.absolute().parent
+        if not folder.is_dir():
+            return [f"no such folder: {shorten(str(path.parent), MAX_NAMED)}"]
+        if path.is_dir():
+            return ["is a folder"]
+        if path.exists() and not path.is_file():
+            return ["is a device or a pipe, not a file"]
+        if not os.access(folder, os.W_OK):
+            return [f"no permission to write to the folder {shorten(str(path.parent), MAX_NAMED)}"]
+    except OSError as error:  # such as a name longer than any file's
+        return [error.strerror or str(error)]
+    return []
 
 
 def write_json(document: Any, file: Path) -> None:

@@ -11,17 +11,20 @@ from sandbox.cli.showing import show_stage, window_options
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import USUAL, UnknownEngineError, able, engine_named, usual
 from sandbox.games.registry import fitting_rules
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import load
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.load import load
 
 
 @click.command(name="play")
 @click.argument("scene", required=False)
-@click.option("--engine", metavar="NAME", help="which engine to begin with: by default exact at tables, else pymunk")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of every scene")
+@click.option("--engine", metavar="NAME", help="engine to start with; default: exact for billiards, otherwise pymunk")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
 @window_options
 def command(scene: str | None, engine: str | None, overrides: tuple[str, ...], **window: Any) -> int:
-    """Play a scene in a window. SCENE is a file, or the name of a shipped one; without, pick one there."""
+    """Play a scene in a window.
+
+    SCENE is a file or the name of a shipped scene. Without it, the window opens with a list of scenes.
+    """
     faults: list[Fault] = []
     with gathering(faults, "--engine", (UnknownEngineError,)):
         engine_named(engine or USUAL)
@@ -34,10 +37,13 @@ def command(scene: str | None, engine: str | None, overrides: tuple[str, ...], *
             first = engine or usual(found)
             missing = engine_named(first).missing(found, found.solver) if not faults else ()
             if missing:
-                click.echo(f"{scene}: {Refusal(first, missing, able(found))}{with_other_engine(found)}", err=True)
+                click.echo(
+                    f"{scene}: {Refusal(first, missing, able(found))}{with_other_engine(found, engine is not None)}",
+                    err=True,
+                )
                 return 1
         elif overrides:
-            raise SceneError([Fault("--set", None, "", "sets values of a scene; name the scene too")])
+            raise SceneError([Fault("--set", None, "", "needs a SCENE to change; name one")])
     if faults:
         return refused(faults)
 

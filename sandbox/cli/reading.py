@@ -7,8 +7,13 @@ from typing import Any
 
 import click
 
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.shipped import UnknownSceneError, find, scenes_in
+from sandbox.cli.streams import can_write_unicode
+from sandbox.echo import MAX_MESSAGE, shorten
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.shipped_scenes import UnknownSceneError, find, scenes_in
+
+MAX_FAULTS = 100
+"""Faults that are printed, a line each."""
 
 
 def scenes_of(names: Sequence[str]) -> list[str]:
@@ -43,7 +48,7 @@ def path_of(name: str) -> str:
     path = paths_of([name])[0][1]
     for ending, what in ((".json", "a recorded session"), (".npz", "a stored run")):
         if path.lower().endswith(ending):
-            raise SceneError([Fault(name, None, "", f"is {what}, no scene; `sandbox replay {name}` shows it")])
+            raise SceneError([Fault(name, None, "", f"is {what}, not a scene; use `sandbox replay {shorten(name)}`")])
     return path
 
 
@@ -66,7 +71,17 @@ def gathering(faults: list[Fault], place: str = "", also: tuple[type[Exception],
 
 def fault_rows(faults: Sequence[Fault]) -> list[dict[str, Any]]:
     """Return faults as JSON objects."""
-    return [{"file": f.file, "line": f.line, "path": f.path, "message": f.message} for f in faults]
+    return [
+        {"file": f.file, "line": f.line, "path": f.path, "message": shorten(f.message, MAX_MESSAGE)} for f in faults
+    ]
+
+
+def print_faults(faults: Sequence[Fault]) -> None:
+    """Print faults on standard error, a line each, up to `MAX_FAULTS`, and then how many there are more."""
+    for fault in faults[:MAX_FAULTS]:
+        click.echo(str(fault), err=True)
+    if len(faults) > MAX_FAULTS:
+        click.echo(f"… and {len(faults) - MAX_FAULTS:,} more faults", err=True)
 
 
 def refused(faults: Sequence[Fault], as_json: bool = False, **empty: Any) -> int:
@@ -77,8 +92,7 @@ def refused(faults: Sequence[Fault], as_json: bool = False, **empty: Any) -> int
         as_json: also print a document.
         empty: what else is in it.
     """
-    for fault in faults:
-        click.echo(str(fault), err=True)
+    print_faults(faults)
     if as_json:
         print_json({**empty, "faults": fault_rows(faults)})
     return 2
@@ -86,4 +100,4 @@ def refused(faults: Sequence[Fault], as_json: bool = False, **empty: Any) -> int
 
 def print_json(document: Any) -> None:
     """Print the one document that `--json` puts on standard output."""
-    click.echo(json.dumps(document, ensure_ascii=False, allow_nan=False))
+    click.echo(json.dumps(document, ensure_ascii=not can_write_unicode(), allow_nan=False))

@@ -11,9 +11,9 @@ from sandbox.cli.stored import find_run, read_run
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.recording import Recording
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import Fault
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -23,10 +23,15 @@ if TYPE_CHECKING:
 
 @click.command(name="replay")
 @click.argument("run")
-@click.option("--engine", metavar="NAME", help="compute it again on this engine; a stored run is then its ghost")
+@click.option(
+    "--engine", metavar="NAME", help="compute the run again on this engine, and show the stored run as a ghost"
+)
 @window_options
 def command(run: str, engine: str | None, **window: Any) -> int:
-    """Look at a stored run or a recorded session. RUN is DIR/<id>, a folder of one run, or a recording."""
+    """Show a stored run or a recorded session in the window.
+
+    RUN is DIR/ID, a folder that holds one run, a .npz file, or a session (.json).
+    """
     faults: list[Fault] = []
     if engine is not None:
         with gathering(faults, "--engine", (UnknownEngineError,)):
@@ -37,7 +42,7 @@ def command(run: str, engine: str | None, **window: Any) -> int:
     show: Live | Stored | None = None
     if source is not None and not faults:
         if isinstance(source, Trajectory) and not len(source.time):
-            click.echo(f"{run}: {source.status}: {source.reason}; there is nothing to show", err=True)
+            click.echo(f"{run}: {source.status}: {source.reason}; the run has no frames to show", err=True)
             return 1
         try:
             with gathering(faults, run, (UnknownEngineError,)):
@@ -63,27 +68,17 @@ def _shown(source: Trajectory | Recording, engine: str | None) -> "Live | Stored
 
 
 def _stored(run: Trajectory) -> "Stored":
-    """Return a stored run to be looked at.
-
-    Raises:
-        SceneError: it is damaged.
-    """
-    from pydantic import ValidationError
-
+    """Return a stored run to be looked at."""
     from sandbox.play.footage.film import Film
     from sandbox.play.running.stored import Stored
 
-    try:
-        return Stored(Film(run))
-    except ValidationError as error:
-        raise SceneError([Fault("<run>", None, "settings", f"they are none: {error.errors()[0]['msg']}")]) from None
+    return Stored(Film(run))
 
 
 def _computed(source: Trajectory | Recording, engine: str | None) -> "Live":
     """Return a session that does again what was done; a stored run is seen beside it.
 
     Raises:
-        SceneError: what is stored is damaged.
         UnknownEngineError: the session is of an engine that is not here.
         Refusal: the engine cannot run it.
     """
@@ -109,29 +104,16 @@ def _computed(source: Trajectory | Recording, engine: str | None) -> "Live":
 
 
 def _session_of(run: Trajectory, scene: Scene, duration: float) -> Recording:
-    """Return what was done in a stored run.
-
-    Raises:
-        SceneError: its settings or actions are none.
-    """
+    """Return what was done in a stored run."""
     import json
 
-    from pydantic import ValidationError
-
-    from sandbox.action import ActionError, actions_from_json
+    from sandbox.action import actions_from_json
     from sandbox.recording import presses_from
 
-    try:
-        settings = Settings.model_validate(run.info["settings"])
-        actions = actions_from_json(json.dumps(run.info.get("actions", [])))
-        presses = presses_from((run.info.get("game") or {}).get("presses", []))
-    except (KeyError, ValidationError):
-        raise SceneError([Fault("<run>", None, "settings", "they are none")]) from None
-    except ActionError as error:
-        raise SceneError([Fault("<run>", None, "actions", line) for line in str(error).splitlines()]) from None
-    except ValueError as error:
-        raise SceneError([Fault("<run>", None, "game", str(error))]) from None
-    return Recording(scene, str(run.info["engine"]), settings, actions, duration, presses=presses)
+    settings = Settings.model_validate(run.info["settings"])
+    actions = actions_from_json(json.dumps(run.info.get("actions", [])))
+    presses = presses_from((run.info.get("game") or {}).get("presses", []))
+    return Recording(scene, run.info["engine"], settings, actions, duration, presses=presses)
 
 
 def _fitting(settings: Settings, scene: Scene, engine: str) -> Settings:

@@ -6,16 +6,18 @@ from pathlib import Path
 import click
 
 from sandbox.cli.naming import engines_in
+from sandbox.cli.output import reasons_against
 from sandbox.cli.reading import gathering, path_of, print_json, refused, scenes_of
+from sandbox.echo import MAX_NAMED, shorten
 from sandbox.interrupt import uninterrupted
 from sandbox.measure.compare import compare
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.tradeoff import tradeoff
 from sandbox.measure.versions import machine, versions
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import load
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import shipped
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import shipped
+from sandbox.scene.scene import Scene
 
 USUAL = "benchmark/"
 """Shipped scenes whose names begin so are reported where none is named."""
@@ -30,15 +32,15 @@ NAME = "report.html"
 
 @click.command(name="report")
 @click.argument("scenes", nargs=-1)
-@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="which engine(s); by default all")
+@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="engine or engines to run; default: all")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of every scene")
 @click.option(
     "--effort",
     type=click.FloatRange(min=0.0),
     default=EFFORT,
     metavar="N",
-    help=f"counted work of the search for a trade-off in each scene, about seconds of computing, by default {EFFORT:g};"
-    " 0 leaves it out",
+    help=f"effort of the trade-off search in each scene, about 1 per second of computing; default: {EFFORT:g};"
+    " 0 skips the search",
 )
 @click.option(
     "--time-limit",
@@ -46,14 +48,14 @@ NAME = "report.html"
     "time_limit",
     type=click.FloatRange(min=0.0, min_open=True),
     metavar="S",
-    help="s after which a scene's search ends; what it tries then depends on the machine; by default none",
+    help="time limit of the search in each scene, so results depend on the machine; default: no limit",
 )
-@click.option("--why", is_flag=True, help="say of each engine that is off which knob matters; takes many times as long")
+@click.option("--why", is_flag=True, help="find the setting that matters most to each error; takes many times as long")
 @click.option(
-    "--out", type=click.Path(path_type=Path), required=True, metavar="PATH", help="the page, .html, or its folder"
+    "--out", type=click.Path(path_type=Path), required=True, metavar="PATH", help="file (.html) or folder to write"
 )
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("--quiet", is_flag=True, help="no progress, no summary")
+@click.option("--quiet", is_flag=True, help="print no progress and no summary")
 def command(
     scenes: tuple[str, ...],
     engines: str | None,
@@ -65,9 +67,10 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Compare many scenes and write one page that needs no network. SCENES: files or shipped; else all benchmarks.
+    """Compare many scenes and write one self-contained HTML page.
 
-    Takes about 10 s of processor time a scene (11 benchmarks took 107 s), a quarter of it without the trade-offs.
+    SCENES are files, folders of files, or names of shipped scenes; default: all benchmark scenes. A scene takes about
+    10 s of processor time (11 benchmarks took 107 s), a quarter of it with --effort 0.
     """
     faults: list[Fault] = []
     names = engines_in(engines, faults)
@@ -77,9 +80,11 @@ def command(
             read.append((name, load(path_of(name), overrides)))
     for flag, figure in (("--effort", effort), ("--time-limit", time_limit)):
         if figure is not None and not math.isfinite(figure):
-            faults.append(Fault(flag, None, "", f"is {figure:g}; it is finite"))
+            faults.append(Fault(flag, None, "", f"is {figure:g}; it must be finite"))
     if not read and not faults:
-        faults.append(Fault("SCENES", None, "", "no benchmark scenes ship here; name some"))
+        faults.append(
+            Fault("SCENES", None, "", "is missing, and there are no shipped benchmark scenes; name some scenes")
+        )
     if not faults:
         with gathering(faults):
             out = _page_path(out)
@@ -97,6 +102,8 @@ def command(
                 click.echo(f"{k + 1}/{len(read)} {name}", err=True)
             try:
                 found = compare(scene, names, why=why)
+                if found.interrupted:
+                    raise KeyboardInterrupt
                 weighed = None
                 if effort:
                     weighed = tradeoff(
@@ -124,7 +131,7 @@ def command(
                 raise KeyboardInterrupt
     except KeyboardInterrupt:
         status = 130
-        click.echo(f"interrupted: {len(told)} of {len(read)} scenes are finished and kept", err=True)
+        click.echo(f"interrupted: {len(told)} of {len(read)} scenes are complete and kept", err=True)
     finally:
         with uninterrupted(), gathering(faults, "--out", (OSError,)):
             write_page(overview.page(), out)
@@ -132,7 +139,8 @@ def command(
         click.echo(str(faults[0]), err=True)
         return 2
     if as_json:
-        print_json({"scenes": told, "page": str(out), "machine": machine(), "versions": versions()})
+        answer = {"scenes": told, "page": str(out), "interrupted": status == 130}
+        print_json({**answer, "machine": machine(), "versions": versions()})
     elif not quiet:
         click.echo(f"written: {out} ({out.stat().st_size / 1e6:.2g} MB)")
     return status
@@ -147,8 +155,11 @@ def _page_path(out: Path) -> Path:
     try:
         if out.suffix.lower() not in {".html", ".htm"} or out.is_dir():
             out.mkdir(parents=True, exist_ok=True)
-            return out / NAME
+            out = out / NAME
         out.parent.mkdir(parents=True, exist_ok=True)
+        reasons = reasons_against(out)
     except OSError as error:
-        raise SceneError([Fault("--out", None, "", f"{out}: {error.strerror or error}")]) from None
+        reasons = [error.strerror or str(error)]
+    if reasons:
+        raise SceneError([Fault("--out", None, "", f"{shorten(str(out), MAX_NAMED)}: {reasons[0]}")])
     return out

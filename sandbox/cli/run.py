@@ -1,28 +1,37 @@
 """`sandbox run`: headless runs, a table on the terminal, a folder of stored runs."""
 
+import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from sandbox.action import Spawn
-from sandbox.batch.crew import Making, MakingError, make
+from sandbox.batch.crew import CrewError, Making, MakingError, make
 from sandbox.batch.outcome import Outcome, execute
-from sandbox.batch.plan import Job, parse_sweep, plan
+from sandbox.batch.plan import Job, parse_sweep, plan, repeated_keys
 from sandbox.batch.store import Store, StoreError
+from sandbox.cli.engine_choice import EngineChoice, only_engine
 from sandbox.cli.ledger_table import print_ledgers
-from sandbox.cli.naming import engines_in, meant_or_known, with_other_engine
+from sandbox.cli.naming import engines_in, meant_or_known, plural, with_other_engine
 from sandbox.cli.output import require_picture
 from sandbox.cli.reading import gathering, paths_of, print_json, refused, scenes_of
 from sandbox.cli.scores_table import print_scores, score_rows
 from sandbox.cli.table import Row, print_runs
+from sandbox.cli.telling import telling
+from sandbox.echo import short_repr
+from sandbox.engines.registry import able
 from sandbox.games.player import Player
 from sandbox.measure.recorder import TooLargeError, require_memory
 from sandbox.measure.seeds import same_chances
-from sandbox.scene.address import AddressError
-from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.overrides import AddressError
+
+MAX_MISSED = 3
+"""Missed contacts that are named below the table of a single run."""
 
 
 @click.command(name="run")
@@ -32,26 +41,50 @@ from sandbox.scene.faults import Fault, SceneError
     "--engines",
     "engines",
     metavar="NAME[,NAME]",
-    help="which engine(s); by default pymunk, or a session's own",
+    help="engine or engines to run; default: pymunk, the engine of the session, or the only engine that has a setting "
+    "of --set or --sweep",
 )
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
-@click.option("--sweep", "sweeps", multiple=True, metavar="KEY=A,B,C", help="run each value; or KEY=LOW:HIGH:N[:log]")
 @click.option(
-    "--seeds", type=click.IntRange(1, 1_000_000), metavar="N", help="run the seeds 1 to N; once where nothing is random"
+    "--sweep",
+    "sweeps",
+    multiple=True,
+    metavar="KEY=A,B,C",
+    help="run once per value; a range is KEY=LOW:HIGH:N[:log]; several sweeps multiply",
+)
+@click.option(
+    "--seeds",
+    type=click.IntRange(1, 1_000_000),
+    metavar="N",
+    help="run with the seeds 1 to N; once if nothing in the scene is random",
 )
 @click.option(
     "--player",
     metavar="WHO",
-    help="who plays a game: random, skilled, none, or a script file",
+    help="player of a game: random, skilled, none, or a script file",
 )
-@click.option("--workers", type=click.IntRange(1, 256), default=1, metavar="N", help="run so many at the same time")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="store every run in a folder, once")
-@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw the run: .png, .svg or .pdf")
-@click.option("--body", "bodies", multiple=True, metavar="NAME", help="which bodies to draw")
-@click.option("--audit/--no-audit", default=True, help="count the contacts that the engine misses")
-@click.option("--ledger", "ledger", is_flag=True, help="account for energy, by cause")
+@click.option(
+    "--workers", type=click.IntRange(1, 256), default=1, metavar="N", help="number of worker processes; default: 1"
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="store the runs in a folder; runs that are already there are not repeated",
+)
+@click.option(
+    "--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw the run to FILE: .png, .svg or .pdf"
+)
+@click.option(
+    "--body", "bodies", multiple=True, metavar="NAME", help="body to draw with --plot; may be repeated; default: all"
+)
+@click.option("--audit/--no-audit", default=True, help="count the contacts that the engine misses (tunnelling)")
+@click.option(
+    "--ledger", "ledger", is_flag=True, help="account for energy by cause; a pymunk run takes 3 to 12 times as long"
+)
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("--quiet", is_flag=True, help="no table, no progress")
+@click.option("-v", "--verbose", is_flag=True, help="explain every column of the table")
+@click.option("--quiet", is_flag=True, help="print no table and no progress")
 def command(
     scenes: tuple[str, ...],
     engines: str | None,
@@ -66,31 +99,36 @@ def command(
     audit: bool,
     ledger: bool,
     as_json: bool,
+    verbose: bool,
     quiet: bool,
 ) -> int:
-    """Run scenes headless and print the results.
+    """Run scenes without a window and print the results.
 
-    SCENES are files, folders of files, names of shipped scenes, or sessions that the window has recorded (.json).
+    SCENES are files, folders of files, names of shipped scenes, or recorded sessions (.json). Exit status 1: a run
+    diverged or failed, or the engine refused the scene.
     """
     faults: list[Fault] = []
     names = engines_in(engines, faults)
     found: list[tuple[str, str]] = []
     for scene in scenes_of(scenes):
         with gathering(faults):
-            found += paths_of([scene])
+            found += _runnable(paths_of([scene]))
     sound: list[str] = []
     for sweep in sweeps:
         with gathering(faults, "--sweep", (AddressError,)):
             parse_sweep(sweep)
             sound.append(sweep)
+    faults += repeated_keys(overrides, sound, seeds)
     plays: Player | None = None
     with gathering(faults):
         plays = None if player is None else Player.named(player)
     jobs: list[Job] = []
-    with gathering(faults, "--sweep", (AddressError,)):
-        jobs = plan(found, names, overrides, sound, seeds, plays)
+    with gathering(faults, "--sweep", (AddressError,)), telling(quiet or as_json) as told:
+        jobs = plan(found, names, overrides, sound, seeds, plays, told)
+    if names is None and not faults:
+        jobs = _on_engines_found(jobs, overrides, sound, quiet)
     if plays is not None and jobs and not any(job.player == plays for job in jobs):
-        faults.append(Fault("--player", None, "", "no scene given has a game with rules"))
+        faults.append(Fault("--player", None, "", "has no use: none of the scenes has a game with rules"))
     if not faults:
         with gathering(faults):
             _check_drawing(plot, bodies, jobs)
@@ -98,25 +136,29 @@ def command(
     store = None
     if out is not None and not faults:
         with gathering(faults, "--out", (StoreError,)):
-            store = Store(out)
+            store = Store(out, _give_notice)
     if faults:
         return refused(faults, as_json, runs=[])
 
     if not quiet:
         _tell_if_nothing_is_random(jobs)
-    status = 0
-    making = Making(out, audit, ledger, as_json)
+    status, was_interrupted = 0, False
+    is_single = all(len(job.scene.bodies) == 1 for job in jobs)  # then the table can show the final position
+    making = Making(out, audit, ledger, as_json or is_single)
     made: dict[int, Row] = {}
     drawn: Outcome | None = None
     try:
-        with _progress(jobs, quiet or as_json) as told:
-            drawn = _make(jobs, workers, making, store, made, told)
+        with _progress(jobs, quiet or as_json) as heard:
+            drawn = _make(jobs, workers, making, store, made, heard)
     except KeyboardInterrupt:
-        status = 130
-        click.echo(f"interrupted: {len(made)} of {len(jobs)} runs are finished and kept", err=True)
+        status, was_interrupted = 130, True
+        click.echo(f"interrupted: {len(made)} of {len(jobs)} runs are complete and kept", err=True)
     except MakingError as error:
         status = 2
         click.echo(str(error), err=True)
+    except CrewError as error:
+        status = 1
+        click.echo(f"--workers: {error}; {len(made)} of {len(jobs)} runs are complete and kept", err=True)
     finally:
         if store is not None:
             store.close()
@@ -125,24 +167,30 @@ def command(
     for k, row in sorted(made.items()):
         if row["status"] != "ok":
             status = status or 1
-            advice = with_other_engine(jobs[k].scene) if row["status"] == "refused" else ""
+            advice = with_other_engine(jobs[k].scene, names is not None) if row["status"] == "refused" else ""
             click.echo(f"{row['scene']}: {row['status']}: {row['reason']}{advice}", err=True)
+        if "damaged" in row:
+            click.echo(f"{row['damaged']}; the run was repeated", err=True)
         if row.get("replayed") is False:
             status = status or 1
             what = "state" if row.get("otherwise") is None else f"game, from {row['otherwise']:g} s on,"
-            message = f"ended in another {what} than the session did; other versions of the engines lead elsewhere"
+            message = f"ended in a different {what} than the session; a possible cause is another version of an engine"
             click.echo(f"{row['scene']}: {message}", err=True)
     if as_json:
         spread = score_rows(rows) if seeds is not None else []
-        print_json({"runs": rows, **({"scores": spread} if spread else {})})
+        print_json({"runs": rows, **({"scores": spread} if spread else {}), "interrupted": was_interrupted})
     elif not quiet and rows:
-        print_runs(rows)
+        print_runs(rows, verbose)
+        if drawn is not None:
+            _print_missed(drawn)
         if seeds is not None:
             print_scores(score_rows(rows))
         if ledger:
             print_ledgers(rows)
         if out is not None:
             click.echo(f"stored: {out}")
+        if len(rows) == 1 and not (overrides or sweeps or plot or out or verbose or status):
+            _suggest_next(rows[0]["scene"])
     if plot is not None and drawn is not None and len(drawn.trajectory.time):
         from sandbox.report.plots import plot_run
 
@@ -156,6 +204,57 @@ def command(
     return status
 
 
+def _runnable(paths: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return names and files of scenes.
+
+    Raises:
+        SceneError: one is a stored run.
+    """
+    reason = "is a stored run, not a scene; `sandbox export` and `sandbox replay` read it"
+    stored = [Fault(name, None, "", reason) for name, path in paths if path.lower().endswith(".npz")]
+    if stored:
+        raise SceneError(stored)
+    return paths
+
+
+def _on_engines_found(jobs: list[Job], overrides: Sequence[str], sweeps: Sequence[str], quiet: bool) -> list[Job]:
+    """Return the runs, each on the one engine that can make it where the usual one lacks a setting that was given.
+
+    All runs of a scene stay on one engine. A recorded session stays on its own.
+    """
+    axes = [parse_sweep(sweep) for sweep in sweeps]
+    found: dict[str, EngineChoice] = {}
+    for label in dict.fromkeys(job.label for job in jobs if not job.recorded):
+        own = [job for job in jobs if job.label == label]
+        if all(own[0].engine in able(job.scene) for job in own):
+            continue
+        choice = only_engine([job.scene for job in own], overrides, axes)
+        if choice is not None:
+            found[label] = choice
+    if not quiet:
+        for sentence in dict.fromkeys(choice.sentence for choice in found.values()):
+            click.echo(sentence, err=True)
+    return [replace(job, engine=found[job.label].engine) if job.label in found else job for job in jobs]
+
+
+def _print_missed(outcome: Outcome) -> None:
+    """Print the first contacts that the engine missed, and the number of the others."""
+    run, fixed = outcome.trajectory, outcome.job.scene.fixed_names
+    missed = list(zip(run.missed_time.tolist(), run.missed_pair.tolist(), strict=True))
+    for time, pair in missed[:MAX_MISSED]:
+        one, other = (short_repr(str(run.names[k]) if k >= 0 else fixed[-1 - k]) for k in pair)
+        click.echo(f"missed: contact of {one} with {other} at {time:.4g} s")
+    if len(missed) > MAX_MISSED:
+        click.echo(f"missed: and {len(missed) - MAX_MISSED:,} more")
+
+
+def _suggest_next(scene: str) -> None:
+    """Print what may follow a plain run of one scene, on a terminal only."""
+    if sys.stdout.isatty() and not scene.endswith(".json"):
+        name = shlex.quote(scene)
+        click.secho(f"next: sandbox compare {name} (error of each engine), sandbox play {name} (window)", dim=True)
+
+
 def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) -> None:
     """Refuse before the run what could not be drawn after it."""
     faults: list[Fault] = []
@@ -164,16 +263,18 @@ def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) 
         faults.append(Fault(option, None, "", message))
 
     if plot is None and bodies:
-        fault("--body", "says what is drawn, but nothing is; give --plot FILE too")
+        fault("--body", "works only together with --plot FILE")
     if plot is not None:
         if len(jobs) != 1:
-            fault("--plot", f"draws one run, but this makes {len(jobs)}")
+            remedy = "run one scene on one --engine, without --sweep and --seeds"
+            several = "sandbox compare SCENE --out DIR plots several engines"
+            fault("--plot", f"draws a single run, but this command makes {len(jobs):,}; {remedy}; {several}")
         with gathering(faults):
             require_picture(plot)
         names = jobs[0].scene.bodies.names
         for name in bodies:
             if name not in names:
-                fault("--body", f"no body is named {name!r}; {meant_or_known(name, names)}")
+                fault("--body", f"no body is named {short_repr(name)}; {meant_or_known(name, names)}")
     if faults:
         raise SceneError(faults)
 
@@ -186,17 +287,19 @@ def _tell_if_nothing_is_random(jobs: list[Job]) -> None:
             continue  # the game and who plays it have chances of their own
         alike = max(job.seeds for job in jobs if job.label == label)
         if alike > 1:
-            where = (
-                "" if all(job.seeds > 1 for job in jobs if job.label == label) else "with some of the swept values, "
+            where = "" if all(job.seeds > 1 for job in jobs if job.label == label) else "for some of the swept values, "
+            click.echo(
+                f"{label}: {where}nothing is random, so the seeds 1 to {alike} give one and the same run, "
+                "which is made once",
+                err=True,
             )
-            click.echo(f"{label}: {where}nothing in it is random: seeds 1 to {alike} are one run, made once", err=True)
             continue
         first, *others = (job.scene for job in jobs if job.label == label)
         other = next((scene for scene in others if scene.world.seed != first.world.seed), first)
         if other is first:
             continue
         if same_chances(first, other):
-            click.echo(f"{label}: nothing in it is random: all seeds are the same run", err=True)
+            click.echo(f"{label}: nothing is random, so all seeds give the same run", err=True)
 
 
 def _check_memory(jobs: list[Job]) -> None:
@@ -212,6 +315,10 @@ def _check_memory(jobs: list[Job]) -> None:
         raise SceneError(tuple(dict.fromkeys(faults)))
 
 
+def _give_notice(message: str) -> None:
+    click.echo(message, err=True)
+
+
 Told = Callable[[int, Job, float], None]
 """Called with how many runs are done, the job that is under way, and the share of it that is done."""
 
@@ -223,6 +330,7 @@ def _make(
 
     Raises:
         MakingError: a run could not be made.
+        CrewError: no worker can be started.
     """
     if min(workers, len(jobs)) > 1:
 
@@ -230,7 +338,7 @@ def _make(
             made[place] = row
             told(len(made), jobs[place], 0.0)
 
-        make(jobs, workers, making, done)
+        make(jobs, workers, making, done, _give_notice)
         return None
     outcome: Outcome | None = None
     for k, job in enumerate(jobs):
@@ -261,7 +369,7 @@ def _progress(jobs: list[Job], silent: bool) -> Iterator[Told]:
 
     columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn()
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
-        whole = bars.add_task(f"{len(jobs)} run(s)", total=float(len(jobs)))
+        whole = bars.add_task(plural(len(jobs), "run"), total=float(len(jobs)))
 
         def told(done: int, job: Job, share: float) -> None:
             at = min(done + 1, len(jobs))

@@ -5,13 +5,13 @@ import tomllib
 import click
 
 from sandbox.cli.reading import print_json
-from sandbox.scene.shipped import shipped
+from sandbox.scene.files.shipped_scenes import shipped
 
 
 @click.command(name="scenes")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 def command(as_json: bool) -> int:
-    """List the scenes that ship: name, title, and what to look for."""
+    """List the shipped scenes: name, title, and what to observe."""
     rows = []
     for scene in shipped():
         document = tomllib.loads(scene.path.read_text(encoding="utf-8"))

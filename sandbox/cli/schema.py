@@ -6,7 +6,9 @@ from typing import Any
 
 import click
 
-from sandbox.scene.schema import dumps, schema
+from sandbox.cli.reading import print_json
+from sandbox.echo import short_repr
+from sandbox.scene.files.json_schema import dumps, schema
 
 Node = dict[str, Any]
 """A JSON Schema."""
@@ -14,11 +16,14 @@ Node = dict[str, Any]
 
 @click.command(name="schema")
 @click.argument("table", required=False)
-@click.option("--json", "as_json", is_flag=True, help="of a table too as JSON Schema; the whole schema is JSON anyway")
+@click.option(
+    "--json", "as_json", is_flag=True, help="print TABLE as JSON Schema too; without TABLE the output is always JSON"
+)
 def command(table: str | None, as_json: bool) -> int:
-    """Print the JSON Schema of a scene file, for editors, or the keys of one TABLE, for people.
+    """Print the keys of a table of the scene file, or the JSON Schema of the whole file.
 
-    TABLE is the name of a table, such as ball, solver, joint, body.box or pinball.bumper.
+    TABLE is the name of a table, such as ball, solver, joint, body.box or pinball.bumper. Without it, the JSON Schema
+    is printed, for editors and other programs.
     """
     if table is None:
         click.echo(dumps(), nl=False)
@@ -27,7 +32,7 @@ def command(table: str | None, as_json: bool) -> int:
     found = _find(whole, table.strip("[]"))
     if as_json:
         one = found[0] if len(found) == 1 else {"oneOf": found}
-        click.echo(json.dumps({"$schema": whole["$schema"], **one, "$defs": whole["$defs"]}, ensure_ascii=False))
+        print_json({"$schema": whole["$schema"], **one, "$defs": whole["$defs"]})
         return 0
     for node in found:
         _print_table(whole, table, node)
@@ -42,16 +47,26 @@ def _find(whole: Node, path: str) -> list[Node]:
     """
     here = [whole]
     for part in path.split("."):
+        nested = _nested(whole, part) if here == [whole] and part not in whole["properties"] else []
+        if nested:
+            here = nested
+            continue
         known = dict.fromkeys(key for node in here for key in node.get("properties", {}))
         if part not in known:
             close = difflib.get_close_matches(part, known, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"known here: {', '.join(known)}"
-            raise click.UsageError(f"{path!r}: no key {part!r}; {hint}")
+            hint = f"did you mean {close[0]!r}?" if close else f"known keys: {', '.join(known)}"
+            raise click.UsageError(f"{short_repr(path)}: no key {short_repr(part)}; {hint}")
         inner = (node["properties"][part] for node in here if part in node.get("properties", {}))
         here = list({node.get("title", ""): node for each in inner for node in _tables(whole, each)}.values())
         if not here:
-            raise click.UsageError(f"{path!r}: {part!r} is a value, no table")
+            raise click.UsageError(f"{short_repr(path)}: {short_repr(part)} is a value, not a table")
     return here
+
+
+def _nested(whole: Node, name: str) -> list[Node]:
+    """Return the tables of a name that are keys of other tables, such as kick; each once."""
+    within = (node["properties"][name] for node in whole["$defs"].values() if name in node.get("properties", {}))
+    return list({node.get("title", ""): node for each in within for node in _tables(whole, each)}.values())
 
 
 def _tables(whole: Node, node: Node) -> list[Node]:
@@ -78,7 +93,7 @@ def _print_table(whole: Node, name: str, node: Node) -> None:
         table.add_column(head, no_wrap=head == "key")
     table.add_column("")
     for key, each in node["properties"].items():
-        needed = "must be given" if key in node.get("required", ()) else json.dumps(each.get("default"))
+        needed = "required" if key in node.get("required", ()) else json.dumps(each.get("default"))
         default = "–" if needed == "null" else needed
         table.add_row(*map(Text, (key, _value(whole, each), default, _line(each.get("description", "")))))
     console = Console()

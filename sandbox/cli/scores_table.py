@@ -35,7 +35,7 @@ def print_scores(rows: Sequence[dict[str, Any]]) -> None:
     for row in rows:
         swept = "".join(f", {key} = {value}" for key, value in row["set"].items())
         click.echo(f"\nscores of {row['scene']}, {row['engine']}{swept}: {row['count']} games, player {row['player']}")
-        click.echo(f"  mean {_score(row['mean'])} ± {_score(row['deviation'])} a game")
+        click.echo(f"  mean {_score(row['mean'])} ± {_score(row['deviation'])} per game")
         names = {0.0: "least", 0.5: "median", 1.0: "most"}
         told = (f"{names.get(share, f'{share:.0%}')} {_score(row['quantiles'][f'{share:g}'])}" for share in SHARES)
         click.echo(f"  {' · '.join(told)}")

@@ -17,8 +17,8 @@ from sandbox.measure.shots.horizon import NUDGE, TOLERANCE, By
 from sandbox.measure.shots.odds import COUNT
 from sandbox.measure.shots.spread import Spread
 from sandbox.measure.shots.study import Study, pot_of, study
-from sandbox.scene.faults import Fault
-from sandbox.scene.file import load
+from sandbox.scene.errors import Fault
+from sandbox.scene.files.load import load
 
 USUAL = Spread()
 SHARE = click.FloatRange(min=0.0, max=1.0)
@@ -27,27 +27,78 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True, max=1.0)
 
 @click.command(name="shots")
 @click.argument("scene")
-@click.option("--shot", "name", metavar="NAME", help="which [[shot]]; by default the first")
+@click.option("--shot", "name", metavar="NAME", help="name of the [[shot]]; default: the first")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
-@click.option("--aim-error", type=SHARE, default=USUAL.aim, metavar="RAD", help="how far aim strays; by default 0.002")
 @click.option(
-    "--speed-error", type=SHARE, default=USUAL.speed, metavar="SHARE", help="how far speed strays; by default 0.03"
+    "--aim-error",
+    type=SHARE,
+    default=USUAL.aim,
+    metavar="RAD",
+    help="standard deviation of the aim, rad; default: 0.002",
 )
-@click.option("--side-error", type=SHARE, default=USUAL.side, metavar="R", help="of the tip, in radii; by default 0")
-@click.option("--height-error", type=SHARE, default=USUAL.height, metavar="R", help="likewise, up and down")
-@click.option("--count", type=click.IntRange(1, 1_000_000), default=COUNT, metavar="N", help="shots; by default 10,000")
-@click.option("--seed", type=click.IntRange(0, 2**63 - 1), metavar="N", help="of the errors; by default the scene's")
-@click.option("--threads", type=click.IntRange(1, 1024), metavar="N", help="by default one a core; changes no figure")
-@click.option("--sensitivity", "slopes", is_flag=True, help="how far rests move with aim, speed, side and height")
 @click.option(
-    "--window", "pots", multiple=True, metavar="BALL:POCKET", help="between which aims a ball falls into a pocket"
+    "--speed-error",
+    type=SHARE,
+    default=USUAL.speed,
+    metavar="FRACTION",
+    help="standard deviation of the speed, as a fraction; default: 0.03",
 )
-@click.option("--horizon", "foretold", is_flag=True, help="the time from which the shot cannot be predicted")
-@click.option("--nudge", type=POSITIVE, default=NUDGE, metavar="X", help="of the horizon, rad or m; by default 1e-9")
 @click.option(
-    "--by", type=click.Choice(["aim", "place"]), default="aim", help="what is nudged: the aim, or the ball's place"
+    "--side-error",
+    type=SHARE,
+    default=USUAL.side,
+    metavar="R",
+    help="standard deviation of the tip to the side, ball radii; default: 0",
 )
-@click.option("--tolerance", type=POSITIVE, default=TOLERANCE, metavar="M", help="of the horizon, m; by default 0.001")
+@click.option(
+    "--height-error",
+    type=SHARE,
+    default=USUAL.height,
+    metavar="R",
+    help="standard deviation of the tip's height, ball radii; default: 0",
+)
+@click.option(
+    "--count", type=click.IntRange(1, 1_000_000), default=COUNT, metavar="N", help="number of shots; default: 10,000"
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0, 2**63 - 1),
+    metavar="N",
+    help="random seed of the errors; default: the seed of the scene",
+)
+@click.option(
+    "--threads",
+    type=click.IntRange(1, 1024),
+    metavar="N",
+    help="number of threads; default: one per core; results do not depend on it",
+)
+@click.option(
+    "--sensitivity", "slopes", is_flag=True, help="derivatives of the rest positions by aim, speed, side and height"
+)
+@click.option(
+    "--window",
+    "pots",
+    multiple=True,
+    metavar="BALL:POCKET",
+    help="interval of aims for which BALL falls into POCKET; may be repeated",
+)
+@click.option("--horizon", "foretold", is_flag=True, help="time after which the shot cannot be predicted")
+@click.option(
+    "--nudge", type=POSITIVE, default=NUDGE, metavar="X", help="perturbation for --horizon, rad or m; default: 1e-9"
+)
+@click.option(
+    "--by",
+    type=click.Choice(["aim", "place"]),
+    default="aim",
+    help="quantity that --horizon perturbs: the aim or the position of the ball",
+)
+@click.option(
+    "--tolerance",
+    type=POSITIVE,
+    default=TOLERANCE,
+    metavar="M",
+    help="position difference that ends the horizon, m; default: 0.001",
+)
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write shots.json, rests.png and aims.png")
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
 @click.option("--quiet", is_flag=True, help="no table, no progress")
@@ -72,9 +123,9 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Play a shot many times with a player's errors, and print the odds of each outcome.
+    """Play a shot many times with random errors of the player, and print the odds of each outcome.
 
-    SCENE is a file or a shipped one, with a [surface] and a [[shot]]. Errors are standard deviations of normal ones.
+    SCENE is a file or the name of a shipped scene, with a [surface] and a [[shot]]. Errors are normally distributed.
     """
     faults: list[Fault] = []
     spread = USUAL
@@ -82,7 +133,7 @@ def command(
         spread = Spread(aim_error, speed_error, side_error, height_error)
     for flag, figure in (("--nudge", nudge), ("--tolerance", tolerance)):
         if math.isnan(figure):
-            faults.append(Fault(flag, None, "", "is no number; it is positive and finite"))
+            faults.append(Fault(flag, None, "", "is not a number; it must be positive and finite"))
     attempt: Attempt | None = None
     wanted: list[tuple[str, str]] = []
     reason = ""
@@ -123,7 +174,10 @@ def command(
         print_study(scene, found)
     status = 0 if found.answered else 1
     if found.odds.interrupted:
-        click.echo(f"interrupted: {found.odds.count:,} of {count:,} shots are played and counted", err=True)
+        click.echo(f"interrupted: {found.odds.count:,} of {count:,} shots were played and are counted", err=True)
+        status = 130
+    elif found.interrupted:
+        click.echo("interrupted: the odds and all other completed results are kept", err=True)
         status = 130
     return max(status, _kept(found, document, out, quiet or as_json))
 

@@ -15,7 +15,7 @@ from sandbox.measure.shots.sensitivity import Slope
 from sandbox.measure.shots.study import Study
 from sandbox.measure.shots.windows import Windows
 
-ODDS_HEADS = ("ball", "falls", "95 %", "into", "else rests at, m", "spread, m", "as it is meant")
+ODDS_HEADS = ("ball", "pocketed", "95 % interval", "into", "mean rest, m", "std, m", "without error")
 OF_POCKETS = slice(1, 4)
 """Those that a table without pockets does without."""
 
@@ -45,7 +45,7 @@ def print_study(scene: str, found: Study) -> None:
     tables = [_table(rows[0], rows[1:])]
     if found.slopes is not None:
         heads = [f"d/d({variable}), m/{UNITS[variable]}" for variable in VARIABLES]
-        tables.append(_table(["ball", *heads, "same course within"], _slope_rows(found.slopes)))
+        tables.append(_table(["ball", *heads, "same contacts within"], _slope_rows(found.slopes)))
     for table in tables:
         console.width = max(console.width, Console(width=10_000).measure(table).maximum)
     console.print(Text(f"{scene}: {title}" if title else scene), soft_wrap=True)
@@ -70,9 +70,7 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     for k, head in enumerate(heads):
-        table.add_column(
-            head, justify="left" if k == 0 or head in ("into", "as it is meant") else "right", no_wrap=True
-        )
+        table.add_column(head, justify="left" if k == 0 or head in ("into", "without error") else "right", no_wrap=True)
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
     return table
@@ -82,13 +80,13 @@ def _about(found: Study) -> Iterator[str]:
     attempt, odds = found.attempt, found.odds
     stroke = attempt.stroke
     off = f", tip at ({stroke.side:+g}, {stroke.height:+g}) R" if stroke.side or stroke.height else ""
-    yield f"{attempt.name}: {attempt.ball!r} struck at {stroke.speed:g} m/s towards {stroke.aim:.6g} rad{off}"
+    yield f"{attempt.name}: {attempt.ball!r} struck at {stroke.speed:g} m/s at an aim of {stroke.aim:.6g} rad{off}"
     errors = odds.spread
     sides = f", tip ± ({errors.side:g}, {errors.height:g}) R" if errors.side or errors.height else ""
-    missed = f"; {odds.miscues:,} miscued" if odds.miscues else ""
+    missed = f"; {odds.miscues:,} miscues" if odds.miscues else ""
     given = f"; {odds.unfinished:,} did not come to rest" if odds.unfinished else ""
     stray = f"aim ± {1e3 * errors.aim:g} mrad, speed ± {100.0 * errors.speed:g} %{sides}"
-    yield f"{odds.count:,} strokes, {stray} (one standard deviation), seed {odds.seed}{missed}{given}"
+    yield f"{odds.count:,} shots, {stray} (standard deviations), seed {odds.seed}{missed}{given}"
 
 
 def _odds_rows(odds: Odds) -> list[list[str]]:
@@ -122,8 +120,8 @@ def _in_all(odds: Odds) -> Iterator[str]:
     if not odds.attempt.pockets:
         return
     pot, scratch = odds.any_pot, odds.scratch
-    yield f"something else falls and {odds.attempt.ball!r} does not: {_percent(pot.share)}, {_bounds(pot)}"
-    yield f"{odds.attempt.ball!r} falls: {_percent(scratch.share)}, {_bounds(scratch)}"
+    yield f"another ball is pocketed and {odds.attempt.ball!r} is not: {_percent(pot.share)}, {_bounds(pot)}"
+    yield f"{odds.attempt.ball!r} is pocketed: {_percent(scratch.share)}, {_bounds(scratch)}"
 
 
 def _slope_rows(slopes: Sequence[Slope]) -> list[list[str]]:
@@ -138,7 +136,7 @@ def _slope_rows(slopes: Sequence[Slope]) -> list[list[str]]:
 
 def _slope(slope: Slope) -> str:
     if slope.value is None:
-        return "falls" if (slope.reason or "").startswith("falls") else "not smooth"
+        return "pocketed" if (slope.reason or "").startswith("falls") else "not smooth"
     x, y = slope.value
     return f"({x:.3g}, {y:.3g})"
 
@@ -147,45 +145,45 @@ def _window(found: Windows) -> Iterator[str]:
     who = f"{found.ball!r} into {found.pocket!r}"
     nearest = found.nearest
     if nearest is None:
-        yield f"{who}: never, for aim within {found.reach:g} rad of {found.aim:.6g}"
+        yield f"{who}: for no aim within {found.reach:g} rad of {found.aim:.6g}"
         return
     near = sorted(found.found, key=lambda each: each.off(found.aim))[:MOST_WINDOWS]
     for each in sorted(near, key=lambda each: each.low):
         ends = f"[{each.low:.9f}, {each.high:.9f}] rad, ± {1e3 * each.half:.4g} mrad about {each.centre:.9f}"
-        yield f"{who}: for aim in {ends}"
+        yield f"{who}: for an aim in {ends}"
     if len(found.found) > len(near):
-        yield f"{who}: {len(found.found) - len(near)} more windows within {found.reach:g} rad, farther off"
+        yield f"{who}: {len(found.found) - len(near)} more intervals within {found.reach:g} rad, farther from the aim"
     off = 1e3 * (found.aim - nearest.centre)
     side = "left" if off > 0.0 else "right"
     inside = "within" if found.aim in nearest else "outside"
-    yield f"{who}: the shot's aim is {inside}, {abs(off):.4g} mrad to the {side} of the centre"
+    yield f"{who}: the aim of the shot is {inside} it, {abs(off):.4g} mrad to the {side} of its centre"
 
 
 def _horizon(found: Horizon) -> Iterator[str]:
-    unit = "rad of aim" if found.by == "aim" else "m of place"
+    unit = "rad in aim" if found.by == "aim" else "m in position"
     within = f"{1e3 * found.tolerance:g} mm"
-    yield f"nudged by {found.parted.nudge:g} {unit}: {_parted(found.parted, within)}"
-    yield f"nudged by {found.parted.nudge:g} {unit}: {_parted(found.by_a_radius, 'a radius')}"
+    yield f"perturbed by {found.parted.nudge:g} {unit}: {_parted(found.parted, within)}"
+    yield f"perturbed by {found.parted.nudge:g} {unit}: {_parted(found.by_a_radius, 'a radius')}"
     if found.player is not None:
-        yield f"by a player's error: {_parted(found.player, 'a radius')}"
+        yield f"perturbed by the player's error: {_parted(found.player, 'a radius')}"
     rungs = [f"{each.nudge:.0e}: {each.time:.3g} s" for each in found.ladder if each.time is not None]
     whole = [each.nudge for each in found.ladder if each.time is None]
-    rungs += [f"{max(whole):.0e}: to the end"] if whole else []
-    yield f"foretold within {within}, by how well aim is known, rad: {', '.join(rungs)}"
+    rungs += [f"{max(whole):.0e}: the whole shot"] if whole else []
+    yield f"predictable to {within}, by the accuracy of the aim in rad: {', '.join(rungs)}"
     digits = found.digits_per_second
     if digits is not None:
-        yield f"one more second takes {digits:.2g} more digits of aim"
+        yield f"each further second needs {digits:.2g} more digits of the aim"
 
 
 def _parted(each: Parted, within: str) -> str:
     if each.time is None:
-        return f"no ball is ever {within} elsewhere; {1e3 * each.farthest:.2g} mm at most"
+        return f"no ball ever differs by {within}; the largest difference is {1e3 * each.farthest:.2g} mm"
     grown = ""
     if each.growth_per_hit is not None and each.growth_per_second is not None:
         decade = math.log(10.0) / each.growth_per_second
-        times = f"ten times in {decade:.2g} s" if decade > 0.0 else "no growth"
-        grown = f", after {each.hits} hits in a row, × {each.growth_per_hit:.3g} each, {times}"
-    return f"{each.ball!r} is {within} elsewhere from {each.time:.4g} s on{grown}"
+        times = f"a factor of 10 per {decade:.2g} s" if decade > 0.0 else "no growth"
+        grown = f", after {each.hits} collisions in a row, × {each.growth_per_hit:.3g} each, {times}"
+    return f"{each.ball!r} differs by {within} from t = {each.time:.4g} s on{grown}"
 
 
 def _percent(share: float) -> str:

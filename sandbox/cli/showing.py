@@ -6,7 +6,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from sandbox.cli.output import reasons_against
+from sandbox.cli.reading import refused
+from sandbox.cli.streams import OutputError
+from sandbox.echo import MAX_NAMED, short_repr, shorten
 from sandbox.play.sight import OVERLAYS
+from sandbox.scene.errors import Fault
 
 if TYPE_CHECKING:
     from sandbox.play.stage import Stage
@@ -24,26 +29,34 @@ class SizeType(click.ParamType):  # type: ignore[type-arg]  # generic in newer v
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
         """Read a size."""
         width, _, height = str(value).lower().partition("x")
-        if not (width.isdecimal() and height.isdecimal()) or not all(1 <= int(n) <= LARGEST for n in (width, height)):
-            self.fail(f"{value!r} is no size in pixels, such as 1280x800 (1 to {LARGEST:,} each)", param, ctx)
+        digits = len(str(LARGEST))  # of more, int() may refuse to read them
+        if not all(n.isdecimal() and len(n) <= digits and 1 <= int(n) <= LARGEST for n in (width, height)):
+            self.fail(
+                f"{short_repr(value)} is not a size in pixels, such as 1280x800 (1 to {LARGEST:,} each)", param, ctx
+            )
         return int(width), int(height)
 
 
 def window_options(command: Command) -> Command:
     """Add the options of every window."""
     options = (
-        click.option("--size", type=SizeType(), metavar="WxH", help="of the window, in pixels"),
-        click.option("--paused", is_flag=True, help="begin paused"),
-        click.option("--film", type=click.Choice(["gif", "mp4"]), default="gif", help="what Ctrl+R records"),
+        click.option("--size", type=SizeType(), metavar="WxH", help="size of the window in pixels"),
+        click.option("--paused", is_flag=True, help="start paused"),
+        click.option(
+            "--film",
+            type=click.Choice(["gif", "mp4"]),
+            default="gif",
+            help="format of films recorded with Ctrl+R; default: gif",
+        ),
         click.option(
             "--overlay",
             "overlays",
             multiple=True,
             type=click.Choice(OVERLAYS),
             metavar="NAME",
-            help=f"begin with it on: {', '.join(OVERLAYS)}",
+            help=f"overlay to switch on at the start; may be repeated: {', '.join(OVERLAYS)}",
         ),
-        click.option("--ghost", is_flag=True, help="begin with the ghost"),
+        click.option("--ghost", is_flag=True, help="start with the ghost of the reference solution on"),
         click.option(
             "--record",
             type=click.Path(path_type=Path, dir_okay=False),
@@ -84,14 +97,22 @@ def show_stage(
     from sandbox.play.screen import NoDisplayError
     from sandbox.play.window import Window
 
-    if record is not None and not record.absolute().parent.is_dir():
-        click.echo(f"--record: {record}: there is no folder {record.parent}", err=True)
-        return 2
+    reasons = [] if record is None else reasons_against(record)
+    if reasons:
+        return refused([Fault("--record", None, "", f"{shorten(str(record), MAX_NAMED)}: {reasons[0]}")])
     stage.paused, stage.saves_at_end = paused, record is not None
+    failures: list[OutputError] = []
+
+    def say(message: str) -> None:
+        try:
+            click.echo(message)
+        except OutputError as error:  # no reason to close the window: it is reported at the end
+            failures.append(error)
+
     try:
-        window = Window(stage, size=size, film=f".{film}", say=click.echo)
+        window = Window(stage, size=size, film=f".{film}", say=say)
     except NoDisplayError as error:
-        click.echo(f"{error}; `sandbox run` and `sandbox export` need none", err=True)
+        click.echo(f"{error}; `sandbox run` and `sandbox export` work without a display", err=True)
         return 1
     try:
         begin()
@@ -103,6 +124,8 @@ def show_stage(
         status = window.run()
         if record is not None and not _saved(stage, record):
             status = status or 1
+        if failures:
+            raise failures[0]
         return status
     finally:
         window.close()

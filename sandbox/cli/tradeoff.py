@@ -18,10 +18,10 @@ from sandbox.measure.tradeoff.aim import UnknownMetricError, require_aim
 from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.weighed import Tradeoff
 from sandbox.measure.tradeoff.weighing import EFFORT, POINTS, REPEATS, tradeoff
-from sandbox.scene.faults import Fault
-from sandbox.scene.file import load
-from sandbox.scene.model import Scene
-from sandbox.scene.rewrite import write_solver
+from sandbox.scene.errors import Fault
+from sandbox.scene.files.load import load
+from sandbox.scene.files.toml_edit import write_solver
+from sandbox.scene.scene import Scene
 
 USUAL_FPS = 60.0
 POSITIVE = click.FloatRange(min=0.0, min_open=True)
@@ -29,23 +29,39 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True)
 
 @click.command(name="tradeoff")
 @click.argument("scene")
-@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="which engine(s); by default all")
+@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="engine or engines to try; default: all")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
-@click.option("--metric", metavar="NAME", help=f"what the error is counted in: {', '.join(METRICS)}")
-@click.option("--tolerance", type=click.FloatRange(min=0.0), metavar="X", help="error that is allowed, in its unit")
-@click.option("--budget", type=POSITIVE, metavar="MS", help="milliseconds a frame that may be spent")
 @click.option(
-    "--fps", type=POSITIVE, default=USUAL_FPS, metavar="N", help="frames a second of the budget; by default 60"
+    "--metric",
+    metavar="NAME",
+    help=f"measure of the error; default: chosen from the scene. One of {', '.join(METRICS)}",
 )
-@click.option("--seeds", type=click.IntRange(1, 1000), default=1, metavar="N", help="errors are the worst of N seeds")
-@click.option("--zoom", type=POSITIVE, metavar="PX", help="pixels a metre, for errors on the screen")
+@click.option(
+    "--tolerance", type=click.FloatRange(min=0.0), metavar="X", help="largest allowed error, in the unit of the metric"
+)
+@click.option("--budget", type=POSITIVE, metavar="MS", help="computing time per frame that is available, ms")
+@click.option(
+    "--fps",
+    type=POSITIVE,
+    default=USUAL_FPS,
+    metavar="N",
+    help="frames per second that --budget refers to; default: 60",
+)
+@click.option(
+    "--seeds",
+    type=click.IntRange(1, 1000),
+    default=1,
+    metavar="N",
+    help="take the largest error over N seeds; default: 1",
+)
+@click.option("--zoom", type=POSITIVE, metavar="PX", help="pixels per metre, for the metrics in pixels")
 @click.option(
     "--effort",
     type=POSITIVE,
     default=EFFORT,
     metavar="N",
-    help="counted work of the search: the same settings are tried on every machine; the whole command takes some 5 s "
-    f"for each 1 of it; by default {EFFORT:g}",
+    help="effort of the search, in seconds of counted work, so that every machine tries the same settings; the truth, "
+    f"timing and other seeds come on top; default: {EFFORT:g}",
 )
 @click.option(
     "--time-limit",
@@ -53,27 +69,33 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True)
     "time_limit",
     type=POSITIVE,
     metavar="S",
-    help="s after which nothing more is tried; what is tried then depends on the machine; by default none",
+    help="time limit of the search, s; the settings tried then depend on the machine; default: no limit",
 )
 @click.option(
     "--points",
     type=click.IntRange(1, 100_000),
     default=POINTS,
     metavar="N",
-    help=f"most settings to try; by default {POINTS}",
+    help=f"largest number of settings to try; default: {POINTS}",
 )
 @click.option(
     "--repeats",
     type=click.IntRange(1, 1000),
     default=REPEATS,
     metavar="N",
-    help=f"timings of each setting near the front; by default {REPEATS}",
+    help=f"timings of each setting near the front; default: {REPEATS}",
 )
-@click.option("--write", is_flag=True, help="put the recommended [solver] into the scene file")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write tradeoff.json and a report page")
-@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw it: .png, .svg or .pdf")
+@click.option("--write", is_flag=True, help="write the recommended [solver] into the scene file")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write tradeoff.json and report.html")
+@click.option(
+    "--plot",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="draw error against cost to FILE: .png, .svg or .pdf",
+)
 @click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("--quiet", is_flag=True, help="no table, no progress")
+@click.option("-v", "--verbose", is_flag=True, help="explain every column of the table")
+@click.option("--quiet", is_flag=True, help="print no table and no progress")
 def command(
     scene: str,
     engines: str | None,
@@ -92,13 +114,15 @@ def command(
     out: Path | None,
     plot: Path | None,
     as_json: bool,
+    verbose: bool,
     quiet: bool,
 ) -> int:
-    """Measure error against cost over engines and settings. SCENE is a file or a shipped one.
+    """Measure error against cost over engines and settings, and recommend a setting.
 
-    The settings that are tried and their errors are the same on every machine. The times are of this machine; where two
-    settings are within its noise, counted work decides which is the cheaper. Exit status 1: no setting that was tried
-    is within the tolerance, or within the budget; the nearest is shown.
+    SCENE is a file or the name of a shipped scene. The settings that are tried and their errors are the same on every
+    machine; times are those of this machine. If the times of two settings differ by less than the timing noise, counted
+    work decides which is cheaper. Exit status 1: no setting is within the tolerance or the
+    budget; the nearest is shown.
     """
     faults: list[Fault] = []
     names = engines_in(engines, faults)
@@ -113,14 +137,16 @@ def command(
             require_aim(*figures)
     for flag, figure in (("--zoom", zoom), ("--effort", effort), ("--time-limit", time_limit)):
         if figure is not None and not math.isfinite(figure):
-            faults.append(Fault(flag, None, "", f"is {figure:g}; it is positive and finite"))
+            faults.append(Fault(flag, None, "", f"is {figure:g}; it must be positive and finite"))
     read: Scene | None = None
     path = scene
     with gathering(faults):
         path = path_of(scene)
         read = load(path, overrides)
     if write and overrides:
-        faults.append(Fault("--write", None, "", "the file lacks what --set changes; leave one of the two out"))
+        faults.append(
+            Fault("--write", None, "", "cannot be combined with --set, because the file does not contain those changes")
+        )
     elif write and read is not None:
         with gathering(faults):
             write_solver(path, {})  # changes nothing, but tells whether it could
@@ -156,7 +182,7 @@ def command(
     if as_json:
         print_json(document)
     elif not quiet:
-        print_tradeoff(scene, found)
+        print_tradeoff(scene, found, verbose)
     status = 1 if found.within_tolerance is None or (budget is not None and found.within_budget is None) else 0
     if found.interrupted:
         click.echo(f"interrupted: the {len(found.points)} settings tried so far are kept", err=True)
@@ -176,21 +202,21 @@ def _kept(
     """Write what was asked for, and say so; return 2 where something cannot be written."""
     faults: list[Fault] = []
     if write and found.within_tolerance is None:
-        _say(f"not written: {path} stays as it is, as no setting that was tried is within the tolerance", silent)
+        _say(f"not written: no setting is within the tolerance, so {path} is unchanged", silent)
     elif write and found.within_tolerance is not None:
         with gathering(faults):
             changed = write_solver(path, found.within_tolerance.point.changes)
-            _say(f"written: {path}" if changed else f"{path}: has the recommended [solver] already", silent)
+            _say(f"written: {path}" if changed else f"{path}: already has the recommended [solver]", silent)
             engine = found.within_tolerance.point.engine
             if engine != USUAL:
                 _say(f"run it with --engine {engine}", silent)
-    asked = "--plot"
+    asked, written = "--plot", list[Path]()
     try:
         if plot is not None:
             from sandbox.report.work_precision import plot_tradeoff
 
             plot_tradeoff(document, plot)
-            _say(f"written: {plot}", silent)
+            written.append(plot)
         asked = "--out"
         if out is not None:
             from sandbox.report.page.tradeoff_page import write_tradeoff
@@ -198,10 +224,14 @@ def _kept(
             write_json(document, out / "tradeoff.json")
             engines = [name for name in ENGINES if any(point.engine == name for point in found.points)]
             replayed = None if found.interrupted else compare(found.scene, engines, truth=found.best)
+            if replayed is not None and replayed.interrupted:
+                raise KeyboardInterrupt
             write_tradeoff(document, out / "report.html", replayed)
-            _say(f"written: {out}", silent)
+            written.append(out)
     except OSError as error:
         faults.append(Fault(asked, None, "", f"{error.filename}: {error.strerror}"))
+    for file in written:
+        _say(f"written: {file}", silent)
     for fault in faults:
         click.echo(str(fault), err=True)
     return 2 if faults else 0

@@ -1,9 +1,9 @@
-"""The contract between a scene and whatever computes it.
+"""Interface between a scene and the engine that computes it.
 
     ENGINES[name].start(scene, settings) -> Simulation
     simulation.step() … frame() … contacts() … close()
 
-Adding an engine is one folder that honours these two protocols, and one line in the registry.
+A new engine is one folder that implements these two protocols, and one line in the registry.
 """
 
 from __future__ import annotations
@@ -11,29 +11,46 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
-if TYPE_CHECKING:  # a contract is for reading; engines that only refuse should not pay for its nouns
+if TYPE_CHECKING:  # importing an engine must stay cheap
     from sandbox.action import Action
-    from sandbox.engines.account import Cause
-    from sandbox.scene.bodies import Bodies
-    from sandbox.scene.demands import Demand
-    from sandbox.scene.model import Scene
-    from sandbox.scene.settings import Settings
-    from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
+    from sandbox.arrays import FloatArray, IntArray
+    from sandbox.engines.energy_ledger import Cause
+    from sandbox.scene.compile.bodies import Bodies
+    from sandbox.scene.compile.demands import Demand
+    from sandbox.scene.compile.setup import Setup
+    from sandbox.scene.description.fixed import PlaneReach
+    from sandbox.scene.description.world import Settings
+    from sandbox.scene.scene import Scene
+    from sandbox.trajectory import Contacts, Frame
 
 
-class Refusal(Exception):  # noqa: N818, an engine refuses; that is no error of its own
-    """An engine lacks what a scene or a setting asks for. `reasons` names each thing, `able` who could."""
+class Refusal(Exception):  # noqa: N818, a refusal is an answer, not an error of the engine
+    """An engine does not support something that the scene or a setting needs.
+
+    Attributes:
+        engine: name of the engine.
+        reasons: each unsupported demand or setting.
+        able: names of the engines that can run the scene.
+    """
 
     def __init__(self, engine: str, reasons: tuple[str, ...], able: tuple[str, ...]) -> None:
-        others = f"these could: {', '.join(able)}" if able else "no engine here could"
+        others = f"engines that can: {', '.join(able)}" if able else "no engine can run the scene with these settings"
         super().__init__(f"{engine} refuses: {'; '.join(reasons)}; {others}")
         self.engine = engine
         self.reasons = reasons
         self.able = able
 
 
-class Divergence(Exception):  # noqa: N818, a result of the physics asked for, not an error of the program
-    """A simulation left what is finite and bounded. It can be read, not stepped further."""
+class Divergence(Exception):  # noqa: N818, a result of the physics, not an error of the program
+    """The state is no longer finite, or exceeds the bounds on position and speed.
+
+    The simulation can still be read, but not stepped.
+
+    Attributes:
+        time: simulated time, s.
+        body: name of the body.
+        what: description of its state.
+    """
 
     def __init__(self, time: float, body: str, what: str) -> None:
         super().__init__(f"at {time:g} s: {body!r} {what}")
@@ -43,19 +60,20 @@ class Divergence(Exception):  # noqa: N818, a result of the physics asked for, n
 
 
 class Exhaustion(Exception):  # noqa: N818, as above
-    """A simulation needs more memory or work than is reasonable. What it has can be read, but not stepped further."""
+    """A step needs more memory or work than its limit. The simulation can still be read, but not stepped."""
 
 
 Observer: TypeAlias = "Callable[[float, FloatArray, FloatArray, IntArray], None]"
-"""Called after each substep with its starting time (s), the centres (N, 2) at its start and end, and the pairs
-(K, 2) that the engine found in contact at its end, numbered as in `Contacts`."""
+"""Callback after each substep: its start time (s), the centres of mass (N, 2) at its start and end, and the pairs (K,
+2) that the engine found in contact at its end, with the indices of `Contacts`."""
 
 
 class Simulation(Protocol):
-    """A running scene. Everything that changes lives in here; all that comes out is a value."""
+    """Running scene. Its state changes in place; the frames and contacts that it returns do not change."""
 
     patience: float | None
-    """s that a step may take, where the engine can tell while it works; beyond, it is an `Exhaustion`. None: any"""
+    """s, largest computing time of a step, after which it raises `Exhaustion`; engines check it where they can. None:
+    unlimited"""
 
     @property
     def time(self) -> float:
@@ -63,115 +81,131 @@ class Simulation(Protocol):
 
     @property
     def scene(self) -> Scene:
-        """What runs, with all that was set since."""
+        """The scene, with all changes that actions have made."""
+
+    @property
+    def setup(self) -> Setup:
+        """State from which the simulation started, with the changes that actions have made to its scene."""
 
     @property
     def settings(self) -> Settings:
-        """The settings, with every choice filled in."""
+        """The settings, with every default chosen by the engine filled in."""
 
     @property
     def bodies(self) -> Bodies:
-        """The bodies by number, as they started; spawned ones join at the end."""
+        """Bodies at their start as arrays; spawned bodies are appended."""
 
     @property
     def retired(self) -> Mapping[int, float]:
-        """When each body that was removed, left world.bounds or had lived its time was gone: number → s."""
+        """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
 
     @property
     def broken(self) -> Mapping[int, float]:
-        """When each joint broke that did: its number in `scene.links` → s."""
+        """Time in s, by index in `setup.links`, at which joints broke."""
+
+    @property
+    def plane_reach(self) -> PlaneReach | None:
+        """Present extent of half-planes as (x, y, distance), m; None if they are infinite."""
 
     @property
     def work(self) -> Mapping[str, int]:
-        """What was done so far, counted and not timed: the same on every machine, at every repeat.
+        """Work counters since the start. They are deterministic: equal on every machine and at every repeat.
 
-        Of these, what the engine has and can tell:
+        An engine has those of the following that apply to it:
 
-        - `substeps`: solver steps, one that is cut short at the end included;
-        - `broad_tests`: tests of the broad phase, whether two may be near;
-        - `pair_tests`: tests of two for contact, or for when they will touch;
-        - `contacts`: contacts found in them, one that lasts at every look anew;
-        - `contact_iterations`, `joint_iterations`: contacts and joints that the solver visited, over all its passes;
-        - `events`, `predictions`: of an event-driven engine, what happened, and how often it looked ahead.
+        - `substeps`: solver steps, including a shortened last one;
+        - `broad_tests`: tests of pairs in the broad phase;
+        - `pair_tests`: tests of pairs for contact, or for their time of impact;
+        - `contacts`: contacts found in these tests; a lasting contact counts at every test;
+        - `contact_iterations`, `joint_iterations`: contacts and joints that the solver visited, over all iterations;
+        - `events`, `predictions`: of an event-driven engine, its events and the predictions of the next event.
         """
 
     def step(self) -> None:
-        """Advance by one dt.
+        """Advance by one time step dt.
 
         Raises:
-            Divergence: the state is not finite, or beyond all bounds.
-            Exhaustion: the step asks for more than can be had.
+            Divergence: the state is not finite, or exceeds the bounds.
+            Exhaustion: the step needs more memory or work than its limit.
         """
 
     def finish(self, part: float) -> None:
-        """Advance by a last part of dt, 0 < part < 1, where a run's duration is no multiple of dt.
+        """Advance by a last fraction of dt, for a duration that is not a multiple of dt. No step can follow.
 
-        No step can follow.
+        Args:
+            part: fraction of dt, 0 < part < 1.
 
         Raises:
             Divergence: as `step`.
-            ValueError: there is no such part.
+            ValueError: `part` is out of range.
         """
 
     def apply(self, action: Action) -> None:
-        """Do what an action says, now; its time is the caller's affair.
+        """Apply an action at once. Its `time` is ignored.
+
+        Args:
+            action: the action.
 
         Raises:
-            ActionError: it cannot be done. Nothing has changed then.
+            ActionError: the action cannot be applied. The simulation is left unchanged.
         """
 
     def frame(self) -> Frame:
         """Return the present state."""
 
     def contacts(self) -> Contacts:
-        """Return the contacts that were open since the last call, with the impulse exchanged since then.
+        """Return the contacts that were open since the last call, with the impulses exchanged since then.
 
-        One that lasts keeps the time of its first touch, so a caller knows it again. Recording starts with
-        the first call, which returns those that touch now: who never asks pays nothing.
+        A lasting contact keeps the time of its first touch, by which it can be identified. Recording starts with the
+        first call, which returns the present contacts. It costs nothing before that.
         """
 
     def account(self) -> Mapping[Cause, float]:
-        """Return the energy, J, that each cause has brought since the first call; negative where it took some.
+        """Return the energy change, J, by each cause since the first call; negative where energy was removed.
 
-        The first call opens the account, which is empty then: who never asks pays nothing. It changes no state. The
-        causes' sum is what the energy of `engines.energy.energy_of` changed by, but for a residual that is rounding
-        in the engines written by hand.
+        Energy accounting is off until the first call, which returns zeros, and costs nothing before that. It does not
+        change the state. The sum over the causes is the change of the energy of `common.energy_balance.energy_of` up to
+        a residual; in the `exact` and `reference` engines that residual is rounding error.
         """
 
     def watch(self, observer: Observer) -> None:
-        """Have an observer called after every substep. Engines without steps never call it."""
+        """Register an observer that is called after every substep. Engines without steps never call it."""
 
     def state_hash(self) -> str:
-        """Return a hash of time and every body's state, bit for bit."""
+        """Return a hash of the time and of the exact state of every body."""
 
     def close(self) -> None:
-        """Release what the engine holds."""
+        """Release the resources of the engine."""
 
 
 class Engine(Protocol):
-    """A way to compute scenes. Light to import: what is heavy is imported by `start`."""
+    """Method to compute scenes. Importing it is cheap; `start` imports what the engine needs."""
 
     @property
     def name(self) -> str:
-        """What `--engine` calls it."""
+        """Name of the engine, as given to `--engine`."""
 
     @property
     def about(self) -> str:
-        """One line."""
+        """One-line description."""
 
     @property
     def capabilities(self) -> frozenset[Demand]:
-        """The demands that it models."""
+        """Demands that the engine models."""
 
-    def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
-        """Return what scene and settings ask for that this engine lacks; none means that it can run them."""
+    def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
+        """Return each demand and setting that the engine does not support; empty if it can run the scene."""
 
-    def resolve(self, scene: Scene, settings: Settings) -> Settings:
-        """Return the settings with every choice that was left to the engine filled in."""
+    def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:
+        """Return the settings with the engine's choice for every setting that is None."""
 
-    def start(self, scene: Scene, settings: Settings | None = None) -> Simulation:
-        """Set a scene up; without settings, by its own `[solver]`.
+    def start(self, start: Scene | Setup, settings: Settings | None = None) -> Simulation:
+        """Start a scene, or continue from a setup.
+
+        Args:
+            start: the scene or setup.
+            settings: settings of the solver; default: the `[solver]` of the scene.
 
         Raises:
-            Refusal: the engine lacks something that is asked for.
+            Refusal: the engine does not support something that the scene or a setting needs.
         """

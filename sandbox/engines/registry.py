@@ -1,11 +1,13 @@
 """ENGINES: every engine by name."""
 
+from sandbox.echo import short_repr
 from sandbox.engines.contract import Engine, Refusal, Simulation
 from sandbox.engines.exact.engine import ExactEngine
-from sandbox.engines.native.engine import PymunkEngine
+from sandbox.engines.pymunk_adapter.engine import PymunkEngine
 from sandbox.engines.reference.engine import ReferenceEngine
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 ENGINES: dict[str, Engine] = {
     "pymunk": PymunkEngine(),
@@ -15,7 +17,7 @@ ENGINES: dict[str, Engine] = {
 
 
 USUAL = "pymunk"
-"""The engine of whoever does not say."""
+"""Default engine."""
 
 
 class UnknownEngineError(ValueError):
@@ -26,36 +28,38 @@ def engine_named(name: str) -> Engine:
     """Return an engine by name.
 
     Raises:
-        UnknownEngineError: with the names there are.
+        UnknownEngineError: no engine has that name; the message lists the engines.
     """
     try:
         return ENGINES[name]
     except KeyError:
-        raise UnknownEngineError(f"no engine {name!r}; engines: {', '.join(ENGINES)}") from None
+        raise UnknownEngineError(f"unknown engine {short_repr(name)}; engines: {', '.join(ENGINES)}") from None
 
 
 def usual(scene: Scene) -> str:
-    """Return the engine that a scene is played on where nobody has said: of a table the one that is exact."""
-    bends = scene.surface is not None and scene.surface.curl != 0.0  # which has no parabolas
+    """Return the engine that the window uses by default: `exact` on a `[surface]` without curl, else `pymunk`."""
+    bends = scene.surface is not None and scene.surface.curl != 0.0  # `exact` needs parabolic paths
     return "exact" if scene.surface is not None and not bends else USUAL
 
 
-def able(scene: Scene, settings: Settings | None = None) -> tuple[str, ...]:
+def able(start: Scene | Setup, settings: Settings | None = None) -> tuple[str, ...]:
     """Return the names of the engines that can run a scene."""
-    settings = scene.solver if settings is None else settings
-    return tuple(name for name, each in ENGINES.items() if not each.missing(scene, settings))
+    setup = Setup.of(start)
+    settings = setup.scene.solver if settings is None else settings
+    return tuple(name for name, each in ENGINES.items() if not each.missing(setup, settings))
 
 
-def start(scene: Scene, engine: str = "pymunk", settings: Settings | None = None) -> Simulation:
-    """Start a scene on an engine.
+def start(start: Scene | Setup, engine: str = "pymunk", settings: Settings | None = None) -> Simulation:
+    """Start a scene on an engine, or continue from a setup.
 
     Raises:
         UnknownEngineError: no engine has that name.
-        Refusal: the engine lacks something, with the engines that do not.
+        Refusal: the engine does not support something that the scene or a setting needs.
     """
-    settings = scene.solver if settings is None else settings
+    setup = Setup.of(start)
+    settings = setup.scene.solver if settings is None else settings
     chosen = engine_named(engine)
-    missing = chosen.missing(scene, settings)
+    missing = chosen.missing(setup, settings)
     if missing:
-        raise Refusal(engine, missing, able(scene, settings))
-    return chosen.start(scene, settings)
+        raise Refusal(engine, missing, able(setup, settings))
+    return chosen.start(setup, settings)

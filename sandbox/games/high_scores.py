@@ -10,8 +10,9 @@ from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints, TypeAdapter, ValidationError
 
-from sandbox.scene.model import Scene
-from sandbox.whole import whole
+from sandbox.scene.files.nesting import NestingError, check_text
+from sandbox.scene.scene import Scene
+from sandbox.whole import read_whole, whole
 
 FOLDER = "SANDBOX_DATA"
 """An environment variable: the folder to keep the file in, where the platform's is not wanted."""
@@ -20,6 +21,12 @@ FILE = "high-scores.json"
 
 BEST = 10
 """kept of each table"""
+
+MAX_SCORE = 10**15
+"""A score beyond this is damage: no game gives it, and it would not fit on a line."""
+
+MAX_BYTES = 2**24
+"""of the file; the ten best of a table take a few hundred"""
 
 LETTERS = 3
 """of initials"""
@@ -30,7 +37,8 @@ _ENTRIES: TypeAdapter[dict[str, list[tuple[str, int | float]]]] = TypeAdapter(
         list[
             tuple[
                 Annotated[str, StringConstraints(pattern=r"^[A-Z0-9 .\-]{1,3}$")],
-                int | Annotated[float, Field(allow_inf_nan=False)],
+                Annotated[int, Field(ge=-MAX_SCORE, le=MAX_SCORE)]
+                | Annotated[float, Field(ge=-MAX_SCORE, le=MAX_SCORE)],
             ]
         ],
     ]
@@ -60,7 +68,7 @@ class HighScores:
             OSError: the file cannot be read.
             ValueError: it is damaged.
         """
-        return tuple(Entry(*row) for row in self._read().get(table, []))
+        return tuple(Entry(*row) for row in self._read().get(table, [])[:BEST])
 
     def rank(self, table: str, score: int | float) -> int | None:
         """Return the place that a score would take, from 1; None where it takes none. Equals stay ahead of it.
@@ -93,13 +101,14 @@ class HighScores:
 
     def _read(self) -> dict[str, list[tuple[str, int | float]]]:
         try:
-            text = self.path.read_text(encoding="utf-8")
+            text = read_whole(self.path, MAX_BYTES).decode("utf-8")
         except FileNotFoundError:
             return {}
         try:
+            check_text(text)
             return _ENTRIES.validate_python(_as_rows(json.loads(text)))
-        except (ValidationError, RecursionError) as error:
-            raise ValueError(f"{self.path} holds no high scores: {str(error).splitlines()[0]}") from None
+        except (ValidationError, NestingError) as error:
+            raise ValueError(f"{self.path} is not a high-score file: {str(error).splitlines()[0]}") from None
 
 
 def opened(path: Path | None = None) -> HighScores:
@@ -118,7 +127,7 @@ def opened(path: Path | None = None) -> HighScores:
         )
         path.replace(aside)
         first = str(error).splitlines()[0]
-        return HighScores(path, f"the high scores are damaged and begin anew; the old file is {aside}: {first}")
+        return HighScores(path, f"the high-score file is damaged and was renamed to {aside}: {first}")
     return scores
 
 

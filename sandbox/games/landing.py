@@ -13,12 +13,14 @@ import numpy as np
 
 from sandbox.action import Action, Move, Throttle
 from sandbox.games.rules import Control, Seen, UnfitError
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.forces import Thrust
-from sandbox.scene.model import Plane, Post, Scene, Wall, default_name
-from sandbox.scene.part import Point
-from sandbox.scene.shapes import form_of
-from sandbox.scene.streams import Stream, draws
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.description.forces import Thrust
+from sandbox.scene.description.scene import default_name
+from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.random_streams import Stream, draws
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 SHIP, PAD = "ship", "pad"
@@ -57,7 +59,7 @@ class Landing:
         }
         if SHIP not in bodies.names or PAD not in scene.fixed_names or not self._thrusts:
             raise UnfitError(
-                f"landing needs a body {SHIP!r}, a fixed thing {PAD!r}, and a thrust on the ship that has a key"
+                f"landing needs a body {SHIP!r}, a fixed element {PAD!r}, and a thrust on the ship that has a key"
             )
         self.controls = tuple(_control(name, thrust) for name, thrust in self._thrusts.items())
         self.score = 0
@@ -115,7 +117,7 @@ class Landing:
             return "lost in space"
         touched = {int(pair[1]) if pair[0] == ship else int(pair[0]) for pair in seen.contacts.pair if ship in pair}
         if any(number >= -self._solid for number in touched - {self._pad}):  # the others are no more than zones
-            return "crashed beside the pad"
+            return "crashed outside the pad"
         if self._pad not in touched:
             self._still = 0.0
             return None
@@ -126,7 +128,7 @@ class Landing:
                 return fault
             self._cues.append("touch")
         if abs(self._tilt(frame)) > FALLEN:
-            return "fell over"
+            return "tipped over"
         speed = float(np.hypot(*frame.velocity[ship]))
         self._still = self._still + elapsed if speed < STILL else 0.0
         if self._still < STANDING:
@@ -139,12 +141,12 @@ class Landing:
         assert self._before is not None
         aside, up = self._before.velocity[self._ship].tolist()
         if -up > DOWN:
-            return f"crashed: {-up:.1f} m/s down, {DOWN:g} at most"
+            return f"crashed: {-up:.1f} m/s down (limit {DOWN:g})"
         if abs(aside) > ASIDE:
-            return f"crashed: {abs(aside):.1f} m/s sideways, {ASIDE:g} at most"
+            return f"crashed: {abs(aside):.1f} m/s sideways (limit {ASIDE:g})"
         tilt = abs(self._tilt(self._before))
         return (
-            f"crashed: tilted by {math.degrees(tilt):.0f}°, {math.degrees(TILT):.0f}° at most" if tilt > TILT else None
+            f"crashed: tilted by {math.degrees(tilt):.0f}° (limit {math.degrees(TILT):.0f}°)" if tilt > TILT else None
         )
 
     def _consolation(self) -> int:

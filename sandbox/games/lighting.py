@@ -62,7 +62,7 @@ class Lightings(NamedTuple):
                 times.append(float(time))
                 states.append(now)
         except (TypeError, ValueError):
-            raise ValueError("these are no lamps: each change is a time and a list of names") from None
+            raise ValueError("invalid lamp record: each change is a time and a list of names") from None
         return cls(times, states)
 
     def at(self, time: float) -> frozenset[str]:

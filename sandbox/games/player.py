@@ -10,8 +10,8 @@ from sandbox.games.registry import fitting_rules
 from sandbox.games.rules import Press, UnfitError
 from sandbox.games.script_file import faults_of, read_script
 from sandbox.recording import Recording
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.model import Scene
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.scene import Scene
 
 RECORDED = "as recorded"
 """What the player of a session is called that is seen again."""
@@ -33,10 +33,16 @@ class Player:
         Raises:
             SceneError: there is none, or the script cannot be read, or has faults.
         """
-        if text not in POLICIES and not Path(text).exists():
-            message = f"cannot be read: No such file; a player is {', '.join(POLICIES)}, or the file of a script"
+        if text in POLICIES:
+            return cls(text)
+        try:
+            reason = "" if Path(text).exists() else "No such file"
+        except (OSError, ValueError) as error:  # such as a name longer than any file's
+            reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        if reason:
+            message = f"cannot be read: {reason}; a player is {', '.join(POLICIES)} or a script file"
             raise SceneError([Fault(text, None, "", message)])
-        return cls(text) if text in POLICIES else cls(text, read_script(text))
+        return cls(text, read_script(text))
 
     @classmethod
     def of(cls, session: Recording) -> Self:

@@ -5,11 +5,13 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from sandbox.games.artillery.terrain import Artillery
+from sandbox.games.curling.match import CurlingMatch
 from sandbox.games.pinball.hand import PinballHand
 from sandbox.games.rules import Control, Policy, Press, Rules, Seen, UnfitError
-from sandbox.scene.curling import CurlingMatch
-from sandbox.scene.model import Scene
-from sandbox.scene.streams import Stream, draws
+from sandbox.scene.description.game_tables import table_of
+from sandbox.scene.random_streams import Stream, draws
+from sandbox.scene.scene import Scene
 
 RATES = 0.2, 2.0
 """1/s, how often a random player presses a usual control: one rate for each, drawn evenly by factors between these"""
@@ -92,15 +94,18 @@ def _nobody(scene: Scene) -> Policy:
         UnfitError: the game stands still until a person delivers a stone, or fires.
     """
     play = scene.play
-    if play.game == "curling" and (play.curling or CurlingMatch()).people:
+    if play.game == "curling" and (table_of(play, CurlingMatch) or CurlingMatch()).people:
         raise UnfitError(
-            "none delivers no stone for red, so nothing would move; --set play.curling.people=0 lets both teams play "
-            "by themselves, random and a script deliver"
+            "player 'none' delivers no stone, so nothing would move; use random or a script, or let both teams play by "
+            "themselves with --set play.curling.people=0"
         )
-    if play.game == "artillery" and scene.artillery is not None:
-        waits = next((player.name for player in scene.artillery.players if player.bot is None), None)
+    artillery = table_of(scene, Artillery)
+    if play.game == "artillery" and artillery is not None:
+        waits = next((player.name for player in artillery.players if player.bot is None), None)
         if waits is not None:
-            raise UnfitError(f"none fires no gun, so the game would wait for {waits}; random, skilled or a script fire")
+            raise UnfitError(
+                f"player 'none' fires no gun, so {waits} would never play; use random, skilled or a script"
+            )
     return Nobody()
 
 
@@ -115,7 +120,7 @@ def _skilled(scene: Scene) -> Policy:
 
         return ArtilleryHand(scene.world.seed)
     if scene.play.game != "pinball":
-        raise UnfitError(f"skilled plays pinball and artillery, not {scene.play.game}; random plays everything")
+        raise UnfitError(f"player 'skilled' plays pinball and artillery, not {scene.play.game}; use random")
     return PinballHand(scene.world.seed)
 
 

@@ -5,14 +5,15 @@ from pathlib import Path
 
 from sandbox.games.curling.rules import Curling
 from sandbox.games.landing import Landing
+from sandbox.games.names import GAMES, registered_games
 from sandbox.games.pinball.pinball import Pinball
 from sandbox.games.rules import Rules, UnfitError
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.faults import Fault, Lines, SceneError
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.errors import Fault, Lines, SceneError
+from sandbox.scene.scene import Scene
 
 REAL_TIME = frozenset({"landing", "pinball"})
-"""Games in which time matters from the first step: a window starts them at a key press."""
+"""Games of this package in which time matters from the first step: a window starts them at a key press."""
 
 
 def _artillery(scene: Scene, bodies: Bodies) -> Rules:
@@ -27,7 +28,25 @@ RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {
     "landing": Landing,
     "pinball": Pinball,
 }
-"""Each begins a game. A game is one line here, and its name in `scene.spots.Game`."""
+"""Each begins a game. A game of this package is one line here, and its name in `games.names.GAMES`."""
+
+
+def _rules_named(game: str | None) -> Callable[[Scene, Bodies], Rules] | None:
+    """Return the rules of a game of this package or another.
+
+    Raises:
+        UnfitError: those of another package cannot be imported.
+    """
+    if game is None or game in RULES or game in GAMES:
+        return RULES.get(game or "")
+    entry = registered_games().get(game)
+    if entry is None:
+        return None
+    try:
+        rules: Callable[[Scene, Bodies], Rules] = entry.load()
+    except (ImportError, AttributeError) as error:
+        raise UnfitError(f"the game {game!r} cannot be imported from {entry.value}: {error}") from error
+    return rules
 
 
 def rules_of(scene: Scene, bodies: Bodies | None = None) -> Rules | None:
@@ -40,8 +59,23 @@ def rules_of(scene: Scene, bodies: Bodies | None = None) -> Rules | None:
     Raises:
         UnfitError: the scene lacks what the game needs.
     """
-    begin = RULES.get(scene.play.game or "")
+    begin = _rules_named(scene.play.game)
     return None if begin is None else begin(scene, scene.bodies if bodies is None else bodies)
+
+
+def is_real_time(game: str | None) -> bool:
+    """Return whether time matters from the first step of a game; rules of other packages state it as `real_time`.
+
+    Raises:
+        UnfitError: the rules are of another package and cannot be imported.
+    """
+    return game in REAL_TIME or bool(getattr(_rules_named(game), "real_time", False))
+
+
+def has_rules(scene: Scene) -> bool:
+    """Return whether a scene names a game that has rules here."""
+    game = scene.play.game
+    return game in RULES or (game is not None and game not in GAMES)
 
 
 def required_rules(scene: Scene) -> Rules:

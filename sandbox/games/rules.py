@@ -23,62 +23,65 @@ __all__ = ["Control", "Gauged", "Lit", "Logged", "Policy", "Press", "Rules", "Se
 
 
 class UnfitError(ValueError):
-    """A scene cannot be played by the rules that it names: raised as a game begins. `str()` says what it needs."""
+    """The scene lacks an element that the rules of its game need; raised at the start of a game.
+
+    `str()` names the element.
+    """
 
 
 class Seen(NamedTuple):
-    """What rules see, once at the start and once after every step."""
+    """Input of the rules, at the start and after every step."""
 
     time: float
     """s"""
     frame: Frame
     contacts: Contacts
-    """of the last step; one that lasts is seen at every step, with the time of its first touch"""
+    """contacts of the last step; a lasting contact appears at every step, with the time of its first touch"""
     actions: tuple[Action, ...]
-    """the player's, applied before this step: those of the controls, and whatever else a hand did"""
+    """actions of the player that were applied before this step, from controls or by hand"""
 
 
 class Control(NamedTuple):
-    """One thing that a player can do: a key, a button of a gamepad, an entry of an action, a word of a script."""
+    """Control of a game: a key, a gamepad button, an entry of an action, or a word of a script."""
 
     name: str
-    """a word or two, unique in the game"""
+    """one or two words, unique in the game"""
     about: str
-    """what it does, for help"""
+    """description for the help overlay"""
     keys: tuple[str, ...]
-    """as the window names them, such as `("left shift", "z")`; never p, o, f1 or escape"""
+    """names of its keys in the window, such as `("left shift", "z")`; never p, o, f1 or escape"""
     pad: str | None = None
     """on a gamepad: `a b x y lb rb lt rt left right up down`, or a stick's half such as `-leftx`, `+righty`; several
     are separated by blanks"""
     analogue: bool = False
-    """its value is 0 to 1; else it is 0 or 1"""
+    """whether its value is any number from 0 to 1; otherwise it is 0 or 1"""
     often: float = 1.0
-    """of the presses of usual controls, those of this one by whoever presses at chance; more than 0"""
+    """frequency with which a random player presses it, relative to an ordinary control; greater than 0"""
 
 
 class Rules(Protocol):
-    """A game that is being played."""
+    """Rules and state of a running game."""
 
     @property
     def controls(self) -> tuple[Control, ...]:
-        """What a player can do; the same throughout a game."""
+        """Controls of the player; constant during a game."""
 
     @property
     def score(self) -> int | float:
-        """Of who plays, or the best."""
+        """Score of the present player, or the best score."""
 
     @property
     def over(self) -> str | None:
-        """Why the game is over; None while it goes on."""
+        """Reason why the game is over; None while it runs."""
 
     def control(self, name: str, value: float) -> Sequence[Action]:
-        """Return what comes of pressing a control now (`value` > 0), or of letting it go (0)."""
+        """Return the actions of pressing a control now (`value` > 0), or of releasing it (0)."""
 
     def look(self, seen: Seen) -> Sequence[Action]:
-        """See what happened, and return what the game itself does, applied before the next step."""
+        """Update the rules after a step, and return the actions of the game itself for the next step."""
 
     def lines(self) -> Sequence[tuple[str, str]]:
-        """Return what a score panel shows, as labels and texts, the most important first."""
+        """Return the lines of the score panel, as labels and texts, the most important first."""
 
     def cues(self) -> Sequence[str]:
         """Return the names of the sounds since the last call."""
@@ -86,31 +89,31 @@ class Rules(Protocol):
 
 @runtime_checkable
 class Logged(Protocol):
-    """Rules that tell, besides, what has happened."""
+    """Rules that also keep a log of events."""
 
     @property
     def log(self) -> Sequence[tuple[float, str]]:
-        """When, s, and what, in order."""
+        """Time, s, and text of each event, in order."""
 
 
 @runtime_checkable
 class Gauged(Protocol):
-    """Rules with gauges, besides: what a player reads off the window, as numbers for who learns to play."""
+    """Rules that also have gauges: numbers that a player reads off the window, for learning agents."""
 
     def gauges(self) -> Sequence[tuple[str, float]]:
-        """Return names and values, finite; the same names in the same order throughout a game, whatever the seed."""
+        """Return names and finite values; names and order are constant during a game, for every seed."""
 
 
 @runtime_checkable
 class Lit(Protocol):
-    """Rules that light lamps, besides."""
+    """Rules that also light lamps."""
 
     def lit(self) -> frozenset[str]:
-        """Return the names of the parts, `[[play.part]]`, whose lamps are lit now."""
+        """Return the names of the parts, `[[play.part]]`, whose lamps are lit."""
 
 
 class Policy(Protocol):
-    """Who plays."""
+    """Player of a game."""
 
     def decide(self, seen: Seen, rules: Rules) -> Sequence[tuple[str, float]]:
-        """Return the controls that are set now, and to what; asked once a step, after the rules have looked."""
+        """Return the controls to set now and their values; called once a step, after `Rules.look`."""

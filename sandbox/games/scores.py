@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
 
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """of games, whose scores are no more than the quantiles"""
@@ -38,7 +38,7 @@ class Scores:
             ValueError: there are none.
         """
         if not scores:
-            raise ValueError("no game, no spread of scores")
+            raise ValueError("no games, so no score statistics")
         values = np.asarray(scores, dtype=np.float64)
         counts, edges = np.histogram(values, _edges(values))
         return cls(

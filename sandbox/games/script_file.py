@@ -4,11 +4,18 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+from sandbox.echo import short_repr, shorten
 from sandbox.games.rules import Control, Press
-from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.whole import read_whole
 
 LONGEST = 1e9
 """s, as of a scene"""
+
+MAX_BYTES = 16 * 2**20
+
+MAX_FAULTS = 20
+"""Faults that are reported; of a file that is no script, every line is wrong."""
 
 
 def read_script(path: str | Path) -> tuple[Press, ...]:
@@ -18,7 +25,7 @@ def read_script(path: str | Path) -> tuple[Press, ...]:
         SceneError: it cannot be read, or lines are wrong; all of them are told.
     """
     try:
-        lines = Path(path).read_text(encoding="utf-8").splitlines()
+        lines = read_whole(Path(path), MAX_BYTES).decode("utf-8").splitlines()
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or error
         raise SceneError([Fault(str(path), None, "", f"cannot be read: {reason}")]) from None
@@ -29,7 +36,7 @@ def read_script(path: str | Path) -> tuple[Press, ...]:
         except ValueError as error:
             faults.append(Fault(str(path), number, "", str(error)))
     if faults:
-        raise SceneError(faults)
+        raise SceneError(_some(faults, str(path)))
     return tuple(sorted(presses, key=lambda press: press.time))
 
 
@@ -46,13 +53,13 @@ def _press(text: str) -> Press:
     try:
         time, control, value = float(parts[0]), ",".join(parts[1:-1]).strip(), float(parts[-1])
     except ValueError:
-        raise ValueError(f"{text!r} should be `time, control, value`, such as `0.5, left, 1`") from None
+        raise ValueError(f"{short_repr(text)} should be `time, control, value`, such as `0.5, left, 1`") from None
     if len(parts) < 3 or not control:
-        raise ValueError(f"{text!r} should be `time, control, value`, such as `0.5, left, 1`")
+        raise ValueError(f"{short_repr(text)} should be `time, control, value`, such as `0.5, left, 1`")
     if not (0.0 <= time <= LONGEST):
-        raise ValueError(f"a time of {parts[0]} s is out of range; it should be 0 to {LONGEST:g}")
+        raise ValueError(f"a time of {shorten(parts[0])} s is out of range; it should be 0 to {LONGEST:g}")
     if not (math.isfinite(value) and 0.0 <= value <= 1.0):
-        raise ValueError(f"a value of {parts[-1]} is out of range; it should be 0 to 1, 0 lets go")
+        raise ValueError(f"a value of {shorten(parts[-1])} is out of range; it should be 0 to 1, 0 releases it")
     return Press(time, control, value)
 
 
@@ -63,17 +70,26 @@ def faults_of(presses: Sequence[Press], controls: Sequence[Control], file: str) 
     found: dict[str, Press] = {}
     for press in presses:
         if press.control not in known:
-            found.setdefault(f"there is no control {press.control!r}; the game has {names}", press)
+            found.setdefault(f"there is no control {short_repr(press.control)}; the game has {names}", press)
         elif not known[press.control].analogue and press.value not in (0.0, 1.0):
-            found.setdefault(f"{press.control!r} is 0 or 1, not {press.value:g}", press)
+            found.setdefault(f"{short_repr(press.control)} is 0 or 1, not {press.value:g}", press)
     lines = _lines(file) if found else {}
-    return [Fault(file, lines.get(press), "", message) for message, press in found.items()]
+    faults = [Fault(file, lines.get(press), "", message) for message, press in found.items()]
+    return _some(faults, file)
+
+
+def _some(faults: list[Fault], file: str) -> list[Fault]:
+    """Return the first `MAX_FAULTS` faults, and one that stands for the others."""
+    more = len(faults) - MAX_FAULTS
+    if more <= 0:
+        return faults
+    return [*faults[:MAX_FAULTS], Fault(file, None, "", f"{more:,} more faults")]
 
 
 def _lines(file: str) -> dict[Press, int]:
     """Return the line of each press; none where the file has gone since it was read."""
     try:
-        said = [*_said(Path(file).read_text(encoding="utf-8").splitlines())]
+        said = [*_said(read_whole(Path(file), MAX_BYTES).decode("utf-8").splitlines())]
         return {_press(text): number for number, text in reversed(said)}  # of equals the first
     except (OSError, ValueError):
         return {}

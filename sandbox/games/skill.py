@@ -8,5 +8,5 @@ def checked_skill(skill: float) -> float:
         ValueError: it is not from 0 to 1.
     """
     if not 0.0 <= skill <= 1.0:
-        raise ValueError(f"a skill of {skill:g} is none; it is 0 to 1")
+        raise ValueError(f"skill {skill:g} is out of range; it should be 0 to 1")
     return skill

@@ -9,12 +9,13 @@ import math
 from collections.abc import Mapping
 from time import perf_counter
 
-from sandbox.engines.compiling import COMPILING
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.run import run
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 SECONDS: Mapping[str, Mapping[str, float]] = {
@@ -52,26 +53,26 @@ SECONDS: Mapping[str, Mapping[str, float]] = {
 within a factor of 2.5 of the time that was measured, but for 8 runs. An engine that is not here counts as reference."""
 
 
-def counted_cost(scene: Scene, engine: str, settings: Settings, steps: int, work: Mapping[str, int]) -> float:
+def counted_cost(start: Scene | Setup, engine: str, settings: Settings, steps: int, work: Mapping[str, int]) -> float:
     """Return what a run cost by its counters, s of the machine that the weights are of.
 
     Args:
-        scene: what ran.
+        start: scene or setup that ran.
         engine: its name.
         settings: as the engine filled them in.
         steps: that were made.
         work: as the run counted it.
     """
-    amounts = _amounts(scene, settings, steps, work)
+    amounts = _amounts(Setup.of(start), settings, steps, work)
     weights = SECONDS.get(engine, SECONDS["reference"])
     return sum(weight * amounts.get(name, 0.0) for name, weight in weights.items())
 
 
-def _amounts(scene: Scene, settings: Settings, steps: int, work: Mapping[str, int]) -> dict[str, float]:
+def _amounts(setup: Setup, settings: Settings, steps: int, work: Mapping[str, int]) -> dict[str, float]:
     """Return how often each of what costs was done; per body and substep where nothing else is said."""
-    bodies, substeps = len(scene.bodies), work.get("substeps", 0)
+    scene, bodies, substeps = setup.scene, len(setup.bodies), work.get("substeps", 0)
     drag = scene.world.linear_drag or scene.world.quadratic_drag
-    meeting = int(meetings(scene).touches.sum())
+    meeting = int(contact_matrix(setup).touches.sum())
     return {
         **work,
         "steps": steps,
@@ -83,20 +84,26 @@ def _amounts(scene: Scene, settings: Settings, steps: int, work: Mapping[str, in
         "dragged": substeps * meeting * bool(drag),
         "attracted": substeps * bodies * len(scene.attractions),
         "driven": substeps * (len(scene.thrusts) + len(scene.drives)),
-        "joined": substeps * len(scene.links),
+        "joined": substeps * len(setup.links),
         "on_floor": substeps * (scene.surface is not None),
     }
 
 
 def bounded_run(
-    scene: Scene, engine: str, settings: Settings, limit: float, deadline: float = math.inf, *, audit: bool = True
+    start: Scene | Setup,
+    engine: str,
+    settings: Settings,
+    limit: float,
+    deadline: float = math.inf,
+    *,
+    audit: bool = True,
 ) -> tuple[Trajectory, float]:
     """Run a scene, but give it up where it counts more work than a limit.
 
     Whether it is given up depends on the counters alone, unless there is a deadline.
 
     Args:
-        scene: what to run.
+        start: scene or setup to run.
         engine: its name.
         settings: all of them; the scene's own do not count.
         limit: counted cost that it may have, s.
@@ -110,16 +117,17 @@ def bounded_run(
         TookTooLongError: it went beyond either.
         TooLargeError: the frames would not fit into memory.
     """
-    filled = ENGINES[engine].resolve(scene, settings)
+    setup = Setup.of(start)
+    filled = ENGINES[engine].resolve(setup, settings)
 
     def watch(steps: int, work: Mapping[str, int]) -> None:
-        if counted_cost(scene, engine, filled, steps, work) > limit:
-            raise TookTooLongError(f"more counted work than the {limit:.3g} that one run may take")
+        if counted_cost(setup, engine, filled, steps, work) > limit:
+            raise TookTooLongError(f"more counted work than the limit of {limit:.3g} for one run")
         if working() > deadline:
             raise TookTooLongError("the time limit was reached")
 
-    found = run(scene, engine, audit=audit, watch=watch, **settings.model_dump())
-    return found, counted_cost(scene, engine, filled, found.info["steps"], found.info["work"])
+    found = run(setup, engine, audit=audit, watch=watch, **settings.model_dump())
+    return found, counted_cost(setup, engine, filled, found.info["steps"], found.info["work"])
 
 
 class TookTooLongError(Exception):
@@ -128,4 +136,4 @@ class TookTooLongError(Exception):
 
 def working() -> float:
     """Return the time by a clock that stands still while something is compiled, s: only differences mean anything."""
-    return perf_counter() - COMPILING.seconds
+    return perf_counter() - COMPILE_CLOCK.seconds

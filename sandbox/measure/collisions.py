@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from sandbox.scene.meetings import reach
-from sandbox.scene.model import Scene
-from sandbox.scene.zone import mask_of
-from sandbox.trajectory import BoolArray, IntArray, Trajectory
+from sandbox.arrays import BoolArray, IntArray
+from sandbox.scene.compile.contacts import reach
+from sandbox.scene.description.fixed import mask_of
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 SOLID = ("plane", "wall", "post", "pocket")
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
 
 CHUNK = 1_000_000
 """Frames × corners × corners worked on at once."""

@@ -16,10 +16,11 @@ from sandbox.measure.schedule import ROUNDING, Stretch
 from sandbox.trajectory import Contacts, Frame
 
 Progress = Callable[[float], None]
-"""Called now and then with the share of the run that is done, 0 to 1."""
+"""Progress callback: called from time to time with the completed fraction of the run, 0 to 1."""
 
 Watch = Callable[[int, Mapping[str, int]], None]
-"""Called now and then, and at the end, with the steps done and the work counted so far. It may raise to end the run."""
+"""Callback from time to time, and at the end, with the steps done and the work counters. It may raise to end the run.
+"""
 
 REPORT_EVERY = 0.1  # s
 

@@ -4,10 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.scene.potential import Potential
-from sandbox.trajectory import BoolArray, FloatArray, Trajectory
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.potential import Potential
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 CHUNK = 10_000_000
 """Frames × bodies worked on at once: a few arrays of 80 MB."""
@@ -25,25 +27,27 @@ class Energies(NamedTuple):
 
 
 def energies(
-    trajectory: Trajectory, scene: Scene, *, bodies: Bodies | None = None, body: int | None = None
+    trajectory: Trajectory, start: Scene | Setup, *, bodies: Bodies | None = None, body: int | None = None
 ) -> Energies:
     """Return the energy of all bodies that move, or of one.
 
     A body counts from its first frame until it is retired; a fixed one counts nothing. Gravity, springs and
     attraction are the scene's; a spring counts until it breaks, as long as both its bodies do, and of one body half of
-    what it shares with another (`scene.potential.Potential`). Where a run diverged, energy may be infinite or nan.
+    what it shares with another (`scene.compile.potential.Potential`). Where a run diverged, energy may be infinite or
+    nan.
 
     Args:
         trajectory: the run.
-        scene: its scene.
-        bodies: the run's bodies, where some were spawned; else the scene's.
+        start: scene or setup of the run.
+        bodies: bodies of the run, where some were spawned; default: those of `start`.
         body: the number of the only body to count.
 
     Raises:
         ValueError: the bodies are not those of the run.
         IndexError: there is no body of that number.
     """
-    bodies = scene.bodies if bodies is None else bodies
+    setup = Setup.of(start)
+    scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
     frames, count = trajectory.position.shape[:2]
     if count != len(bodies):
         raise ValueError(f"the run has {count:,} bodies, described are {len(bodies):,}; pass the run's own")
@@ -56,7 +60,7 @@ def energies(
     mass = np.where(bodies.fixed, 0.0, bodies.mass)[columns]
     moment = np.where(bodies.fixed, 0.0, bodies.moment)[columns]
     gravity = np.asarray(scene.world.gravity)
-    stored = Potential(scene, bodies, body, trajectory.breaks(len(scene.links)))
+    stored = Potential(setup, bodies, body, trajectory.breaks(len(setup.links)))
     looked = slice(None) if stored else columns  # who is there, of whom one may be joined to
     own = columns if stored else slice(None)
     gone = np.where(np.isnan(trajectory.retired_time), np.inf, trajectory.retired_time)[looked]

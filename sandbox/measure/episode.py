@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 from sandbox.action import Action
-from sandbox.engines.relay import Relay, start
+from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.games.referee import Referee
 from sandbox.games.registry import required_rules
 from sandbox.games.rules import Control, Rules
 from sandbox.recording import Recording
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 
@@ -24,7 +24,7 @@ class Episode:
         """
         self.scene, self.engine = scene, engine
         self._referee = Referee(required_rules(scene))
-        self.relay: Relay = start(scene, engine)
+        self.relay: SwitchableSimulation = start(scene, engine)
         """what runs"""
         self.relay.contacts()
         self._done: list[Action] = []

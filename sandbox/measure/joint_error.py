@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.links import LinkKind, Links
-from sandbox.scene.model import Scene
-from sandbox.scene.potential import both_there, ends_over_time, parted, turned_by
-from sandbox.trajectory import BoolArray, FloatArray, Trajectory
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.compile.potential import both_there, ends_over_time, parted, turned_by
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 CHUNK = 2_000_000
 """Frames × joints worked on at once."""
@@ -24,7 +26,7 @@ HOLDING = (
 """Kinds that hold something in place; springs and motors do not."""
 
 
-def joint_errors(trajectory: Trajectory, scene: Scene) -> FloatArray:
+def joint_errors(trajectory: Trajectory, start: Scene | Setup) -> FloatArray:
     """Return how far each joint is off in each frame, (T, J); nan once it broke or lost a body, of springs, of motors.
 
     Of a rod |l − length|, of a pivot the distance of its two points, of a slide how far the distance is beyond its
@@ -32,10 +34,10 @@ def joint_errors(trajectory: Trajectory, scene: Scene) -> FloatArray:
     bounds, of a gear |angle_b·ratio − angle_a − phase|, in rad. A state that has diverged is infinitely far off.
 
     Args:
-        trajectory: the run; its first bodies are the scene's.
-        scene: whose joints.
+        trajectory: the run; its first bodies are those of `start`.
+        start: scene or setup whose joints.
     """
-    links = scene.links
+    links = Setup.of(start).links
     found = np.full((len(trajectory.time), len(links)), np.nan)
     gone = np.where(np.isnan(trajectory.retired_time), np.inf, trajectory.retired_time)
     breaks = trajectory.breaks(len(links))
@@ -54,17 +56,18 @@ def starting_errors(scene: Scene) -> FloatArray:
     return np.asarray(_errors(links, bodies.position[None], bodies.angle[None], there)[0])
 
 
-def joint_error(trajectory: Trajectory, scene: Scene) -> float | None:
+def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
     """Return the largest error of any joint in any frame, as a share; None where the scene has no joint that holds.
 
     Of lengths it is the share of the rod's length or of the slide's bound; where that is 0, and of pivots and
     grooves, of the diameter of the smaller body. Of angles it is the error in rad. It is of the frames that were
     kept, so that with `record_every` a larger one may have passed unseen. Infinite where a state has diverged.
     """
-    links = scene.links
+    setup = Setup.of(start)
+    links = setup.links
     if not np.isin(links.kind, HOLDING).any() or not len(trajectory.time):
         return None
-    errors = joint_errors(trajectory, scene) / sizes(links, scene.bodies)
+    errors = joint_errors(trajectory, setup) / sizes(links, setup.bodies)
     there = errors[~np.isnan(errors)]
     return float(there.max()) if len(there) else None
 

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from sandbox.engines.account import Cause
+from sandbox.arrays import FloatArray
+from sandbox.engines.energy_ledger import Cause
 from sandbox.measure.energy import energies
 from sandbox.measure.finite import finite
 from sandbox.measure.run import run
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 HARDLY = 1e-6
 """The least scale, as a part of the energy itself: where hardly anything moves, its rounding is all there is."""
@@ -95,7 +96,7 @@ def ledger_of(trajectory: Trajectory, scene: Scene) -> Ledger:
         ValueError: the run kept none.
     """
     if not len(trajectory.energy):
-        raise ValueError("the run kept no account of energy; run it with account=True")
+        raise ValueError("the run has no energy account; run it with account=True")
     # Whoever was spawned is in no scene; of a run with spawned bodies the turnover alone is the scale.
     known = len(scene.bodies) == len(trajectory.names)
     motion = float(energies(trajectory, scene).kinetic.max()) if known else 0.0

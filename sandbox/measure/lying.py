@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sandbox.scene.bodies import Bodies
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
+from sandbox.scene.compile.bodies import Bodies
 
 
 def pieces_over_time(

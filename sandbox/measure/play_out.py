@@ -1,4 +1,4 @@
-"""Playing out: a scene's game from start to end without a window, by a policy or a script."""
+"""Play a game from start to end without a window, by a policy or a script."""
 
 import json
 from dataclasses import dataclass
@@ -11,21 +11,22 @@ from sandbox.games.registry import required_rules
 from sandbox.games.rules import Policy, Press
 from sandbox.measure.run import Progress, run
 from sandbox.recording import Recording
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """A game that was played."""
+    """Result of a game."""
 
     score: float
+    """score at the end"""
     over: str | None
-    """why it ended; None where the scene's duration did"""
+    """reason why the game ended; None if it lasted to the end of the scene's duration"""
     recording: Recording
-    """all that was pressed and done; `measure.replay.rerun` leads to the same score and state"""
+    """all controls and actions; `measure.replay.rerun` reproduces score and state from it"""
     trajectory: Trajectory
-    """what happened, its contacts among it; its `status` says whether the physics came to the end"""
+    """recorded run with its contacts; its `status` is `ok` if the physics reached the end"""
 
 
 def play_out(
@@ -37,18 +38,18 @@ def play_out(
     progress: Progress | None = None,
     **settings: Any,
 ) -> Played:
-    """Play a scene's game until it is over, or for the scene's duration.
+    """Play the game of a scene until it is over, or for the scene's duration.
 
     Args:
-        scene: what is played; its seed decides all chances, a random player's too.
-        player: `random`, `none`, the file of a script, or any policy.
-        engine: its name in the registry.
+        scene: scene with a game; its seed determines all random numbers, also those of the `random` player.
+        player: `random`, `none`, the path of a script, or a policy.
+        engine: name of the engine.
         audit: count the contacts that the engine misses.
-        progress: who is told how far it is.
-        settings: changes to the scene's `[solver]`.
+        progress: progress callback, called with the completed fraction, 0 to 1.
+        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
     Raises:
-        UnfitError: the scene has no game with rules, or lacks what its game needs.
+        UnfitError: the scene has no game with rules, or lacks an element that its game needs.
         SceneError: the script has faults.
         UnknownEngineError: no engine has that name.
         TooLargeError: the frames would not fit into memory.

@@ -1,11 +1,50 @@
 """Replaying: a recorded session run again without a window, on its own engine or another."""
 
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from sandbox.action import Switch
+from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.games.bout import Bout
 from sandbox.games.player import RECORDED
 from sandbox.games.registry import rules_of
 from sandbox.measure.run import Progress, run
 from sandbox.recording import Recording
+from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
+
+
+def read_session(path: str | Path) -> Recording:
+    """Read a session whose engines and settings exist, those of its `switch` actions too.
+
+    Raises:
+        SceneError: the file cannot be read or is no session; or with every engine and setting that does not exist.
+    """
+    session = Recording.load(path)
+    faults = []
+
+    def check_engine(name: str, key: str) -> None:
+        try:
+            engine_named(name)
+        except UnknownEngineError as error:
+            faults.append(Fault(str(path), None, key, str(error)))
+
+    check_engine(session.engine, "engine")
+    for k, action in enumerate(session.actions):
+        if not isinstance(action, Switch):
+            continue
+        if action.engine is not None:
+            check_engine(action.engine, f"actions[{k}].engine")
+        try:
+            session.settings.replace(**action.settings)
+        except ValidationError as error:
+            for each in error.errors():
+                key = ".".join(("settings", *map(str, each["loc"])))
+                faults.append(Fault(str(path), None, f"actions[{k}].{key}", each["msg"]))
+    if faults:
+        raise SceneError(faults)
+    return session
 
 
 def rerun(

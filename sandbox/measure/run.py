@@ -1,19 +1,21 @@
-"""Running: a scene on an engine from start to end, recorded and audited."""
+"""Run: compute a scene on an engine from start to end, with recording and audit."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from sandbox.action import Action, Spawn, actions_to_json, in_order
-from sandbox.engines.account import Cause
-from sandbox.engines.compiling import COMPILING
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
+from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.contract import Refusal, Simulation
-from sandbox.engines.energy import total_energy
+from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import engine_named
-from sandbox.engines.relay import start
+from sandbox.engines.switching import start
 from sandbox.games.bout import Bout
 from sandbox.interrupt import heeded
 from sandbox.measure.audit import Audit
@@ -23,20 +25,22 @@ from sandbox.measure.joint_error import joint_error
 from sandbox.measure.recorder import Books, Recorder, TooLargeError
 from sandbox.measure.schedule import schedule
 from sandbox.measure.versions import versions
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.document import to_document
-from sandbox.scene.meetings import bits_of
-from sandbox.scene.model import Scene
-from sandbox.scene.part import MAX_STEPS
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import Contacts, FloatArray, IntArray, Trajectory
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import bits_of
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import MAX_STEPS
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import as_scene
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Contacts, Trajectory
 
 __all__ = ["Progress", "run"]
 
 
 @heeded()
 def run(
-    scene: Scene,
+    scene: Scene | Setup | str | Path,
     engine: str = "pymunk",
     *,
     actions: Sequence[Action] = (),
@@ -50,48 +54,53 @@ def run(
     """Run a scene from start to end.
 
     Args:
-        scene: what to run.
-        engine: its name in the registry.
-        actions: what happens on the way; each takes effect before the first step that starts at its time or later,
-            those of the very end after the last step.
+        scene: the scene, or its name or path, as `load` takes it; or a setup, to start from another state.
+        engine: name of the engine.
+        actions: actions applied during the run, each before the first step that starts at its time or later. Actions at
+            the end of the run are applied after the last step.
         audit: count the contacts that the engine misses.
-        account: keep the account of energy at every frame, which `measure.ledger` reads.
-        progress: who is told how far it is.
-        bout: a game to be played on the way; the run ends with it. What it did is among the actions of the outcome.
-        watch: sees the work as it is counted; what it raises ends the run without an outcome.
+        account: record the energy account at every frame, which `measure.ledger` reads.
+        progress: progress callback, called with the completed fraction of the run, 0 to 1.
+        bout: game played during the run; the run ends with the game. Its actions are among those of the result.
+        watch: callback with the steps done and the work counters. An exception that it raises ends the run without a
+            result.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
     Returns:
-        What was recorded, also of a run that ended early: its `status` is then `diverged` (the physics left all
-        bounds) or `failed` (an action could not be done, such as one for a body that is not there; contacts outgrew
-        memory), with the reason; `refused`, with no frames, where the engine lacks something.
+        The recorded run up to its end or failure. Its `status` is `ok`; `diverged` if the state left the bounds of
+        position or speed; `failed` if an action could not be applied, such as one for a removed body, or if the
+        contacts exceeded memory; `refused`, without frames, if the engine does not support the scene or a setting.
+        `reason` has the details.
 
     Raises:
         UnknownEngineError: no engine has that name.
-        TooLargeError: the frames would not fit into memory, or the steps are more than a run may have.
-        pydantic.ValidationError: a setting is wrong.
-        KeyboardInterrupt: Ctrl-C was pressed, whatever the library that it fell into made of it.
+        SceneError: the name or path is not that of a valid scene.
+        TooLargeError: the frames would not fit into memory, or the number of steps exceeds the limit.
+        pydantic.ValidationError: a setting is invalid.
+        KeyboardInterrupt: Ctrl-C was pressed, even if a library converted it to another exception.
     """
+    setup = scene if isinstance(scene, Setup) else Setup.of(as_scene(scene))
+    scene = setup.scene
     chosen = engine_named(engine)
     wanted = scene.solver.replace(**settings) if settings else scene.solver
     actions = in_order(tuple(actions))
     stretches = schedule(scene.world.duration, wanted.dt, actions)
     substeps = sum(stretch.steps + stretch.part for stretch in stretches) * wanted.substeps
     if substeps > MAX_STEPS:
-        raise TooLargeError(f"{substeps:.3g} steps a run; at most {MAX_STEPS:g}")
+        raise TooLargeError(f"{substeps:.3g} steps in a run; the limit is {MAX_STEPS:g}")
     try:
-        simulation = start(scene, engine, wanted)
+        simulation = start(setup, engine, wanted)
     except Refusal as refusal:
-        return _refused(scene, engine, wanted, actions, str(refusal))
-    resolved = chosen.resolve(scene, wanted)
+        return run_without_frames(setup, engine, wanted, actions, "refused", str(refusal))
+    resolved = chosen.resolve(setup, wanted)
     spawned = sum(isinstance(action, Spawn) for action in actions)
     books = _books(simulation) if account else None
-    recorder = Recorder(scene, resolved, len(scene.bodies) + spawned, actions, books, len(Cause))
-    auditor = Auditor(scene, simulation) if audit else None
+    recorder = Recorder(scene, resolved, len(setup.bodies) + spawned, actions, books, len(Cause))
+    auditor = Auditor(setup, simulation) if audit else None
 
-    began, compiled = perf_counter(), COMPILING.seconds
+    began, compiled = perf_counter(), COMPILE_CLOCK.seconds
     end = drive(scene.world.duration, simulation, stretches, actions, recorder, progress, bout, watch)
-    seconds = perf_counter() - began - (auditor.seconds if auditor else 0.0) - (COMPILING.seconds - compiled)
+    seconds = perf_counter() - began - (auditor.seconds if auditor else 0.0) - (COMPILE_CLOCK.seconds - compiled)
     bodies, work = simulation.bodies, dict(simulation.work)
     state_hash = simulation.state_hash()
     simulation.close()
@@ -99,7 +108,7 @@ def run(
     retired = np.full(len(bodies), np.nan)
     for number, time in simulation.retired.items():
         retired[number] = time
-    broken = np.full(len(scene.links), np.nan)
+    broken = np.full(len(setup.links), np.nan)
     broken[list(simulation.broken)] = list(simulation.broken.values())
     missed = auditor.missed if auditor else _no_misses()
     outcome = {"status": end.status, "reason": end.reason, "steps": end.steps, "seconds": seconds, "work": work}
@@ -112,9 +121,9 @@ def run(
         info["causes"] = [cause.value for cause in Cause]
     trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, end.contacts, retired, broken, missed, info)
     trajectory = replace(trajectory, layer=recorder.layers(len(bodies)))
-    total = energies(trajectory.at([0, -1]), scene, bodies=bodies).total
+    total = energies(trajectory.at([0, -1]), setup, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
-    info["joint_error"] = joint_error(trajectory, scene)
+    info["joint_error"] = joint_error(trajectory, setup)
     return trajectory
 
 
@@ -139,18 +148,21 @@ def _info(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, 
     }
 
 
-def _refused(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, ...], reason: str) -> Trajectory:
-    """Return a trajectory without frames, which says why."""
-    count = len(scene.bodies)
-    outcome = {"status": "refused", "reason": reason, "steps": 0, "seconds": 0.0, "work": {}, "audited": False}
+def run_without_frames(
+    start: Scene | Setup, engine: str, settings: Settings, actions: tuple[Action, ...], status: str, reason: str
+) -> Trajectory:
+    """Return the trajectory of a run of which nothing was recorded: its status, and why."""
+    setup = Setup.of(start)
+    scene, count = setup.scene, len(setup.bodies)
+    outcome = {"status": status, "reason": reason, "steps": 0, "seconds": 0.0, "work": {}, "audited": False}
     outcome |= {"state_hash": None, "broken": 0}
     info = _info(scene, engine, settings, actions, **outcome, energy_start=None, energy_end=None, joint_error=None)
     shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
     frames = {"time": np.empty(0), "energy": np.empty(0), "account": np.empty((0, 0))} | {
         name: np.empty(shape) for name, shape in shapes.items()
     }
-    whole = np.full(len(scene.links), np.nan)
-    return _trajectory(frames, scene.bodies, Contacts.none(), np.full(count, np.nan), whole, _no_misses(), info)
+    whole = np.full(len(setup.links), np.nan)
+    return _trajectory(frames, setup.bodies, Contacts.none(), np.full(count, np.nan), whole, _no_misses(), info)
 
 
 def _trajectory(
@@ -192,11 +204,12 @@ def _no_misses() -> tuple[FloatArray, IntArray]:
 class Auditor:
     """An audit that times itself, so that a run's seconds are the engine's."""
 
-    def __init__(self, scene: Scene, simulation: Simulation) -> None:
-        self._audit = Audit(scene, simulation.bodies)
+    def __init__(self, start: Scene | Setup, simulation: Simulation) -> None:
+        setup = Setup.of(start)
+        self._audit = Audit(setup, simulation.bodies)
         self._simulation = simulation
         self._known, self._scene = len(simulation.bodies), simulation.scene
-        self._on = self._layers() if len(scene.layers) > 1 else None
+        self._on = self._layers() if len(setup.scene.layers) > 1 else None
         self.seconds = 0.0
         simulation.watch(self)
 

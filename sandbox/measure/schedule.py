@@ -43,7 +43,9 @@ def _stretches(duration: float, dt: float, actions: Sequence[Action]) -> Iterato
         dt = changed
     steps_left = (duration - begin) / dt
     whole = round(steps_left)
-    if abs(steps_left - whole) <= ROUNDING * whole:
+    # After a change to a far shorter dt, the digits of the duration itself are what counts.
+    digits = min(4.0 * math.ulp(duration) / dt, 0.25) if begin > 0.0 else 0.0
+    if abs(steps_left - whole) <= max(ROUNDING * whole, digits):
         yield Stretch(whole, dt)
     else:
         yield Stretch(math.floor(steps_left), dt, steps_left - math.floor(steps_left))

@@ -1,8 +1,8 @@
 """Seeds: the same scene with other chances."""
 
-from sandbox.scene.document import to_document
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 CHANCES = ("position", "velocity", "lifetime")
 """What of a body may come from the seed."""

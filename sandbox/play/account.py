@@ -5,7 +5,7 @@ from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 from sandbox.play.sight import Status
 from sandbox.play.stage import Stage
-from sandbox.scene.zone import notes
+from sandbox.scene.description.scene import zone_visits
 
 
 def account(stage: Stage, claimed: tuple[tuple[str, str], ...], rate: float, recording: str | None) -> Status:
@@ -19,11 +19,11 @@ def account(stage: Stage, claimed: tuple[tuple[str, str], ...], rate: float, rec
     """
     show, messages = stage.show, stage.messages.shown()
     if show is None:
-        return Status("No scene", "Ctrl+O", "pick one", 0, 0.0, messages=messages, faults=stage.faults)
+        return Status("No scene", "Ctrl+O", "opens a scene", 0, 0.0, messages=messages, faults=stage.faults)
     picked = stage.hands.picked
     live = stage.live
     company = live.company if live is not None else None
-    touches = show.contacts.some(~notes(show.contacts.pair, show.scene))
+    touches = show.contacts.some(~zone_visits(show.contacts.pair, show.scene))
     trust = company.trust if company is not None else None
     return Status(
         title=show.scene.title or (stage.path.stem if stage.path is not None else "scene"),
@@ -59,4 +59,4 @@ def _ended(show: Live | Stored) -> str | None:
     if isinstance(show, Live):
         session = show.session
         return session.ended if show.step_number == session.step_number else None
-    return "the end of the run" if show.frame.time >= show.end else None
+    return "end of the run" if show.frame.time >= show.end else None

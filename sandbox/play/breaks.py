@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sandbox.scene.potential import parted
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
+from sandbox.scene.compile.potential import parted
 
 TELL_EVERY = 1.0
 """s of the scene between two notes"""

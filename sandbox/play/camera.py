@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
 
 CLOSEST, FARTHEST = 1e12, 1e-14
 """px/m: what double precision can still tell apart, and the widest view of the largest scene"""

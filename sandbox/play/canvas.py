@@ -16,8 +16,8 @@ from sandbox.play.drawing.picture import Picture
 from sandbox.play.framing import framing
 from sandbox.play.running.burning import burning
 from sandbox.play.sight import Sight
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 

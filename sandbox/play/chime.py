@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
 
 Samples = npt.NDArray[np.int16]
 

@@ -14,8 +14,9 @@ from sandbox.play.hands import Hands
 from sandbox.play.hosting import control_keys
 from sandbox.play.hosting.host import Host
 from sandbox.play.running.live import Live
-from sandbox.scene.driven import names_of
-from sandbox.scene.model import Scene, default_name
+from sandbox.scene.compile.drives import names_of
+from sandbox.scene.description.scene import default_name
+from sandbox.scene.scene import Scene
 
 ARROWS = {
     pygame.K_LEFT: (-1.0, 0.0),
@@ -65,7 +66,7 @@ def claims(scene: Scene, hands: Hands, gestures: Gestures | None = None, host: H
         told.append(("Arrows", f"move {body} by {step:g} m"))
     if generator is not None:
         deeds[pygame.K_SPACE] = partial(_relaunch, generator=generator)
-        told.append(("Space", f"launch {generator} again"))
+        told.append(("Space", f"relaunch {generator}"))
     releases: dict[int, Deed] = {}
     played, played_out = ({}, {}) if host is None else control_keys.deeds(host)
     for called, verb, pressed, released in held(scene):

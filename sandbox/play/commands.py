@@ -25,11 +25,11 @@ BUTTONS = {
 
 
 LOSING = {
-    Command.RESTART: "R again restarts",
-    Command.PREVIOUS: "[ again opens the other scene",
-    Command.NEXT: "] again opens the other scene",
-    Command.RELOAD: "Ctrl+L again reloads",
-    Command.QUIT: "Esc again quits",
+    Command.RESTART: "press R again to restart",
+    Command.PREVIOUS: "press [ again to open the other scene",
+    Command.NEXT: "press ] again to open the other scene",
+    Command.RELOAD: "press Ctrl+L again to reload",
+    Command.QUIT: "press Esc again to quit",
 }
 """What ends a session, and how that is confirmed where something hand-made would be lost."""
 

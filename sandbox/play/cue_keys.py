@@ -16,10 +16,10 @@ POWER = 0.02
 """of the greatest, that an arrow key adds"""
 
 TOLD = (
-    ("Mouse", "aim; Shift: finely"),
-    ("Left or Right", "aim finely; Shift: finer"),
+    ("Mouse", "aim; Shift: fine"),
+    ("Left or Right", "fine aim; Shift: finer"),
     ("Up or Down", "power"),
-    ("S (hold)", "stroke: pull back, push through"),
+    ("S (hold)", "stroke: pull back, push forward"),
     ("Left-drag", "draw the cue back, release"),
     ("E (hold)", "english: where the tip hits"),
     ("X (hold)", "set the power"),
@@ -28,7 +28,7 @@ TOLD = (
     ("Z", "undo shot"),
     ("Click", "call a ball, or a pocket"),
     ("C", "call a safety"),
-    ("D", "next choice, if there is one"),
+    ("D", "next choice, if any"),
     ("Enter", "confirm the choice"),
 )
 """as help lists them"""

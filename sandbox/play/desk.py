@@ -177,7 +177,7 @@ class Desk:
             path = self.picker.handle(event)
             count = stage.count_unsaved()
             if path is not None and count and self.picker.confirmed != path:
-                self.picker.ask(path, describe_loss(count, "choose it again to open it"))
+                self.picker.ask(path, describe_loss(count, "choose it again to open it anyway"))
                 return True
             if path is not None:
                 stage.take(path)
@@ -282,10 +282,10 @@ class Desk:
         if show is None or not self.out_of_sight:
             return None
         moving = show.frame.present[: len(show.bodies)] & ~show.bodies.fixed[: len(show.frame.present)]
-        words = ["Everything is out of view: Home fits it, F follows" if moving.any() else "Nothing is left"]
+        words = ["All bodies are out of view: Home fits the view, F follows" if moving.any() else "No bodies are left"]
         launched = show.scene.play.relaunch
         if launched is not None and stage.live is not None:
-            words.append(f"Space launches {launched} again")
+            words.append(f"Space relaunches {launched}")
         return " · ".join(words)
 
     def _draw_play(self, surface: pygame.Surface, stage: Stage, left: int, plates: dict[str, pygame.Rect]) -> None:
@@ -368,9 +368,9 @@ class Desk:
             self._untold = False
             told = self.claims(stage).told
             if stage.game is not None:
-                stage.messages.tell("aim with the mouse; Space shoots, H lists all keys")
+                stage.messages.tell("aim with the mouse, shoot with Space; H lists all keys")
             elif len(told) > MOST:  # more than are seen at once
-                stage.messages.tell(f"{', '.join(keys for keys, _ in told)} (F1: help)")
+                stage.messages.tell(f"keys: {', '.join(keys for keys, _ in told)} (F1: help)")
             else:
                 for keys, what in told:
                     stage.messages.tell(f"{keys}: {what}")

@@ -3,10 +3,10 @@
 import math
 
 from sandbox.play.instruments.figures import figure
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.settings import Settings
-from sandbox.scene.solids import Box, Capsule
-from sandbox.scene.stacks import Stack
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.bodies import Box, Capsule
+from sandbox.scene.description.generators import Stack
+from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 
 
@@ -19,7 +19,7 @@ def facts(bodies: Bodies, frame: Frame, contacts: Contacts, number: int) -> tupl
     mass, moment = float(bodies.mass[number]), float(bodies.moment[number])
     lines = [bodies.names[number]]
     if not frame.present[number]:
-        return (*lines, "no longer there")
+        return (*lines, "removed")
     if bodies.fixed[number]:
         lines.append("fixed")
     else:

@@ -2,15 +2,15 @@
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import UnknownEngineError, start
 from sandbox.play.camera import Box
 from sandbox.play.drawing.table.cushions import outside
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.links import LinkKind
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 LOOK_STEPS, LOOK_WORK = 12_000, 30_000
 """Steps, and steps times moving bodies, that a look ahead takes at most: about half a second on pymunk."""

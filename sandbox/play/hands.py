@@ -11,10 +11,10 @@ from sandbox.play.hulls import Hull, area_of
 from sandbox.play.picking import is_free, picked
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.discs import Ball, Disc
-from sandbox.scene.shapes import form_of
-from sandbox.scene.solids import Box
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.bodies import Box
+from sandbox.scene.description.discs import Ball, Disc
+from sandbox.scene.geometry.shapes import form_of
 
 Place = tuple[float, float]
 
@@ -136,7 +136,7 @@ class Hands:
     def _chosen(self, live: Live) -> int:
         number = self.picked_of(live)
         if number is None:
-            raise ActionError("click a body first")
+            raise ActionError("select a body first: click it")
         return number
 
     def nudge(self, live: Live) -> None:
@@ -208,7 +208,7 @@ def _beside_others(live: Live, made: Ball | Box) -> Ball | Box:
             there = [Hull(hull.corners + np.asarray(place), hull.radius) for hull in hulls]
             if is_free(live.scene, live.bodies, live.frame, there, made.layer):
                 return made.model_copy(update={"position": place})
-    raise ActionError("there is no room for it here; point at a free place")
+    raise ActionError("no room here; point at a free place")
 
 
 def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -> int:

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.scene.bodies import Bodies
-from sandbox.trajectory import FloatArray, Frame
+from sandbox.arrays import FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.trajectory import Frame
 
 Distance = Callable[[FloatArray, FloatArray], FloatArray]
 """Takes x and y, that broadcast, and returns the signed distance there, negative inside."""

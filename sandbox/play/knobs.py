@@ -7,9 +7,9 @@ from sandbox.action import Action, SetParameter, Switch, heading_of
 from sandbox.engines.registry import ENGINES
 from sandbox.play.instruments.knob import Knob, Value
 from sandbox.play.running.live import Live
-from sandbox.scene.elements import mover_of
-from sandbox.scene.model import Mover, Scene
-from sandbox.scene.settings import Detection, Integrator, Settings
+from sandbox.scene.description.base import BodySource
+from sandbox.scene.description.world import Detection, Integrator, Settings
+from sandbox.scene.scene import Scene
 
 KINDS = ("ball", "grid", "scatter", "emitter")
 
@@ -60,18 +60,20 @@ class Knobs:
         if key not in self._able:
             engine = ENGINES[live.engine]
             self._able[key] = tuple(
-                word for word in words if not engine.missing(live.scene, live.session.wanted.replace(**{key: word}))
+                word
+                for word in words
+                if not engine.missing(live.session.relay.setup, live.session.wanted.replace(**{key: word}))
             )
         able, value = self._able[key], getattr(live.settings, key)
         if len(able) < 2:
-            why = f"{live.engine} has no other" if able else f"{live.engine} has none"
+            why = f"{live.engine} offers no other" if able else f"not used by {live.engine}"
             return Knob(key, key, value=value or "none", choices=(value or "none",), enabled=False, why=why)
         return Knob(key, key, value=value, choices=able)
 
 
 def _counts(live: Live, file: Scene) -> tuple[Knob, ...]:
     steps = live.settings.integrator is not None
-    why = "" if steps else f"{live.engine} takes no steps"
+    why = "" if steps else f"{live.engine} has no time step"
     settings, own = live.settings, file.solver
     return (
         Knob("substeps", "substeps", 1, 32, settings.substeps, step=1, enabled=steps, why=why, default=own.substeps),
@@ -97,10 +99,10 @@ def _surface(live: Live, file: Scene, picked: int | None, key: str, high: float)
     scene = live.scene
     place = _place(live, picked)
     if place >= len(scene.movers) and picked is None:
-        return Knob(key, key, 0.0, high, 0.0, enabled=False, why="there is no ball")
+        return Knob(key, key, 0.0, high, 0.0, enabled=False, why="the scene has no body")
     disc = live.bodies.elements[live.bodies.element[picked or 0]] if place >= len(scene.movers) else scene.movers[place]
     name = disc.name if picked is None or place < len(scene.movers) else live.bodies.names[picked]
-    label = key if picked is None else f"{key} of {name or 'this'}"
+    label = key if picked is None else f"{key} of {name or 'this body'}"
     default = None
     pairs = _pairs(scene, disc if picked is not None else None)
     if pairs:
@@ -117,15 +119,15 @@ def _surface(live: Live, file: Scene, picked: int | None, key: str, high: float)
 
 def _place(live: Live, picked: int | None) -> int:
     """Return the place among the scene's movers of a picked body's, or else of the first."""
-    return 0 if picked is None else mover_of(live.scene, int(live.bodies.element[picked]))
+    return 0 if picked is None else live.scene.mover_of(int(live.bodies.element[picked]))
 
 
-def _pairs(scene: Scene, disc: Mover | None) -> list[int]:
+def _pairs(scene: Scene, disc: BodySource | None) -> list[int]:
     """Return the numbers of the pairs that a ball's material is in; without a ball, of all."""
     return [n for n, pair in enumerate(scene.pairs) if disc is None or disc.material in pair.between]
 
 
-def stated(scene: Scene, disc: Mover, key: str) -> float:
+def stated(scene: Scene, disc: BodySource, key: str) -> float:
     """Return the restitution or friction that a ball states itself, or its material; 0 for none."""
     own: float | None = getattr(disc, key)
     if own is None and disc.material is not None:
@@ -158,7 +160,7 @@ def _paths(live: Live, key: str, picked: int | None) -> list[str]:
         pairs = _pairs(scene, scene.movers[place] if picked is not None else None)
         if pairs:
             return [f"pair.{n}.{key}" for n in pairs] if picked is not None else [f"pair.*.{key}"]
-    lists: list[tuple[str, Sequence[Mover]]] = list(scene.kinds.items())
+    lists: list[tuple[str, Sequence[BodySource]]] = list(scene.kinds.items())
     if picked is None:
         return [f"{kind}.{each}.{key}" for kind, discs in lists if discs for each in _every(discs)]
     for kind, discs in lists:
@@ -168,12 +170,12 @@ def _paths(live: Live, key: str, picked: int | None) -> list[str]:
     return []
 
 
-def _every(discs: Sequence[Mover]) -> list[str]:
+def _every(discs: Sequence[BodySource]) -> list[str]:
     """Return what addresses all elements of a list: `*`, unless one is called so."""
     return [_part(discs, k) for k in range(len(discs))] if any(disc.name == "*" for disc in discs) else ["*"]
 
 
-def _part(discs: Sequence[Mover], index: int) -> str:
+def _part(discs: Sequence[BodySource], index: int) -> str:
     """Return what addresses an element of a list: its number, unless another is called so, as names go first."""
     name = discs[index].name
     if name is None or all(disc.name != str(index) for disc in discs):

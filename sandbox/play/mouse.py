@@ -14,6 +14,8 @@ from sandbox.play.seat import Seat
 
 NOTCH = 1.15
 """by which the wheel brings things closer"""
+MOST_NOTCHES = 100.0
+"""of one event of the wheel: more than these zoom from any end to the other"""
 REACH = 6.0
 """px at unit 1 beside a body that still point at it"""
 SLACK = 4.0
@@ -37,6 +39,7 @@ class Mouse:
         seat = self._seat
         if event.type == pygame.MOUSEWHEEL:
             notches = getattr(event, "precise_y", 0.0) or float(event.y)
+            notches = min(max(notches, -MOST_NOTCHES), MOST_NOTCHES)
             seat.camera = seat.camera.zoomed(NOTCH**notches, pygame.mouse.get_pos())
             seat.at_home = False
             if seat.following == "all":
@@ -103,7 +106,7 @@ class Mouse:
         if self._pressed is not None and math.dist(self._pressed, event.pos) > SLACK * seat.desk.unit:
             self._pressed = None
             if stage.game is not None and stage.game.match.rules.name != "free":
-                stage.messages.tell("in a game balls are moved by the cue", "warning")
+                stage.messages.tell("in a game, only the cue moves balls", "warning")
             else:
                 stage.act(lambda live: stage.hands.hold(live, stage.paused))
         if stage.hands.holding:

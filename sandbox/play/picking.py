@@ -4,13 +4,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.play.hulls import Hull, hulls_of, meeting, nearest
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.meetings import bits_of
-from sandbox.scene.model import Scene
-from sandbox.scene.near import near_pairs
-from sandbox.scene.zone import mask_of
-from sandbox.trajectory import BoolArray, FloatArray, Frame
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import bits_of
+from sandbox.scene.description.fixed import mask_of
+from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Frame
 
 
 def picked(bodies: Bodies, frame: Frame, place: tuple[float, float], reach: float = 0.0) -> int | None:

@@ -37,11 +37,11 @@ def open_screen(size: tuple[int, int] | None, title: str) -> pygame.Surface:
             pygame.display.init()
         pygame.font.init()
         if not asked and pygame.display.get_driver() in ("dummy", "offscreen"):
-            raise pygame.error("no display was found")
+            raise pygame.error("no display found")
         surface = pygame.display.set_mode(size or _fitting(), pygame.RESIZABLE)
     except (pygame.error, NotImplementedError) as error:
         close_screen()
-        raise NoDisplayError(f"no window can be opened: {str(error) or 'there is no display'}") from None
+        raise NoDisplayError(f"cannot open a window: {str(error) or 'there is no display'}") from None
     pygame.display.set_caption(title, "sandbox")
     pygame.display.set_icon(_icon())
     pygame.key.set_repeat(350, 40)

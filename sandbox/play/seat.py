@@ -9,21 +9,22 @@ from typing import Literal
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray
 from sandbox.play.camera import Box, Camera
 from sandbox.play.desk import Desk
 from sandbox.play.drawing.picture import Picture
+from sandbox.play.drawing.text import renderable
 from sandbox.play.footage.taking import Taking
 from sandbox.play.framing import Corners, around, framing, lies_down
 from sandbox.play.instruments.plates import largest_room
 from sandbox.play.instruments.thumbnail import frame_in_flight
 from sandbox.play.sight import Sight
 from sandbox.play.stage import Stage
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray
+from sandbox.scene.scene import Scene
 
 TITLE = "sandbox"
 CLOSER = 1.5
-"""A camera that follows all that moves is at most so many times as close as at first."""
+"""A camera that follows all moving bodies is at most so many times as close as at first."""
 FIELD_MARGIN = 0.02
 """of what plates leave free, so much is left on each side of a table or the field of a game"""
 BESIDE_BODIES = 12.0
@@ -73,7 +74,8 @@ class Seat:
         if self.at_home:
             self.home()
         self.desk.renew(same)
-        pygame.display.set_caption(f"{show.scene.title or self.name} - {TITLE}" if show is not None else TITLE)
+        title = "" if show is None else f"{show.scene.title or self.name} - "
+        pygame.display.set_caption(renderable(title + TITLE))
 
     @property
     def name(self) -> str:
@@ -123,12 +125,12 @@ class Seat:
             return
         if self.following is not None:
             self.following = None
-            messages.tell("the camera stays here; Home fits the scene")
+            messages.tell("the camera stays here; Home fits the view")
             return
         picked = self.stage.hands.picked
         self.following, self.at_home = "all" if picked is None else picked, False
-        name = "all that moves" if picked is None else show.bodies.names[picked]
-        messages.tell(f"the camera follows {name}; F ends this")
+        name = "all moving bodies" if picked is None else show.bodies.names[picked]
+        messages.tell(f"the camera follows {name} (F: stop)")
 
     def follow(self, elapsed: float) -> None:
         """Move the camera after what it follows, by so much real time, s."""

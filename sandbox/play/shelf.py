@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sandbox.scene.shipped import shipped
+from sandbox.scene.files.shipped_scenes import shipped
 
 
 def beside(path: Path | None) -> tuple[Path, ...]:

@@ -5,12 +5,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.play.artillery.gunnery import Gunnery
 from sandbox.play.billiards.aim import Aim
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.links import Links
-from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray, Contacts, FloatArray, Frame
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.joint_arrays import Links
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Contacts, Frame
 
 OVERLAYS = (
     "shapes",
@@ -85,11 +87,13 @@ class Sight:
     """px at the upper left that words over the picture cover"""
     flames: tuple[Flame, ...] = ()
     """of the thrusts that fire"""
+    setup: Setup | None = None
+    """of the running session; None where `bodies` are those of the scene or of a recorded run"""
 
     @cached_property
     def links(self) -> Links:
         """The joints that are whole."""
-        return self.scene.links.without(self.broken)
+        return (self.setup or self.scene).links.without(self.broken)
 
 
 @dataclass(frozen=True)

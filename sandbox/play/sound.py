@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.play.chime import RATE, chime, pitch_of
 from sandbox.play.hosting.jingle import jingle
-from sandbox.scene.bodies import Bodies
-from sandbox.trajectory import Contacts, FloatArray, IntArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.trajectory import Contacts
 
 VOICES = 16
 """Sounds at a time."""

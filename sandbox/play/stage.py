@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.registry import ENGINES, USUAL, engine_named, usual
-from sandbox.games.registry import REAL_TIME
+from sandbox.games.registry import is_real_time
 from sandbox.play.billiards.game import PLAYERS, Game, Players
 from sandbox.play.billiards.gestures import Gestures
 from sandbox.play.billiards.seats import Seats
@@ -26,10 +26,10 @@ from sandbox.play.shelf import neighbour
 from sandbox.play.wishes import Wishes
 from sandbox.play.worker import Compute, compute_here
 from sandbox.recording import Recording
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import Override, load
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.load import Override, load
+from sandbox.scene.scene import Scene
 
 FEW = 64
 """Bodies up to which a twin is watched from the beginning."""
@@ -141,7 +141,7 @@ class Stage:
         self.hands.forget()
         self.faults, self.question, self._lost = (), None, None
         if not same:
-            self.waits_for_start = again is None and self.host is not None and file.play.game in REAL_TIME
+            self.waits_for_start = again is None and self.host is not None and is_real_time(file.play.game)
         if isinstance(show, Live):
             # What rules and hands do next, no twin can tell.
             self._wishes.begin(show.company, trusting=len(show.bodies) <= FEW and self.host is None)
@@ -214,13 +214,13 @@ class Stage:
         if live is not None and live.session.replaced is not None:
             lost = live.session.replaced.recording
         if lost is None or live is None or self.file is None:
-            self.messages.tell("there is nothing to bring back", "warning")
+            self.messages.tell("there is nothing to restore", "warning")
             return
         known, present = lost, self._recorded() if self.count_unsaved() else None
         self.put_on(self.compute(lambda: played_again(known)), self.path, self.file, same=True)
         self._lost = present
-        again = "" if present is None else "; Ctrl+Z again exchanges the two"
-        self.messages.tell(f"the session is back as it was{again}")
+        again = "" if present is None else " (Ctrl+Z again: the later one)"
+        self.messages.tell(f"previous session restored{again}")
 
     def _recorded(self) -> Recording | None:
         """Return the session as it is, whole; one that is being replayed is first played to where it is wanted."""
@@ -260,7 +260,7 @@ class Stage:
     def toggle_ghost(self) -> None:
         """Begin a ghost from here, or end it."""
         if self.live is None:
-            self._tell_why_not("has no ghost; replay it with --engine")
+            self._tell_why_not("has no ghost; replay it with --engine NAME")
             return
         company = self.live.company
         self.compute(lambda: self._wishes.toggle_ghost(company))
@@ -268,7 +268,7 @@ class Stage:
     def toggle_trust(self) -> None:
         """Begin to watch a twin from here, or end it."""
         if self.live is None:
-            self._tell_why_not("has no twin; `sandbox play` plays its scene")
+            self._tell_why_not("has no predictability horizon; open its scene with `sandbox play`")
             return
         company = self.live.company
         self.compute(lambda: self._wishes.toggle_trust(company))
@@ -276,7 +276,7 @@ class Stage:
     def next_engine(self) -> None:
         """Go on with the next engine that can, from the same state; who cannot says why."""
         if not isinstance(self.show, Live):
-            self._tell_why_not("cannot change its engine; replay it with --engine")
+            self._tell_why_not("cannot change its engine; replay it with --engine NAME")
             return
         names = list(ENGINES)
         here = names.index(self.show.engine)
@@ -331,7 +331,7 @@ class Stage:
         """Do something to what is on, and say so where it cannot be done; return whether it could."""
         live = self.live
         if live is None:
-            self._tell_why_not("cannot be changed; `sandbox play` plays its scene")
+            self._tell_why_not("cannot be changed; open its scene with `sandbox play`")
             return False
         try:
             self.compute(lambda: deed(live))

@@ -13,7 +13,7 @@ from types import FrameType
 
 import pygame
 
-from sandbox.engines.compiling import COMPILING
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.play.commands import Commands
 from sandbox.play.cue_keys import Deed
 from sandbox.play.hosting.gamepad import Gamepads
@@ -91,7 +91,7 @@ class Window(Seat):
         stage.on_new = self.renew
         self._worker = Worker(self._wait)
         stage.compute = self._worker.compute
-        COMPILING.on_begin = self._note_compiling
+        COMPILE_CLOCK.on_begin = self._note_compiling
         if stage.show is not None:
             self.renew(False)
 
@@ -111,13 +111,13 @@ class Window(Seat):
         if self.leaving is not None:
             return
         self.stage.covered = self.desk.covers or self.stage.question is not None
-        compiled = COMPILING.seconds
+        compiled = COMPILE_CLOCK.seconds
         self.stage.go_on(elapsed)
-        if COMPILING.seconds > compiled:
+        if COMPILE_CLOCK.seconds > compiled:
             self._clock.tick()  # that time was not the scene's
         self.follow(elapsed)
         self.draw()
-        if COMPILING.seconds > compiled:
+        if COMPILE_CLOCK.seconds > compiled:
             pygame.event.get(tuple(PRESSES))
         pygame.display.flip()
         self.taking.roll(self.surface, elapsed)
@@ -252,7 +252,7 @@ class Window(Seat):
 
     def close(self) -> None:
         """Finish what is being recorded, and close the window."""
-        COMPILING.on_begin = None
+        COMPILE_CLOCK.on_begin = None
         self.taking.end_film()
         self.desk.close()
         self.stage.compute = compute_here

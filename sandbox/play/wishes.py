@@ -5,9 +5,9 @@ from typing import Any
 
 from sandbox.action import SetParameter
 from sandbox.play.running.company import Company
-from sandbox.scene.document import to_document
-from sandbox.scene.file import Override, from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import Override, from_document
+from sandbox.scene.scene import Scene
 
 
 @dataclass

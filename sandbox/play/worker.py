@@ -11,7 +11,7 @@ from queue import SimpleQueue
 from time import perf_counter
 from typing import Protocol, TypeVar
 
-from sandbox.engines.compiling import COMPILING
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 
 T = TypeVar("T")
 
@@ -78,7 +78,7 @@ class Worker:
         return not self._done.is_set()
 
     def note_compiling(self, _: str) -> None:
-        """Take note that a kernel is about to be compiled; `COMPILING.on_begin`."""
+        """Take note that a kernel is about to be compiled; `COMPILE_CLOCK.on_begin`."""
         if threading.current_thread() is self._thread:
             self.kernels += 1
             self._stirred.set()
@@ -98,16 +98,16 @@ class Wait:
     """How long the window has waited for a job."""
 
     def __init__(self, worker: Worker) -> None:
-        self._worker, self._began, self._compiled = worker, perf_counter(), COMPILING.seconds
+        self._worker, self._began, self._compiled = worker, perf_counter(), COMPILE_CLOCK.seconds
 
     @property
     def compiled(self) -> bool:
         """Whether anything was compiled meanwhile."""
-        return self._worker.kernels > 0 or COMPILING.seconds > self._compiled
+        return self._worker.kernels > 0 or COMPILE_CLOCK.seconds > self._compiled
 
     def told(self) -> str:
         """Return what is being done, and for how long."""
         seconds = f"{perf_counter() - self._began:.0f} s"
         if not self._worker.kernels:
             return f"computing … {seconds}"
-        return f"compiling, only this once … {self._worker.kernels} done or begun, {seconds}"
+        return f"compiling, on first use only … function {self._worker.kernels}, {seconds}"

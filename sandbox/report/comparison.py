@@ -12,11 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.compare import Comparison
 from sandbox.measure.compare.errors import Errors, errors
 from sandbox.measure.compare.runs import common_frames
 from sandbox.measure.energy import energies
-from sandbox.report.colours import colour_of
+from sandbox.report.colours import COLOURS, colour_of
 from sandbox.report.figure_file import write_figure
 from sandbox.report.panels import (
     BEYOND,
@@ -32,7 +33,6 @@ from sandbox.report.panels import (
 )
 from sandbox.report.paths import draw_fixed, draw_path, draw_truth, moving_axes
 from sandbox.report.plots import MOST_BODIES
-from sandbox.trajectory import FloatArray
 
 FLOOR = 1e-16
 """The lowest that a logarithmic axis reaches; what is smaller, such as 0, is drawn at its floor."""
@@ -102,7 +102,7 @@ def draw_trajectories(comparison: Comparison) -> Figure:
     moving = int((~scene.bodies.fixed).sum())
     more = f"the first {len(numbers)} of {moving:,} bodies" if moving > len(numbers) else ""
     if comparison.trusted_until is not None and comparison.trusted_until < scene.world.duration:
-        more = f"{more}; pale beyond the time that is trusted".removeprefix("; ")
+        more = f"{more}; pale where the truth is not trusted".removeprefix("; ")
     _finish(figure, comparison, "trajectories", more)
     return figure
 
@@ -111,11 +111,12 @@ def draw_error(comparison: Comparison) -> Figure:
     """Return the largest position and velocity error of any body against time, on logarithmic axes."""
     figure = Figure(figsize=(8.0, 7.0), facecolor="white")
     panels = figure.subplots(2, 1, sharex=True)
-    truth = comparison.best
     found: dict[str, Errors] = {}
-    if truth is not None:
-        moving = ~comparison.scene.bodies.fixed
-        found = {name: errors(run, truth.trajectory, moving) for name, run in comparison.trajectories.items()}
+    moving = ~comparison.scene.bodies.fixed
+    for name, run in comparison.trajectories.items():
+        truth = comparison.truth_of(name)
+        if truth is not None:
+            found[name] = errors(run, truth.trajectory, moving)
     for panel, what, unit in zip(panels, ("position", "velocity"), ("m", "m/s"), strict=True):
         curves = {name: (each.time, getattr(each, what)) for name, each in found.items()}
         _draw_log(panel, comparison, curves, f"largest {what} error, {unit}")
@@ -148,9 +149,11 @@ def draw_energy(comparison: Comparison) -> Figure:
         draw(upper, run.time, total, colour)
         upper.lines[-1].set(linewidth=width, alpha=OPAQUE)
         mine, away = np.arange(len(total)), total - total[0]
-        if whole and truth is not None and right is not None:
-            mine, its = common_frames(run, truth.trajectory)
-            away = total[mine] - right[its]
+        own = comparison.truth_of(name)
+        if whole and own is not None:
+            its_energy = right if own is truth and right is not None else energies(own.trajectory, scene).total
+            mine, its = common_frames(run, own.trajectory)
+            away = total[mine] - its_energy[its]
         curves[name] = run.time[mine], np.abs(away)
     _draw_log(lower, comparison, curves, f"energy, difference from {against}, J")
     if truth is not None and right is not None:
@@ -163,8 +166,10 @@ def draw_energy(comparison: Comparison) -> Figure:
 
 
 def _colours(comparison: Comparison) -> dict[str, str]:
-    """Return a colour for each engine that has a run."""
-    return {name: colour_of(name) for name in comparison.trajectories}
+    """Return a colour for each row that has a run: its engine's, or of a sweep its own."""
+    swept = any(row.set for row in comparison.rows)
+    names = enumerate(comparison.trajectories)
+    return {name: COLOURS[k % len(COLOURS)] if swept else colour_of(name) for k, name in names}
 
 
 def _widths(comparison: Comparison) -> Iterator[float]:

@@ -61,7 +61,7 @@ def draw_pairs(result: Extremes) -> Figure:
     tall = [len(pair.first.levels) * ROW + 0.95 for pair in pairs]
     height, width = sum(tall) + 0.9, 1.4 + columns * 2.5
     figure = Figure(figsize=(width, height), facecolor="white")
-    figure.suptitle("Two at once", x=0.01, y=1.0 - 0.12 / height, ha="left", va="top", size=14)
+    figure.suptitle("Two axes combined", x=0.01, y=1.0 - 0.12 / height, ha="left", va="top", size=14)
     top = height - 0.85
     for pair, space in zip(pairs, tall, strict=True):
         figure.text(0.1 / width, top / height, pair.name, size=10, weight="bold", va="top")
@@ -124,8 +124,8 @@ def _bound(limit: Limit) -> str:
     if limit.first_failure is None:
         return "no failure"
     if limit.limit is None:
-        return "none passes"
-    rough = "" if limit.monotone else ", not the only one"
+        return "all fail"
+    rough = "" if limit.monotone else " (not monotone)"
     return f"to {level_text(float(f'{limit.limit:.4g}'))}{rough}: {limit.rule}"
 
 

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.ticker import NullLocator
 
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.arrays import BoolArray, FloatArray
 
 MOST_POINTS = 4000
 """Points to a curve; longer ones keep the extremes of every stretch."""
@@ -98,12 +98,15 @@ def _make_logarithmic(panel: Axes, drawn: FloatArray, linear: int) -> None:
     panel.set_ylabel(f"{panel.get_ylabel()} (log)")
 
 
-def add_legend(owner: Axes | Figure, entries: list[tuple[str, Line2D]], **layout: Any) -> None:
-    """Add a legend; its texts are set afterwards, as matplotlib drops labels that start with an underscore."""
+def add_legend(owner: Axes | Figure, entries: list[tuple[str, Line2D]], most: int = 40, **layout: Any) -> None:
+    """Add a legend of labels with at most `most` characters.
+
+    Its texts are set afterwards, as matplotlib drops labels that start with an underscore.
+    """
     handles = [key for _, key in entries]
     legend = owner.legend(handles, ["name"] * len(handles), frameon=False, fontsize=10, **layout)
     for text, (label, _) in zip(legend.get_texts(), entries, strict=True):
-        text.set_text(shortened(label))
+        text.set_text(shortened(label, most))
         literal(text)
 
 

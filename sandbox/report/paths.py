@@ -9,10 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.lines import AxLine, Line2D
 from matplotlib.patches import Circle, Polygon
 
+from sandbox.arrays import FloatArray
 from sandbox.report.panels import BEYOND, CLOSED, MOST_POINTS, STILL, draw, draw_closed
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Plane, Post, Scene
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.fixed import Plane, Post
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 SOLID: dict[str, Any] = {"color": "#9a9a9a", "lw": 1.4, "zorder": 0.6}
 """Fixed things."""
@@ -78,7 +80,7 @@ def draw_fixed(panel: Axes, scene: Scene) -> None:
             panel.add_artist(Line2D(*np.asarray(points).T, **SOLID))
     bodies = scene.bodies
     for number in np.flatnonzero(bodies.fixed).tolist():
-        pieces = _pieces(bodies, number)
+        pieces = outlines_of(bodies, number)
         edge = SOLID if len(pieces) == 1 else SOLID | {"lw": 2.0 * SOLID["lw"]}
         for piece in pieces:
             panel.add_artist(Polygon(piece, fill=False, **edge))
@@ -87,7 +89,7 @@ def draw_fixed(panel: Axes, scene: Scene) -> None:
             panel.add_artist(Polygon(piece, **inside))
 
 
-def _pieces(bodies: Bodies, number: int) -> list[FloatArray]:
+def outlines_of(bodies: Bodies, number: int) -> list[FloatArray]:
     """Return the outlines (K, 2) of a body's pieces as it starts, m."""
     shapes, angle = bodies.shapes, float(bodies.angle[number])
     cos, sin = math.cos(angle), math.sin(angle)

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.closed_form import ClosedForm, closed_form
 from sandbox.measure.energy import energies
 from sandbox.report.colours import COLOURS
@@ -29,9 +30,9 @@ from sandbox.report.panels import (
     literal,
     shortened,
 )
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 MOST_BODIES = 5
 """Drawn where none is named."""

@@ -12,14 +12,14 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 
-from sandbox.engines.exact.rolling.fan import Fan
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.exact.tabletop.shots import ShotBatch
 from sandbox.measure.shots.odds import Odds
 from sandbox.measure.shots.study import Study
 from sandbox.report.colours import COLOURS
 from sandbox.report.figure_file import write_figure
 from sandbox.report.panels import FAINT, INK, literal, shortened
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray, IntArray
+from sandbox.scene.scene import Scene
 
 SQUARES = 90
 """Fields along the longer side of the heat maps."""
@@ -79,7 +79,7 @@ def draw_rests(odds: Odds) -> Figure:
     glow = ScalarMappable(scale_of, GLOW)
     bar = figure.colorbar(glow, ax=list(panels), shrink=0.7)
     bar.ax.yaxis.set_major_formatter("{x:g}")
-    about = f"rests of {odds.count:,} shots, counted in fields of {100.0 * side:.2g} cm"
+    about = f"rest positions of {odds.count:,} shots, in squares of {100.0 * side:.2g} cm"
     _head(figure, f"{_title(odds)}: {about}")
     return figure
 
@@ -105,14 +105,14 @@ def draw_aims(found: Study) -> Figure:
     for panel in (upper, lower):
         panel.axvline(0.0, color=FAINT, lw=0.9, ls=(0, (2, 3)))
         panel.axvspan(-1e3 * odds.spread.aim, 1e3 * odds.spread.aim, color=FAINT, alpha=0.12, lw=0)
-    lower.set_xlabel("aim, mrad to the left of what is meant; shaded: one standard deviation of the aim")
+    lower.set_xlabel("aim error, mrad (positive: left); shaded: one standard deviation")
     fell = sorted(set(fan.pocket[fan.pocket >= 0].tolist()))
     keys = [Patch(color=_colour(hole), label=f"pocket {hole}") for hole in fell] + [Patch(color=STAYS, label="stays")]
     legend = figure.legend(handles=keys, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     for text, name in zip(legend.get_texts(), [*(attempt.pockets[hole] for hole in fell), "stays"], strict=True):
         text.set_text(shortened(name))
         literal(text)
-    _head(figure, f"{_title(odds)}: over the angle of aim")
+    _head(figure, f"{_title(odds)}: outcome against aim")
     return figure
 
 
@@ -157,11 +157,11 @@ def _mark(panel: Axes, odds: Odds, name: str, own: int) -> None:
             panel.plot(*odds.nominal.position[k], "+", color="#0072B2", ms=9, mew=1.6)
 
 
-def _draw_place(panel: Axes, off: FloatArray, fan: Fan, own: int, ball: str) -> None:
+def _draw_place(panel: Axes, off: FloatArray, fan: ShotBatch, own: int, ball: str) -> None:
     stays = fan.pocket[:, own] < 0
     for k, axis in enumerate("xy"):
         panel.plot(off[stays], fan.position[stays, own, k], ".", ms=2.4, color=COLOURS[k], label=axis)
-    literal(panel.set_ylabel(shortened(f"where {ball} rests, m", 34)))
+    literal(panel.set_ylabel(shortened(f"rest position of {ball}, m", 34)))
     panel.legend(frameon=False, markerscale=4, loc="upper right", fontsize=9)
     panel.spines[["top", "right"]].set_visible(False)
     panel.grid(color="#e4e4e4", lw=0.6)

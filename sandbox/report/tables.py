@@ -5,7 +5,7 @@ memory beside the run itself.
 """
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ CONTACTS = ("time", "a", "b", "point_x", "point_y", "normal_x", "normal_y", "imp
 """Columns of contacts, SI units; `a` and `b` are names."""
 CHUNK = 1 << 16
 """Rows that are worked on at once, about 10 MB."""
-NEEDS_PARQUET = 'parquet needs the `parquet` extra: pip install -e ".[parquet]"; a csv needs nothing more'
+NEEDS_PARQUET = 'parquet needs the `parquet` extra: pip install -e ".[parquet]"; csv works without it'
 
 Column = npt.NDArray[Any] | tuple[npt.NDArray[np.int64], list[str]]
 """Values, or for words the numbers of those that all rows share."""
@@ -66,6 +66,48 @@ def write_contacts(trajectory: Trajectory, fixed_names: Sequence[str], path: Pat
         ValueError: another suffix.
     """
     return _write(CONTACTS, _contacts(trajectory, fixed_names), path)
+
+
+def write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> int:
+    """Write rows that all have the same keys, the columns, and return how many there are. None is an empty cell.
+
+    Args:
+        rows: values are texts, numbers, booleans or None.
+        path: ends in `.csv` or `.parquet`.
+
+    Raises:
+        OSError: the file cannot be written.
+        MissingExtraError: parquet without its extra.
+        ValueError: another suffix, or no row.
+    """
+    if not rows:
+        raise ValueError("there are no rows to write")
+    match path.suffix.lower():
+        case ".csv":
+            with whole(path) as temporary, temporary.open("x", encoding="utf-8", newline="") as stream:
+                writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+                writer.writeheader()
+                writer.writerows(rows)
+        case ".parquet":
+            if not can_write_parquet():
+                raise MissingExtraError(NEEDS_PARQUET)
+            import pyarrow as pa
+            from pyarrow import parquet
+
+            columns = {key: _alike([row[key] for row in rows]) for key in rows[0]}
+            with whole(path) as temporary, temporary.open("xb") as stream:
+                parquet.write_table(pa.table(columns), stream)
+        case suffix:
+            raise ValueError(f"a table ends in .csv or .parquet, not {suffix!r}")
+    return len(rows)
+
+
+def _alike(values: list[Any]) -> list[Any]:
+    """Return values of one type, as a column of a typed table has: numbers, booleans, or else texts."""
+    kinds = {type(value) for value in values if value is not None}
+    if len(kinds) <= 1 or kinds <= {int, float}:
+        return values if kinds != {int, float} else [None if value is None else float(value) for value in values]
+    return [None if value is None else str(value) for value in values]
 
 
 def _states(run: Trajectory) -> Iterator[list[Column]]:

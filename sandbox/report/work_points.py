@@ -110,10 +110,30 @@ def budget_of(document: Document) -> float | None:
     return None if budget is None else float(budget) * float(document.get("fps") or 1.0)
 
 
+def is_longer_than_frame(point: WorkPoint, document: Document) -> bool:
+    """Tell whether a point's dt is longer than a frame, so that it is not recommended."""
+    longest = document.get("max_dt")
+    return longest is not None and float(point.settings.get("dt", point.step)) > float(longest)
+
+
+def frame_time(point: WorkPoint, document: Document) -> float | None:
+    """Return the computing time of a point's most expensive frame, ms; None where the cost is unknown.
+
+    It is the median of the repeats; if dt is longer than a frame, it is the time of one step.
+    """
+    cost = point.document.get("cost_median_ms_per_second")
+    fps = document.get("fps")
+    if cost is None or not fps:
+        return None
+    return float(cost) * max(1.0 / float(fps), float(point.settings.get("dt", point.step)))
+
+
 def told(point: WorkPoint, metric: str, unit: str) -> Iterator[str]:
     """Yield lines that say what a point is."""
     yield f"{point.engine}{', ' if point.method else ''}{point.method}"
-    yield f"dt {point.settings.get('dt', point.step):.4g} s, {point.settings.get('substeps', 1)} substep(s)"
+    substeps = point.settings.get("substeps", 1)
+    noun = "substep" if substeps == 1 else "substeps"
+    yield f"dt {point.settings.get('dt', point.step):.4g} s, {substeps} {noun}"
     if point.error is not None:
         yield f"{metric.replace('_', ' ')} {point.error:.3g} {unit}".rstrip()
     if point.cost is not None:
@@ -129,7 +149,10 @@ def _point(number: int, row: Document, plain: Document) -> WorkPoint:
         value = settings.get(key)
         if value is None or value is False or value == plain.get(key):
             continue
-        words.append(f"{value} iterations" if key == "iterations" else key if value is True else str(value))
+        if key == "iterations":
+            words.append(f"{value} iteration{'' if value == 1 else 's'}")
+        else:
+            words.append(key if value is True else str(value))
     return WorkPoint(
         number=number,
         engine=row["engine"],

@@ -3,17 +3,21 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from sandbox import run_file
 from sandbox.action import Force, Remove, Spawn
 from sandbox.batch.outcome import execute
 from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError
 from sandbox.engines.registry import UnknownEngineError
-from sandbox.scene.file import loads
-from sandbox.scene.model import Ball
+from sandbox.resource_limits import TooLargeError
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import loads
+from sandbox.trajectory import Trajectory
 
 SCENE = loads("""
 title = "Two"
@@ -98,20 +102,85 @@ def test_refused_job_has_no_final_state(tmp_path: Path) -> None:
 
 
 def test_unknown_engine_is_an_error() -> None:
-    with pytest.raises(UnknownEngineError, match="no engine 'none'"):
+    with pytest.raises(UnknownEngineError, match="unknown engine 'none'"):
         execute(replace(JOB, engine="none"))
 
 
-def test_damaged_arrays_are_a_fault_of_the_store(tmp_path: Path) -> None:
+def test_damaged_run_is_made_again_and_replaced(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        first = execute(JOB, store)
+        assert first.path is not None
+        first.path.write_bytes(b"damaged")
+        again = execute(JOB, store)
+        assert (again.repeated, again.path) == (False, first.path)
+        assert again.damaged is not None
+        assert again.damaged.startswith(f"{first.path} is not a stored run: ")
+        assert again.row()["damaged"] == again.damaged
+        found = execute(JOB, store)
+        assert (found.repeated, found.damaged, "damaged" in found.row()) == (True, None, False)
+        assert found.trajectory.info["state_hash"] == first.trajectory.info["state_hash"]
+        assert [row.seconds for row in store.rows()] == [again.trajectory.info["seconds"]]
+    assert {entry.name for entry in tmp_path.iterdir()} == {"runs.sqlite", first.path.name}
+
+
+OTHERS = [
+    ("scene", replace(JOB, scene=SCENE.model_copy(update={"title": "Three"}))),
+    ("seed", replace(JOB, scene=SCENE.model_copy(update={"world": SCENE.world.model_copy(update={"seed": 4})}))),
+    ("engine", replace(JOB, engine="reference")),
+    ("settings", replace(JOB, scene=SCENE.model_copy(update={"solver": SCENE.solver.replace(slop=0.02)}))),
+    ("actions", replace(JOB, actions=(Remove(time=0.05, body="a"),))),
+]
+
+
+@pytest.mark.parametrize(("key", "other"), OTHERS)
+def test_run_under_the_id_of_another_is_made_again(key: str, other: Job, tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        path, theirs = execute(JOB, store).path, execute(other, store).path
+        assert path is not None
+        assert theirs is not None
+        path.write_bytes(theirs.read_bytes())
+        again = execute(JOB, store)
+        assert again.damaged is not None
+        assert f"is not the run of its id: its info.{'scene' if key == 'seed' else key} is" in again.damaged
+        assert execute(JOB, store).repeated
+        assert execute(other, store).repeated
+
+
+@pytest.mark.parametrize("error", [PermissionError(13, "Permission denied"), OSError(5, "Input/output error")])
+def test_stored_run_that_cannot_be_opened_is_a_fault_of_the_store(
+    error: OSError, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Store(tmp_path) as store:
+        path = execute(JOB, store).path
+
+        def load(path: Path) -> Trajectory:
+            raise error
+
+        monkeypatch.setattr(Trajectory, "load", load)
+        with pytest.raises(StoreError, match=rf"{path}: {error.strerror}"):
+            execute(JOB, store)
+
+
+def test_stored_run_that_does_not_fit_into_memory_is_not_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with Store(tmp_path) as store:
         path = execute(JOB, store).path
         assert path is not None
-        path.write_bytes(b"damaged")
-        with pytest.raises(StoreError, match="remove the file, and the run is made again"):
+        before = path.read_bytes()
+        monkeypatch.setattr(run_file, "free_memory", lambda: 1000)
+        with pytest.raises(TooLargeError, match="delete the file to repeat the run"):
             execute(JOB, store)
-        path.unlink()
-        assert not execute(JOB, store).repeated
-        assert len(store.rows()) == 1
+        assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("changes", [{}, {"solver": SCENE.solver.replace(integrator="rk4")}])
+def test_sessions_with_actions_and_refused_runs_are_found_again(changes: dict[str, Any], tmp_path: Path) -> None:
+    actions = (Remove(time=0.05, body="a"), Remove(time=0.01, body="b"))  # not in order
+    job = replace(JOB, scene=SCENE.model_copy(update=changes), actions=actions)
+    with Store(tmp_path) as store:
+        first, found = execute(job, store), execute(job, store)
+    assert (first.trajectory.status, found.repeated) == ("refused" if changes else "ok", True)
 
 
 def test_ledger_made_later_keeps_the_audit_that_was_stored(tmp_path: Path) -> None:

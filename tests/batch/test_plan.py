@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.batch.plan import MOST_POINTS, parse_sweep, plan
-from sandbox.scene.address import AddressError
-from sandbox.scene.faults import SceneError
-from sandbox.scene.shipped import find
+from sandbox.batch.plan import MAX_FAILED, parse_sweep, plan, repeated_keys
+from sandbox.resource_limits import RUNS
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.overrides import AddressError
+from sandbox.scene.files.shipped_scenes import find
 
 BALL = '[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 1\n'
 
@@ -54,7 +55,8 @@ def scene(tmp_path: Path) -> tuple[str, str]:
     ],
 )
 def test_sweep_is_a_key_and_values(text: str, key: str, values: list[object]) -> None:
-    assert parse_sweep(text) == (key, values)
+    found, swept = parse_sweep(text)
+    assert (found, list(swept)) == (key, values)
 
 
 @given(st.integers(1, 60), st.integers(1, 60), st.integers(1, 200))
@@ -72,7 +74,7 @@ def test_whole_values_between_whole_ends_are_integers_and_others_numbers(low: in
 def test_log_range_has_equal_factors_and_its_very_ends(low: float, factor: float, count: int) -> None:
     high = low * factor
     _, values = parse_sweep(f"x={low!r}:{high!r}:{count}:log")
-    assert (len(values), values[0], values[-1]) == (count, low, high)
+    assert (len(values), values[0], values[-1]) == (count if low < high else 1, low, high)
     for k, value in enumerate(values):
         # pow of up to 1e9 rounds its exponent by 1e-16, its result by 20 times that.
         assert math.log(value / low) == pytest.approx(math.log(factor) * k / (count - 1), abs=1e-14)
@@ -89,9 +91,9 @@ def test_log_range_has_equal_factors_and_its_very_ends(low: float, factor: float
         ("solver.dt=1:2:x", "a range is LOW:HIGH:N"),
         ("solver.dt=1:2:2.5", "a range is LOW:HIGH:N"),
         ("solver.dt=a:2:3", "a range is LOW:HIGH:N"),
-        ("solver.dt=1:2:0", "1 to 1,000,000 values"),
-        ("solver.dt=1:2:-3", "1 to 1,000,000 values"),
-        (f"solver.dt=1:2:{MOST_POINTS + 1}", "1 to 1,000,000 values"),
+        ("solver.dt=1:2:0", "at least 1 value"),
+        ("solver.dt=1:2:-3", "at least 1 value"),
+        (f"solver.dt=1:2:{RUNS.default + 1}", "set SANDBOX_MAX_RUNS=1_100_000"),
         ("solver.dt=1:inf:3", "finite ends"),
         ("solver.dt=nan:1:3", "finite ends"),
         ("solver.dt=-1e308:1e308:3", "finite ends"),
@@ -128,7 +130,40 @@ def test_any_text_is_a_sweep_or_refused(text: str) -> None:
 )
 def test_listed_values_are_read_as_toml_has_them(values: list[object]) -> None:
     texts = [str(v).lower() if isinstance(v, bool) else f'"{v}"' if isinstance(v, str) else str(v) for v in values]
-    assert parse_sweep(f"x={','.join(texts)}") == ("x", tomllib.loads(f"x = [{','.join(texts)}]")["x"])
+    key, found = parse_sweep(f"x={','.join(texts)}")
+    stated = tomllib.loads(f"x = [{','.join(texts)}]")["x"]
+    assert (key, found) == ("x", [value for k, value in enumerate(stated) if not _is_among(value, stated[:k])])
+
+
+def _is_among(value: object, others: list[object]) -> bool:
+    """Tell whether one of the others is the same value of the same type: 1, 1.0 and true are three."""
+    return any(type(other) is type(value) and repr(other) == repr(value) for other in others)
+
+
+@pytest.mark.parametrize("values", [",".join(["a"] * 10**5), "1:1:1000000", '"' + "," * 10**5, "[" + "," * 10**5])
+def test_equal_values_of_a_sweep_are_one(values: str) -> None:
+    assert len(parse_sweep(f"title={values}")[1]) == 1
+
+
+def test_runs_that_would_be_too_many_are_counted_without_being_laid_out(scene: tuple[str, str]) -> None:
+    with pytest.raises(AddressError, match=r"multiply to 1,000,000,000 runs"):
+        plan([scene], None, sweeps=["world.duration=1:2:1000000", "solver.dt=1:2:1000"])
+    with pytest.raises(AddressError, match=r"multiply to 10\^300 runs"):
+        plan([scene], None, sweeps=["solver.dt=1:2:1000000"] * 50)
+
+
+def test_scenes_that_would_fill_the_memory_are_refused_at_the_first(scene: tuple[str, str]) -> None:
+    Path(scene[1]).write_text(BALL + SPARKS.replace("3\n", "100000\n"))
+    with pytest.raises(SceneError, match="200,000 runs of 100,001 bodies"):
+        plan([scene], None, sweeps=["world.duration=1:2:1000"], seeds=200)
+    Path(scene[1]).write_text(BALL)
+    assert plan([scene], None, seeds=1_000_000)[0].seeds == 1_000_000  # one run, as nothing is random
+
+
+def test_faults_of_many_runs_end_the_check(scene: tuple[str, str]) -> None:
+    with pytest.raises(SceneError) as error:
+        plan([scene], None, sweeps=["solver.dt=-1:-2:1000000"])
+    assert len(error.value.faults) == MAX_FAILED
 
 
 def test_plan_multiplies_in_its_order(scene: tuple[str, str], tmp_path: Path) -> None:
@@ -179,9 +214,19 @@ def test_every_fault_is_told_once(scene: tuple[str, str], tmp_path: Path) -> Non
     ]
 
 
+@pytest.mark.parametrize("path", ["nothing.at.all", "ball..radius", "ball.none.radius"])
+def test_path_that_leads_nowhere_is_named_by_its_option(scene: tuple[str, str], path: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        plan([scene], None, [f"{path}=1"])
+    assert {fault.path for fault in caught.value.faults} == {"--set"}
+    with pytest.raises(SceneError) as caught:
+        plan([scene], None, ["solver.none.x=3"], [f"{path}=1,2"])
+    assert sorted(fault.path for fault in caught.value.faults) == ["--set", "--sweep"]
+
+
 def test_too_many_runs_are_refused_before_any_is_laid_out(scene: tuple[str, str]) -> None:
     sweeps = ["solver.dt=0.1:1:1001", "ball.a.mass=1:2:1000"]
-    with pytest.raises(AddressError, match="multiply to more than 1,000,000 runs"):
+    with pytest.raises(AddressError, match="multiply to 1,001,000 runs"):
         plan([scene], ["pymunk"], sweeps=sweeps)
 
 
@@ -200,3 +245,21 @@ def test_seeds_are_one_run_only_where_nothing_is_random(scene: tuple[str, str]) 
         (1.0, 3, 1),
         (-1.0, 1, 3),
     ]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "sweeps", "seeds", "told"),
+    [
+        ([], ["world.seed=1,2"], 2, [("--sweep", "world.seed")]),
+        (["world.seed=1"], [], 2, [("--set", "world.seed")]),
+        (["solver.dt=1"], ["solver.dt=1,2"], None, [("--sweep", "solver.dt")]),
+        ([], ["ball[0].mass=1", "ball.0.mass=2"], None, [("--sweep", "ball.0.mass")]),
+        (["solver.dt=1"], ["world.seed=1,2"], None, []),
+        (["nonsense"], ["ball..mass=1", "ball..mass=2"], 2, []),
+    ],
+)
+def test_keys_that_are_given_twice_are_found(
+    overrides: list[str], sweeps: list[str], seeds: int | None, told: list[tuple[str, str]]
+) -> None:
+    faults = repeated_keys(overrides, sweeps, seeds)
+    assert [(fault.file, fault.path) for fault in faults] == told

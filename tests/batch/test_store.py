@@ -14,12 +14,13 @@ import pytest
 
 from sandbox.action import Remove
 from sandbox.batch.store import VERSION, Store, StoredRun, StoreError, run_id
-from sandbox.scene.document import to_document
-from sandbox.scene.file import dumps, loads
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import dumps, loads
 from sandbox.trajectory import Trajectory
 
-SCENE = loads('title = "Ünïted ✂ ../etc"\n[[ball]]\nname = "a/b"\nposition = [0, 1]\nradius = 0.5\n')
+GROUND = "[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n"
+SCENE = loads(f'title = "Ünïted ✂ ../etc"\n[[ball]]\nname = "a/b"\nposition = [0, 1]\nradius = 0.5\n{GROUND}')
 VERSIONS = {"sandbox": "0.1.0", "pymunk": "7.3.1"}
 ID = run_id(SCENE, "pymunk", SCENE.solver, 7, VERSIONS)
 OTHER = "0123456789abcdef0123"
@@ -171,7 +172,7 @@ def test_what_is_no_number_is_stored_as_unknown(tmp_path: Path) -> None:
 @pytest.mark.parametrize("run", ["", "../../../../tmp/ownage", "A" * 20, ID + "\n", ID[:19], "a/b"])
 def test_text_that_is_no_id_never_becomes_a_file(tmp_path: Path, run: str) -> None:
     with Store(tmp_path) as store:
-        with pytest.raises(ValueError, match="no run id"):
+        with pytest.raises(ValueError, match="not a run id"):
             store.add(a_run(), run)
         assert store.find(run) is None
     assert files(tmp_path) == {"runs.sqlite"}
@@ -220,7 +221,7 @@ def test_several_processes_add_to_one_folder(tmp_path: Path) -> None:
 def test_folder_that_is_a_file_is_refused(tmp_path: Path, below: str) -> None:
     file = tmp_path / "runs"
     file.write_text("precious")
-    with pytest.raises(StoreError, match=r"runs\S*: is or lies in a file; runs are stored in a folder"):
+    with pytest.raises(StoreError, match=r"runs\S*: is a file or inside a file; runs need a folder"):
         Store(file / below)
     assert file.read_text() == "precious"
 
@@ -244,7 +245,7 @@ def locked() -> Iterator[Path]:
 def test_folder_that_cannot_be_written_to_is_refused(locked: Path, below: str) -> None:
     with pytest.raises(StoreError) as caught:
         Store(locked / below)
-    assert str(caught.value) == f"{locked / below}: Permission denied; name a folder that you may write to"
+    assert str(caught.value) == f"{locked / below}: Permission denied; name a folder with write permission"
 
 
 def test_name_that_no_folder_can_have_is_refused(tmp_path: Path) -> None:
@@ -270,7 +271,7 @@ def test_database_of_something_else_is_refused_and_left_alone(tmp_path: Path) ->
     with closing(sqlite3.connect(tmp_path / "runs.sqlite")) as foreign:
         foreign.execute("CREATE TABLE runs (a)")
     before = (tmp_path / "runs.sqlite").read_bytes()
-    with pytest.raises(StoreError, match="a database of something else"):
+    with pytest.raises(StoreError, match="not a database of runs"):
         Store(tmp_path)
     assert (tmp_path / "runs.sqlite").read_bytes() == before
 
@@ -279,7 +280,7 @@ def test_store_of_a_newer_version_is_refused(tmp_path: Path) -> None:
     Store(tmp_path).close()
     with closing(sqlite3.connect(tmp_path / "runs.sqlite")) as newer:
         newer.execute(f"PRAGMA user_version = {VERSION + 1}")
-    with pytest.raises(StoreError, match=f"written by a newer sandbox, version {VERSION + 1}"):
+    with pytest.raises(StoreError, match=rf"written by a newer version of sandbox \(format {VERSION + 1}"):
         Store(tmp_path)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from sandbox.cli.main import call
-from sandbox.engines.compiling import ANNOUNCEMENT
+from sandbox.engines.common.compile_clock import ANNOUNCEMENT
 
 DROP = """
 title = "Drop"

@@ -10,9 +10,9 @@ from sandbox.engines.registry import ENGINES
 from sandbox.measure.forecast import FAILED, Warning
 from sandbox.measure.forecast.forecasts import FORECASTS, Forecast
 from sandbox.measure.run import run
-from sandbox.scene.demands import JOINTS, Demand
-from sandbox.scene.file import load, loads
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.demands import JOINTS, Demand
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.scene import Scene
 
 
 def test_json_of_a_sound_scene_has_every_key(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -78,7 +78,7 @@ def test_warning_carries_kind_message_and_figures(capfd: pytest.CaptureFixture[s
     (warning,) = document["warnings"]
     assert warning["kind"] == "tunnelling"
     assert warning["odds"] == pytest.approx(0.8, abs=1e-12)  # 1 − 0.02/(100·0.001), but for rounding
-    assert warning["message"].endswith("odds up to 80 %; dt <= 0.0002 s would be safe")
+    assert warning["message"].endswith("odds up to 80 %; dt <= 0.0002 s is safe")
     assert document["safe_dt"] == pytest.approx(0.0002, rel=1e-12)  # a quotient's rounding
     _, document, _ = json_of(capfd, "check", "bullet", "--set", "solver.dt=0.0002")
     assert document["warnings"] == []
@@ -99,7 +99,7 @@ def test_bill_is_printed_a_line_each(tmp_path: Path, capfd: pytest.CaptureFixtur
     bill = 1 + len(Demand) - len(JOINTS) + 1  # kinds of joints are one line, as the scene has none
     marks = {line.split()[1]: line.split()[0] for line in out[1:bill]}
     assert (marks["gravity"], marks["drag"], marks["rotation"]) == ("on", "off", "off")
-    assert out[bill : bill + len(ENGINES)] == [f"  engine {name}: models all of it" for name in ENGINES]
+    assert out[bill : bill + len(ENGINES)] == [f"  engine {name}: models everything in the scene" for name in ENGINES]
     assert len(out) == bill + 1 + len(ENGINES)
 
 
@@ -107,7 +107,7 @@ def test_quiet_tells_only_what_is_wrong(tmp_path: Path, capfd: pytest.CaptureFix
     assert lines_of(capfd, "check", written(tmp_path), "--quiet") == (0, [], [])
     status, out, err = lines_of(capfd, "check", "bullet", "--quiet")
     assert (status, len(out), err) == (0, 1, [])
-    assert out[0].startswith("bullet: warning: 'bullet' can close on 'wall' at up to 100 m/s, 0.1 m a substep")
+    assert out[0].startswith("bullet: warning: 'bullet' can approach 'wall' at up to 100 m/s, 0.1 m per substep")
 
 
 def test_each_of_three_bullets_is_named_with_its_own_speed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -148,7 +148,7 @@ def test_substeps_of_a_preset_are_shown(capfd: pytest.CaptureFixture[str]) -> No
     _, document, _ = json_of(capfd, "check", "9-ball")
     assert document["step"] == {"dt": 0.01, "substeps": 10}
     _, out, _ = lines_of(capfd, "check", "9-ball")
-    assert any("dt × substeps is 0.01 s × 10, a step every 0.001 s" in line for line in out)
+    assert any("dt is 0.01 s with 10 substeps, so a step takes 0.001 s" in line for line in out)
 
 
 def test_speed_that_nothing_bounds_is_unknown(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -156,7 +156,7 @@ def test_speed_that_nothing_bounds_is_unknown(tmp_path: Path, capfd: pytest.Capt
     _, document, _ = json_of(capfd, "check", written(tmp_path, text))
     assert (document["safe_dt"], document["safe_dt_known"]) == (None, False)
     _, out, _ = lines_of(capfd, "check", written(tmp_path, text))
-    assert any("unknown: attraction without softening" in line for line in out)
+    assert any("unknown, because attraction without softening" in line for line in out)
 
 
 def test_trial_run_is_on_the_engine_asked_about(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -204,7 +204,7 @@ def test_note_is_told_of_a_concave_outline(tmp_path: Path, capfd: pytest.Capture
     outline = "[[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]"
     scene = written(tmp_path, f'[[polygon]]\nname = "L"\nposition = [0, 0]\npoints = {outline}\ncollides = "none"\n')
     status, document, err = json_of(capfd, "check", scene)
-    message = "the outline of 'L' is concave and is cut into 2 convex pieces"
+    message = "the outline of 'L' is concave and is decomposed into 2 convex pieces"
     assert (status, err) == (0, [])
     assert document["notes"] == [{"kind": "outline", "message": message, "body": "L", "pieces": 2}]
     status, out, _ = lines_of(capfd, "check", scene)

@@ -24,9 +24,9 @@ from sandbox.play.footage import limits
 from sandbox.play.footage.film import Film
 from sandbox.recording import Recording
 from sandbox.report import tables
-from sandbox.scene.file import loads
-from sandbox.scene.model import Ball
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 
 SCENE = loads(DROP)
@@ -203,7 +203,7 @@ def test_recording_that_is_refused_exports_nothing(tmp_path: Path, capfd: pytest
     assert (status, document) == (1, {"run": name, "files": []})
     assert len(err) == 1
     assert err[0].startswith(f"{name}: refused: pymunk refuses: ")
-    assert err[0].endswith("there is nothing to export")
+    assert err[0].endswith("no frames to export")
     assert not (tmp_path / "a.csv").exists()
 
 
@@ -212,7 +212,7 @@ def test_folder_of_several_runs_lists_them(stored: Path, tmp_path: Path, capfd: 
     ids = sorted(path.stem for path in stored.glob("*.npz"))
     status, out, err = lines_of(capfd, "export", str(stored), "--to", str(tmp_path / "a.csv"))
     assert (status, out) == (2, [])
-    assert err == [f"{stored}: holds {len(ids)} runs; name one, such as {', '.join(f'{stored}/{id}' for id in ids)}"]
+    assert err == [f"{stored}: contains {len(ids)} runs; name one: {', '.join(f'{stored}/{id}' for id in ids)}"]
 
 
 def test_all_faults_are_told_at_once_and_nothing_is_written(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -229,33 +229,33 @@ def test_all_faults_are_told_at_once_and_nothing_is_written(tmp_path: Path, capf
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "--to: says where the run goes; give --to FILE, once or several times"),
-        (("--to=a",), "--to: a: the name ends in .csv, .parquet, .gif, .mp4 or .png"),
-        (("--to=a.csv", "--to=./a.csv"), "--to: ./a.csv: named twice"),
-        (("--to=no/a.csv",), "--to: no/a.csv: there is no folder no"),
+        ((), "--to: is missing: give --to FILE, once or several times"),
+        (("--to=a",), "--to: a: the name must end in .csv, .parquet, .gif, .mp4 or .png"),
+        (("--to=a.csv", "--to=./a.csv"), "--to: ./a.csv: is given twice"),
+        (("--to=no/a.csv",), "--to: no/a.csv: no such folder: no"),
         (("--to=runs.csv",), "--to: runs.csv: is a folder"),
         ((f"--to={'a' * 300}.csv",), "File name too long"),
-        (("--to=a.csv", "--fps=10"), "--fps: is for .gif, .mp4, and no --to FILE is one"),
-        (("--to=a.csv", "--overlay=names"), "--overlay: is for .gif, .mp4, .png, and no --to FILE is one"),
-        (("--to=a.gif", "--at=0"), "--at: is for .png, and no --to FILE is one"),
-        (("--to=a.png", "--contacts"), "--contacts: is for .csv, .parquet, and no --to FILE is one"),
-        (("--to=a.gif", "--fps=51"), "--fps: 51; a gif shows at most 50 pictures a second"),
-        (("--to=a.mp4", "--fps=nan"), "--fps: nan; it lies between 0.01 and 240 pictures a second"),
-        (("--to=a.mp4", "--fps=-1"), "--fps: -1; it lies between 0.01 and 240 pictures a second"),
-        (("--to=a.mp4", "--speed=nan"), "--speed: nan; 1 is real time"),
-        (("--to=a.png", "--width=10"), "--width: 10x6; sizes go from 16x16 to 7680x4320 pixels"),
-        (("--to=a.png", "--size=99999x10"), "--size: 99999x10; sizes go from"),
-        (("--to=a.png", "--size=9x9x9"), "--size: '9x9x9'; a size is written like 960x540"),
-        (("--to=a.png", "--size=90x90", "--width=90"), "--width: gives the size, and so does --size"),
-        (("--to=a.mp4", "--size=91x90"), "--size: 91x90; both sides of an mp4 are even"),
-        (("--to=a.png", "--at=0.6"), "--at: 0.6 s; the run ends at 0.5 s"),
-        (("--to=a.png", "--at=inf"), "--at: inf s; a time is 0 or more"),
-        (("--to=a.csv", "--from=0.6"), "--from: 0.6 s; the run ends at 0.5 s"),
-        (("--to=a.csv", "--from=0.3", "--until=0.2"), "--until: 0.2 s comes before --from, 0.3 s"),
-        (("--to=a.png", "--overlay=glitter"), "--overlay: 'glitter'; there are shapes, velocities, "),
+        (("--to=a.csv", "--fps=10"), "--fps: applies to .gif, .mp4 only"),
+        (("--to=a.csv", "--overlay=names"), "--overlay: applies to .gif, .mp4, .png only"),
+        (("--to=a.gif", "--at=0"), "--at: applies to .png only"),
+        (("--to=a.png", "--contacts"), "--contacts: applies to .csv, .parquet only"),
+        (("--to=a.gif", "--fps=51"), "--fps: is 51; a gif shows at most 50 frames per second"),
+        (("--to=a.mp4", "--fps=nan"), "--fps: is nan; it must be between 0.01 and 240"),
+        (("--to=a.mp4", "--fps=-1"), "--fps: is -1; it must be between 0.01 and 240"),
+        (("--to=a.mp4", "--speed=nan"), "--speed: is nan; it must be between"),
+        (("--to=a.png", "--width=10"), "--width: is 10x6; it must be 16x16 to 7680x4320 pixels"),
+        (("--to=a.png", "--size=99999x10"), "--size: is 99999x10; it must be"),
+        (("--to=a.png", "--size=9x9x9"), "--size: '9x9x9' is not a size"),
+        (("--to=a.png", "--size=90x90", "--width=90"), "--width: cannot be combined with --size"),
+        (("--to=a.mp4", "--size=91x90"), "--size: is 91x90; an mp4 needs an even width and height"),
+        (("--to=a.png", "--at=0.6"), "--at: is 0.6 s, but the run ends at 0.5 s"),
+        (("--to=a.png", "--at=inf"), "--at: is inf s; it must be 0 or more"),
+        (("--to=a.csv", "--from=0.6"), "--from: is 0.6 s, but the run ends at 0.5 s"),
+        (("--to=a.csv", "--from=0.3", "--until=0.2"), "--until: is 0.2 s, before --from at 0.3 s"),
+        (("--to=a.png", "--overlay=glitter"), "--overlay: unknown: 'glitter'; overlays: shapes, velocities, "),
         (
             ("--to=a.gif", "--speed=0.001"),
-            "--to: 15,000 pictures, and a film holds at most 3,000: give a higher --speed",
+            "--to: the film would have 15,000 frames, the limit is 3,000: use a higher --speed",
         ),
     ],
 )
@@ -278,10 +278,10 @@ def test_fault_is_one_line_that_says_what_is_right(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "no such run; `sandbox run SCENE --out DIR` stores one as DIR/<id>.npz"),
-        (b"", "neither a stored run (.npz) nor a recording (.json)"),
-        (b'title = "A scene"', "neither a stored run (.npz) nor a recording (.json)"),
-        (b"PK\x03\x04damaged", "is no stored run: "),
+        (None, "no such run; `sandbox run SCENE --out DIR` stores runs as DIR/ID.npz"),
+        (b"", "is neither a stored run (.npz) nor a recorded session (.json)"),
+        (b'title = "A scene"', "is neither a stored run (.npz) nor a recorded session (.json)"),
+        (b"PK\x03\x04damaged", "is not a stored run: "),
         (b"{}", "cannot be read as a session: it has no `format`"),
         (b'{"format": 1, "scene": {}}', "cannot be read as a session: "),
     ],
@@ -299,7 +299,7 @@ def test_what_is_no_run_is_told(
 
 
 def test_empty_folder_and_impossible_names_are_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    for name, message in ((str(tmp_path), "holds no run"), ("x" * 5000, "too long"), ("a\0b", "no such run")):
+    for name, message in ((str(tmp_path), "contains no run"), ("x" * 5000, "too long"), ("a\0b", "a NUL")):
         status, _, err = lines_of(capfd, "export", name, "--to", str(tmp_path / "a.csv"))
         assert (status, len(err)) == (2, 1)
         assert message in err[0]
@@ -310,11 +310,11 @@ def test_empty_folder_and_impossible_names_are_told(tmp_path: Path, capfd: pytes
     [
         ({"position": np.zeros((3, 1, 3))}, "position is 3 x 1 x 3 of float64, not 51 x 1 x 2"),
         ({"angle": np.zeros((51, 1), np.int64)}, "angle is 51 x 1 of int64"),
-        ({"names": np.asarray(["a", "b"])}, "retired_time is 1 of float64, not 2"),
-        ({"time": np.linspace(1.0, 0.0, 51)}, "its times do not rise"),
-        ({"broken_time": np.zeros((2, 2))}, "broken_time is 2 x 2 of float64, not 4"),
-        ({"info": {"scene": {}}}, "does not say `engine`"),
-        ({"contact_pair": np.asarray([[0, -9]])}, "contact_pair: names a thing that the scene does not have"),
+        ({"names": np.asarray(["a", "b"])}, "position is 51 x 1 x 2 of float64, not 51 x 2 x 2"),
+        ({"time": np.linspace(1.0, 0.0, 51)}, "its times do not increase"),
+        ({"broken_time": np.zeros((2, 2))}, "broken_time is 2 x 2 of float64, not J of float64"),
+        ({"info": {"scene": {}}}, "info.engine: Field required"),
+        ({"contact_pair": np.asarray([[0, -9]])}, "contact_pair: refers to an object that the scene does not have"),
     ],
 )
 def test_run_that_is_inconsistent_is_told(
@@ -417,10 +417,14 @@ def long(trajectory: Trajectory) -> Trajectory:
     states = {name: getattr(trajectory, name) for name in ("position", "velocity", "angle", "angular_velocity")}
     count = times * len(trajectory.time)
     states = {name: np.tile(array, (times, *[1] * (array.ndim - 1))) for name, array in states.items()}
-    return replace(trajectory, time=np.arange(count) * 1e-3, **states)
+    scene = {**trajectory.info["scene"], "world": {"duration": count * 1e-3}}
+    info = {**trajectory.info, "scene": scene, "steps": count}
+    return replace(trajectory, time=np.arange(count) * 1e-3, info=info, **states)
 
 
-@pytest.mark.parametrize("suffix", [".gif", ".mp4", ".csv", ".parquet"])
+@pytest.mark.parametrize(
+    "suffix", [".csv", *(pytest.param(each, marks=pytest.mark.slow) for each in (".gif", ".mp4", ".parquet"))]
+)
 def test_interrupt_keeps_what_is_finished_and_leaves_no_half_file(suffix: str, tmp_path: Path) -> None:
     long(run(SCENE)).save(tmp_path / "run.npz")
     out = tmp_path / "out"
@@ -430,6 +434,6 @@ def test_interrupt_keeps_what_is_finished_and_leaves_no_half_file(suffix: str, t
     status, printed, err = interrupted(
         [*words, *film], lambda: (out / "first.png").exists() and bool(list(out.glob(".*.tmp"))), tmp_path
     )
-    assert (status, err) == (130, "interrupted: 1 of 3 files are finished and kept\n")
+    assert (status, err) == (130, "interrupted: 1 of 3 files are complete and kept\n")
     assert printed == "written: out/first.png (1 frame)\n"
     assert [path.name for path in out.iterdir()] == ["first.png"]

@@ -13,6 +13,7 @@ from interruptible import interruptible
 SMALL = ("extremes", "--axes", "stiffness,restitution", "--engines", "pymunk,exact", "--quick", "--workers", "1")
 
 
+@pytest.mark.slow
 def test_document_has_cells_limits_and_predictions(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """The same document twice over, but for times; heat maps and the document are written."""
     status, document, errors = json_of(capfd, *SMALL, "--out", str(tmp_path))
@@ -41,7 +42,7 @@ def test_document_has_cells_limits_and_predictions(capfd: pytest.CaptureFixture[
     stored.write_text(json.dumps(farther), encoding="utf-8")
     status, again, (line,) = json_of(capfd, *SMALL, "--against", str(stored))
     assert status == 1
-    assert line.startswith("stiffness on pymunk: worse: passed up to 3, now up to 1.99: ")
+    assert line.startswith("stiffness on pymunk: worse: passed up to 3 before, up to 1.99 now: ")
     assert [change["worse"] for change in again["changes"]] == [True]
     for one, other in zip(document["cells"], again["cells"], strict=True):
         assert {**one, "seconds": 0.0} == {**other, "seconds": 0.0}
@@ -50,8 +51,8 @@ def test_document_has_cells_limits_and_predictions(capfd: pytest.CaptureFixture[
 def test_table_has_a_line_a_setup(capfd: pytest.CaptureFixture[str]) -> None:
     status, out, errors = lines_of(capfd, "extremes", "--axes", "speed", "--engines", "exact", "--quick")
     assert (status, errors) == (0, [])
-    assert out[0] == "speed  exact  EEE  all of them, up to 10"
-    assert "one at a time: 3 cells: 3 exact" in out
+    assert out[0] == "speed  exact  EEE  all levels pass, up to 10"
+    assert "single axes: 3 cells: 3 exact" in out
 
 
 def test_faults_are_a_line_each_before_anything_runs(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -63,9 +64,9 @@ def test_faults_are_a_line_each_before_anything_runs(capfd: pytest.CaptureFixtur
     assert (document["cells"], document["limits"]) == ([], [])
     assert len(errors) == len(document["faults"]) == 4
     assert errors[0].startswith("--axes: no axis 'nonsense'; axes: dt, ")
-    assert "no engine 'box3d'" in errors[1]
-    assert "holds no boundaries" in errors[2]
-    assert errors[3] == f"--out: {file}: is no folder"
+    assert "unknown engine 'box3d'" in errors[1]
+    assert "contains no boundaries" in errors[2]
+    assert errors[3] == f"--out: {file}: is not a folder"
     status, _, errors = lines_of(capfd, "extremes", "--axes", "speed", "--out", str(file))
     assert (status, len(errors)) == (2, 1)
 
@@ -76,7 +77,7 @@ def test_faults_are_a_line_each_before_anything_runs(capfd: pytest.CaptureFixtur
         ("solver.itterations=3", "itterations"),
         ("solver.dt", "solver.dt"),
         ("solver.iterations=0", "iterations"),
-        ("solver.dt=0.01", "varies; leave it out"),
+        ("solver.dt=0.01", "varies; remove it"),
     ],
 )
 def test_override_that_suits_no_scene_is_a_fault(capfd: pytest.CaptureFixture[str], override: str, words: str) -> None:
@@ -107,7 +108,7 @@ def test_interrupted_run_keeps_what_is_finished(tmp_path: Path) -> None:
     document = json.loads(out)
     assert command.returncode == 130
     assert document["interrupted"]
-    assert errors == f"interrupted: {len(document['cells'])} cells are finished and kept\n"
+    assert errors == f"interrupted: {len(document['cells'])} cells are complete and kept\n"
     assert all(cell["verdict"] in ("exact", "degraded", "refused", "failed") for cell in document["cells"])
 
 

@@ -14,7 +14,7 @@ from sandbox.cli.replay import _computed
 from sandbox.cli.stored import read_run
 from sandbox.games import registry
 from sandbox.measure.play_out import play_out
-from sandbox.scene.file import load, loads
+from sandbox.scene.files.load import load, loads
 from sandbox.trajectory import Trajectory
 
 
@@ -118,16 +118,14 @@ def test_script_plays(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[s
 def test_player_where_nobody_plays_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     plain = written(tmp_path, TOY.replace('game = "landing"', ""), "plain.toml")
     status, _, err = lines_of(capfd, "run", plain, "--player", "none")
-    assert (status, err) == (2, ["--player: no scene given has a game with rules"])
+    assert (status, err) == (2, ["--player: has no use: none of the scenes has a game with rules"])
 
 
-@pytest.mark.parametrize(
-    ("name", "missing"), [("curling", "play.curling.people=0"), ("duel", "the game would wait for ")]
-)
+@pytest.mark.parametrize(("name", "missing"), [("curling", "play.curling.people=0"), ("duel", "would never play")])
 def test_game_that_would_stand_still_is_refused(name: str, missing: str, capfd: pytest.CaptureFixture[str]) -> None:
     status, out, err = lines_of(capfd, "run", name, "--player", "none")
     assert (status, out) == (2, [])
-    assert err[0].startswith("--player: none ")
+    assert err[0].startswith("--player: player 'none' ")
     assert missing in err[0]
 
 
@@ -155,7 +153,7 @@ def test_session_is_played_again_with_its_score(scene: str, tmp_path: Path, capf
     file.write_text(json.dumps(forged))
     status, document, err = json_of(capfd, "run", str(file))
     assert (status, document["runs"][0]["replayed"], document["runs"][0]["otherwise"]) == (1, False, kick["time"])
-    assert f"ended in another game, from {kick['time']:g} s on," in err[0]
+    assert f"ended in a different game, from {kick['time']:g} s on," in err[0]
 
 
 def test_stored_game_is_played_again_in_the_window(
@@ -190,9 +188,10 @@ def test_check_tells_the_game() -> None:
     assert "game landing: engine (up), turn left (left), turn right (right)\n" in told
 
 
+@pytest.mark.slow
 def test_scene_that_its_game_does_not_fit_is_told_with_its_line(tmp_path: Path) -> None:
     lacking = written(tmp_path, TOY, "lacking.toml")
-    wanted = f"{lacking}:4: play.game: landing needs a body 'ship', a fixed thing 'pad', and a thrust"
+    wanted = f"{lacking}:4: play.game: landing needs a body 'ship', a fixed element 'pad', and a thrust"
     for command in ("run", "check", "play"):
         done = process(command, lacking)
         assert done.returncode == 2

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from calling import json_of, lines_of, written
 
-from sandbox.engines.account import Cause
+from sandbox.engines.energy_ledger import Cause
 from sandbox.trajectory import Trajectory
 
 RUN = ("--engine", "reference", "--ledger")

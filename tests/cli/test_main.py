@@ -11,7 +11,7 @@ from calling import json_of, lines_of, process, written
 
 from sandbox.cli.main import COMMANDS
 from sandbox.engines.registry import ENGINES
-from sandbox.scene.shipped import shipped
+from sandbox.scene.files.shipped_scenes import shipped
 
 
 def test_commands_are_those_promised() -> None:
@@ -69,10 +69,10 @@ def test_wrong_use_is_one_line(
     assert word in err[0]  # the rest is click's to word
 
 
-def test_no_command_shows_the_help_and_is_wrong_use(capfd: pytest.CaptureFixture[str]) -> None:
+def test_no_command_greets_with_suggestions_and_is_wrong_use(capfd: pytest.CaptureFixture[str]) -> None:
     status, out, err = lines_of(capfd)
     assert (status, out) == (2, [])
-    assert err[0].startswith("Usage: sandbox ")
+    assert [line for line in err if line.startswith("  sandbox ")]  # suggestions
 
 
 def test_scenes_are_listed_a_line_each(capfd: pytest.CaptureFixture[str]) -> None:
@@ -115,9 +115,9 @@ print(status, *heavy, file=sys.stderr)
         (("--help",), "numpy,pydantic,pymunk,matplotlib,rich"),
         (("scenes",), "numpy,pydantic,pymunk,matplotlib,rich"),
         (("check", "bounce"), "matplotlib,rich,sqlite3,tomlkit"),
-        (("check", "bounce", "--no-trial"), "pymunk,matplotlib,rich,sqlite3,tomlkit"),
-        (("schema",), "numpy,pymunk,matplotlib,rich"),
-        (("engines",), "pymunk,matplotlib,rich"),
+        (("check", "bounce", "--no-trial"), "numba,pymunk,matplotlib,rich,sqlite3,tomlkit"),
+        (("schema",), "numba,numpy,pymunk,matplotlib,rich"),
+        (("engines",), "numba,pymunk,matplotlib,rich"),
         (("run", "bounce", "--set", "world.duration=0.01", "--json"), "matplotlib,rich,pygame"),
     ],
 )

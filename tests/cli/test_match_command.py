@@ -1,11 +1,17 @@
 """`sandbox match`: frames, the score, sessions that replay, what is refused."""
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from calling import json_of, lines_of
 
-from sandbox.games.billiards.frame import Frame
+from sandbox.cli.main import call
+from sandbox.engines.contract import Divergence, Exhaustion
+from sandbox.games.billiards.frame import Frame, NoRestError, play
 from sandbox.games.billiards.match import Match
 
 QUICK = ("match", "straight-rail", "--distance", "2", "--players", "bot:0.9,bot:0.8")
@@ -41,7 +47,7 @@ def test_all_that_is_wrong_is_told_at_once(capfd: pytest.CaptureFixture[str]) ->
     assert (status, out) == (2, [])
     assert [line.partition(":")[0] for line in err] == ["--engine", "--players", "9-ball"]
     status, _, err = lines_of(capfd, "match", "9-ball", "--game", "chess")
-    assert (status, "no game 'chess'" in err[0]) == (2, True)
+    assert (status, "unknown game 'chess'" in err[0]) == (2, True)
 
 
 def test_misses_are_of_snooker(capfd: pytest.CaptureFixture[str]) -> None:
@@ -52,7 +58,7 @@ def test_misses_are_of_snooker(capfd: pytest.CaptureFixture[str]) -> None:
 def test_snooker_is_played_with_the_miss(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     states = []
 
-    def ended(match: Match, *_: object) -> Frame:
+    def ended(match: Match, *_: object, **__: object) -> Frame:
         states.append(match.state)
         raise KeyboardInterrupt
 
@@ -66,3 +72,80 @@ def test_scene_without_a_floor_is_no_table(capfd: pytest.CaptureFixture[str]) ->
     status, _, err = lines_of(capfd, "match", "bounce")
     assert status == 2
     assert "is not a billiard table" in err[0]
+
+
+def test_frame_without_an_end_is_given_up_and_counted(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    endless = ("match", "three-cushion", "--players", "bot:0,bot:0", "--frames", "3")
+    status, document, err = json_of(capfd, *endless, "--turns", "2", "--out", str(tmp_path))
+    assert (status, document["unfinished"], document["wins"]) == (1, 3, [0, 0])
+    assert [len(frame["turns"]) for frame in document["frames"]] == [2, 2, 2]
+    assert [line.partition(":")[0] for line in err] == ["frame 1", "frame 2", "frame 3"]
+    assert len(list(tmp_path.iterdir())) == 3
+    status, out, err = lines_of(capfd, *endless, "--time-limit", "1e-9")
+    assert (status, len(err)) == (1, 3)
+    assert out[-1].endswith("abandoned 3")
+    assert lines_of(capfd, *endless, "--time-limit", "nan")[0] == 2
+
+
+@pytest.mark.parametrize("error", [NoRestError("no rest"), Divergence(1.0, "cue", "flies off"), Exhaustion("too many")])
+def test_shot_without_an_end_gives_the_frame_up(
+    error: Exception, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def failing(_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("sandbox.games.billiards.frame.roll_out", failing)
+    status, document, (line,) = json_of(capfd, *QUICK)
+    assert (status, document["unfinished"]) == (1, 1)
+    assert str(error) in document["frames"][0]["unfinished"]
+    assert str(error) in line
+
+
+def test_reader_that_leaves_is_no_fault_of_out(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def write(*_: object) -> None:
+        raise BrokenPipeError
+
+    monkeypatch.setattr("sys.stdout", sys.stdout)  # `call` replaces it
+    monkeypatch.setattr("sandbox.cli.match._told", write)
+    assert call(list(QUICK)) == 0
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_interrupt_keeps_the_frames_that_are_finished(
+    as_json: bool, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    frames = []
+
+    def interrupted(*given: Any, **named: Any) -> Frame:
+        if frames:
+            raise KeyboardInterrupt
+        frames.append(play(*given, **named))
+        return frames[0]
+
+    monkeypatch.setattr("sandbox.cli.match.play", interrupted)
+    called = json_of if as_json else lines_of
+    status, told, err = called(capfd, *QUICK, "--frames", "3")
+    assert (status, err) == (130, ["interrupted: 1 of 3 frames are complete"])
+    if as_json:
+        assert (len(told["frames"]), told["interrupted"]) == (1, True)
+    else:
+        assert [line.partition(":")[0] for line in told] == ["frame 1", "1 frames"]
+
+
+def test_progress_is_said_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    said: list[str] = []
+
+    @contextmanager
+    def telling(silent: bool) -> Iterator[Any]:
+        yield None if silent else said.append
+
+    monkeypatch.setattr("sandbox.cli.match.telling", telling)
+    lines_of(capfd, *QUICK, "--frames", "2")
+    assert said[0].startswith("frame 1 of 2: 1 turn, ")
+    assert said[-1].startswith("frame 2 of 2: ")
+    said.clear()
+    lines_of(capfd, *QUICK, "--quiet")
+    assert said == []

@@ -17,8 +17,16 @@ BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
         # --set and --sweep
         ("run bounce --set dt=0.01", 2, "dt (set): unknown key; did you mean solver.dt?"),
         ("run bounce --set gravity=[0,1]", 2, "did you mean world.gravity?"),
-        ("run bounce --set ball.radius=1", 2, "name an element, such as ball.ball.radius, or all by ball.*.radius"),
-        ("run double_pendulum --set joint.length=3", 2, "such as joint.upper rod.length, or all by joint.*.length"),
+        (
+            "run bounce --set ball.radius=1",
+            2,
+            "name an element, such as ball.ball.radius, or use ball.*.radius for all",
+        ),
+        (
+            "run double_pendulum --set joint.length=3",
+            2,
+            "such as joint.upper rod.length, or use joint.*.length for all",
+        ),
         ("run bounce --set scatter.count=3", 2, "scatter.count: the scene has no [[scatter]]"),
         ("run bounce --set ball.bal.radius=1", 2, "no element 'bal'; did you mean 'ball'?"),
         ("run bounce --set ground.restitution=1", 2, "that is an element: plane.ground.restitution"),
@@ -27,12 +35,16 @@ BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
         ("run bounce --sweep solver.dt=1e-3:1e-2", 2, "a range needs a count: solver.dt=1e-3:1e-2:N"),
         ("run bounce --sweep solver.substeps=1:4", 2, "a range needs a count"),
         ("run bounce --sweep solver.dt=1:2:3:4:5", 2, "a range is LOW:HIGH:N or LOW:HIGH:N:log"),
-        ("run bounce --set ball.ball.velocity.0=3", 2, "set it as a whole, ball.ball.velocity=…"),
+        ("run bounce --set ball.ball.velocity.0=3", 2, "set all of it, ball.ball.velocity=…"),
         # engines
-        ("run bounce --set solver.integrator=rk4", 1, "these could: reference; add --engine reference"),
-        ("play bounce --set solver.integrator=rk4", 1, "these could: reference; add --engine reference"),
-        ("match 8-ball --engine reference", 1, "; add --engine "),
-        ("run bounce --set solver.engine=box2d", 2, "a scene does not choose its engine; the command line does"),
+        (
+            "run bounce --engine pymunk --set solver.integrator=rk4",
+            1,
+            "engines that can: reference; use --engine reference",
+        ),
+        ("play bounce --set solver.integrator=rk4", 1, "engines that can: reference; add --engine reference"),
+        ("match 8-ball --engine reference", 1, "; use --engine "),
+        ("run bounce --set solver.engine=box2d", 2, "the engine is not part of a scene"),
         # values
         ("run bounce --set ball.ball.radius=-1", 2, "ball.ball.radius (set): must be greater than 0, is -1"),
         ("run bounce --set ball.ball.mass=0", 2, "ball.ball.mass (set): must be greater than 0, is 0"),
@@ -41,13 +53,13 @@ BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
         ("run bounce --set solver.substeps=2.5", 2, "must be a whole number, is 2.5"),
         ("run bounce --set ball.ball.position=[1]", 2, "must be an array of 2, has 1"),
         # commands and names
-        ("rum bounce", 2, "no command 'rum'; did you mean 'run'?"),
-        ("bounce", 2, "is a scene; `sandbox run bounce` or `sandbox play bounce`"),
+        ("rum bounce", 2, "unknown command 'rum'; did you mean 'run'?"),
+        ("bounce", 2, "is a scene, not a command; use `sandbox run bounce` or `sandbox play bounce`"),
         ("xyzzy", 2, "commands: run, play, "),
         ("match bounce", 2, "is not a billiard table"),
         ("run bounce --plot x.png --body bal", 2, "no body is named 'bal'; did you mean 'ball'?"),
         ("compare tutorial", 2, "is a folder; name one of its scenes: tutorial/ball, "),
-        ("run .", 2, "is a folder; it holds no scene (*.toml)"),
+        ("run .", 2, "is a folder; it contains no scene (*.toml)"),
     ],
 )
 def test_mistake_is_answered_in_one_line_with_what_would_be_right(
@@ -72,8 +84,8 @@ def test_mistake_is_answered_in_one_line_with_what_would_be_right(
             ":2: pinball.wall[0].points[1]",
             "an array of 2 or 3, is",
         ),
-        (SLINGSHOT, ":3: pinball.slingshot[0].points", "a slingshot has 3 corners"),
-        ('[solver]\nengine = "box2d"\n' + BALL, ":2: solver.engine", "the command line does, by --engine NAME"),
+        (SLINGSHOT, ":3: pinball.slingshot[0].points", "must be 3 corners"),
+        ('[solver]\nengine = "box2d"\n' + BALL, ":2: solver.engine", "choose it with --engine NAME"),
         ("dt = 0.1\n" + BALL, ":1: dt", "did you mean solver.dt?"),
         ("[world]\nsubsteps = 2\n" + BALL, ":2: world.substeps", "did you mean solver.substeps?"),
     ],
@@ -152,6 +164,6 @@ def test_folder_of_many_runs_names_three_and_where_all_are_listed(
         (tmp_path / f"{k:032x}.npz").touch()
     status, _, (line,) = lines_of(capfd, "export", str(tmp_path), "--to", "x.gif")
     assert status == 2
-    assert "holds 500 runs; name one, such as " in line
+    assert "contains 500 runs; name one: " in line
     assert line.count(str(tmp_path / "0000")) == 3
-    assert f"the table `runs` of {tmp_path / 'runs.sqlite'} lists all 500" in line
+    assert f"the table `runs` of {tmp_path / 'runs.sqlite'} lists all" in line

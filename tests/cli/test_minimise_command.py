@@ -8,7 +8,7 @@ from calling import document_of, json_of, lines_of, written
 from sandbox.cli import minimising
 from sandbox.cli.main import call
 from sandbox.measure.compare.minimise import Minimised, minimise
-from sandbox.scene.file import load
+from sandbox.scene.files.load import load
 
 TUNNEL = """
 title = "Tunnel"
@@ -48,14 +48,14 @@ def test_the_smallest_scene_is_written_here_and_told(tmp_path: Path, capfd: pyte
     scene = written(folder, TUNNEL, "tunnel.toml")
     status, out, err = lines_of(capfd, "compare", scene, *CHOICE)
     assert (status, err) == (0, [])
-    assert out[-3].startswith("minimised: 4 bodies to 1, 2 fixed things to 1, in ")
-    parts = 'pymunk and exact differ by more than 0.0001 m from 0.01 s on, "bullet" first'
+    assert out[-3].startswith("minimised: 4 bodies to 1, 2 fixed objects to 1, in ")
+    parts = 'pymunk and exact differ by more than 0.0001 m from t = 0.01 s on, "bullet" first'
     assert out[-2:] == [parts, "written: tunnel.min.toml"]
     text = Path("tunnel.min.toml").read_text(encoding="utf-8")
     assert text.splitlines()[:3] == [
         f"# {parts}.",
-        "# Minimised: 4 bodies to 1, 2 fixed things to 1, of tunnel.toml.",
-        "# See: sandbox compare tunnel.min.toml --engines pymunk,exact --tolerance 0.0001",
+        "# Minimised: 4 bodies to 1, 2 fixed objects to 1, from tunnel.toml.",
+        "# Reproduce: sandbox compare tunnel.min.toml --engines pymunk,exact --tolerance 0.0001",
     ]
     least = load("tunnel.min.toml")
     assert (least.title, least.bodies.names, least.fixed_names) == ("Tunnel, minimised", ("bullet",), ("thin",))
@@ -106,10 +106,10 @@ def test_what_cannot_be_written_is_refused_before_the_runs(tmp_path: Path, capfd
     scene = written(tmp_path, TUNNEL, "tunnel.toml")
     Path("old.toml").write_text("kept", encoding="utf-8")
     for file, reason in (
-        ("old.toml", "exists; --force replaces it"),
+        ("old.toml", "exists already; add --force"),
         ("tunnel.toml", "is the scene itself"),
         (".", "is a folder"),
-        ("nowhere/small.toml", "there is no such folder"),
+        ("nowhere/small.toml", "no such folder"),
     ):
         status, out, err = lines_of(capfd, "compare", scene, *CHOICE, file)
         assert (status, out, len(err)) == (2, [], 1)
@@ -140,5 +140,5 @@ def test_interrupted_it_writes_what_it_has(
     out, err = capfd.readouterr()
     assert status == 130
     assert document_of(out)["minimised"]["error"] == "interrupted"
-    assert err.splitlines()[-1] == "interrupted: there may be a smaller one"
+    assert err.splitlines()[-1] == "interrupted: a smaller scene may exist"
     assert len(load("tunnel.min.toml").bodies) < 4

@@ -39,7 +39,7 @@ def test_document_has_a_row_an_engine_integrator_and_step(capfd: pytest.CaptureF
 def test_table_tells_the_truth_and_by_how_much_each_misses(capfd: pytest.CaptureFixture[str], air: str) -> None:
     status, out, _ = lines_of(capfd, "miss", air, "--dt", "0.1", "--angle", "30", "--speed", "40")
     assert status == 0
-    assert f"exactly {1600.0 * math.sin(math.radians(60.0)) / 9.81:.4f} m" in out[0]
+    assert f"exact range {1600.0 * math.sin(math.radians(60.0)) / 9.81:.4f} m" in out[0]
     exact = next(line for line in out if line.startswith("exact"))
     assert "less than 1 nm" in exact
     euler = next(line for line in out if "explicit_euler" in line)

@@ -15,7 +15,7 @@ from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
 from sandbox.play.stage import Stage
 from sandbox.recording import Recording
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 SCENE = loads(DROP)
 KICK = Impulse(time=0.1, body="a", impulse=(1.0, 0.0))

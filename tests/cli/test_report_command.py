@@ -9,7 +9,7 @@ from sandbox.cli import report as module
 from sandbox.cli.main import call
 from sandbox.measure.compare import Comparison, compare
 from sandbox.measure.recorder import TooLargeError
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 ONLY = ("--engine", "pymunk")
 
@@ -52,10 +52,10 @@ def test_interrupt_keeps_what_is_finished(
 
     monkeypatch.setattr(module, "compare", once)
     status, document, err = json_of(capfd, "report", *scenes(tmp_path), "--out", str(tmp_path / "a.html"))
-    assert (status, len(document["scenes"])) == (130, 1)
-    assert err[-1] == "interrupted: 1 of 2 scenes are finished and kept"
+    assert (status, len(document["scenes"]), document["interrupted"]) == (130, 1, True)
+    assert err[-1] == "interrupted: 1 of 2 scenes are complete and kept"
     text = (tmp_path / "a.html").read_text(encoding="utf-8")
-    assert "Interrupted: 1 of 2 scenes are here." in text
+    assert "Interrupted: the page has 1 of 2 scenes." in text
     assert text.count('<figure class="replay"') == 1
 
 
@@ -70,6 +70,7 @@ def test_scene_that_fails_is_told_and_the_rest_goes_on(
     monkeypatch.setattr(module, "compare", some)
     status, document, err = json_of(capfd, "report", *scenes(tmp_path), "--out", str(tmp_path / "a.html"), "--quiet")
     assert (status, [each["status"] for each in document["scenes"]]) == (1, ["failed", "ok"])
+    assert document["interrupted"] is False
     assert err == [f"{tmp_path / 'First.toml'}: too <large>"]
     text = (tmp_path / "a.html").read_text(encoding="utf-8")
     assert "too &lt;large&gt;" in text
@@ -100,7 +101,7 @@ def test_out_is_asked_for(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> 
 def test_bound_without_end_is_a_fault(tmp_path: Path, capfd: pytest.CaptureFixture[str], flag: str) -> None:
     status, _, err = lines_of(capfd, "report", *scenes(tmp_path), flag, "inf", "--out", str(tmp_path / "r.html"))
     named = flag.replace("patience", "time-limit")
-    assert (status, err) == (2, [f"{named}: is inf; it is finite"])
+    assert (status, err) == (2, [f"{named}: is inf; it must be finite"])
 
 
 def test_what_a_comparison_found_right_is_an_answer_of_its_tradeoff(

@@ -10,9 +10,13 @@ from sandbox.action import Impulse
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.replay import rerun
 from sandbox.recording import Recording
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 
+PLOT_OF_TWO = (
+    "--plot: draws a single run, but this command makes 2; run one scene on one --engine, without --sweep and --seeds; "
+    "sandbox compare SCENE --out DIR plots several engines"
+)
 KEYS = {
     "id": str,
     "scene": str,
@@ -36,7 +40,8 @@ KEYS = {
 def test_json_has_every_key_with_its_type(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene = written(tmp_path)
     status, document, err = json_of(capfd, "run", scene)
-    assert (status, err, list(document)) == (0, [], ["runs"])
+    assert (status, err, list(document)) == (0, [], ["runs", "interrupted"])
+    assert document["interrupted"] is False
     (row,) = document["runs"]
     assert {key: type(row[key]) for key in KEYS} == KEYS
     assert (row["scene"], row["title"], row["engine"], row["status"]) == (scene, "Drop", "pymunk", "ok")
@@ -65,7 +70,7 @@ def test_without_audit_the_misses_are_unknown(tmp_path: Path, capfd: pytest.Capt
     _, without, _ = json_of(capfd, "run", scene, "--no-audit")
     assert without["runs"][0]["missed_contacts"] is None
     assert without["runs"][0]["final"] == with_audit["runs"][0]["final"]
-    assert lines_of(capfd, "run", scene, "--no-audit")[1][-1].split()[-1] == "?"
+    assert lines_of(capfd, "run", scene, "--no-audit")[1][2].split()[-1] == "?"
 
 
 def test_bullet_that_tunnels_is_counted(capfd: pytest.CaptureFixture[str]) -> None:
@@ -116,10 +121,13 @@ def test_seeds_of_a_scene_without_chance_are_told_to_be_one_run(
     scene, folder = written(tmp_path), tmp_path / "runs"
     words = ("run", scene, "--seeds", "3", "--sweep", "solver.dt=0.01,0.02", "--out", str(folder))
     status, document, err = json_of(capfd, *words)
-    assert (status, err) == (0, [f"{scene}: nothing in it is random: seeds 1 to 3 are one run, made once"])
+    assert (status, err) == (
+        0,
+        [f"{scene}: nothing is random, so the seeds 1 to 3 give one and the same run, which is made once"],
+    )
     assert [(run["settings"]["dt"], run["seed"]) for run in document["runs"]] == [(0.01, 1), (0.02, 1)]
     assert len(list(folder.glob("*.npz"))) == 2
-    told = f"{scene}: nothing in it is random: all seeds are the same run"
+    told = f"{scene}: nothing is random, so all seeds give the same run"
     assert lines_of(capfd, "run", scene, "--sweep", "world.seed=1,2")[2] == [told]
     assert lines_of(capfd, "run", scene, "--seeds", "1")[2] == []
     random = written(tmp_path, DROP + SPARKS, "sparks.toml")
@@ -133,17 +141,19 @@ def test_engines_may_be_listed_and_count_once(tmp_path: Path, capfd: pytest.Capt
 
 def test_refused_run_is_told_with_its_reason(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene = written(tmp_path)
-    status, document, err = json_of(capfd, "run", scene, "--set", "solver.integrator=rk4")
+    status, document, err = json_of(capfd, "run", scene, "--engine", "pymunk", "--set", "solver.integrator=rk4")
     (row,) = document["runs"]
     assert (status, row["status"], row["final"], row["steps"]) == (1, "refused", {}, 0)
-    assert row["reason"].startswith("pymunk refuses: integrator 'rk4' is not a choice it has")
+    assert row["reason"].startswith("pymunk refuses: integrator 'rk4' is not supported")
     unknown = ("energy_start", "energy_end", "steps_per_second", "realtime_factor", "missed_contacts", "path")
     assert [row[key] for key in unknown] == [None] * 6
-    assert err == [f"{scene}: refused: {row['reason']}; add --engine reference"]
+    assert err == [f"{scene}: refused: {row['reason']}; use --engine reference"]
 
 
 def test_one_refused_of_several_runs_leaves_the_others(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    status, document, _ = json_of(capfd, "run", written(tmp_path), "--sweep", "solver.integrator=rk4,explicit_euler")
+    status, document, _ = json_of(
+        capfd, "run", written(tmp_path), "--engine", "pymunk", "--sweep", "solver.integrator=rk4,explicit_euler"
+    )
     assert (status, [row["status"] for row in document["runs"]]) == (1, ["refused", "ok"])
 
 
@@ -188,18 +198,18 @@ def test_fault_of_several_points_of_a_sweep_is_told_once(tmp_path: Path, capfd: 
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (("--engine", "none"), f"--engine: no engine 'none'; engines: {', '.join(ENGINES)}"),
-        (("--engines", "pymunk,"), f"--engine: no engine ''; engines: {', '.join(ENGINES)}"),
+        (("--engine", "none"), f"--engine: unknown engine 'none'; engines: {', '.join(ENGINES)}"),
+        (("--engines", "pymunk,"), f"--engine: unknown engine ''; engines: {', '.join(ENGINES)}"),
         (
             ("--sweep", "solver.dt=1:2:0"),
-            "--sweep: 'solver.dt=1:2:0': a range has finite ends and 1 to 1,000,000 values",
+            "--sweep: 'solver.dt=1:2:0': a range needs finite ends and at least 1 value",
         ),
-        (("--plot", "x.gif"), "--plot: x.gif: the name ends in .png, .svg or .pdf"),
-        (("--plot", "nowhere/x.png"), "--plot: nowhere/x.png: there is no folder nowhere"),
-        (("--plot", "x.png", "--sweep", "solver.dt=0.01,0.02"), "--plot: draws one run, but this makes 2"),
-        (("--plot", "x.png", "--body", "b"), "--body: no body is named 'b'; there are 'a'"),
-        (("--body", "a"), "--body: says what is drawn, but nothing is; give --plot FILE too"),
-        (("--out", "drop.toml"), "--out: drop.toml: is or lies in a file; runs are stored in a folder"),
+        (("--plot", "x.gif"), "--plot: x.gif: the name must end in .png, .svg or .pdf"),
+        (("--plot", "nowhere/x.png"), "--plot: nowhere/x.png: no such folder: nowhere"),
+        (("--plot", "x.png", "--sweep", "solver.dt=0.01,0.02"), PLOT_OF_TWO),
+        (("--plot", "x.png", "--body", "b"), "--body: no body is named 'b'; known names: 'a'"),
+        (("--body", "a"), "--body: works only together with --plot FILE"),
+        (("--out", "drop.toml"), "--out: drop.toml: is a file or inside a file; runs need a folder"),
     ],
 )
 def test_wrong_option_is_one_line_and_nothing_is_written(
@@ -255,7 +265,9 @@ def test_table_has_columns_for_what_differs(tmp_path: Path, capfd: pytest.Captur
     _, out, _ = lines_of(capfd, "run", scene, "--sweep", "solver.iterations=5,10")
     assert out[0] == scene
     assert out[1].split("  ")[0] == "engine"
-    assert " ".join(out[1].split()) == "engine dt iterations status × real time energy, J contacts missed"
+    assert (
+        " ".join(out[1].split()) == "engine dt iterations status × real time energy, J first contact, s contacts missed"
+    )
     assert [line.split()[2] for line in out[2:]] == ["5", "10"]
 
 
@@ -290,7 +302,9 @@ def test_plot_is_drawn_and_said(tmp_path: Path, capfd: pytest.CaptureFixture[str
 def test_plot_that_cannot_be_written_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     plot = tmp_path / ("x" * 300 + ".svg")  # longer than any file's name may be
     status, _, err = lines_of(capfd, "run", written(tmp_path), "--plot", str(plot))
-    assert (status, err) == (2, [f"--plot: {plot}: File name too long"])
+    assert (status, len(err)) == (2, 1)
+    assert err[0].startswith(f"--plot: {tmp_path}")
+    assert err[0].endswith("x.svg: File name too long")
 
 
 def test_plot_is_refused_where_there_is_a_folder(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -329,8 +343,8 @@ def test_session_that_ends_elsewhere_is_one_line_and_status_1(
     session = str(replace(recorded(), state_hash="00ff").save(tmp_path / "session.json"))
     status, _, err = lines_of(capfd, "run", session)
     assert (status, len(err)) == (1, 1)
-    assert err[0].startswith(f"{session}: ended in another state")
-    assert "other versions" in err[0]
+    assert err[0].startswith(f"{session}: ended in a different state")
+    assert "another version" in err[0]
     status, document, _ = json_of(capfd, "run", session)
     assert (status, document["runs"][0]["replayed"]) == (1, False)
 
@@ -360,3 +374,51 @@ def test_table_shows_substeps_beside_dt(tmp_path: Path, capfd: pytest.CaptureFix
     assert out[2].split()[1:4] == ["0.01", "×", "4"]
     _, out, _ = lines_of(capfd, "run", written(tmp_path))
     assert out[1].split()[:3] == ["engine", "dt", "status"]
+
+
+def test_verbose_explains_every_column(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    swept = ("--sweep", "solver.iterations=5,10", "--sweep", "ball.a.restitution=0.1,0.9")
+    for words in (("run", *swept), ("compare",), ("tradeoff", "--points", "2", "--tolerance", "1")):
+        command, *options = words
+        status, out, err = lines_of(capfd, command, written(tmp_path), *options, "--verbose")
+        assert (status, err) == (0, [])
+        row = next(k for k, line in enumerate(out) if line.startswith("engine "))
+        explained = {line[2:].partition("  ")[0] for line in out[row + 1 :] if line.startswith("  ")}
+        left = out[row]
+        for head in sorted(explained, key=len, reverse=True):
+            left = left.replace(head, "", 1)
+        assert left.split() == []
+
+
+def test_missed_contact_of_a_single_run_is_named(capfd: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = lines_of(capfd, "run", "bullet")
+    assert out[-1] == "missed: contact of 'bullet' with 'wall' at 0.009 s"
+    _, out, _ = lines_of(capfd, "run", "bullet", "--sweep", "solver.dt=0.0005,0.001")
+    assert not any(line.startswith("missed:") for line in out)
+    _, document, _ = json_of(capfd, "run", "bullet")
+    assert document["runs"][0]["missed_contacts"] == 1
+
+
+def test_more_missed_contacts_than_are_named_are_counted(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    bullets = "[world]\nduration = 0.02\n[solver]\ndt = 0.01\n[[wall]]\npoints = [[1.25, -1], [1.25, 9]]\n"
+    bullets += "".join(f"[[ball]]\nposition = [0, {k}]\nvelocity = [100, 0]\nradius = 0.1\n" for k in range(5))
+    _, out, _ = lines_of(capfd, "run", written(tmp_path, bullets))
+    missed = [line for line in out if line.startswith("missed: ")]
+    assert (len(missed), missed[-1]) == (4, "missed: and 2 more")
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_key_that_is_set_and_swept_is_refused(command: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path)
+    status, _, err = lines_of(capfd, command, scene, "--set", "solver.dt=0.1", "--sweep", "solver.dt=0.1,0.2")
+    assert status == 2
+    assert err == ["--sweep: solver.dt: is given by --set too; leave out one of them"]
+
+
+def test_stored_run_is_no_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "0123456789abcdef0123.npz"
+    file.write_bytes(b"PK")
+    status, _, (line,) = lines_of(capfd, "run", str(file))
+    assert status == 2
+    assert "is a stored run" in line
+    assert "sandbox export" in line

@@ -3,16 +3,24 @@
 import os
 import re
 import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
+from time import monotonic, sleep
+from typing import Any, NoReturn
 
 import pytest
 from calling import DROP, SPARKS, document_of, json_of, lines_of, written
-from interruptible import interrupted
+from interruptible import interrupted, interruptible
 
-from sandbox.batch.crew import CrewError, Making, Worker
-from sandbox.batch.plan import plan
+from sandbox.batch import crew
+from sandbox.batch.crew import ATTEMPTS, Making
+from sandbox.batch.outcome import Outcome, execute
+from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError
-from sandbox.scene.faults import Fault, SceneError
+from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
 
 TIMES = ("seconds", "steps_per_second", "realtime_factor")
@@ -48,7 +56,7 @@ def test_interrupt_ends_workers_and_keeps_what_is_finished(tmp_path: Path) -> No
     words = ["run", scene, "--seeds", "500", "--workers", "2", "--json", "--out", str(folder)]
     status, out, err = interrupted(words, lambda: len(list(folder.glob("*.npz"))) >= 3)
     assert status == 130, err
-    told = re.fullmatch(r"interrupted: (\d+) of 500 runs are finished and kept\n", err)
+    told = re.fullmatch(r"interrupted: (\d+) of 500 runs are complete and kept\n", err)
     assert told is not None, err  # as of a traceback
     runs = document_of(out)["runs"]
     assert len(runs) == int(told[1]) < 500
@@ -59,29 +67,225 @@ def test_interrupt_ends_workers_and_keeps_what_is_finished(tmp_path: Path) -> No
     assert {path.name for path in folder.iterdir()} == {"runs.sqlite", *(row.path for row in rows)}
 
 
-def test_worker_that_dies_is_told(tmp_path: Path) -> None:
-    job, *_ = plan([("drop", written(tmp_path, DROP.replace("duration = 0.5", "duration = 2000.0")))], ["pymunk"])
-    worker = Worker(Making())
+def pid_file(folder: Path) -> Path:
+    return folder / "pids"
+
+
+def die(job: Job, store: Store | None, *_: object) -> NoReturn:
+    """In place of `execute`, die of a signal, and write down that this was tried."""
+    with pid_file(Path(job.label).parent).open("a") as stream:
+        stream.write(f"{os.getpid()}\n")
+    os.kill(os.getpid(), signal.SIGSEGV if job.scene.world.seed == 2 else signal.SIGKILL)
+    raise AssertionError("still alive")
+
+
+def die_of_one(job: Job, *more: Any) -> Outcome:
+    """In place of `execute`, die of seed 2 alone."""
+    return die(job, *more) if job.scene.world.seed == 2 else execute(job, *more)
+
+
+def die_once(job: Job, *more: Any) -> Outcome:
+    """In place of `execute`, die at the first attempt alone."""
+    return execute(job, *more) if pid_file(Path(job.label).parent).exists() else die(job, *more)
+
+
+def fail_of_one(job: Job, *more: Any) -> Outcome:
+    """In place of `execute`, meet a fault of the program with seed 2."""
+    if job.scene.world.seed == 2:
+        raise ZeroDivisionError("here")
+    return execute(job, *more)
+
+
+def run_out_of_memory(job: Job, *more: Any) -> Outcome:
+    """In place of `execute`."""
+    raise MemoryError
+
+
+@pytest.fixture
+def replaced(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., Outcome]], None]:
+    """Have workers run a function in place of `execute`."""
+
+    def replace(function: Callable[..., Outcome]) -> None:
+        # A worker imports what it serves by, from wherever that is: this folder is on its path.
+        monkeypatch.setattr(crew, "_serve", partial(serve_with, function))
+
+    return replace
+
+
+def serve_with(function: Callable[..., Outcome], pipe: Any, making: Making) -> None:
+    crew.execute = function  # type: ignore[assignment]
+    ORIGINAL_SERVE(pipe, making)
+
+
+ORIGINAL_SERVE = crew._serve
+
+
+def test_run_whose_worker_is_killed_is_made_again(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], replaced: Callable[[Callable[..., Outcome]], None]
+) -> None:
+    replaced(die_once)
+    words = ("run", written(tmp_path, DROP + SPARKS), "--seeds", "4", "--workers", "2")
+    status, document, err = json_of(capfd, *words)
+    assert (status, err) == (0, [])
+    assert [run["status"] for run in document["runs"]] == ["ok"] * 4
+    assert pid_file(tmp_path).exists()
+
+
+@pytest.mark.slow
+def test_run_that_kills_every_worker_fails_and_the_others_go_on(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], replaced: Callable[[Callable[..., Outcome]], None]
+) -> None:
+    replaced(die_of_one)
+    scene, folder = written(tmp_path, DROP + SPARKS), tmp_path / "runs"
+    words = ("run", scene, "--seeds", "4", "--workers", "2", "--out", str(folder))
+    status, document, err = json_of(capfd, *words)
+    assert status == 1
+    assert [run["status"] for run in document["runs"]] == ["ok", "failed", "ok", "ok"]
+    assert len(pid_file(tmp_path).read_text().split()) == ATTEMPTS
+    assert "SIGSEGV" in err[0]
+    assert f"{ATTEMPTS} attempts" in err[0]
+    with Store(folder) as store:
+        assert sorted(row.status for row in store.rows()) == ["failed", "ok", "ok", "ok"]
+    # It is not finished, and is made by the next call.
+    replaced(execute)
+    status, document, _ = json_of(capfd, *words)
+    assert status == 0
+    assert [run["repeated"] for run in document["runs"]] == [True, False, True, True]
+    with Store(folder) as store:
+        assert [row.status for row in store.rows()] == ["ok"] * 4
+
+
+@pytest.mark.parametrize(
+    ("function", "phrase"), [(fail_of_one, "ZeroDivisionError"), (run_out_of_memory, "out of memory")]
+)
+def test_fault_of_the_program_in_a_worker_names_its_run_and_the_others_go_on(
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    replaced: Callable[[Callable[..., Outcome]], None],
+    function: Callable[..., Outcome],
+    phrase: str,
+) -> None:
+    replaced(function)
+    scene = written(tmp_path, DROP + SPARKS)
+    status, document, err = json_of(capfd, "run", scene, "--seeds", "3", "--workers", "2")
+    assert status == 1
+    assert document["runs"][1]["status"] == "failed"
+    assert len(document["runs"]) == 3
+    told = [line for line in err if phrase in line]
+    assert told and all(line.startswith(f"{scene}: failed: ") for line in told)
+
+
+@pytest.mark.slow
+def test_workers_that_cannot_start_are_told_and_not_started_for_ever(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(crew, "_serve", end_at_once)
+    status, document, err = json_of(capfd, "run", written(tmp_path, DROP + SPARKS), "--seeds", "3", "--workers", "2")
+    assert (status, document["runs"]) == (1, [])
+    assert "no worker process could be started" in err[-1]
+    assert "status 3" in err[-1]
+
+
+def end_at_once(pipe: object, making: object) -> NoReturn:
+    os._exit(3)
+
+
+def children(pid: int) -> list[int]:
+    """Return the processes that a process has started, but for the tracker of multiprocessing."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+            words = (folder / "cmdline").read_text()
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if parent == pid and "spawn_main" in words:
+            found.append(int(folder.name))
+    return found
+
+
+def is_alive(pid: int) -> bool:
     try:
-        worker.hand(0, job)
-        assert worker.process.pid is not None
-        os.kill(worker.process.pid, signal.SIGKILL)
-        with pytest.raises(CrewError, match="ended with status -9"):
-            worker.answer()
-    finally:
-        worker.dismiss()
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
 
 
-def test_what_cannot_be_made_ends_the_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+@contextmanager
+def at_work(tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", list[int]]]:
+    """A command whose three workers are in the middle of long runs."""
+    long = DROP.replace("duration = 0.5", "duration = 20_000.0") + SPARKS + "[solver]\nrecord_every = 1000\n"
+    folder = tmp_path / "runs"
+    words = interruptible("run", written(tmp_path, long), "--seeds", "9", "--workers", "3", "--out", str(folder))
+    pipe = subprocess.PIPE
+    with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True) as command:
+        pids: list[int] = []
+        try:
+            wait_until(lambda: len(children(command.pid)) == 3)
+            pids = children(command.pid)
+            # A worker is in a session of its own once it serves.
+            wait_until(lambda: all(os.getsid(pid) == pid for pid in pids))
+            yield command, pids
+        finally:
+            for pid in (command.pid, *pids):
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+
+
+def wait_until(ready: Callable[[], bool]) -> None:
+    until = monotonic() + 120.0
+    while not ready():
+        assert monotonic() < until
+        sleep(0.02)
+
+
+@pytest.mark.slow
+def test_interrupt_ends_workers_that_are_stopped(tmp_path: Path) -> None:
+    with at_work(tmp_path) as (command, pids):
+        for pid in pids:
+            os.kill(pid, signal.SIGSTOP)
+        command.send_signal(signal.SIGINT)
+        _, err = command.communicate(timeout=120)
+        assert command.returncode == 130, err
+        assert err.startswith("interrupted: 0 of 9")
+        assert not any(map(is_alive, pids))
+    assert {path.name for path in (tmp_path / "runs").iterdir()} == {"runs.sqlite"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_workers_end_with_their_parent_in_the_middle_of_a_run(tmp_path: Path, number: signal.Signals) -> None:
+    with at_work(tmp_path) as (command, pids):
+        command.send_signal(number)
+        command.communicate(timeout=120)
+        wait_until(lambda: not any(map(is_alive, pids)))
+
+
+@pytest.mark.slow
+def test_damaged_run_is_reported_and_made_again_by_a_worker(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene, folder = written(tmp_path), tmp_path / "runs"
     _, document, _ = json_of(capfd, "run", scene, "--out", str(folder))
-    Path(document["runs"][0]["path"]).write_bytes(b"no arrays")
-    status, _, err = lines_of(capfd, "run", scene, "--out", str(folder), "--seeds", "2", "--workers", "2", "--quiet")
-    assert status == 0, err  # seeds 1 and 2 are other runs than that of seed 0
+    path = Path(document["runs"][0]["path"])
+    path.write_bytes(b"no arrays")
+    words = ("run", scene, "--out", str(folder), "--sweep", "world.seed=0,7", "--workers", "2")
+    status, found, err = json_of(capfd, *words)
+    assert (status, [row["repeated"] for row in found["runs"]]) == (0, [False, False])
+    (told,) = [line for line in err if "random" not in line]
+    assert told.startswith(f"{path} is not a stored run: ")
+    status, found, _ = json_of(capfd, *words)
+    assert (status, [row["repeated"] for row in found["runs"]]) == (0, [True, True])
+
+
+def test_what_cannot_be_stored_ends_the_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene, folder = written(tmp_path), tmp_path / "runs"
+    _, document, _ = json_of(capfd, "run", scene, "--out", str(folder))
+    path = Path(document["runs"][0]["path"])
+    path.unlink()
+    path.mkdir()
     words = ("--sweep", "world.seed=0,7", "--workers", "2", "--quiet")
     status, _, err = lines_of(capfd, "run", scene, "--out", str(folder), *words)
     assert status == 2
-    assert "remove the file, and the run is made again" in err[-1]
+    assert "Is a directory" in err[-1]
 
 
 @pytest.mark.parametrize("error", [StoreError("a: b"), SceneError([Fault("a.toml", 3, "ball.a", "is none")])])

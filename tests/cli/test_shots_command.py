@@ -14,7 +14,7 @@ from sandbox.measure.run import run
 from sandbox.measure.shots.attempt import Attempt, attempt_of
 from sandbox.measure.shots.spread import Spread
 from sandbox.measure.shots.study import study
-from sandbox.scene.file import load, loads
+from sandbox.scene.files.load import load, loads
 from sandbox.trajectory import Trajectory
 
 POT = """
@@ -124,19 +124,21 @@ def test_table_has_a_line_a_ball_and_sentences_below(scene: str, capfd: pytest.C
     status, out, err = lines_of(capfd, "shots", scene, *FEW, *asked, "--side-error", "0.01")
     assert (status, err) == (0, [])
     assert out[0] == f"{scene}: Pot"
-    assert out[1] == "stun: 'cue' struck at 3 m/s towards 0 rad"
-    spread = "aim ± 2 mrad, speed ± 3 %, tip ± (0.01, 0) R (one standard deviation), seed 5"
-    assert out[2] == f"400 strokes, {spread}"
-    assert out[3].split()[:4] == ["ball", "falls", "95", "%"]
+    assert out[1] == "stun: 'cue' struck at 3 m/s at an aim of 0 rad"
+    spread = "aim ± 2 mrad, speed ± 3 %, tip ± (0.01, 0) R (standard deviations), seed 5"
+    assert out[2] == f"400 shots, {spread}"
+    assert out[3].split()[:4] == ["ball", "pocketed", "95", "%"]
     assert re.match(r"8:ball +\d+\.\d % +\d+\.\d–\d+\.\d % +far \[left\] \d+\.\d %", out[5])
-    assert re.match(r"something else falls and 'cue' does not: \d+\.\d %", out[7])
+    assert re.match(r"another ball is pocketed and 'cue' is not: \d+\.\d %", out[7])
     assert out[9].split()[:2] == ["ball", "d/d(aim),"]
-    assert "falls" in out[11]
+    assert "pocketed" in out[11]
     text = "\n".join(out[13:])
-    assert re.search(r"^'8:ball' into 'far \[left\]': for aim in \[-0\.00\d+, 0\.00\d+\] rad, ± \d", text, re.MULTILINE)
-    assert "the shot's aim is within" in text
-    assert "nudged by 0.0001 rad of aim: " in text
-    assert "foretold within 1 mm, by how well aim is known, rad: 1e-02: " in text
+    assert re.search(
+        r"^'8:ball' into 'far \[left\]': for an aim in \[-0\.00\d+, 0\.00\d+\] rad, ± \d", text, re.MULTILINE
+    )
+    assert "the aim of the shot is within" in text
+    assert "perturbed by 0.0001 rad in aim: " in text
+    assert "predictable to 1 mm, by the accuracy of the aim in rad: 1e-02: " in text
 
 
 def test_another_shot_is_asked_for_by_its_name(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
@@ -165,18 +167,18 @@ def test_quiet_prints_nothing(scene: str, capfd: pytest.CaptureFixture[str]) -> 
 def test_a_window_that_is_not_there_is_status_1(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
     status, out, err = lines_of(capfd, "shots", scene, *FEW, "--window", "bystander:far [left]")
     assert (status, err) == (1, [])
-    assert out[-1] == "'bystander' into 'far [left]': never, for aim within 0.1 rad of 0"
+    assert out[-1] == "'bystander' into 'far [left]': for no aim within 0.1 rad of 0"
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--window", "9:far [left]"), "--window: no ball is named '9'; there are: cue, 8:ball, bystander"),
-        (("--window", "cue:near"), "--window: no pocket is named 'near'; there are: far [left]"),
+        (("--window", "9:far [left]"), "--window: no ball is named '9'; known names: cue, 8:ball, bystander"),
+        (("--window", "cue:near"), "--window: no pocket is named 'near'; known names: far [left]"),
         (("--window", "cue"), "--window: 'cue' is not BALL:POCKET"),
-        (("--shot", "draw"), "no shot is named 'draw'; there are: stun, soft"),
-        (("--aim-error", "nan"), "aim = nan is no spread; it is 0 or more, and finite"),
-        (("--nudge", "nan"), "--nudge: is no number; it is positive and finite"),
+        (("--shot", "draw"), "no shot is named 'draw'; known names: stun, soft"),
+        (("--aim-error", "nan"), "aim = nan is not a standard deviation; it must be 0 or more, and finite"),
+        (("--nudge", "nan"), "--nudge: is not a number; it must be positive and finite"),
     ],
 )
 def test_what_is_typed_wrongly_is_a_line_and_status_2(
@@ -229,7 +231,7 @@ def test_an_interrupt_keeps_what_was_played(
     out, err = capfd.readouterr()
     document = document_of(out)
     assert status == 130
-    assert err == "interrupted: 1,024 of 3,000 shots are played and counted\n"
+    assert err == "interrupted: 1,024 of 3,000 shots were played and are counted\n"
     assert (document["odds"]["count"], document["odds"]["interrupted"], document["horizon"]) == (1024, True, None)
 
 
@@ -240,7 +242,7 @@ def test_a_folder_that_cannot_be_made_is_told_before_anything_is_played(
     file.write_text("", encoding="utf-8")
     status, out, err = lines_of(capfd, "shots", scene, "--out", str(file))
     assert (status, out) == (2, [])
-    assert err == [f"--out: {file}: is no folder"]
+    assert err == [f"--out: {file}: is not a folder"]
 
 
 def test_help_is_a_screen() -> None:

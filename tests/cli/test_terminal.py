@@ -46,10 +46,11 @@ def test_table_of_many_columns_loses_none_of_them(tmp_path: Path) -> None:
     out = shown("run", name, *(word for sweep in sweeps for word in ("--sweep", sweep)), cwd=tmp_path)
     assert out[0] == name
     assert " ".join(out[1].split()) == (
-        "engine dt iterations persistence half_kick status × real time energy, J first contact, s contacts missed"
+        "engine dt iterations persistence half_kick status × real time energy, J first contact, s "
+        "final position, m contacts missed"
     )
     assert len([line for line in out if line.startswith("pymunk")]) == 16
-    assert "missed: contacts that the engine passed over" in " ".join(out[18:])
+    assert "missed: contacts that the engine missed" in " ".join(out[18:])
     assert not any("…" in line for line in out)
 
 
@@ -64,4 +65,6 @@ def test_warnings_are_folded_between_words(tmp_path: Path) -> None:
     assert max(map(len, out)) <= 80
     at = next(k for k, line in enumerate(out) if line.startswith("  warning: "))
     folded = " ".join(line.strip() for line in out[at:])
-    assert folded.endswith("0.1 m a substep, and pass through unseen: odds up to 80 %; dt <= 0.0002 s would be safe")
+    assert folded.endswith(
+        "0.1 m per substep, and tunnel through it undetected: odds up to 80 %; dt <= 0.0002 s is safe"
+    )

@@ -1,6 +1,7 @@
 """`sandbox tradeoff`: what it prints, its JSON, what it writes, its exit status."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +11,29 @@ from calling import DROP, FAULTY, document_of, json_of, lines_of, written
 import sandbox
 from sandbox.cli import tradeoff as module
 from sandbox.cli.main import call
+from sandbox.cli.tradeoff_table import print_tradeoff
+from sandbox.measure.compare.truth import truth_of
 from sandbox.measure.tradeoff.trial import Trial, tried
 from sandbox.measure.tradeoff.weighed import Tradeoff
-from sandbox.scene import rewrite
+from sandbox.scene.files import toml_edit as rewrite
 
 FEW = ("--engine", "pymunk", "--points", "6", "--repeats", "1")
 """Enough for an answer, and quick."""
 COMMENTED = DROP.replace(
     "[[plane]]", "[solver]  # mine\ndt = 0.02  # coarse\nsubsteps = 1\n\n# below it all\n[[plane]]", 1
 )
+BULLET = """
+world = { duration = 0.2 }
+solver = { dt = 0.01 }
+wall = [{ name = "wall", points = [[1.0, -1.0], [1.0, 1.0]], thickness = 0.01 }]
+
+[[ball]]
+name = "bullet"
+position = [0.0, 0.0]
+velocity = [20.0, 0.0]
+radius = 0.02
+restitution = 1.0
+"""
 
 
 def test_json_is_as_promised_to_the_letter(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -40,7 +55,7 @@ def test_table_has_the_front_and_the_answers(tmp_path: Path, capfd: pytest.Captu
     scene = written(tmp_path)
     status, out, err = lines_of(capfd, "tradeoff", scene, *FEW, "--tolerance", "0.01", "--budget", "4")
     assert (status, err) == (0, [])
-    assert out[0].startswith(f"{scene} (Drop): errors are max_position (largest distance from the truth), because ")
+    assert out[0].startswith(f"{scene} (Drop): error metric: max_position (largest distance from the truth), because ")
     assert "closed form" in out[0]
     assert re.fullmatch("[456] settings tried", out[1])
     assert out[2].split()[:4] == ["engine", "dt", "substeps", "iterations"]
@@ -49,9 +64,50 @@ def test_table_has_the_front_and_the_answers(tmp_path: Path, capfd: pytest.Captu
     assert any("cheapest" in row for row in rows)
     answers = [line for line in out if line.startswith(("cheapest setting", "most accurate setting"))]
     assert answers[0].startswith("cheapest setting with max_position within 10 mm: pymunk with substeps = ")
-    assert answers[1].startswith("most accurate setting within 4 ms a frame, at 60 frames a second: pymunk")
+    assert answers[1].startswith("most accurate setting within 4 ms per frame at 60 fps: pymunk")
     assert "    [solver]" in out
     assert any(line.startswith("    space.iterations = ") for line in out)
+
+
+def test_notes_name_what_can_go_wrong_with_a_recommended_setting(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene = written(tmp_path, BULLET)
+    own = ("--engine", "pymunk", "--effort", "0.05", "--repeats", "1", "--metric", "missed_contacts", "--budget", "100")
+    status, out, err = lines_of(capfd, "tradeoff", scene, *own)
+    assert (status, err) == (0, [])
+    (k,) = [k for k, line in enumerate(out) if line.startswith("cheapest setting with missed_contacts")]
+    assert re.search(r"ms per frame of the budget of 100 ms$", out[k])
+    notes = [line for line in out[k:] if line.startswith("note: pymunk with ")]
+    (note, *_) = [line for line in notes if "'bullet' can approach 'wall'" in line]
+    assert "substeps >= 8 prevents tunnelling" in note
+    assert len(notes) == len(set(notes))
+
+
+def test_rows_whose_step_is_longer_than_a_frame_are_marked(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = written(tmp_path, BULLET)
+    own = ("tradeoff", scene, "--engine", "pymunk", "--effort", "0.05", "--repeats", "1", "--tolerance", "100")
+    _, out, _ = lines_of(capfd, *own)
+    rows = [line.split() for line in out if line.startswith("pymunk ")]
+    long = [row for row in rows if float(row[1]) > 1.01 / 60.0]
+    assert long
+    assert [row for row in rows if ">frame" in row] == long
+    assert all("cheapest" not in row for row in long)
+    (legend,) = [line for line in out if line.startswith(">frame: ")]
+    assert "longer than a frame at 60 fps" in legend
+    _, out, _ = lines_of(capfd, *own, "--fps", "10")
+    assert not [line for line in out if ">frame" in line]
+
+
+def test_error_that_is_split_into_parts_is_named(capfd: pytest.CaptureFixture[str]) -> None:
+    scene = sandbox.loads(BULLET)
+    truth = truth_of(scene, scene.solver, 1e-4)
+    assert truth is not None
+    more: dict[str, Any] = {"metric": "missed_contacts", "most": 2, "repeats": 1}
+    for until, label in ((0.2, ""), (0.15, ", while the truth is trusted (0.15 s)")):
+        found = sandbox.tradeoff(scene, ("pymunk",), truth=replace(truth, trusted_until=until), **more)
+        print_tradeoff("bullet", found)
+        assert f"position error of pymunk with the settings of the scene{label}: " in capfd.readouterr().out
 
 
 def test_quiet_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -64,7 +120,7 @@ def test_nothing_within_the_tolerance_is_status_1(tmp_path: Path, capfd: pytest.
     before = Path(scene).read_bytes()
     status, out, err = lines_of(capfd, "tradeoff", scene, *FEW, "--tolerance", "1e-9", "--write")
     assert (status, err) == (1, [])
-    assert any(re.search("none of the . that were tried; the nearest is pymunk with ", line) for line in out)
+    assert any(re.search("none of the . settings tried; the nearest is pymunk with ", line) for line in out)
     assert out[-1].startswith("not written")
     assert Path(scene).read_bytes() == before
 
@@ -125,7 +181,7 @@ def test_write_keeps_comments_and_the_file_meets_the_tolerance(
 def test_write_says_which_engine_it_is_for(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene = written(tmp_path)
     _, out, _ = lines_of(capfd, "tradeoff", scene, "--engine", "exact", "--points", "1", "--repeats", "1", "--write")
-    assert out[-2:] == [f"{scene}: has the recommended [solver] already", "run it with --engine exact"]
+    assert out[-2:] == [f"{scene}: already has the recommended [solver]", "run it with --engine exact"]
 
 
 def faults_of(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: str) -> list[str]:
@@ -146,9 +202,9 @@ def test_faults_are_a_line_each_and_all_at_once(
     scene = written(tmp_path, FAULTY)
     err = faults_of(capfd, monkeypatch, scene, "--engine", "pymunk,unity", "--metric", "beauty", "--tolerance", "0")
     assert len(err) == 5
-    assert err[0].startswith("--engine: no engine 'unity'")
-    assert err[1].startswith("--metric: no metric 'beauty'; metrics: max_position, ")
-    assert err[2] == "--tolerance: a tolerance of 0; it is positive and finite"
+    assert err[0].startswith("--engine: unknown engine 'unity'")
+    assert err[1].startswith("--metric: unknown metric 'beauty'; metrics: max_position, ")
+    assert err[2] == "--tolerance: the tolerance is 0; it must be positive and finite"
     assert err[3].startswith(f"{scene}:3: ball.a.position")
     assert err[4].startswith(f"{scene}:4: ball.a.radius")
 
@@ -186,7 +242,7 @@ def test_write_with_set_is_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (line,) = faults_of(capfd, monkeypatch, written(tmp_path), "--set", "world.duration=0.1", "--write")
-    assert line.startswith("--write: the file lacks what --set changes")
+    assert line.startswith("--write: cannot be combined with --set")
 
 
 def test_write_into_the_installed_package_is_refused_at_once(
@@ -264,7 +320,7 @@ def test_interrupt_before_anything_is_tried_is_told(
     interrupted_after(0, monkeypatch)
     assert call(["tradeoff", written(tmp_path), "--engine", "pymunk"]) == 130
     out, err = capfd.readouterr()
-    assert "none of the 0 that were tried" in out
+    assert "none of the 0 settings tried" in out
     assert err.splitlines() == ["interrupted: the 0 settings tried so far are kept"]
 
 

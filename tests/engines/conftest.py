@@ -4,7 +4,7 @@ from functools import partial
 
 import pytest
 
-from sandbox.engines import relay
+from sandbox.engines import switching as relay
 
 
 @pytest.fixture(params=("pymunk", "reference"), scope="module")

@@ -4,9 +4,9 @@ import math
 from typing import Any
 
 from sandbox.action import Drive
-from sandbox.engines.relay import Relay
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.engines.switching import SwitchableSimulation
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 LENGTH = 0.0702  # m
 MASS = 0.080  # kg
@@ -60,6 +60,6 @@ def scene(*tables: dict[str, Any], gravity: tuple[float, float] = (0.0, 0.0), dt
     return from_document(document)
 
 
-def press(running: Relay, level: float = 1.0, drive: str = "flip") -> None:
+def press(running: SwitchableSimulation, level: float = 1.0, drive: str = "flip") -> None:
     """Ask a drive for a level."""
     running.apply(Drive(time=0.0, drive=drive, level=level))

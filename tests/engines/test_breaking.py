@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from sandbox.action import Action, Force, Impulse, Launch, Remove, SetParameter, Switch
-from sandbox.engines.relay import Relay, start
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 ENGINES = ("pymunk", "reference")
 OTHER = {"pymunk": "reference", "reference": "pymunk"}
@@ -41,7 +41,7 @@ def chain(*strengths: float | None, collides: str = "none") -> Scene:
     return scene_of(*rods, ball=balls)
 
 
-def loaded(relay: Relay, body: str, rise: float, steps: int = 400) -> float:
+def loaded(relay: SwitchableSimulation, body: str, rise: float, steps: int = 400) -> float:
     """Pull a body down by a force that grows with each step until something breaks; return that force, N."""
     for k in range(steps):
         relay.apply(Force(time=0.0, body=body, force=(0.0, -rise * k)))
@@ -139,7 +139,7 @@ def test_springs_off_centre_break_at_the_stretch_between_their_ends(engine: str)
     while not relay.broken and relay.time < 1.0:
         relay.step()
         frame = relay.frame()
-        first, second = (end[0] for end in relay.scene.links.ends(frame.position, frame.angle))
+        first, second = (end[0] for end in relay.setup.links.ends(frame.position, frame.angle))
         arms = np.asarray([first - frame.position[0], second - frame.position[1]])
         speed = frame.velocity + frame.angular_velocity[:, None] * np.column_stack((-arms[:, 1], arms[:, 0]))
         way = second - first
@@ -202,7 +202,7 @@ def test_exact_breaks_nothing() -> None:
     assert relay.broken == {}
 
 
-def torn(engine: str) -> Relay:
+def torn(engine: str) -> SwitchableSimulation:
     """A chain of five whose fourth rod breaks, and which has then lost its first ball, so that numbers shift."""
     relay = start(chain(None, None, None, 20.5, 12.0), engine)
     loaded(relay, "b3", 0.5)
@@ -217,11 +217,11 @@ def torn(engine: str) -> Relay:
 @pytest.mark.parametrize("then", [None, SetParameter(time=0.0, path="world.gravity", value=[0.0, -5.0])], ids=str)
 def test_what_is_broken_stays_so_on_the_next_engine(engine: str, to: str, then: Action | None) -> None:
     relay = torn(engine)
-    broken, links = dict(relay.broken), relay.scene.links
+    broken, links = dict(relay.broken), relay.setup.links
     relay.apply(Switch(time=0.0, engine=to))
     assert relay.broken == broken
-    assert np.array_equal(relay.scene.links.number, links.number)
-    assert np.array_equal(relay.scene.links.b, links.b)  # by the numbers of the whole
+    assert np.array_equal(relay.setup.links.number, links.number)
+    assert np.array_equal(relay.setup.links.b, links.b)  # by the numbers of the whole
     if then is not None:
         relay.apply(then)
     gravity = G if then is None else 5.0
@@ -247,7 +247,7 @@ def test_what_is_broken_stays_so_from_a_checkpoint_on(engine: str) -> None:
     for _ in range(5):
         relay.step()
     assert set(relay.broken) == {0}
-    resumed = Relay.resumed(relay.checkpoint())
+    resumed = SwitchableSimulation.resumed(relay.checkpoint())
     assert resumed.broken == relay.broken
     for _ in range(20):
         relay.step()

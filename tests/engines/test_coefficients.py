@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.engines.native.coefficients import TOLERANCE, factors, wrong_pairs
+from sandbox.engines.pymunk_adapter.colliders import TOLERANCE, factors, wrong_pairs
 from sandbox.engines.registry import start
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 
 
 def rebounds(document: dict[str, object], balls: int) -> np.ndarray:

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.engines.contact_log import ContactLog
-from sandbox.engines.touching import Touching
+from sandbox.engines.common.contact_log import ContactBatch, ContactLog
 from sandbox.trajectory import Contacts
 
 PAIRS = ((0, -1), (1, -1), (0, 1), (1, 2), (-2, 2))  # fixed things first or second, as engines list them
@@ -41,9 +40,9 @@ def told(script: list[Moment], joints: bool, quickly: bool) -> list[Contacts]:
             time += 0.25
             impulse = np.asarray([given_to[n] * (k + 1.0) / 3.0 for n in pairs], np.complex128)
             if quickly and k and log.steady:
-                log.go_on(impulse)
+                log.add_impulses(impulse)
             else:
-                log.record(time, Touching(a, b, impulse, places + 1.0, places))
+                log.record(time, ContactBatch(a, b, impulse, places + 1.0, places))
             if taken and k == 1:
                 found.append(log.take())
     return [*found, log.take()]

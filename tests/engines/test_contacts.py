@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from sandbox.engines.common.contact_log import PairIndex
 from sandbox.engines.registry import start
-from sandbox.engines.rows import RowTable
-from sandbox.scene.file import from_document, load
-from sandbox.scene.shipped import find
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
 
 BOUNCE = {
     "world": {"gravity": [0, -9.81]},
@@ -111,7 +111,7 @@ def test_a_ball_in_a_corner_of_one_wall_is_one_contact():
 def test_row_table_agrees_with_a_dictionary():
     random = np.random.default_rng(1)
     for highest in (50, 5000):  # a square table, and beyond it a search
-        table, last, count = RowTable(), {}, 0
+        table, last, count = PairIndex(), {}, 0
         for _ in range(60):
             pairs = sorted({tuple(p) for p in random.integers(0, highest, (30, 2)) % [highest, 8]})
             pairs += [p for p in last if random.random() < 0.5 and p not in pairs]

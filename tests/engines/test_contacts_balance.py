@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from sandbox.action import Action, Move, Remove, Reshape, Spawn, Toggle
-from sandbox.engines.relay import start
-from sandbox.scene.discs import Ball
-from sandbox.scene.file import load, loads
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
-from sandbox.scene.solids import Box
+from sandbox.engines.switching import start
+from sandbox.scene.description.bodies import Box
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts
 
 GRAVITY = np.array([0.0, -9.81])

@@ -9,10 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sandbox.engines.floor.curl import SHORT, curled
-from sandbox.engines.floor.phase import figures_of
-from sandbox.engines.native.rolling import rolled
-from sandbox.scene.floor import Floor
+from sandbox.engines.tabletop.motion import SHORT, curled, figures_of, rolled
+from sandbox.scene.description.surface import Floor
 
 G, MU = 9.81, 0.01
 SLOWING = MU * G

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from sandbox.action import Action, Force, Impulse
-from sandbox.engines.account import Cause
-from sandbox.engines.relay import Relay, start
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 # Rounding of a few hundred sums
 kept = partial(accounts.kept, engine="pymunk", closes=1e-11)
@@ -44,7 +44,7 @@ def spring(a: str, b: str | None, stiffness: float, rest: float = 0.0, **more: A
     return {"kind": "spring", "between": between, "stiffness": stiffness, "rest_length": rest, **more}
 
 
-def run(scene: Scene, seconds: float, *actions: Action) -> Relay:
+def run(scene: Scene, seconds: float, *actions: Action) -> SwitchableSimulation:
     relay = start(scene)
     for action in actions:
         relay.apply(action)

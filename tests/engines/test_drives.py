@@ -268,7 +268,7 @@ def test_account_closes_and_what_drives_gave_is_there(start):
 
 
 def _energy(running):
-    from sandbox.engines.energy import total_energy
+    from sandbox.engines.common.energy_balance import total_energy
 
     return total_energy(running)
 

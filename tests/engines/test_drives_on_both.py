@@ -8,8 +8,8 @@ from flippers import BALL, BAR_MOMENT, MASS, MOMENT, REST, ball, bar, bat, press
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.engines import relay
-from sandbox.engines.energy import total_energy
+from sandbox.engines import switching as relay
+from sandbox.engines.common.energy_balance import total_energy
 
 ROD = {
     "box": [{"name": "rod", "size": [0.02, 0.1], "position": [0.0, -0.05]}],

@@ -8,13 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.action import Launch, Remove, Spawn, Switch
-from sandbox.engines.expiry import SLACK, Expiry
+from sandbox.engines.common.lifetimes import SLACK, Lifetimes
 from sandbox.engines.registry import ENGINES, able, start
-from sandbox.engines.relay import Relay
+from sandbox.engines.switching import SwitchableSimulation
 from sandbox.measure.compare.closed import solved
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Ball, Scene
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 SPARK = {"position": [0.0, 1.0], "velocity_min": [-2.0, 1.0], "velocity_max": [2.0, 5.0], "radius": 0.05}
 FLOOR = {"point": [0.0, -0.5], "normal": [0.0, 1.0], "restitution": 0.5}
@@ -51,7 +52,7 @@ def ends(scene: Scene, steps: int, engine: str) -> dict[int, float]:
 @given(st.lists(st.tuples(st.floats(0, 2), st.floats(1e-9, 3)), min_size=1, max_size=12), st.floats(-1, 1))
 def test_each_is_told_once_at_the_first_frame_after_its_end(lives: list[tuple[float, float]], began: float) -> None:
     born, lifetime = zip(*lives, strict=True)
-    expiry = Expiry(bodies_of(list(born), list(lifetime)), began, 0.1)
+    expiry = Lifetimes(bodies_of(list(born), list(lifetime)), began, 0.1)
     told: dict[int, float] = {}
     for k in range(1, 70):
         for number in expiry.due(0.1 * k).tolist():
@@ -64,7 +65,7 @@ def test_each_is_told_once_at_the_first_frame_after_its_end(lives: list[tuple[fl
 
 
 def test_nobody_is_due_where_lives_do_not_end() -> None:
-    expiry = Expiry(bodies_of([0.0, 1.0], [np.inf, np.inf]), 0.0, 0.1)
+    expiry = Lifetimes(bodies_of([0.0, 1.0], [np.inf, np.inf]), 0.0, 0.1)
     assert not len(expiry.due(1e12))
 
 
@@ -122,11 +123,11 @@ def test_lives_change_no_path_before_they_end(engine: str) -> None:
 @pytest.mark.parametrize("cut", [0, 7, 29, 30, 31, 45])
 def test_a_leg_that_begins_later_retires_at_the_same_frames(engine: str, cut: int) -> None:
     scene = mixed()
-    through, other = Relay(scene, engine), Relay(scene, engine)
+    through, other = SwitchableSimulation(scene, engine), SwitchableSimulation(scene, engine)
     for k in range(60):
         if k == cut:
             other.apply(Switch(time=0.0))
-            other = Relay.resumed(other.checkpoint())
+            other = SwitchableSimulation.resumed(other.checkpoint())
         through.step()
         other.step()
         a, b = through.frame(), other.frame()
@@ -139,7 +140,7 @@ def test_a_leg_that_begins_later_retires_at_the_same_frames(engine: str, cut: in
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_launch_gives_new_lives(engine: str) -> None:
-    relay = Relay(mixed(), engine)
+    relay = SwitchableSimulation(mixed(), engine)
     for _ in range(50):
         relay.step()
     assert len(relay.retired) > 100
@@ -149,7 +150,7 @@ def test_a_launch_gives_new_lives(engine: str) -> None:
     assert (relay.bodies.born[300:] == 0.0).all()
     lives = relay.bodies.lifetime[:300].copy()
     assert not np.array_equal(lives, mixed().bodies.lifetime[:300])
-    again = Relay.resumed(relay.checkpoint())
+    again = SwitchableSimulation.resumed(relay.checkpoint())
     for _ in range(61):
         relay.step()
         again.step()
@@ -164,7 +165,7 @@ def test_a_launch_gives_new_lives(engine: str) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_who_is_gone_already_is_not_retired_again_and_who_joins_stays(engine: str) -> None:
-    relay = Relay(mixed(), engine)
+    relay = SwitchableSimulation(mixed(), engine)
     for _ in range(10):
         relay.step()
     relay.apply(Remove(time=0.0, body="free-1"))

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from sandbox.action import Force, Remove
 from sandbox.engines.contract import Divergence
-from sandbox.engines.native import free
+from sandbox.engines.pymunk_adapter import particles as free
 from sandbox.engines.registry import start
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 
 EPS = np.finfo(float).eps
 

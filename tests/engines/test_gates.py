@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from sandbox.action import Remove, Spawn, Switch
 from sandbox.engines.contract import Refusal
-from sandbox.engines.relay import Relay, start
+from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.measure.run import run
-from sandbox.scene.discs import Ball
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
 
@@ -34,11 +34,11 @@ def gate(ball: dict[str, Any], points: list[list[float]] | None = None, **more: 
     )
 
 
-def start_on(engine: str, scene: Scene, settings: Settings | None = None) -> Relay:
+def start_on(engine: str, scene: Scene, settings: Settings | None = None) -> SwitchableSimulation:
     return start(scene, engine, settings)
 
 
-def gone(simulation: Relay, steps: int) -> np.ndarray[Any, Any]:
+def gone(simulation: SwitchableSimulation, steps: int) -> np.ndarray[Any, Any]:
     """Return the velocities (steps, 2) while a simulation goes on."""
     found = []
     for _ in range(steps):
@@ -151,7 +151,7 @@ def test_checkpoint_within_the_gate_goes_on_through(engine: str) -> None:
     for _ in range(110):  # its centre is beyond the line by now, and it still overlaps
         simulation.step()
     assert -R < simulation.frame().position[0, 0] < 0.0
-    taken_up = Relay.resumed(simulation.checkpoint())
+    taken_up = SwitchableSimulation.resumed(simulation.checkpoint())
     for each in (simulation, taken_up):
         gone(each, 100)
     assert taken_up.state_hash() == simulation.state_hash()
@@ -184,7 +184,7 @@ def test_checkpoint_where_it_has_turned_round_within_lets_it_go_back(engine: str
     while simulation.frame().velocity[0, 0] <= 0.0:
         simulation.step()
     assert -R < simulation.frame().position[0, 0] < 0.0
-    taken_up = Relay.resumed(simulation.checkpoint())
+    taken_up = SwitchableSimulation.resumed(simulation.checkpoint())
     assert taken_up.state_hash() == simulation.state_hash()
     for each in (simulation, taken_up):
         gone(each, 150)
@@ -218,7 +218,7 @@ def test_audit_misses_nothing_at_a_gate(engine: str) -> None:
 
 
 def test_exact_engine_refuses_gates() -> None:
-    with pytest.raises(Refusal, match=r"does not model one-way walls; these could: pymunk, reference"):
+    with pytest.raises(Refusal, match=r"does not model one-way walls; engines that can: pymunk, reference"):
         start(gate({"position": [0.5, 0.0]}), "exact")
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from sandbox.action import Launch, Remove, SetParameter, Spawn
 from sandbox.engines.registry import start as start_engine
-from sandbox.engines.relay import start
-from sandbox.scene.elements import mover_of
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Ball, Scene
+from sandbox.engines.switching import start
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 ENGINES = ("pymunk", "reference")
 every_engine = pytest.mark.parametrize("engine", ENGINES)
@@ -48,10 +48,10 @@ def test_changed_coefficient_reaches_the_bodies_of_its_element_and_spawned_ones_
 
 def test_element_leads_back_to_its_mover() -> None:
     scene = mixed()
-    assert [mover_of(scene, k) for k in range(len(scene.elements))] == [0, 1, 2, *[3] * 15]
-    assert mover_of(scene, len(scene.elements)) == len(scene.movers)
+    assert [scene.mover_of(k) for k in range(len(scene.elements))] == [0, 1, 2, *[3] * 15]
+    assert scene.mover_of(len(scene.elements)) == len(scene.movers)
     plain = from_document({"ball": [{"position": [k, 0], "radius": 0.1} for k in range(3)]})
-    assert [mover_of(plain, k) for k in range(4)] == [0, 1, 2, 3]
+    assert [plain.mover_of(k) for k in range(4)] == [0, 1, 2, 3]
 
 
 @every_engine

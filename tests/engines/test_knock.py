@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pytest import approx
 
-from sandbox.engines.floor.collide import STILL, Five
-from sandbox.engines.floor.knock import knock
+from sandbox.engines.tabletop.collisions import STILL, Five, collide_pucks
 
 SPEED, SIZE = st.floats(-10, 10), st.floats(0.01, 10)
 MOTION = st.tuples(SPEED, SPEED, st.just(0.0), st.just(0.0), SPEED)
@@ -30,7 +29,7 @@ def test_a_hit_keeps_the_laws(
     closing = (a[0] - b[0]) * n[0] + (a[1] - b[1]) * n[1]
     if closing < 0.0:
         a, b, closing = (-a[0], -a[1], *a[2:]), (-b[0], -b[1], *b[2:]), -closing
-    c, d = knock(restitution, friction, a, b, (1 / ma, 1 / mb), radii, *n)
+    c, d = collide_pucks(restitution, friction, a, b, (1 / ma, 1 / mb), radii, *n)
     rounding = 1e-12 * (ma + mb) * 200  # of sums of momenta and of energies up to 200 times the masses
     for k in (0, 1):
         assert ma * c[k] + mb * d[k] == approx(ma * a[k] + mb * b[k], abs=rounding)
@@ -51,12 +50,14 @@ def test_a_hit_keeps_the_laws(
 
 
 def test_what_never_moves_gives_back_all_that_its_restitution_says() -> None:
-    after, wall = knock(0.5, 0.0, (2.0, 1.0, 0.0, 0.0, 3.0), STILL, (2.0, 0.0), (0.1, 0.0), 1.0, 0.0)
+    after, wall = collide_pucks(0.5, 0.0, (2.0, 1.0, 0.0, 0.0, 3.0), STILL, (2.0, 0.0), (0.1, 0.0), 1.0, 0.0)
     assert after == (-1.0, 1.0, 0.0, 0.0, 3.0)
     assert wall == STILL
 
 
 def test_a_rough_wall_ends_the_slip_of_a_rim() -> None:
-    (_, vy, _, _, spin), _ = knock(0.5, 100.0, (2.0, 1.0, 0.0, 0.0, 0.0), STILL, (2.0, 0.0), (0.1, 0.0), 1.0, 0.0)
+    (_, vy, _, _, spin), _ = collide_pucks(
+        0.5, 100.0, (2.0, 1.0, 0.0, 0.0, 0.0), STILL, (2.0, 0.0), (0.1, 0.0), 1.0, 0.0
+    )
     assert vy == approx(2.0 / 3.0, rel=1e-15)  # a disc keeps two thirds
     assert vy + 0.1 * spin == approx(0.0, abs=1e-15)  # rounding

@@ -7,10 +7,11 @@ import pytest
 
 from sandbox.action import ActionError, Launch, Pull, Remove, SetParameter, Spawn, Switch
 from sandbox.engines.registry import ENGINES
-from sandbox.engines.relay import Relay, start
-from sandbox.scene.file import from_document, load
-from sandbox.scene.model import Ball, Scene
-from sandbox.scene.shipped import find
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 BOUNDS = [[-3.0, -3.0], [3.0, 30.0]]
@@ -38,7 +39,7 @@ def mixed(**world: Any) -> Scene:
 ROWS = {"g": slice(1, 3), "scatter-1": slice(3, 6), "s": slice(6, 10), "emitter-2": slice(10, 12)}
 
 
-def stepped(relay: Relay, steps: int) -> Relay:
+def stepped(relay: SwitchableSimulation, steps: int) -> SwitchableSimulation:
     for _ in range(steps):
         relay.step()
     return relay

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 import sandbox
 from sandbox.action import ActionError, Launch, Spawn, Switch
 from sandbox.engines.contract import Refusal
-from sandbox.engines.relay import Relay
-from sandbox.scene.discs import Ball
-from sandbox.scene.file import from_document
-from sandbox.scene.meetings import meetings, reach
-from sandbox.scene.model import Scene
+from sandbox.engines.switching import SwitchableSimulation
+from sandbox.scene.compile.contacts import contact_matrix, reach
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
@@ -27,7 +27,7 @@ def run_on(engine: str, scene: Scene) -> Trajectory:
     return sandbox.run(scene, engine)
 
 
-def start_on(engine: str, scene: Scene) -> Relay:
+def start_on(engine: str, scene: Scene) -> SwitchableSimulation:
     return sandbox.start(scene, engine)
 
 
@@ -136,7 +136,7 @@ def test_meetings_count_every_layer_that_can_be_got_to() -> None:
     assert names == ("ground", "a", "b", "far", "farther", "none")
     got = [{name for k, name in enumerate(names) if bits >> k & 1} for bits in reach(scene, scene.bodies).tolist()]
     assert got == [{"ground", "a", "b"}, {"b"}, {"far", "farther"}, {"ground"}, {"none"}]
-    meet = meetings(scene)
+    meet = contact_matrix(scene)
     assert meet.touches.tolist() == [True, True, False, False, False]
     assert meet.noted.tolist() == [True, False, True, False, False]
     assert meet.free.tolist() == [False, False, False, True, True]
@@ -150,7 +150,7 @@ def test_spawned_body_is_on_its_layer_and_an_unknown_one_is_refused(engine: str)
     for name, y in (("up", 0.5), ("ground", -0.5)):
         spawned = Ball(name=name, position=(0.0, y), velocity=(2.0, 0.0), radius=0.1, layer=name)
         relay.apply(Spawn(time=0, ball=spawned))
-    with pytest.raises(ActionError, match="no layer is named 'attic'; the scene speaks of ground, up"):
+    with pytest.raises(ActionError, match="no layer is named 'attic'; layers: ground, up"):
         relay.apply(Spawn(time=0, ball=Ball(position=(0.0, 3.0), radius=0.1, layer="attic")))
     for _ in range(50):
         relay.step()

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.engines.floor import mathavan as module
-from sandbox.engines.floor.collide import MATHAVAN2010, Five, rebound
+from sandbox.engines.tabletop import collisions as module
+from sandbox.engines.tabletop.collisions import MATHAVAN2010, Five, collide_cushion
 
 R = 0.028575
 SCALE = np.asarray([1.0, 1.0, R, R, R])  # spins as speeds of the rim, m/s
@@ -29,7 +29,7 @@ speeds, spins = st.floats(-3.0, 3.0), st.floats(-80.0, 80.0)
 
 
 def hit(a: Five, height: float, e: float = 0.85, friction: float = 0.2, sliding: float = 0.2) -> Five:
-    return rebound(MATHAVAN2010, e, friction, sliding, a, R, height, 0.0, 1.0)
+    return collide_cushion(MATHAVAN2010, e, friction, sliding, a, R, height, 0.0, 1.0)
 
 
 @pytest.mark.parametrize(("before", "height", "after"), POOLTOOL)
@@ -69,7 +69,7 @@ def test_direction_of_the_cushion_does_not_matter() -> None:
         return cos * a[0] - sin * a[1], sin * a[0] + cos * a[1], cos * a[2] - sin * a[3], sin * a[2] + cos * a[3], a[4]
 
     before: Five = (1.2, 1.0, -30.0, 40.0, 20.0)
-    there = rebound(MATHAVAN2010, 0.85, 0.2, 0.2, turned(before), R, 1.28 * R, -sin, cos)
+    there = collide_cushion(MATHAVAN2010, 0.85, 0.2, 0.2, turned(before), R, 1.28 * R, -sin, cos)
     assert there == pytest.approx(turned(hit(before, 1.28 * R)), rel=1e-9)  # rounding of 4,000 steps
 
 

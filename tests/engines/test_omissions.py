@@ -5,9 +5,9 @@ import pytest
 
 from sandbox.action import Spawn
 from sandbox.engines.registry import start
-from sandbox.scene.file import from_document, load
-from sandbox.scene.model import Ball
-from sandbox.scene.shipped import find
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
 
 FLOOR = {"point": [0, 0], "normal": [0, 1], "restitution": 0.9}
 
@@ -62,7 +62,7 @@ def test_recording_contacts_and_watching_change_nothing(name):
 
 def with_moments(simulation, scene):
     """Give every body the moment that the engine left out."""
-    half = simulation._population.meeting
+    half = simulation._population.space_bodies
     for number, moment in enumerate(scene.bodies.moment.tolist()):
         half.give_moment(number, moment)
     return simulation
@@ -71,7 +71,7 @@ def with_moments(simulation, scene):
 def test_a_moment_left_out_changes_nothing_where_normals_are_exact():
     scene = row_of_balls("all")
     left_out, given = start(scene), with_moments(start(scene), scene)
-    assert np.isinf(left_out._population.meeting.moment(0))
+    assert np.isinf(left_out._population.space_bodies.moment(0))
     assert same(run(left_out, 300), run(given, 300))
 
 

@@ -150,7 +150,7 @@ def test_ball_on_a_plunger_leaves_at_the_speed_of_its_pull(start, pull):
 
 
 def test_account_of_strokes_and_plungers_closes(start):
-    from sandbox.engines.energy import total_energy
+    from sandbox.engines.common.energy_balance import total_energy
 
     own, more = gate(), rod()
     more["box"][0]["position"] = [0.3, -0.05]

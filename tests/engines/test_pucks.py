@@ -9,15 +9,16 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.action import Action, ActionError, Impulse, SetParameter, Spawn, Strike, Switch
-from sandbox.engines.account import Cause
+from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.contract import Refusal, Simulation
-from sandbox.engines.energy import total_energy
-from sandbox.engines.floor.curl import curled
+from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
-from sandbox.scene.demands import Demand, demands, on_floor
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, loads
-from sandbox.scene.model import Ball, Scene
+from sandbox.engines.tabletop.motion import curled
+from sandbox.scene.compile.demands import Demand, demands, on_floor
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import dumps, from_document, loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 G, MU, MUS, R, MASS = 9.81, 0.05, 0.004, 0.145, 19.96
@@ -175,7 +176,7 @@ def test_ice_may_be_swept_while_pucks_slide(engine: str) -> None:
         simulation.step()
     assert simulation.frame().velocity[0, 0] == pytest.approx(speed - 0.5 * MU * G, rel=1e-12)  # rounding
     smooth = start(ice_without_rub(), engine)
-    with pytest.raises(ActionError, match="cannot begin to rub"):
+    with pytest.raises(ActionError, match="floor friction cannot be switched"):
         smooth.apply(SetParameter(time=0.0, path="surface.sliding_friction", value=0.1))
 
 
@@ -239,10 +240,10 @@ def test_a_run_goes_on_on_another_engine() -> None:
     ("surface", "more", "path", "words"),
     [
         ({"curl": 0.1, "bodies": "spheres"}, {}, "surface.curl", "pucks"),
-        ({"rolling_friction": 0.1}, {}, "surface.rolling_friction", "never roll"),
+        ({"rolling_friction": 0.1}, {}, "surface.rolling_friction", "do not roll"),
         ({}, {"contact_models": {"ball_ball": "frictional"}}, "contact_models.ball_ball", "spheres"),
         ({}, {"ball": [puck("a", 0, 0) | {"spin": [0, 0, 1]}]}, "ball.a.spin", "angular_velocity"),
-        ({}, {"wall": [{"points": [[5, 0], [5, 1]], "height": 0.01}]}, "wall[0].height", "nose"),
+        ({}, {"wall": [{"points": [[5, 0], [5, 1]], "height": 0.01}]}, "wall[0].height", "cushions"),
         ({}, {"shot": [{"ball": "a", "aim": 0, "speed": 1}]}, "shot[0]", "cue"),
         ({"bodies": "bricks"}, {}, "surface.bodies", "'spheres' or 'pucks'"),
     ],

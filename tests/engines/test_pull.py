@@ -9,23 +9,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.action import ActionError, Impulse, Pull, Remove, SetParameter
-from sandbox.engines.pull import pulled
+from sandbox.action import ActionError, Impulse, Pull, Remove, SetParameter, Spawn
+from sandbox.engines.mouse_joint import mouse_joint_impulse
 from sandbox.engines.registry import ENGINES
-from sandbox.engines.relay import Relay, start
-from sandbox.scene.file import from_document
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document
 
 OMEGA = 2.0 * math.pi * 7.5
 """rad/s, as the manual of the window has it"""
 
 
-def started(engine: str = "reference", dt: float = 0.01, gravity: float = 0.0, **more: Any) -> Relay:
+def started(engine: str = "reference", dt: float = 0.01, gravity: float = 0.0, **more: Any) -> SwitchableSimulation:
     ball = {"name": "a", "position": [0.0, 0.0], "radius": 0.5, **more}
     document = {"world": {"gravity": [0.0, gravity]}, "solver": {"dt": dt}, "ball": [ball]}
     return start(from_document(document), engine)
 
 
-def stepped(relay: Relay, steps: int) -> Relay:
+def stepped(relay: SwitchableSimulation, steps: int) -> SwitchableSimulation:
     for _ in range(steps):
         relay.step()
     return relay
@@ -58,7 +59,7 @@ def test_spring_loses_energy_at_any_step_and_mass(
 
     begin = energy()
     for _ in range(60):
-        (jx, jy), turn = pulled(
+        (jx, jy), turn = mouse_joint_impulse(
             (float(place[0]), float(place[1])), (x, y), (float(velocity[0]), float(velocity[1])), spin, mass, moment,
             gravity, h,
         )  # fmt: skip
@@ -73,7 +74,7 @@ def test_spring_loses_energy_at_any_step_and_mass(
 def test_impulse_is_that_of_the_soft_constraint_worked_out_by_hand() -> None:
     """Solved together: the impulse is −h·(k·x⁺ + c·v⁺), with the offset and velocity at the end of the step."""
     h, mass, x, v = 0.02, 2.0, 0.3, -1.5
-    (jx, jy), turn = pulled((x, 0.0), (0.0, 0.0), (v, 0.0), 0.0, mass, math.inf, 1e30, h)
+    (jx, jy), turn = mouse_joint_impulse((x, 0.0), (0.0, 0.0), (v, 0.0), 0.0, mass, math.inf, 1e30, h)
     after = v + jx / mass
     stiffness, damping = mass * OMEGA**2, 2.0 * mass * OMEGA
     assert jx == pytest.approx(-h * (stiffness * (x + h * after) + damping * after), rel=1e-12)  # rounding
@@ -177,7 +178,7 @@ def test_fixed_missing_or_gone_body_cannot_be_pulled() -> None:
     relay = start(from_document(document))
     relay.apply(Remove(time=0.0, body="gone"))
     before = relay.state_hash()
-    for body, words in (("post", "fixed"), ("gone", "no longer there"), ("zzz", "zzz"), ("floor", "floor")):
+    for body, words in (("post", "fixed"), ("gone", "has been removed"), ("zzz", "zzz"), ("floor", "floor")):
         with pytest.raises(ActionError, match=words):
             relay.apply(Pull(time=0.0, body=body, target=(1.0, 1.0)))
     assert relay.state_hash() == before
@@ -209,3 +210,21 @@ def test_hand_slips_where_it_would_take_more_than_there_may_be(ball: dict[str, A
     relay.step()
     assert not relay.checkpoint().pulls
     assert np.isfinite(relay.frame().velocity).all()
+
+
+@pytest.mark.parametrize("mass", [1e-15, 1.0, 1e30])
+@pytest.mark.parametrize("moment", [1e-200, 1e-20, 1.0, 1e60])
+@pytest.mark.parametrize("grip", [(0.0, 0.0), (1.0, 1.0), (1e9, 1e9), (-1e16, 1e16), (0.0, 1e-9)])
+def test_grip_however_far_out_is_drawn_towards_the_hand(mass: float, moment: float, grip: tuple[float, float]) -> None:
+    """Of a body that its grip turns with no resistance, rounding leaves no determinant to divide by."""
+    for offset in ((0.0, 0.0), (1.0, -2.0)):
+        (x, y), _ = mouse_joint_impulse(offset, grip, (0.0, 0.0), 0.0, mass, moment, 0.0, 0.01)
+        assert x * offset[0] + y * offset[1] <= 0.0
+        assert math.hypot(x, y) <= 1.0001 * 100.0 * mass * 9.81 * 0.01
+
+
+def test_spawned_body_too_small_for_its_grip_is_pulled() -> None:
+    relay = started()
+    relay.apply(Spawn(time=0.0, ball=Ball(name="b", position=(5.0, 5.0), radius=1e-9)))
+    relay.apply(Pull(time=0.0, body="b", grip=(1.0, 1.0), target=(5.0, 5.0)))
+    stepped(relay, 3)

@@ -9,16 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.action import ActionError, Spawn
-from sandbox.engines.account import Account, Cause
+from sandbox.engines.common.energy_balance import total_energy
+from sandbox.engines.common.restitution import fraction_at, kicked, rebound, segment_fractions
 from sandbox.engines.contract import Refusal
-from sandbox.engines.energy import total_energy
-from sandbox.engines.rebound import kicked, rebound, share_at, stretches
-from sandbox.engines.relay import Relay, start
-from sandbox.scene.discs import Ball
-from sandbox.scene.file import from_document
-from sandbox.scene.floor import Floor
-from sandbox.scene.kick import Kick
-from sandbox.scene.model import Post, Scene
+from sandbox.engines.energy_ledger import Cause, EnergyLedger
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.fixed import Post
+from sandbox.scene.description.surface import Floor
+from sandbox.scene.description.world import Kick
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 ENGINES = ("pymunk", "exact", "reference")
 SURFACES = {
@@ -45,7 +46,7 @@ def falling(speed: float, x: float = 0.0, sideways: float = 0.0, **wall: Any) ->
     )
 
 
-def after(scene: Scene, engine: str, steps: int = 40) -> tuple[Relay, np.ndarray[Any, Any]]:
+def after(scene: Scene, engine: str, steps: int = 40) -> tuple[SwitchableSimulation, np.ndarray[Any, Any]]:
     """Return a simulation that has gone on for some steps, with an account, and its ball's velocity, m/s."""
     simulation = start(scene, engine)
     simulation.account()
@@ -54,7 +55,7 @@ def after(scene: Scene, engine: str, steps: int = 40) -> tuple[Relay, np.ndarray
     return simulation, simulation.frame().velocity[0]
 
 
-def closes(simulation: Relay, before: float) -> None:
+def closes(simulation: SwitchableSimulation, before: float) -> None:
     brought = sum(simulation.account().values())
     assert total_energy(simulation) - before == pytest.approx(brought, rel=1e-9, abs=1e-13)  # rounding
 
@@ -279,7 +280,7 @@ def test_middle_is_where_a_kick_is_most_and_ends_have_none(speed: float, share: 
 @settings(max_examples=30)
 @given(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), min_size=3, max_size=6, unique=True), st.booleans())
 def test_stretches_follow_each_other_from_nothing_to_the_whole(points: list[tuple[float, float]], closed: bool) -> None:
-    parts = stretches((*points, points[0]) if closed else points)
+    parts = segment_fractions((*points, points[0]) if closed else points)
     assert parts[0][0] == 0.0
     assert parts[-1][1] == pytest.approx(1.0, rel=1e-14)  # sums round
     assert all(a[1] == b[0] for a, b in pairwise(parts))
@@ -287,9 +288,9 @@ def test_stretches_follow_each_other_from_nothing_to_the_whole(points: list[tupl
 
 
 def test_share_at_is_held_between_the_ends_of_a_segment() -> None:
-    assert share_at((0.0, 0.0), (2.0, 0.0), (0.5, 0.75), (1.0, 3.0)) == 0.625
-    assert share_at((0.0, 0.0), (2.0, 0.0), (0.5, 0.75), (-1.0, 3.0)) == 0.5
-    assert share_at((0.0, 0.0), (2.0, 0.0), (0.5, 0.75), (9.0, 3.0)) == 0.75
+    assert fraction_at((0.0, 0.0), (2.0, 0.0), (0.5, 0.75), (1.0, 3.0)) == 0.625
+    assert fraction_at((0.0, 0.0), (2.0, 0.0), (0.5, 0.75), (-1.0, 3.0)) == 0.5
+    assert fraction_at((0.0, 0.0), (2.0, 0.0), (0.5, 0.75), (9.0, 3.0)) == 0.75
 
 
 def test_springs_refuse_what_they_cannot_part_so() -> None:
@@ -298,16 +299,16 @@ def test_springs_refuse_what_they_cannot_part_so() -> None:
         start(scene, "reference", scene.solver.replace(response="penalty"))
     plain = falling(1.0, restitution=0.5)
     simulation = start(plain, "reference", plain.solver.replace(response="penalty"))
-    with pytest.raises(ActionError, match="no restitution that falls with speed"):
+    with pytest.raises(ActionError, match="does not support restitution_falloff"):
         simulation.apply(Spawn(time=0.0, ball=Ball(position=(0.5, 0.5), radius=R, restitution_falloff=0.1)))
 
 
 def test_pairs_that_need_nothing_are_told_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sandbox.engines.native.laws import Laws
+    from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks
 
     told: list[int] = []
-    tell = Laws._tell
-    monkeypatch.setattr(Laws, "_tell", lambda self, *rest: (told.append(1), tell(self, *rest))[1])
+    tell = PairCallbacks._set_coefficients
+    monkeypatch.setattr(PairCallbacks, "_set_coefficients", lambda self, *rest: (told.append(1), tell(self, *rest))[1])
     after(falling(2.0, restitution=0.5, friction=0.2), "pymunk")
     assert not told
     after(falling(2.0, restitution=0.5, restitution_falloff=0.1), "pymunk")
@@ -315,7 +316,7 @@ def test_pairs_that_need_nothing_are_told_nothing(monkeypatch: pytest.MonkeyPatc
 
 
 def test_account_books_kicks_as_a_cause_of_their_own() -> None:
-    account = Account()
+    account = EnergyLedger()
     account.enter(Cause.KICKS, 2.0)
     assert account.entries()[Cause.KICKS] == 2.0
     assert account.entries()[Cause.PHANTOM] == 0.0

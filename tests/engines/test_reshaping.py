@@ -6,10 +6,10 @@ import pytest
 
 from sandbox.action import ActionError, Reshape, Switch
 from sandbox.engines.registry import ENGINES
-from sandbox.engines.relay import Relay, start
+from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.measure.run import run
 from sandbox.recording import Recording
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 GROUND = """
 [world]
@@ -74,7 +74,7 @@ def test_it_outlives_checkpoints_switches_and_recordings(engine: str) -> None:
     simulation = start(scene, engine)
     simulation.step()
     simulation.apply(LOWER)
-    resumed = Relay.resumed(simulation.checkpoint())
+    resumed = SwitchableSimulation.resumed(simulation.checkpoint())
     assert resumed.scene.walls[0].points == LOWER.points
     switched = start(scene, engine)
     switched.apply(LOWER)
@@ -110,8 +110,11 @@ def test_what_cannot_be_changes_nothing(engine: str) -> None:
     simulation = start(loads(GROUND), engine)
     walls = simulation.scene.walls
     for action, told in (
-        (LOWER.model_copy(update={"thing": "hull"}), "no wall is named 'hull'; there are 'hill', 'post'"),
-        (LOWER.model_copy(update={"points": ((0.0, 0.0), (0.0, 0.0))}), "the wall 'hill': points.0 lies on the point"),
+        (LOWER.model_copy(update={"thing": "hull"}), "no wall is named 'hull'; walls: 'hill', 'post'"),
+        (
+            LOWER.model_copy(update={"points": ((0.0, 0.0), (0.0, 0.0))}),
+            "the wall 'hill': points.0 is at the same place",
+        ),
     ):
         with pytest.raises(ActionError, match=told):
             simulation.apply(action)

@@ -4,18 +4,19 @@ from typing import Any
 
 import pytest
 
-from sandbox.action import ActionError, SetParameter
-from sandbox.engines import surroundings
+from sandbox.action import ActionError, SetParameter, Spawn, Switch
+from sandbox.engines.common import actions as surroundings
 from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
-from sandbox.engines.relay import start
+from sandbox.engines.switching import start
 from sandbox.recording import Recording
-from sandbox.scene.address import assign
-from sandbox.scene.document import change_value, to_document
-from sandbox.scene.file import from_document, load
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.scene.shipped import find
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.document import change_value, to_document
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.overrides import assign
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 SCENES = (
     "benchmark/incline",
@@ -110,7 +111,7 @@ def test_value_that_is_right_is_set_without_reading_the_whole_scene(name, path, 
     def refuse(*_: Any) -> Scene:
         raise AssertionError("the whole scene was read again")
 
-    monkeypatch.setattr(surroundings, "from_document", refuse)
+    monkeypatch.setattr(surroundings, "from_session", refuse)
     relay.apply(SetParameter(time=0.0, path=path, value=value))
     assert to_document(relay.scene) == assign(to_document(load(find(name))), path, value)[0]
 
@@ -169,6 +170,65 @@ def test_wrong_value_is_refused_with_the_fault_of_the_whole_scene(name, path, va
     assert refusal() == quick
     if (name, path) != ("billiards/9-ball", "surface.sliding_friction") or value:
         assert quick is not None
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "hint"),
+    [
+        ("pinball/classic", "pinball.bumper.'left bumper'.restitution", "post.left bumper.restitution"),
+        ("pinball/classic", "pinball.bumper.*.restitution", "post.right bumper.restitution"),
+        ("pinball/classic", "pinball.flipper.0.friction", "polygon.left flipper.friction"),
+        ("pinball/classic", "pinball.bumber.0.friction", ""),
+        ("pinball/classic", "pinball.restitution", "examples: "),
+        ("pinball/classic", "pinball.wall.cabinett.restitution", "wall.cabinet.restitution"),
+        ("billiards/9-ball", "billiards.cushion.restitution", "wall.lower cushion.restitution"),
+        ("artillery/duel", "artillery.friction", "box.Red.friction"),
+        ("artillery/duel", "terrain.friction", "wall.terrain.friction"),
+        ("tutorial/bounce", "terrain.friction", "ball.ball.friction"),
+    ],
+)
+def test_path_of_an_expanded_preset_is_refused_with_the_elements_it_may_mean(name, path, hint):
+    relay = start(load(find(name)))
+    with pytest.raises(ActionError, match="running scene") as refused:
+        relay.apply(SetParameter(time=0.0, path=path, value=0.5))
+    assert hint in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        ("ball.late.restitution", 2, "between 0 and 1"),
+        ("ball.late.friction", -1.0, "between 0 and 1000"),
+        ("ball.late.friction", "x" * 1000, "a number"),
+        ("ball.late.restitution", True, "a number"),
+        ("box.late.restitution", 0.5, "ball.late.restitution"),
+        ("ball.1.restitution", 0.5, "ball.late"),
+        ("ball.later.restitution", 0.5, "ball.late"),
+    ],
+)
+def test_wrong_value_of_a_spawned_body_is_refused_in_the_words_of_a_scene(path, value, said):
+    relay = start(load(find("tutorial/bounce")))
+    relay.apply(Spawn(time=0.0, ball=Ball(name="late", position=(50.0, 50.0), radius=0.1)))
+    with pytest.raises(ActionError) as refused:
+        relay.apply(SetParameter(time=0.0, path=path, value=value))
+    assert str(refused.value).startswith(f"{path}: ")
+    assert said in str(refused.value)
+    assert len(str(refused.value)) < 200
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("dt", -1.0, "at most 10"),
+        ("dt", "fast", "a number"),
+        ("integrator", "none", "one of"),
+        ("steps", 3, "unknown key"),
+    ],
+)
+def test_wrong_setting_of_a_switch_is_refused_in_the_words_of_a_scene(key, value, said):
+    relay = start(load(find("tutorial/bounce")))
+    with pytest.raises(ActionError, match=f"^solver.{key}: .*{said}"):
+        relay.apply(Switch(time=0.0, settings={key: value}))
 
 
 def test_session_that_has_only_just_begun_keeps_its_duration():

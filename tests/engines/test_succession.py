@@ -5,11 +5,11 @@ from typing import Any
 import pytest
 
 from sandbox.action import Launch, Pull, Switch
-from sandbox.engines.account import Cause
-from sandbox.engines.energy import total_energy
-from sandbox.engines.relay import Relay, start
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.engines.common.energy_balance import total_energy
+from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 
 def scene_of(**more: Any) -> Scene:
@@ -20,7 +20,7 @@ def scene_of(**more: Any) -> Scene:
     )
 
 
-def stepped(relay: Relay, steps: int) -> Relay:
+def stepped(relay: SwitchableSimulation, steps: int) -> SwitchableSimulation:
     for _ in range(steps):
         relay.step()
     return relay

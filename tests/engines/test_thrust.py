@@ -8,8 +8,8 @@ import pytest
 import sandbox
 from sandbox.action import ActionError, Switch, Throttle
 from sandbox.engines.contract import Refusal
-from sandbox.engines.relay import Relay
-from sandbox.scene.file import from_document
+from sandbox.engines.switching import SwitchableSimulation
+from sandbox.scene.files.load import from_document
 
 ENGINES = ("pymunk", "reference")
 every_engine = pytest.mark.parametrize("engine", ENGINES)
@@ -76,7 +76,7 @@ def test_thrust_with_a_key_waits_for_a_throttle(engine):
 @every_engine
 def test_unknown_thrust_is_refused_with_those_there_are(engine):
     simulation = sandbox.start(ship({"name": "main"}, {}), engine)
-    with pytest.raises(ActionError, match="no thrust is named 'mian'; there are main, thrust-2"):
+    with pytest.raises(ActionError, match="no thrust is named 'mian'; known names: main, thrust-2"):
         simulation.apply(Throttle(time=0.0, thrust="mian", level=1.0))
 
 
@@ -86,7 +86,7 @@ def test_throttle_is_kept_where_the_engine_changes_and_where_a_checkpoint_is_tak
     stepped(simulation, 10)
     simulation.apply(Switch(time=0.1, engine="reference"))
     assert stepped(simulation, 10).velocity[0, 0] == pytest.approx(0.4, abs=1e-14)
-    resumed = Relay.resumed(simulation.checkpoint())
+    resumed = SwitchableSimulation.resumed(simulation.checkpoint())
     assert stepped(resumed, 10).state_hash() == stepped(simulation, 10).state_hash()
     assert resumed.frame().velocity[0, 0] == pytest.approx(0.6, abs=1e-14)
 

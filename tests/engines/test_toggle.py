@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from sandbox.action import Action, ActionError, Switch, Toggle, actions_from_json, actions_to_json
-from sandbox.engines.energy import total_energy
-from sandbox.engines.relay import Relay, start
+from sandbox.engines.common.energy_balance import total_energy
+from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.measure.run import run
-from sandbox.scene.document import to_document
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 ENGINES = ("pymunk", "exact", "reference")
 R = 0.05
@@ -34,14 +34,14 @@ def shelf(**more: Any) -> Scene:
     )
 
 
-def advance(simulation: Relay, steps: int) -> float:
+def advance(simulation: SwitchableSimulation, steps: int) -> float:
     """Return how high the ball is after some steps, m."""
     for _ in range(steps):
         simulation.step()
     return float(simulation.frame().position[0, 1])
 
 
-def toggle(simulation: Relay, thing: str, solid: bool) -> None:
+def toggle(simulation: SwitchableSimulation, thing: str, solid: bool) -> None:
     simulation.apply(Toggle(time=0.0, thing=thing, solid=solid))
 
 
@@ -104,7 +104,7 @@ def test_checkpoint_holds_what_is_solid(engine: str) -> None:
     simulation = start(shelf(), engine)
     toggle(simulation, "shelf", False)
     advance(simulation, 100)
-    taken_up = Relay.resumed(simulation.checkpoint())
+    taken_up = SwitchableSimulation.resumed(simulation.checkpoint())
     assert advance(taken_up, 100) == pytest.approx(advance(simulation, 100), rel=1e-12)  # in free fall
 
 
@@ -165,14 +165,14 @@ def test_every_choice_of_the_reference_knows_what_is_solid(how: dict[str, Any]) 
 def test_what_is_toggled_must_be_there() -> None:
     simulation = start(shelf())
     for name in ("ball", "shelves"):
-        with pytest.raises(ActionError, match=rf"no wall or post is named '{name}'; there are shelf, floor, peg"):
+        with pytest.raises(ActionError, match=rf"no wall or post is named '{name}'; known names: shelf, floor, peg"):
             toggle(simulation, name, False)
     plane = {"plane": [{"name": "ground", "point": [0, 0], "normal": [0, 1]}]}
     bare = start(from_document(plane))
-    with pytest.raises(ActionError, match="no wall or post is named 'ground'; there are none"):
+    with pytest.raises(ActionError, match="no wall or post is named 'ground'; known names: none"):
         toggle(bare, "ground", False)
     table = start(from_document({"surface": {}, "wall": [{"name": "w", "points": [[0, 0], [1, 0]]}]}))
-    with pytest.raises(ActionError, match="cushions of a table"):
+    with pytest.raises(ActionError, match="cushions of a billiard table"):
         toggle(table, "w", False)
 
 
@@ -194,7 +194,7 @@ def test_document_round_trip_keeps_kicks_gates_and_openings() -> None:
 
 def test_spawned_bodies_leave_what_is_solid_as_it_is() -> None:
     from sandbox.action import Remove, Spawn
-    from sandbox.scene.discs import Ball
+    from sandbox.scene.description.discs import Ball
 
     for engine in ENGINES:
         simulation = start(shelf(), engine)

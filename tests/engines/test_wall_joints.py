@@ -9,9 +9,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import sandbox
-from sandbox.engines.fixtures import straightened, wall_segments
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene, Wall
+from sandbox.engines.common.colliders import straightened, wall_segments
+from sandbox.scene.description.fixed import Wall
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 ENGINES = "pymunk", "reference"
 

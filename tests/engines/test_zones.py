@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 import sandbox
 from sandbox.action import Action, Force, Impulse, Move, Pull, Remove, SetParameter, Spawn, Switch
 from sandbox.engines.contract import Refusal
-from sandbox.engines.relay import Relay
-from sandbox.scene.discs import Ball
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
-from sandbox.scene.zone import AWAY, HELD, INSIDE, LET_GO
+from sandbox.engines.switching import SwitchableSimulation
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.fixed import AWAY, HELD, INSIDE, LET_GO
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
@@ -35,7 +35,7 @@ def run_on(engine: str, scene: Scene, **more: Any) -> Trajectory:
     return sandbox.run(scene, engine, **more)
 
 
-def start_on(engine: str, scene: Scene) -> Relay:
+def start_on(engine: str, scene: Scene) -> SwitchableSimulation:
     return sandbox.start(scene, engine)
 
 
@@ -176,7 +176,7 @@ def test_world_gravity_that_changes_changes_nothing_inside(engine: str) -> None:
 HOLE: dict[str, Any] = {"name": "hole", "position": [1.0, 0.0], "radius": 0.08, "holds": True}
 
 
-def started(engine: str, scene: Scene, seconds: float) -> Relay:
+def started(engine: str, scene: Scene, seconds: float) -> SwitchableSimulation:
     relay = start_on(engine, scene)
     relay.contacts()
     while relay.time < seconds - 1e-9:
@@ -362,7 +362,7 @@ def test_checkpoints_hold_visits_and_layers(engine: str) -> None:
     relay = started(engine, scene_of(HOLE, {"position": [0.5, 0.0], "radius": 0.1, "to_layer": "up"}), 0.5)
     point = relay.checkpoint()
     ways = []
-    for each in (relay, Relay.resumed(point)):
+    for each in (relay, SwitchableSimulation.resumed(point)):
         for _ in range(120):
             each.step()
         ways.append(each.state_hash())

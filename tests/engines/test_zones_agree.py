@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.action import Impulse, Switch
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
-from sandbox.scene.zone import HELD
+from sandbox.scene.description.fixed import HELD
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 H = 0.002
 """s, the substep"""

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.games.high_scores import BEST, FILE, HighScores, data_folder, initials_of, opened, table_of
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 
 @pytest.fixture
@@ -78,6 +78,7 @@ DAMAGE = {
     "no pairs": b'{"a": [["ABC"]]}',
     "no initials": b'{"a": [["ABCDEF", 5]]}',
     "no number": b'{"a": [["ABC", "many"]]}',
+    "too large": b'{"a": [["ABC", 1' + b"0" * 400 + b"]]}",
     "not finite": b'{"a": [["ABC", 1e999]]}',
     "too deep": b"[" * 100_000,
 }

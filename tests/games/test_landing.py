@@ -20,9 +20,9 @@ from sandbox.games.landing import (
 from sandbox.games.policies import Script
 from sandbox.games.rules import Press, Rules, Seen, UnfitError
 from sandbox.measure.play_out import Played, play_out
-from sandbox.scene.file import load, loads
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 SCENE = load(find("landing"))
 G, ENGINE = 1.62, 5.0  # m/s², the Moon's and the engine's on 1 kg
@@ -126,7 +126,7 @@ def test_slow_touch_is_a_landing_and_fuel_counts() -> None:
 
 def test_tilted_touch_is_a_crash() -> None:
     game = play_out(flat(1.7, angle=0.4), "none")
-    assert game.over == "crashed: tilted by 23°, 15° at most"
+    assert game.over == "crashed: tilted by 23° (limit 15°)"
     assert 0 < game.score <= FOR_A_CRASH
 
 
@@ -151,7 +151,7 @@ def test_who_flies_away_is_lost() -> None:
 
 def test_crash_beside_the_pad_is_none_of_a_landing() -> None:
     game = play_out(SCENE, "none")
-    assert game.over == "crashed beside the pad"
+    assert game.over == "crashed outside the pad"
     contact = list(game.trajectory.contact_pair[-1])
     assert contact != [0, -2]  # which is the pad
 
@@ -162,13 +162,13 @@ def test_scene_that_lacks_something_is_refused(lacks: str) -> None:
     if lacks != 'name = "ship"':
         text = text.replace('body = "box-1"', 'body = "ship"')
     scene = loads(text)
-    with pytest.raises(UnfitError, match="landing needs a body 'ship', a fixed thing 'pad', and a thrust"):
+    with pytest.raises(UnfitError, match="landing needs a body 'ship', a fixed element 'pad', and a thrust"):
         Landing(scene, scene.bodies)
 
 
 def test_panel_tells_what_would_be_a_crash() -> None:
     rules = Landing(SCENE, SCENE.bodies)
-    from sandbox.engines.relay import start
+    from sandbox.engines.switching import start
 
     relay = start(SCENE)
     rules.look(Seen(0.0, relay.frame(), relay.contacts(), ()))

@@ -45,5 +45,5 @@ def test_game_without_lamps_tells_none() -> None:
 
 @pytest.mark.parametrize("told", [[1.0], [[1.0]], [["x", []]], 5, [[1.0, 2.0]]])
 def test_what_is_no_lamps_is_refused(told: list[object]) -> None:
-    with pytest.raises(ValueError, match="these are no lamps"):
+    with pytest.raises(ValueError, match="invalid lamp record"):
         Lightings.of(told)

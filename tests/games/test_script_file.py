@@ -7,7 +7,7 @@ import pytest
 from sandbox.games.player import Player
 from sandbox.games.rules import Control, Press
 from sandbox.games.script_file import faults_of, read_script
-from sandbox.scene.faults import SceneError
+from sandbox.scene.errors import SceneError
 
 CONTROLS = (Control("left flipper", "", ("z",)), Control("plunger", "", ("enter",), analogue=True))
 
@@ -63,8 +63,38 @@ def test_what_a_game_does_not_have_is_told_where_it_is_first(tmp_path: Path) -> 
 
 
 def test_no_file_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="No such file; a player is random, none, skilled, or the file of a script"):
+    with pytest.raises(SceneError, match="No such file; a player is random, none, skilled or a script file"):
         Player.named(str(tmp_path / "none.txt"))
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(SceneError, match="cannot be read"):
         Player.named(str(tmp_path / "bytes"))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["x" * 10**6, "1, x, 1," * 10**5, "9" * 10**6 + ", a, 1", "[" * 10**6, "0, a, " + "9" * 10**6, "wrong\n" * 10**5],
+)
+def test_faults_of_large_scripts_are_few_and_short(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "s.txt"
+    file.write_text(text)
+    with pytest.raises(SceneError) as error:
+        read_script(file)
+    assert len(error.value.faults) <= 21
+    assert all(len(fault.message) < 200 for fault in error.value.faults)
+
+
+def test_controls_that_there_are_not_are_told_by_the_first(tmp_path: Path) -> None:
+    presses = tuple(Press(0.0, f"control {k}" + "x" * 1000, 1.0) for k in range(1000))
+    faults = faults_of(presses, CONTROLS, "s.txt")
+    assert faults[-1].message == "980 more faults"
+    assert (len(faults), max(len(fault.message) for fault in faults) < 200) == (21, True)
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "x" * 300, "folder", "loop", "a\0b"])
+def test_what_is_no_script_is_one_line(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("folder").mkdir()
+    Path("loop").symlink_to("loop")
+    with pytest.raises(SceneError, match="cannot be read: ") as error:
+        Player.named(name)
+    assert len(str(error.value)) < 500

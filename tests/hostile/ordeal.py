@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from sandbox.engines.compiling import ANNOUNCEMENT
+from sandbox.engines.common.compile_clock import ANNOUNCEMENT
 
 PRELUDE = """
 import json, math, sys
@@ -18,9 +18,9 @@ from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import UnknownEngineError, start
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.run import run
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import from_document, loads
-from sandbox.scene.model import Ball
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import from_document, loads
+from sandbox.scene.description.discs import Ball
 
 EXPECTED = (
     SceneError, ValidationError, ActionError, Refusal, Divergence, Exhaustion, TooLargeError, UnknownEngineError

@@ -62,7 +62,7 @@ def test_word_that_pymunk_would_abort_on_is_one_line_and_status_2(
         (("--sweep", "solver.dt=0.01,-1"), 2),
         (("--sweep", "solver.dt=0.01:inf:3"), 2),
         (("--engine", "zzz"), 2),
-        (("--set", "solver.detection='swept'"), 1),
+        (("--engine", "pymunk", "--set", "solver.detection='swept'"), 1),
     ],
 )
 def test_run_that_cannot_be_or_diverges_has_its_status(words: tuple[str, ...], status: int, tmp_path: Path) -> None:

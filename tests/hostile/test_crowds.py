@@ -195,3 +195,112 @@ say([
     assert done == 255  # with the surface of the first ball, 256
     assert errors == 5
     assert finite
+
+
+@WAYS
+def test_table_of_pairs_that_does_not_fit_is_refused_before_it_is_allocated(flags: tuple[str, ...]) -> None:
+    code = """
+import os, resource
+resource.setrlimit(resource.RLIMIT_AS, (4 * 2**30, 4 * 2**30))
+from sandbox.engines.registry import ENGINES
+def reasons(columns):
+    grid = {"origin": [0, 0], "columns": columns, "rows": 100, "spacing": [3, 3], "radius": 1}
+    scene = from_document({"surface": {"sliding_friction": 0.2}, "grid": [grid]})
+    return ENGINES["exact"].missing(scene, scene.solver)
+(large,), few = reasons(1_000), reasons(2)
+os.environ["SANDBOX_MAX_MEMORY"] = "100KiB"
+(lowered,) = reasons(2)
+say(["SANDBOX_MAX_MEMORY=75GiB" in large, few, "SANDBOX_MAX_MEMORY=1MiB" in lowered])
+"""
+    assert endure(code, flags) == [True, [], True]
+
+
+@WAYS
+def test_particles_beside_a_few_balls_and_columns_of_two_sizes_are_looked_at_quickly(flags: tuple[str, ...]) -> None:
+    """Every pair of what touches nothing, or of what lies above one another, would take minutes."""
+    code = """
+burst = {"position": [0, 0], "count": 200_000, "velocity_min": [-9, -9], "velocity_max": [9, 9]}
+balls = [{"position": [3 * k, 0], "radius": 1, "velocity": [1, 0]} for k in range(5)]
+steps(start(from_document({"emitter": [burst], "ball": balls}), "reference"), 2)
+sizes = [{"position": [9, 0], "radius": 9}, *({"position": [99 * k, 99], "radius": 1 + k} for k in range(40))]
+steps(start(from_document({"emitter": [burst], "ball": sizes}), "reference"), 2)
+column = {"origin": [-99, 0], "rows": 60_000, "columns": 1, "spacing": [1, 3], "radius": 1, "velocity_jitter": 9}
+steps(start(from_document({"grid": [column], "ball": sizes[:1]}), "reference"), 2)
+say("done")
+"""
+    assert endure(code, flags) == "done"
+
+
+@WAYS
+@pytest.mark.parametrize("broad_phase", ["all_pairs", "circles", "sweep", "grid"])
+def test_too_many_candidate_pairs_are_refused_with_what_to_set(broad_phase: str, flags: tuple[str, ...]) -> None:
+    code = f"""
+import os
+line = {{"name": "g", "origin": [0, 0], "rows": 100, "columns": 1, "spacing": [3, 3], "radius": 1}}
+balls = [{{"position": [0, 999], "radius": 100}}]
+scene = from_document({{"grid": [line], "ball": balls, "world": {{"duration": 0.1}}}})
+whole = run(scene, "reference", broad_phase={broad_phase!r})
+os.environ["SANDBOX_MAX_PAIRS"] = "1000"
+cut = run(scene, "reference", broad_phase={broad_phase!r})
+say([whole.status, cut.status, "set SANDBOX_MAX_PAIRS=" in cut.reason])
+"""
+    assert endure(code, flags) == ["ok", "refused", True]
+
+
+@WAYS
+def test_step_of_too_many_iterations_is_refused_or_ends_the_run(flags: tuple[str, ...]) -> None:
+    """A move of all bodies onto one spot makes many contacts of few."""
+    code = """
+import os
+grid = {"name": "g", "origin": [0, 0], "columns": 20, "spacing": [3, 0], "radius": 1}
+scene = from_document({"grid": [grid], "world": {"duration": 0.1}})
+refused = [run(scene, name, iterations=10_000, substeps=1_000).info["reason"] for name in ("pymunk", "reference")]
+os.environ["SANDBOX_MAX_STEP_WORK"] = "1000"
+actions = [Move(time=0, body=f"g-{k + 1}", position=(0.0, 0.0)) for k in range(20)]
+moved = run(scene, "reference", actions=actions)
+say([*("set SANDBOX_MAX_STEP_WORK=" in each for each in (*refused, moved.reason)), moved.status])
+"""
+    assert endure(code, flags) == [True, True, True, "failed"]
+
+
+@WAYS
+def test_hits_of_many_balls_on_a_floor_end_the_run_at_a_limit(flags: tuple[str, ...]) -> None:
+    """Each hit looks at all pairs in contact and at all balls, and one hit sets off others."""
+    code = """
+import os
+grid = {"name": "g", "origin": [0, 0], "columns": 20, "rows": 20, "spacing": [0.061, 0.061], "radius": 0.03}
+cue = {"position": [-1, 0.5], "radius": 0.03, "velocity": [30, 0]}
+scene = from_document({"grid": [grid], "ball": [cue], "surface": {"sliding_friction": 0.2}, "world": {"duration": 0.2}})
+whole = run(scene, "pymunk")
+os.environ["SANDBOX_MAX_PAIRS"] = "50"
+cut = run(scene, "pymunk")
+say([whole.status, cut.status, "set SANDBOX_MAX_PAIRS=" in cut.reason])
+"""
+    assert endure(code, flags, timeout=300.0) == ["ok", "failed", True]
+
+
+@WAYS
+def test_many_attractions_are_refused_and_many_one_way_walls_are_not(flags: tuple[str, ...]) -> None:
+    code = """
+grid = {"name": "g", "origin": [0, 9], "columns": 20_000, "spacing": [3, 0], "radius": 1}
+pulls = [{"toward": [k, 0], "strength": 1} for k in range(20_000)]
+scene = from_document({"grid": [grid], "attraction": pulls})
+walls = [{"points": [[3 * k, 0], [3 * k + 1, 0]], "one_way": True} for k in range(20_000)]
+steps(start(from_document({"grid": [grid], "wall": walls}), "reference"), 2)
+say([outcome(start, scene, name) for name in ("pymunk", "reference")])
+"""
+    assert endure(code, flags) == ["Refusal", "Refusal"]
+
+
+@WAYS
+def test_many_bodies_in_many_zones_are_refused(flags: tuple[str, ...]) -> None:
+    code = """
+zones = [{"position": [0, 0], "radius": 1e4} for k in range(1_000)]
+grid = {"origin": [0, 0], "columns": 1_000, "spacing": [3, 3], "radius": 1}
+say([
+    outcome(from_document, {"zone": zones, "grid": [{**grid, "rows": 1_000}]}),
+    outcome(from_document, {"zone": zones, "grid": [{**grid, "rows": 2}]}),
+    outcome(from_document, {"zone": zones[:10], "grid": [{**grid, "rows": 2}]}),
+])
+"""
+    assert endure(code, flags) == ["SceneError", "SceneError", "done"]

@@ -7,11 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.action import Drive
+from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.contract import Divergence, Exhaustion
-from sandbox.engines.energy import total_energy
-from sandbox.engines.relay import Relay, start
-from sandbox.scene.drives import PlungerDrive
-from sandbox.scene.file import from_document
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.description.forces import PlungerDrive
+from sandbox.scene.files.load import from_document
+
+pytestmark = pytest.mark.slow  # some 30 s together
 
 BODIES = [
     {"name": "a", "position": [0.0, 0.0], "size": [1.0, 0.4], "restitution": 0.5, "friction": 0.5},
@@ -59,7 +61,9 @@ def test_driven_bodies_stay_where_their_drives_let_them(how, session):
     try:
         for k in range(60):
             if k == 30:
-                again = Relay.resumed(again.checkpoint())  # taken up from what can be known: it must go on
+                again = SwitchableSimulation.resumed(
+                    again.checkpoint()
+                )  # taken up from what can be known: it must go on
             for each in (running, again):
                 for when, drive, level in told:
                     if when == k:

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.action import Action, ActionError, Drive, Impulse, Remove, Reshape, Spawn, Switch, Toggle
+from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.contract import Divergence
-from sandbox.engines.energy import total_energy
-from sandbox.engines.relay import Relay, start
+from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.measure.replay import rerun
 from sandbox.play.running.session import Session
-from sandbox.scene.discs import Ball
-from sandbox.scene.file import from_document
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document
 
 STEPS = 40
 LAYERS = (["ground"], ["ramp"], ["ground", "ramp"])
@@ -98,7 +98,7 @@ def interfering(r: random.Random) -> Timed:
     return [*driven(r), *((r.randrange(STEPS), action) for action in r.sample(each, 3))]
 
 
-def play(running: Relay | Session, told: Timed, steps: int = STEPS) -> None:
+def play(running: SwitchableSimulation | Session, told: Timed, steps: int = STEPS) -> None:
     act = running.act if isinstance(running, Session) else running.apply
     for k in range(steps):
         for when, action in told:

@@ -8,7 +8,7 @@ from ways import HARD, INTEGRATORS, SOFT, Way, drop, named
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.energy import energies
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 
 G = 9.81
 FIRST_ORDER = {"explicit_euler": 0.5, "semi_implicit_euler": -0.5}

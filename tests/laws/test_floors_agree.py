@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.measure.run import run
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 R = 0.0285
 CORNERS = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]]

@@ -8,7 +8,7 @@ from ways import INTEGRATORS, Way, drop
 from sandbox.engines.reference.integrators import INTEGRATORS as TABLE
 from sandbox.measure.closed_form import bounces
 from sandbox.measure.compare.closed import solved
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 
 STEPS = np.array([0.04, 0.02, 0.01, 0.005])
 

@@ -5,11 +5,11 @@ import re
 import pytest
 
 from sandbox.measure.forecast import notes, warnings
-from sandbox.scene.address import AddressError, assign, parse_assignment
-from sandbox.scene.document import to_document
-from sandbox.scene.faults import path_of
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.errors import path_of
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import loads
+from sandbox.scene.files.overrides import AddressError, assign, parse_assignment
+from sandbox.scene.scene import Scene
 
 UNNAMED = """
 [world]
@@ -104,7 +104,7 @@ def resolved(scene: Scene, name: str) -> list[str]:
             try:
                 _, location = assign(to_document(scene), f"{kind}.{name}.anything", 1)
             except AddressError as error:
-                if "is laid out by" in str(error):
+                if "is made by the generator" in str(error):
                     found.append(kind)
             else:
                 assert location[0] == kind
@@ -143,7 +143,7 @@ def test_name_that_was_stated_outranks_one_that_would_be_made() -> None:
     [
         ("joint-1.length=2", "that is an element: joint.joint-1.length"),
         ("rope-1-joint-2.strength=2", "that is part of an element: rope.rope-1.strength"),
-        ("rope.rope-1-joint-2.strength=2", "is laid out by rope.rope-1"),
+        ("rope.rope-1-joint-2.strength=2", "is made by the generator rope.rope-1"),
         ("grid-1-2.radius=2", "that is part of an element: grid.grid-1.radius"),
     ],
 )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ways import Way, named
 
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 
 G = 9.81
 SOLID = [

@@ -8,7 +8,7 @@ from scipy.special import ellipk
 from ways import Way, named
 
 from sandbox.measure.energy import energies
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 
 G = 9.81
 PYMUNK, PLAIN = Way("pymunk", {}), Way("reference", {})

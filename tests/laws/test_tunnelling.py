@@ -5,8 +5,8 @@ import pytest
 
 from sandbox.measure.forecast.passages import passages
 from sandbox.measure.run import run
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 
 BULLETS = 2500
 RADIUS, THICK, SPEED = 0.01, 0.02, 100.0

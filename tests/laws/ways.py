@@ -7,8 +7,8 @@ import pytest
 
 from sandbox.engines.registry import ENGINES, start
 from sandbox.measure.run import run
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 

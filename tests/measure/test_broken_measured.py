@@ -7,14 +7,14 @@ import pytest
 
 from sandbox.batch.outcome import execute
 from sandbox.batch.plan import Job
-from sandbox.engines.energy import energy_of
+from sandbox.engines.common.energy_balance import energy_of
 from sandbox.measure.energy import energies
 from sandbox.measure.joint_error import joint_error, joint_errors
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
 from sandbox.recording import Recording
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame, Trajectory
 
 every_engine = pytest.mark.parametrize("engine", ["pymunk", "reference"])

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 
 from sandbox.measure.closed_form import bounces, closed_form, free_flight, valid_until, why_not
 from sandbox.measure.compare.closed import solved
-from sandbox.scene.file import load, loads
-from sandbox.scene.model import Scene, World
-from sandbox.scene.shipped import find
+from sandbox.scene.description.world import World
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 G = 9.81

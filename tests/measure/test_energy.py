@@ -6,8 +6,9 @@ import pytest
 from sandbox.measure import energy
 from sandbox.measure.closed_form import bounces
 from sandbox.measure.energy import energies
-from sandbox.scene.file import loads
-from sandbox.scene.model import Ball, Scene
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 BALLS = """

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 from forecast_calibration import Observation, confusion, halves, observe, shares, summary

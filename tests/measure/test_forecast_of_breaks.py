@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
+from sandbox.arrays import FloatArray
 from sandbox.engines.registry import start
 from sandbox.measure.forecast import notes
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 RADIUS = 0.03
 

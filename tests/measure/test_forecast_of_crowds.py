@@ -11,9 +11,9 @@ from sandbox.measure.forecast import notes, warnings
 from sandbox.measure.forecast.events import event_rate
 from sandbox.measure.forecast.horizon import horizon
 from sandbox.measure.run import run
-from sandbox.scene.file import from_document
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 
 def heap(places: list[tuple[float, float]], width: float, friction: float, restitution: float = 0.1) -> Scene:
@@ -46,7 +46,7 @@ def test_exact_has_as_many_events_as_were_told(
     settled = simulation.work["events"]
     for _ in range(60):
         simulation.step()
-    told = event_rate(scene, meetings(scene))
+    told = event_rate(scene, contact_matrix(scene))
     assert simulation.work["events"] - settled == pytest.approx(told, rel=0.25)  # 56,000 to 77,000 were measured
     assert [w.kind for w in warnings(scene, engine="exact")] == []
 
@@ -67,7 +67,7 @@ def test_exact_gives_up_as_was_told_where_balls_rub() -> None:
 
 @pytest.mark.parametrize("scene", [heap(WEDGED, 0.23, 0.5, restitution=1.0), heap(UPRIGHT[:1], 0.2, 0.5)])
 def test_what_bounces_for_ever_or_lies_alone_is_not_told_of(scene: Scene) -> None:
-    assert event_rate(scene, meetings(scene)) == 0.0
+    assert event_rate(scene, contact_matrix(scene)) == 0.0
 
 
 def gas(columns: int, radius: float, seed: int, duration: float) -> Scene:

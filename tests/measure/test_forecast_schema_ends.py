@@ -8,9 +8,11 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from sandbox.measure.forecast import FAILED, largest_safe_dt, notes, warnings
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
+
+pytestmark = pytest.mark.slow  # some 10 s
 
 
 def ends(low: float, high: float, *usual: float) -> st.SearchStrategy[float]:

@@ -18,7 +18,7 @@ from sandbox.measure.play_out import play_out
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
 from sandbox.recording import Recording
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
 
 

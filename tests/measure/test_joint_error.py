@@ -9,7 +9,7 @@ from test_energy import still
 
 from sandbox.measure.joint_error import joint_error, joint_errors
 from sandbox.measure.run import run
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 TWO = """
 [[box]]

@@ -3,8 +3,8 @@
 import pytest
 
 from sandbox.measure.forecast import Warning, warnings
-from sandbox.scene.file import load, loads
-from sandbox.scene.shipped import ShippedScene, shipped
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import ShippedScene, shipped
 
 TWO = """
 [[ball]]
@@ -53,7 +53,7 @@ def test_joint_that_starts_violated_is_warned_of_with_the_size_of_its_error(join
     (warning,) = found(joint)
     assert warning.kind == "joint_start"
     assert warning.figures["error"] == pytest.approx(error)
-    assert f"starts {error:.3g} " in warning.message
+    assert f"error of {error:.3g} " in warning.message
 
 
 @pytest.mark.parametrize(

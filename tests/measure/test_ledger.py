@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sandbox.engines.account import Account, Cause
+from sandbox.engines.energy_ledger import Cause, EnergyLedger
 from sandbox.measure.energy import energies
 from sandbox.measure.ledger import Ledger, ledger, ledger_of
 from sandbox.measure.run import run
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 
 SCENE = loads("""
@@ -109,7 +109,7 @@ def test_a_refused_scene_has_no_ledger_but_a_reason() -> None:
 
 
 def test_what_only_takes_gives_phantom_energy() -> None:
-    account = Account()
+    account = EnergyLedger()
     account.enter(Cause.JOINTS, 2.0)
     account.enter(Cause.JOINTS, -1.0)
     account.enter(Cause.DRAG, 3.0)  # wind may give
@@ -130,7 +130,7 @@ def test_what_only_takes_gives_phantom_energy() -> None:
     ],
 )
 def test_contacts_give_phantom_energy_only_together(along: float, across: float, booked: dict[Cause, float]) -> None:
-    account = Account()
+    account = EnergyLedger()
     account.touch(along, across)
     assert {cause: energy for cause, energy in account.entries().items() if energy} == booked
 

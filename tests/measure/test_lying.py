@@ -7,7 +7,7 @@ import pytest
 
 from sandbox.measure.distance import hull_distance
 from sandbox.measure.lying import gap_above, pieces_over_time
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 SCENE = loads(
     '[[box]]\nname = "box"\nposition = [0, 0]\nsize = [2.0, 1.0]\n'

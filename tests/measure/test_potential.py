@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from test_energy import still
 
-from sandbox.engines.energy import energy_of
+from sandbox.engines.common.energy_balance import energy_of
 from sandbox.measure.energy import energies
 from sandbox.measure.run import run
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Frame
 
 SPRUNG = """

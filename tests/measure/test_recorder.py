@@ -1,6 +1,8 @@
 """Recorder: how many frames a run has, and whether they fit."""
 
 import re
+import subprocess
+import sys
 from decimal import Decimal
 
 import numpy as np
@@ -10,10 +12,11 @@ from hypothesis import strategies as st
 
 from sandbox.engines.contract import Exhaustion
 from sandbox.measure import recorder
-from sandbox.measure.recorder import BYTES_PER_BODY, SHARE, Recorder, TooLargeError, frame_count, kept_frames
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene, World
-from sandbox.scene.settings import Settings
+from sandbox.measure.recorder import Recorder, TooLargeError, bytes_per_frame, frame_count, kept_frames
+from sandbox.resource_limits import FREE_FRACTION, free_memory
+from sandbox.scene.description.world import Settings, World
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 
@@ -61,7 +64,7 @@ def test_frames_that_do_not_fit_name_a_number_that_does(
     scene, settings = scene_of((steps + part) * 0.01), Settings(dt=0.01, record_every=every)
     with pytest.MonkeyPatch.context() as patch:
         # Room for so many frames, and half a one.
-        patch.setattr(recorder, "free_memory", lambda: (room + 0.5) * bodies * BYTES_PER_BODY / SHARE)
+        patch.setattr(recorder, "free_memory", lambda: (room + 0.5) * bytes_per_frame(scene, bodies) / FREE_FRACTION)
         needed = kept_frames(steps, part, every)
         if needed <= room:
             assert recorder.require_memory(scene, settings, bodies) == needed
@@ -86,12 +89,27 @@ def test_message_says_what_is_needed_and_what_there_is(monkeypatch: pytest.Monke
     with pytest.raises(TooLargeError) as caught:
         Recorder(scene_of(1.0), Settings(dt=1e-8, record_every=2), 1)
     assert str(caught.value) == (
-        "50,000,001 frames of 1 body take 2.4 GB, but 0.6 GB can be used; solver.record_every = 9 would fit (it is 2)"
+        "50,000,001 frames of 1 body take 2.8 GB, but only 0.6 GB are available; "
+        "solver.record_every = 10 would fit (now 2)"
     )
 
 
+def test_account_of_energy_counts_as_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recorder, "free_memory", lambda: int(200 * 56 / FREE_FRACTION))
+    assert recorder.require_memory(scene_of(1.0), Settings(), 1) == 101
+    with pytest.raises(TooLargeError, match="record_every"):
+        recorder.require_memory(scene_of(1.0), Settings(), 1, causes=13)
+
+
 def test_free_memory_is_a_positive_number_of_bytes() -> None:
-    assert 2**20 < recorder.free_memory() < 2**60
+    assert 2**20 < free_memory() < 2**60
+
+
+def test_free_memory_is_within_the_limit_of_address_space() -> None:
+    code = "import resource\nresource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30))\n"
+    code += "from sandbox.resource_limits import free_memory\nprint(free_memory())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 0 < int(done.stdout) < 2**30
 
 
 def frame_at(time: float, bodies: int) -> Frame:

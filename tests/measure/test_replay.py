@@ -23,8 +23,9 @@ from sandbox.engines.registry import ENGINES, UnknownEngineError
 from sandbox.measure.replay import rerun
 from sandbox.play.running.session import Session
 from sandbox.recording import Recording
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Ball, Scene
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 SCENE = from_document(
     {

@@ -81,3 +81,10 @@ def test_stretches_fill_the_duration_and_begin_when_they_should(
         # A step earlier it would have been too early: something was asked for within the last step.
         early = begin - before.dt + 2.0 * ROUNDING * before.dt  # as far as times count as equal
         assert any(early < time for time, _ in changes[: len(asked)])
+
+
+def test_whole_steps_after_a_change_to_a_far_shorter_dt_are_whole() -> None:
+    switch = Switch(time=0.2, settings={"dt": 1e-9})
+    for steps in range(1, 20):
+        duration = 0.2 + steps * 1e-9
+        assert schedule(duration, 0.1, [switch])[-1] == Stretch(steps, 1e-9)

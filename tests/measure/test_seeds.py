@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from sandbox.measure.seeds import is_random, same_chances, seeded
-from sandbox.scene.document import to_document
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import loads
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import loads
 
 PLAIN = "[world]\nseed = 3\n[[ball]]\nname = 'a'\nposition = [0, 0]\nradius = 1\n"
 HEADS = {

@@ -10,8 +10,8 @@ from functools import cache
 import pytest
 
 from sandbox import load, run
-from sandbox.engines.relay import start
-from sandbox.scene.shipped import find
+from sandbox.engines.switching import start
+from sandbox.scene.files.shipped_scenes import find
 
 SLACK = 1.02
 """Contacts come and go by rounding, which a processor's libraries may do otherwise; a percent in the largest pile."""
@@ -127,7 +127,7 @@ def test_work_is_the_same_compiled_or_not() -> None:
     code = """
         import json
         from sandbox import load, run
-        from sandbox.scene.shipped import find
+        from sandbox.scene.files.shipped_scenes import find
         cases = [("newtons_cradle", 0.5), ("hanging_chain", 0.02)]
         works = []
         for name, seconds in cases:

@@ -5,7 +5,7 @@ import pytest
 
 from sandbox.play.camera import Camera
 from sandbox.play.framing import lies_down
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 CAMERA = Camera((0.6, 1.3), 200.0, (640, 400), turned=True)
 TABLE = loads('title = "t"\n[billiards]\ntable = "pool-7ft"\n[billiards.place]\ncue = [0.5, 0.5]\n')

@@ -6,9 +6,8 @@ import pytest
 from sandbox.action import Drive, Throttle
 from sandbox.play.claims import KEYS, claims, held
 from sandbox.play.hands import Hands
-from sandbox.scene.drives import DriveKey
-from sandbox.scene.file import from_document
-from sandbox.scene.forces import ThrustKey
+from sandbox.scene.description.forces import DriveKey, ThrustKey
+from sandbox.scene.files.load import from_document
 
 BOX = {"name": "rod", "position": [0.0, 0.0], "size": [1.0, 1.0]}
 PLUNGER = {"kind": "plunger", "body": "rod", "direction": [0.0, 1.0], "travel": 1.0, "speed": 1.0}

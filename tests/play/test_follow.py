@@ -12,7 +12,7 @@ from windowed import turned, window_on
 from sandbox.play.camera import Camera
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
-from sandbox.scene.shipped import find
+from sandbox.scene.files.shipped_scenes import find
 
 LEAVING = """
 title = "Leaving"
@@ -99,7 +99,7 @@ def test_spent_fireworks_say_that_space_launches_them(tmp_path: Path) -> None:
         window.camera = Camera((1e6, 0.0), 10.0, (640, 480))
         window.at_home = False
         window.turn(0.0)
-        assert "Space launches" in str(window.desk._describe_absence(window.stage))
+        assert "Space relaunches" in str(window.desk._describe_absence(window.stage))
     finally:
         window.close()
 

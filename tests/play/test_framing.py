@@ -14,9 +14,9 @@ from sandbox.play.camera import Camera
 from sandbox.play.framing import framing, look_ahead
 from sandbox.play.picking import overlapping, picked
 from sandbox.play.running.trails import LENGTH, MOST, Trails
-from sandbox.scene.file import from_document, load
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find, shipped
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find, shipped
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 SHIPPED = [each.name for each in shipped()]

@@ -19,9 +19,9 @@ from sandbox.play.picking import overlapping
 from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
 from sandbox.play.window import Window
-from sandbox.scene.discs import Ball
-from sandbox.scene.file import from_document, load
-from sandbox.scene.shipped import find
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
 
 REST = """
 title = "Rest"

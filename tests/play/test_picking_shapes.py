@@ -19,8 +19,8 @@ from sandbox.play.picking import overlapping, picked
 from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
 from sandbox.play.sight import Sight
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 

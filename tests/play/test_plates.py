@@ -15,8 +15,8 @@ from sandbox.play.instruments.plates import largest_room
 from sandbox.play.sight import OVERLAYS
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
-from sandbox.scene.file import load
-from sandbox.scene.shipped import find, shipped
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import find, shipped
 
 SIZES = [(400, 300, 1.0), (800, 600, 1.0), (1024, 700, 1.0), (1280, 720, 1.0), (1920, 1080, 1.0), (1280, 720, 2.0)]
 """Width and height, px, and by how much letters and widgets are larger."""

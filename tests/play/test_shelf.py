@@ -9,9 +9,9 @@ from sandbox.play import messages as module
 from sandbox.play.facts import facts, told
 from sandbox.play.messages import MOST, Messages
 from sandbox.play.shelf import beside, neighbour, to_pick
-from sandbox.scene.file import from_document
-from sandbox.scene.settings import Settings
-from sandbox.scene.shipped import shipped
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import from_document
+from sandbox.scene.files.shipped_scenes import shipped
 from sandbox.trajectory import Contacts, Frame
 
 
@@ -106,7 +106,7 @@ def test_facts_of_a_body_are_its_figures() -> None:
     assert lines[-1] == "2 contacts"
     assert "fixed" in facts(bodies, frame, Contacts.none(), 1)
     gone = Frame(0.0, *(array.copy() for array in state), np.zeros(2, np.bool_))
-    assert facts(bodies, gone, contacts, 0) == ("cue", "no longer there")
+    assert facts(bodies, gone, contacts, 0) == ("cue", "removed")
     assert facts(bodies, frame, contacts, 2) == ()
 
 

@@ -13,8 +13,8 @@ import pytest
 from sandbox.play import sound
 from sandbox.play.chime import HIGHEST, LOWEST, RATE, SECONDS, STEPS, chime, pitch_of
 from sandbox.play.sound import A_CALL, SILENT, Sounds, loudness, volume
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.file import loads
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
 
 PITCHES = [float(LOWEST * (HIGHEST / LOWEST) ** (k / (STEPS - 1))) for k in range(STEPS)]
@@ -188,7 +188,7 @@ def test_mixer_that_is_missing_is_no_exception(monkeypatch: pytest.MonkeyPatch) 
 
 NO_DEVICE = """
 from sandbox.play.sound import Sounds
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
 sounds = Sounds()
 bodies = loads("[[ball]]\\nposition = [0, 0]\\nradius = 1").bodies

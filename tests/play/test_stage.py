@@ -15,8 +15,8 @@ from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
 from sandbox.play.running.stored import Stored
 from sandbox.play.stage import Stage
-from sandbox.scene.file import from_document, load
-from sandbox.scene.shipped import find
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
 
 GOOD = """
 title = "{name}"
@@ -223,7 +223,7 @@ def test_scene_that_the_engine_refuses_is_played_by_one_that_does_not(folder: Pa
     stage.walk(1)
     assert live(stage).engine == "pymunk"
     assert "exact refuses" in told(stage, "warning")
-    assert "pymunk plays it" in told(stage, "warning")
+    assert "opened with pymunk" in told(stage, "warning")
 
 
 def test_next_engine_goes_round_and_skips_who_refuses_and_says_why(folder: Path) -> None:

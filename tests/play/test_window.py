@@ -253,7 +253,7 @@ def test_claimed_keys_are_told_once_and_only_arrows_repeat(opened: Open) -> None
     window = opened(ROOM + CLAIMS)
     turn(window)
     told = [text for _, text in window.stage.messages.shown()]
-    assert told == ["Arrows: move a by 0.25 m", "Space: launch spark again"]
+    assert told == ["Arrows: move a by 0.25 m", "Space: relaunch spark"]
     window.stage.messages = Messages()
     turn(window, key(pygame.K_SPACE), key(pygame.K_SPACE), key(pygame.K_SPACE))
     assert [action.kind for action in live(window).session.actions] == ["launch"]
@@ -266,7 +266,7 @@ def test_claimed_keys_are_told_once_and_only_arrows_repeat(opened: Open) -> None
 @pytest.mark.parametrize("code", [pygame.K_n, pygame.K_DELETE])
 def test_key_for_a_picked_body_says_that_none_is(window: Window, code: int) -> None:
     turn(window, key(code))
-    assert window.stage.messages.shown() == (("warning", "click a body first"),)
+    assert window.stage.messages.shown() == (("warning", "select a body first: click it"),)
 
 
 def test_faults_are_closed_by_a_click_on_them_or_by_escape(window: Window) -> None:
@@ -414,7 +414,7 @@ def test_window_of_a_stored_run_tells_what_cannot_be_done(opened: Open, tmp_path
     show = Stored(Film(sandbox.run(sandbox.load(tmp_path / "room.toml"))))
     window.stage.put_on(show, None, show.scene)
     show.scrub(show.end)
-    assert window.desk.status(window.stage, 60.0, None).ended == "the end of the run"
+    assert window.desk.status(window.stage, 60.0, None).ended == "end of the run"
     show.scrub(show.begin)
     assert window.desk.status(window.stage, 60.0, None).ended is None
     for code in (pygame.K_e, pygame.K_g, pygame.K_t, pygame.K_b, pygame.K_n, pygame.K_DELETE):
@@ -450,7 +450,7 @@ def test_signal_ends_the_loop_and_leaves_others_handlers_alone(
 def test_no_display_is_told(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     pygame.quit()
     monkeypatch.setitem(os.environ, "SDL_VIDEODRIVER", "none-such")
-    with pytest.raises(NoDisplayError, match="no window can be opened"):
+    with pytest.raises(NoDisplayError, match="cannot open a window"):
         open_screen(None, "none")
     assert not pygame.display.get_init()
     assert capfd.readouterr().err == ""

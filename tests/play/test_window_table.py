@@ -10,13 +10,13 @@ import pytest
 from pressing import key, key_up, move, press, release
 
 from sandbox.action import Move, Strike
+from sandbox.games.billiards.equipment import INCH
 from sandbox.games.billiards.rules.snooker import SnookerState
 from sandbox.play.billiards.game import Game
 from sandbox.play.instruments.manual import groups
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
-from sandbox.scene.billiards.tables import INCH
-from sandbox.scene.shipped import find
+from sandbox.scene.files.shipped_scenes import find
 
 SIZE = (1000, 620)
 TURN = 1.0 / 60.0
@@ -154,7 +154,7 @@ def test_foul_is_said_and_z_takes_the_stroke_back(window: Window) -> None:
     do(window, key(pygame.K_SPACE))
     roll_out(window)
     assert game.match.verdict is not None
-    assert "the cue ball touched no ball" in "; ".join(game.match.messages)
+    assert "the cue ball hit no ball" in "; ".join(game.match.messages)
     assert game.match.turn == 1
     do(window, key(pygame.K_z))
     window.turn(TURN)
@@ -213,4 +213,4 @@ def test_balls_of_a_game_are_moved_by_the_cue_alone(window: Window) -> None:
     start, end = at(window, x, y), at(window, x - 0.2, y)
     do(window, move(*start), press(*start), move(*end, held=True), release(*end))
     assert game.live.session.actions == ()
-    assert "by the cue" in window.stage.messages.shown()[-1][1]
+    assert "the cue moves balls" in window.stage.messages.shown()[-1][1]

@@ -9,11 +9,11 @@ import pytest
 from pressing import FOCUS_LOST, key, key_up, press
 from windowed import turned, window_on
 
-from sandbox.engines.compiling import COMPILING
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
 from sandbox.play.worker import Worker
-from sandbox.scene.shipped import find
+from sandbox.scene.files.shipped_scenes import find
 
 MOVING = """
 title = "Moving"
@@ -114,12 +114,12 @@ def compile_for(window: Window, *meanwhile: pygame.event.Event) -> None:
     """Let the next job of the stage compile until so many events have been taken out of the queue."""
 
     def job() -> None:
-        COMPILING.begin("sandbox.test")
+        COMPILE_CLOCK.begin("sandbox.test")
         for event in meanwhile:
             pygame.event.post(event)
         while pygame.event.peek([event.type for event in meanwhile]) and window.leaving is None:
             threading.Event().wait(0.01)
-        COMPILING.end()
+        COMPILE_CLOCK.end()
 
     window.stage.compute(job)
 
@@ -156,10 +156,10 @@ def test_scene_is_seen_while_its_session_is_being_started(window: Window, tmp_pa
 
     def compute(job: Callable[[], object]) -> object:
         def slow() -> object:
-            COMPILING.begin("sandbox.test")
+            COMPILE_CLOCK.begin("sandbox.test")
             while not seen:
                 threading.Event().wait(0.01)
-            COMPILING.end()
+            COMPILE_CLOCK.end()
             return job()
 
         return begin(slow)

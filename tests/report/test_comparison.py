@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from sandbox.measure.compare import Comparison, compare
 from sandbox.measure.compare.truth import Truth
 from sandbox.report.comparison import draw_energy, draw_error, draw_trajectories, plot_comparison
-from sandbox.scene.file import load, loads
-from sandbox.scene.shipped import find
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find
 
 DROP = compare(load(find("bounce"), ["world.duration=1.5", "solver.dt=0.01"]), ["pymunk"])
 THROWN = compare(

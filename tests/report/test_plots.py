@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 
 from sandbox.report.colours import COLOURS
 from sandbox.report.plots import draw_run, format_of, plot_run
-from sandbox.scene.file import loads
-from sandbox.scene.model import Ball, Scene
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 HEAD = 'title = "Trial"\n[world]\ngravity = [0.0, -10.0]\n[solver]\ndt = 0.1\n'

@@ -11,7 +11,7 @@ from sandbox.measure.shots.attempt import attempt_of
 from sandbox.measure.shots.spread import Spread
 from sandbox.measure.shots.study import Study, study
 from sandbox.report.shots import draw_aims, draw_rests, plot_shots
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 FLOOR = "[surface]\nsliding_friction = 0.2\nrolling_friction = 0.01\nspinning_friction = 0.01\n"
 WALLS = "[[wall]]\npoints = [[-0.5, -0.5], [1.5, -0.5], [1.5, 0.5], [-0.5, 0.5]]\nclosed = true\nrestitution = 0.8\n"

@@ -12,8 +12,8 @@ from sandbox.action import Remove, Spawn
 from sandbox.measure.run import run
 from sandbox.report import tables
 from sandbox.report.tables import CONTACTS, STATES, MissingExtraError, write_contacts, write_states
-from sandbox.scene.file import loads
-from sandbox.scene.model import Ball
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 
 SCENE = loads("""

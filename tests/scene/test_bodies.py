@@ -1,15 +1,18 @@
 """Bodies: numbering and starting state."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import strategies
 from hypothesis import given, settings
 
-from sandbox.scene.file import loads
-from sandbox.scene.generators import size
-from sandbox.scene.model import Ball, Emitter, Grid, Scatter, Scene
-from sandbox.scene.shapes import form_of
+from sandbox.scene.compile.generators import size
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.discs import Ball, Emitter, Grid, Scatter
+from sandbox.scene.files.load import loads
+from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.scene import Scene
 
 SCENE = """
 [[emitter]]
@@ -142,3 +145,28 @@ def test_arrays_of_any_scene_agree_in_shape_and_are_finite(scene: Scene) -> None
     assert not bodies.angular_velocity[bodies.fixed].any()
     assert len(scene.fixed_names) == len(scene.fixed)
     assert not set(scene.fixed_names) & set(bodies.names)
+
+
+def test_changed_copy_of_a_scene_has_bodies_of_its_own_fields():
+    scene = loads(
+        '[world]\ngravity = [0, -9.81]\n[[ball]]\nname = "a"\nradius = 0.1\nposition = [0, 1]\n'
+        '[[ball]]\nname = "b"\nradius = 0.1\nposition = [1, 1]\n[[joint]]\nkind = "rod"\nbetween = ["a", "b"]\n'
+    )
+    assert scene.bodies.names == ("a", "b") and len(scene.links) == 1
+    moved = scene.model_copy(update={"balls": scene.balls[:1], "joints": ()})
+    assert moved.bodies.names == ("a",)
+    assert len(moved.links) == 0
+    assert scene.bodies.names == ("a", "b")
+
+
+def test_setup_with_a_changed_scene_keeps_its_bodies():
+    scene = loads('[[ball]]\nname = "a"\nradius = 0.1\nposition = [0, 1]\n')
+    setup = Setup.of(scene)
+    moved = setup.placed(replace(setup.bodies, position=setup.bodies.position + 1.0), time=2.0)
+    changed = moved.with_scene(
+        scene.model_copy(update={"balls": (scene.balls[0].model_copy(update={"friction": 0.7}),)})
+    )
+    assert changed.bodies.position.tolist() == [[1.0, 2.0]]
+    assert changed.time == 2.0
+    assert changed.bodies.elements[0].friction == 0.7
+    assert setup.bodies.position.tolist() == [[0.0, 1.0]]

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import from_document
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import from_document
 
 BALL: dict[str, Any] = {"position": [0.0, 0.0], "radius": 1.0}
 UP, DOWN = math.inf, -math.inf
@@ -191,10 +191,10 @@ def test_mass_from_density_is_bounded_like_a_stated_one() -> None:
 
 def test_steps_at_the_edge_are_taken_and_more_refused() -> None:
     from_document({"world": {"duration": 1e7}, "solver": {"dt": 0.01}, "ball": [BALL]})
-    with pytest.raises(SceneError, match="steps a run") as caught:
+    with pytest.raises(SceneError, match="steps per run") as caught:
         from_document({"world": {"duration": 1e7 + 1.0}, "solver": {"dt": 0.01}, "ball": [BALL]})
     assert caught.value.faults[0].path == "solver.dt"
-    with pytest.raises(SceneError, match="steps a run"):
+    with pytest.raises(SceneError, match="steps per run"):
         from_document({"world": {"duration": 1e7}, "solver": {"dt": 0.01, "substeps": 2}, "ball": [BALL]})
 
 

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.engines.registry import start
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, load, loads
-from sandbox.scene.links import LinkKind
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import dumps, from_document, load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 CLOTH = {"corner": [1.0, 2.0], "columns": 4, "rows": 3, "spacing": [0.5, 0.25], "stiffness": 100.0, "damping": 0.1}
 
@@ -98,15 +98,15 @@ def test_pinned_nodes_never_move_and_their_links_to_each_other_are_left_out(pins
 @pytest.mark.parametrize(
     ("cloth", "key", "message"),
     [
-        ({"pins": [[0, 0], [4, 0]]}, "pins[1]", "its last node is [3, 2]"),
+        ({"pins": [[0, 0], [4, 0]]}, "pins[1]", "last node is [3, 2]"),
         ({"pins": [[0, 3]]}, "pins[0]", "outside the cloth"),
         ({"pins": "bottom"}, "pins", "'top', 'corners', 'left'"),
         ({"pins": [[0, -1]]}, "pins", "'top', 'corners', 'left'"),
         ({"stiffness": None}, "stiffness", "is missing"),
-        ({"kind": "rods", "damping": None}, "stiffness", "kind is 'rods'"),
-        ({"kind": "rods", "stiffness": None}, "damping", "kind is 'rods'"),
-        ({"collides": "all", "radius": 0.2}, "radius", "0.125 m at most"),
-        ({"columns": 1001, "rows": 1000}, "", "at most 1,000,000"),
+        ({"kind": "rods", "damping": None}, "stiffness", "is 'rods'"),
+        ({"kind": "rods", "stiffness": None}, "damping", "is 'rods'"),
+        ({"collides": "all", "radius": 0.2}, "radius", "at most 0.125 m"),
+        ({"columns": 1001, "rows": 1000}, "", "the limit is 1,000,000"),
         ({"spacing": [0.0, 1.0]}, "spacing[0]", "must be greater than 0"),
     ],
 )

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandbox.scene.bodies import expand
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import from_document, loads
-from sandbox.scene.model import Plane
-from sandbox.scene.starts import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps, height_above
+from sandbox.scene.compile.start_state import start_bodies
+from sandbox.scene.description.fixed import Plane
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import from_document, loads
+from sandbox.scene.validate.bodies import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps, height_above
 
 BALL: dict[str, Any] = {"position": [0.0, 0.0], "radius": 1.0}
 GRID: dict[str, Any] = {"origin": [0, 0], "columns": 2, "spacing": [3, 3], "radius": 1}
@@ -33,7 +33,7 @@ def only(document: dict[str, Any], path: str, words: str) -> None:
 def test_material_must_be_declared() -> None:
     only({"ball": [{**BALL, "material": "rubber"}]}, "ball[0].material", "no material is named 'rubber'")
     declared = {"material": [{"name": "steel"}]}
-    only({**declared, "post": [{**POST, "material": "Steel"}]}, "post[0].material", "declared are: steel")
+    only({**declared, "post": [{**POST, "material": "Steel"}]}, "post[0].material", "materials: steel")
     for kind, thing in (
         ("plane", {"point": [0, 0], "normal": [0, 1]}),
         ("wall", {"points": [[0, 0], [1, 0]]}),
@@ -48,7 +48,7 @@ def test_material_must_be_declared() -> None:
 def test_pair_names_declared_materials() -> None:
     materials = [{"name": "a"}, {"name": "b"}]
     from_document({"material": materials, "pair": [{"between": ["a", "b"]}, {"between": ["a", "a"]}]})
-    only({"material": materials, "pair": [{"between": ["a", "c"]}]}, "pair[0].between[1]", "declared are: a, b")
+    only({"material": materials, "pair": [{"between": ["a", "c"]}]}, "pair[0].between[1]", "materials: a, b")
     assert [path for path, _ in faults({"pair": [{"between": ["c", "d"]}]})] == [
         "pair[0].between[0]",
         "pair[0].between[1]",
@@ -58,16 +58,16 @@ def test_pair_names_declared_materials() -> None:
 @pytest.mark.parametrize("again", [["a", "b"], ["b", "a"]])
 def test_pair_is_stated_once(again: list[str]) -> None:
     pairs = [{"between": ["a", "b"]}, {"between": again, "restitution": 0.5}]
-    only({"material": [{"name": "a"}, {"name": "b"}], "pair": pairs}, "pair[1].between", "second time")
+    only({"material": [{"name": "a"}, {"name": "b"}], "pair": pairs}, "pair[1].between", "stated twice")
 
 
 def test_pair_of_a_material_with_itself_is_stated_once() -> None:
     pairs = [{"between": ["a", "a"]}, {"between": ["a", "a"]}]
-    only({"material": [{"name": "a"}], "pair": pairs}, "pair[1].between", "second time")
+    only({"material": [{"name": "a"}], "pair": pairs}, "pair[1].between", "stated twice")
 
 
 def test_material_is_declared_once() -> None:
-    only({"material": [{"name": "a"}, {"name": "a"}]}, "material.a.name", "a second material")
+    only({"material": [{"name": "a"}, {"name": "a"}]}, "material.a.name", "another material")
 
 
 def test_material_and_body_may_share_a_name() -> None:
@@ -75,10 +75,10 @@ def test_material_and_body_may_share_a_name() -> None:
 
 
 def test_names_are_unique_over_bodies_and_fixed_things() -> None:
-    only({"ball": [{**BALL, "name": "a"}, {**BALL, "name": "a"}]}, "ball.a.name", "a second body")
-    only({"ball": [{**BALL, "name": "a"}], "post": [{**POST, "name": "a"}]}, "post.a.name", "a second body")
+    only({"ball": [{**BALL, "name": "a"}, {**BALL, "name": "a"}]}, "ball.a.name", "another body")
+    only({"ball": [{**BALL, "name": "a"}], "post": [{**POST, "name": "a"}]}, "post.a.name", "another body")
     plane, wall = {"point": [0, 0], "normal": [0, 1], "name": "a"}, {"points": [[0, 0], [1, 0]], "name": "a"}
-    only({"plane": [plane], "wall": [wall]}, "wall.a.name", "a second body")
+    only({"plane": [plane], "wall": [wall]}, "wall.a.name", "another body")
 
 
 def test_names_are_unique_over_names_that_generators_make() -> None:
@@ -103,13 +103,13 @@ def test_names_are_told_apart_to_the_letter() -> None:
 @pytest.mark.parametrize("kind", ["ball", "grid"])
 def test_mass_and_density_exclude_each_other(kind: str) -> None:
     thing = BALL if kind == "ball" else GRID
-    only({kind: [{**thing, "mass": 1, "density": 1}]}, f"{kind}[0].density", "state one of them")
+    only({kind: [{**thing, "mass": 1, "density": 1}]}, f"{kind}[0].density", "`mass`")
 
 
 def test_fixed_ball_has_no_motion_of_its_own() -> None:
     from_document({"ball": [{**BALL, "fixed": True, "velocity": [0, -0.0], "angular_velocity": 0}]})
-    only({"ball": [{**BALL, "fixed": True, "velocity": [0, 1e-300]}]}, "ball[0].velocity", "never moves")
-    only({"ball": [{**BALL, "fixed": True, "angular_velocity": 1}]}, "ball[0].angular_velocity", "never moves")
+    only({"ball": [{**BALL, "fixed": True, "velocity": [0, 1e-300]}]}, "ball[0].velocity", "cannot move")
+    only({"ball": [{**BALL, "fixed": True, "angular_velocity": 1}]}, "ball[0].angular_velocity", "cannot move")
 
 
 @pytest.mark.parametrize("normal", [[0, 0], [0.0, -0.0], [1e-200, 1e-200], [1e300, 1e300], [1.7e308, 1.7e308]])
@@ -123,16 +123,18 @@ def test_normal_of_any_other_length_is_taken(normal: list[float]) -> None:
 
 
 def test_wall_of_zero_length_segments_is_refused_where_it_doubles_back() -> None:
-    only({"wall": [{"points": [[0, 0], [0, 0]]}]}, "wall[0].points[0]", "neighbours")
-    only({"wall": [{"points": [[0, 0], [1, 0], [1, 0], [2, 0]]}]}, "wall[0].points[1]", "neighbours")
-    only({"wall": [{"points": [[0, 0], [1, 0], [1, 1], [0, 0]], "closed": True}]}, "wall[0].points[3]", "neighbours")
+    only({"wall": [{"points": [[0, 0], [0, 0]]}]}, "wall[0].points[0]", "the next point")
+    only({"wall": [{"points": [[0, 0], [1, 0], [1, 0], [2, 0]]}]}, "wall[0].points[1]", "the next point")
+    only(
+        {"wall": [{"points": [[0, 0], [1, 0], [1, 1], [0, 0]], "closed": True}]}, "wall[0].points[3]", "the next point"
+    )
     from_document({"wall": [{"points": [[0, 0], [1, 0], [1, 1], [0, 0]]}]})
     from_document({"wall": [{"points": [[0, 0], [1e-9, 0]]}]})
     only({"wall": [{"points": [[0, 0], [0.99e-9, 0]]}]}, "wall[0].points[0]", "1e-09")
 
 
 def test_closed_wall_of_two_points_is_refused() -> None:
-    only({"wall": [{"points": [[0, 0], [1, 0]], "closed": True}]}, "wall[0].closed", "three or more")
+    only({"wall": [{"points": [[0, 0], [1, 0]], "closed": True}]}, "wall[0].closed", "at least three")
     from_document({"wall": [{"points": [[0, 0], [1, 0], [0, 1]], "closed": True}]})
 
 
@@ -181,13 +183,13 @@ def test_start_outside_the_bounds_is_refused_and_on_them_taken() -> None:
 
 @pytest.mark.parametrize("bounds", [[[1, 1], [-1, -1]], [[0, 0], [0, 1]], [[0, 0], [1, 0]], [[0, 0], [0, 0]]])
 def test_bounds_that_enclose_nothing_are_refused(bounds: list[list[float]]) -> None:
-    only({"world": {"bounds": bounds}}, "world.bounds", "encloses nothing")
+    only({"world": {"bounds": bounds}}, "world.bounds", "upper right corner")
 
 
 def test_bodies_are_at_most_a_million_over_all_generators() -> None:
     half = {"count": 500_000, "position": [0, 0], "velocity_min": [0, 0], "velocity_max": [0, 0]}
     from_document({"emitter": [half, half]})
-    only({"emitter": [half, half], "ball": [BALL]}, "emitter[1]", "1,000,001 bodies; at most 1,000,000")
+    only({"emitter": [half, half], "ball": [BALL]}, "emitter[1]", "1,000,001 bodies; the limit is 1,000,000")
     only({"grid": [{**GRID, "columns": 10**6, "rows": 10**6}]}, "grid[0]", "1,000,000,000,000 bodies")
 
 
@@ -237,7 +239,7 @@ def test_corners_and_velocities_in_the_wrong_order_are_refused() -> None:
 
 
 def test_generator_that_carries_balls_out_of_range_is_refused() -> None:
-    only({"grid": [{**GRID, "columns": 3, "spacing": [1e16, 0]}]}, "grid[0]", "beyond")
+    only({"grid": [{**GRID, "columns": 3, "spacing": [1e16, 0]}]}, "grid[0]", "from the origin")
     from_document({"grid": [{**GRID, "columns": 2, "spacing": [1e16, 0]}]})
     fast = {"position": [0, 0], "count": 50, "velocity_min": [0, 0], "velocity_max": [1e12, 0]}
     from_document({"emitter": [fast]})
@@ -290,4 +292,28 @@ velocity = [1, 0]
 
 def test_bodies_can_be_laid_out_again_from_a_scene_that_passed() -> None:
     scene = from_document({"ball": [BALL], "grid": [{**GRID, "origin": [9, 9]}]})
-    assert np.array_equal(expand(scene).position, scene.bodies.position)
+    assert np.array_equal(start_bodies(scene).position, scene.bodies.position)
+
+
+def test_outline_with_a_fault_makes_no_other_body_heavy():
+    text = """
+[[body]]
+name = "bat"
+position = [0, 0]
+mass = 0.08
+[[body.ball]]
+radius = 0.1
+[[drive]]
+kind = "torque"
+body = "bat"
+pivot = [0.1, 0]
+stops = [-0.5, 0.5]
+moment = 0.01
+torque = 1
+[[polygon]]
+name = "thin"
+points = [[0.0, 0.0], [0.04, 1e16], [-4.2, -0.02]]
+"""
+    with pytest.raises(SceneError) as error:
+        loads(text)
+    assert [fault.path for fault in error.value.faults] == ["polygon.thin.points[0]"]

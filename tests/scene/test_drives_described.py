@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from sandbox.scene.driven import mounts
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, loads
+from sandbox.scene.compile.drives import mounts
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import dumps, from_document, loads
 
 BAR = '[[box]]\nname = "bar"\nposition = [1, 0]\nsize = [2, 1]\n'
 TORQUE = {"kind": "torque", "body": "bar", "pivot": [0, 0], "stops": [0, 1], "torque": 1}
@@ -24,14 +24,14 @@ def faults(document: dict[str, Any]) -> list[str]:
 @pytest.mark.parametrize(
     ("box", "drive", "told"),
     [
-        ({}, {**TORQUE, "body": "car"}, "drive[0].body: no body is named 'car'; there are 'bar'"),
-        ({"fixed": True}, TORQUE, "drive[0].body: 'bar' is fixed; leave that out, its drive holds it"),
-        ({"velocity": [1, 0]}, PLUNGER, "drive[0].body: 'bar' starts with a velocity; a driven body starts at rest"),
-        ({"angle": 2}, STROKE, "drive[0].stops: 'bar' starts at an angle of 2, not between 0 and 1 rad"),
-        ({}, {**STROKE, "stops": [1, 1]}, "drive[0].stops: are one and the same angle; give two, where it rests and"),
-        ({}, {**PLUNGER, "direction": [0, 0]}, "drive[0].direction: [0.0, 0.0] has no direction; such as [0, 1] for"),
+        ({}, {**TORQUE, "body": "car"}, "drive[0].body: no body is named 'car'"),
+        ({"fixed": True}, TORQUE, "drive[0].body: 'bar' is fixed"),
+        ({"velocity": [1, 0]}, PLUNGER, "drive[0].body: 'bar' has an initial velocity"),
+        ({"angle": 2}, STROKE, "drive[0].stops: 'bar' starts at 2 rad; the angle must be between 0 and 1 rad"),
+        ({}, {**STROKE, "stops": [1, 1]}, "drive[0].stops: must be two different angles"),
+        ({}, {**PLUNGER, "direction": [0, 0]}, "drive[0].direction: [0.0, 0.0] has no direction"),
         # 1 kg at 1 m
-        ({}, {**TORQUE, "moment": 0.9}, "drive[0].moment: its mass alone makes 1 kg·m² about that pivot; state more"),
+        ({}, {**TORQUE, "moment": 0.9}, "drive[0].moment: must be greater than 1 kg·m²"),
     ],
 )
 def test_fault_of_a_drive_is_told(box: dict[str, Any], drive: dict[str, Any], told: str) -> None:
@@ -42,15 +42,15 @@ def test_fault_of_a_drive_is_told(box: dict[str, Any], drive: dict[str, Any], to
 def test_body_has_one_drive_and_no_thrust() -> None:
     thrust = {"body": "bar", "force": [1, 0]}
     found = faults({"box": [BOX], "drive": [{**TORQUE, "name": "a"}, {**STROKE, "name": "a"}], "thrust": [thrust]})
-    assert "drive.a.name: a second drive named 'a'; names are unique" in found
-    assert sum("has a drive already" in each for each in found) == 1
-    assert sum("carries a thrust" in each for each in found) == 2
+    assert "drive.a.name: another drive is also named 'a'; names must be unique" in found
+    assert sum("already has a drive" in each for each in found) == 1
+    assert sum("has a thrust" in each for each in found) == 2
 
 
 def test_one_of_many_bodies_has_no_drive() -> None:
     grid = {"name": "g", "origin": [0, 0], "spacing": [3, 3], "columns": 2, "rows": 1, "radius": 1}
     (found,) = faults({"grid": [grid], "drive": [{**PLUNGER, "body": "g-1"}]})
-    assert found == "drive[0].body: 'g-1' is one of many; a drive holds a body with a table of its own"
+    assert found == "drive[0].body: 'g-1' is made by a generator; a drive needs a body with a table of its own"
 
 
 def test_fault_in_a_figure_names_line_and_range() -> None:
@@ -63,7 +63,7 @@ def test_fault_in_a_figure_names_line_and_range() -> None:
 
 def test_kind_that_no_drive_is_and_key_that_it_lacks() -> None:
     assert faults({"box": [BOX], "drive": [{**STROKE, "kind": "strike"}]}) == [
-        'drive[0].kind: is "strike"; a drive is one of torque, stroke, plunger'
+        'drive[0].kind: is "strike"; kinds of drive: torque, stroke, plunger'
     ]
     assert faults({"box": [BOX], "drive": [{**STROKE, "rat": 1}]}) == [
         "drive[0].rat: unknown key; did you mean 'rate'?"
@@ -84,7 +84,7 @@ def test_moment_about_the_hinge_is_that_which_is_stated() -> None:
 
 
 def test_value_of_a_drive_can_be_set_by_its_path() -> None:
-    from sandbox.scene.address import assign
+    from sandbox.scene.files.overrides import assign
 
     document, where = assign({"box": [BOX], "drive": [{**TORQUE, "name": "left"}]}, "drive.left.torque", 3.0)
     assert where == ("drive", 0, "torque")

@@ -8,8 +8,8 @@ import strategies
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.scene.faults import Fault, Lines, SceneError, path_of
-from sandbox.scene.file import loads
+from sandbox.scene.errors import Fault, Lines, SceneError, path_of
+from sandbox.scene.files.load import loads
 
 
 @given(strategies.rendered())
@@ -145,8 +145,8 @@ FLIPPER = "[pinball]\n[[pinball.flipper]]\npivot = [0.1, 0.1]\nstops = [{}, 0.35
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[pinball]\nslope = 6.5\n", "must be between 0 and 1.5, is 6.5; angles are in rad, and 6.5° is 0.1134"),
-        (FLIPPER.format(-31), "must be between -10 and 10, is -31; angles are in rad, and -31° is -0.5411"),
+        ("[pinball]\nslope = 6.5\n", "must be between 0 and 1.5, is 6.5; angles are in radians, 6.5° is 0.1134"),
+        (FLIPPER.format(-31), "must be between -10 and 10, is -31; angles are in radians, -31° is -0.5411"),
         (FLIPPER.format(-3100), "must be between -10 and 10, is -3100"),  # no angle in degrees either
         ("[[shot]]\naim = 1e9\nspeed = 1.0\n", "must be between -1e+06 and 1e+06, is 1000000000"),
         (

@@ -2,8 +2,8 @@
 
 import pytest
 
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import loads
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import loads
 
 BALL = '[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n'
 

@@ -10,10 +10,10 @@ import strategies
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from sandbox.scene.document import to_document
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, load, loads
-from sandbox.scene.model import Scene
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import dumps, from_document, load, loads
+from sandbox.scene.scene import Scene
 
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
 KEYS = sorted(
@@ -220,7 +220,7 @@ def test_file_beyond_the_limit_is_refused_unread(tmp_path: Path) -> None:
     path = tmp_path / "huge.toml"
     with path.open("wb") as stream:
         stream.truncate(2**40)  # sparse: takes no room
-    with pytest.raises(SceneError, match="larger than 256 MiB"):
+    with pytest.raises(SceneError, match="SANDBOX_MAX_FILE_SIZE=1024GiB to allow it"):
         load(path)
 
 

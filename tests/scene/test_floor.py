@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandbox.scene.cue import Stroke, struck
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, loads
+from sandbox.scene.description.surface import Stroke, struck
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import dumps, from_document, loads
 
 MASS, RADIUS = 0.170097, 0.028575
 BALL: dict[str, Any] = {"name": "cue", "position": [0, 0], "radius": RADIUS, "mass": MASS}
@@ -41,11 +41,11 @@ def test_pockets_are_numbered_after_everything_solid() -> None:
     ("document", "path", "words"),
     [
         ({"ball": [{**BALL, "spin": [1, 0, 0]}]}, "ball.cue.spin", "[surface]"),
-        ({**TABLE, "ball": [{**BALL, "spin": [1, 0, 0], "angular_velocity": 1}]}, "angular_velocity", "both"),
-        ({**TABLE, "ball": [{**BALL, "spin": [1, 0, 0], "fixed": True}]}, "spin", "never moves"),
+        ({**TABLE, "ball": [{**BALL, "spin": [1, 0, 0], "angular_velocity": 1}]}, "angular_velocity", "`spin`"),
+        ({**TABLE, "ball": [{**BALL, "spin": [1, 0, 0], "fixed": True}]}, "spin", "cannot move"),
         ({"ball": [BALL], "contact_models": {"cushion": "simple"}}, "contact_models.cushion", "[surface]"),
         ({"ball": [BALL], "wall": [CUSHION]}, "height", "[surface]"),
-        ({**TABLE, "wall": [{**CUSHION, "height": 0.06}]}, "height", "passes over"),
+        ({**TABLE, "wall": [{**CUSHION, "height": 0.06}]}, "height", "less than 0.05715"),
         (
             {**TABLE, "contact_models": {"cushion": "han2005"}, "post": [{"position": [5, 5], "radius": 1}]},
             "post",
@@ -53,7 +53,7 @@ def test_pockets_are_numbered_after_everything_solid() -> None:
         ),
         ({"ball": [BALL], "shot": [{"aim": 0, "speed": 1}]}, "shot", "[surface]"),
         ({**TABLE, "shot": [{"aim": 0, "speed": 1, "ball": "eight"}]}, "ball", "no body is named 'eight'"),
-        ({**TABLE, "shot": [{"aim": 0, "speed": 1}, {"aim": 1, "speed": 1}]}, "ball", "second shot"),
+        ({**TABLE, "shot": [{"aim": 0, "speed": 1}, {"aim": 1, "speed": 1}]}, "ball", "another shot"),
         ({**TABLE, "shot": [{"aim": 0, "speed": 1, "side": 0.4, "height": -0.4}]}, "side", "slips"),
         ({**TABLE, "shot": [{"aim": 0, "speed": 1, "side": 0.6}]}, "side", "0.5"),
         ({**TABLE, "pocket": [{"name": "cue", "position": [9, 9], "radius": 1}]}, "pocket", "unique"),
@@ -97,7 +97,7 @@ def test_shot_at_a_ball_in_a_pocket_is_a_fault() -> None:
         "[surface]\n[[pocket]]\nposition = [1.0, 0.0]\nradius = 0.06\n"
         '[[ball]]\nname = "cue"\nposition = [1.01, 0.0]\nradius = 0.03\n[[shot]]\naim = 0\nspeed = 1\n'
     )
-    with pytest.raises(SceneError, match=r"shot\[0\].ball: 'cue' lies in a pocket"):
+    with pytest.raises(SceneError, match=r"shot\[0\].ball: 'cue' is in a pocket"):
         loads(text)
 
 

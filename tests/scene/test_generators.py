@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.scene.crosscheck import crosscheck
-from sandbox.scene.generators import GeneratorError, expand, lifetimes, size
-from sandbox.scene.model import Emitter, Grid, Scatter, Scene, World
+from sandbox.scene.compile.generators import GeneratorError, expand, lifetimes, size
+from sandbox.scene.description.discs import Emitter, Grid, Scatter
+from sandbox.scene.description.world import World
+from sandbox.scene.scene import Scene
+from sandbox.scene.validate.scene import crosscheck
 
 GRID = Grid(origin=(1.0, 2.0), columns=3, rows=2, spacing=(0.5, -4.0), radius=0.1)
 SCATTER = Scatter(count=200, lower=(-5.0, 0.0), upper=(5.0, 20.0), radius=0.1)
@@ -99,7 +101,7 @@ def test_scatter_that_passes_through_itself_may_overlap(collides: str) -> None:
 
 @pytest.mark.parametrize("radius", [0.9, 0.6])
 def test_scatter_that_does_not_fit_says_so(radius: float) -> None:
-    with pytest.raises(GeneratorError, match=r"do not fit.*lower the\s+count") as caught:
+    with pytest.raises(GeneratorError, match=r"do not fit.*use\s+fewer") as caught:
         expand(SCATTER.model_copy(update={"radius": radius}), 0, 4)
     assert caught.value.location == ("scatter", 4, "count")
 
@@ -196,10 +198,14 @@ def test_bodies_know_how_long_they_live() -> None:
 @pytest.mark.parametrize(
     ("stated", "key", "told"),
     [
-        ({"lifetime_jitter": 0.5}, "lifetime_jitter", "state one"),
+        ({"lifetime_jitter": 0.5}, "lifetime_jitter", "needs a `lifetime`"),
         ({"lifetime": 1.0, "lifetime_jitter": 1.0}, "lifetime_jitter", "less than `lifetime`"),
-        ({"colours": ("#000000", "#ffffff")}, "colours", "fade over a `lifetime`"),
-        ({"lifetime": 1.0, "colour": "#000000", "colours": ("#000000", "#ffffff")}, "colours", "instead of `colour`"),
+        ({"colours": ("#000000", "#ffffff")}, "colours", "need a `lifetime`"),
+        (
+            {"lifetime": 1.0, "colour": "#000000", "colours": ("#000000", "#ffffff")},
+            "colours",
+            "combined with `colour`",
+        ),
     ],
 )
 def test_what_is_said_of_lives_must_agree(stated: dict[str, object], key: str, told: str) -> None:

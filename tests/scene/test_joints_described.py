@@ -2,9 +2,9 @@
 
 import pytest
 
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import loads
-from sandbox.scene.joints import Rod
+from sandbox.scene.description.joints import Rod
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import loads
 
 TWO = '[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n[[ball]]\nname="b"\nposition=[5,0]\nradius=1\n'
 KINDS = "rod, pin, pivot, slide, groove, rotary_limit, motor, gear, spring, rotary_spring"
@@ -35,41 +35,50 @@ def test_joint_of_every_kind_is_read() -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ('between=["a","b"]', [f"s.toml:9: joint[0].kind: is missing; a joint is one of {KINDS}"]),
-        ('kind="spirng"\nbetween=["a","b"]', ['s.toml:10: joint[0].kind: is "spirng"; a joint is one']),
+        ('between=["a","b"]', [f"s.toml:9: joint[0].kind: is missing; kinds of joint: {KINDS}"]),
+        ('kind="spirng"\nbetween=["a","b"]', ['s.toml:10: joint[0].kind: is "spirng"; kinds of joint']),
         ('kind=5\nbetween=["a","b"]', ["s.toml:10: joint[0].kind: "]),
         ('kind="rod"', ["s.toml:9: joint[0].between: is missing"]),
         ('kind="rod"\nbetween="a"', ["s.toml:11: joint[0].between: must be the name of"]),
         ('kind="rod"\nbetween=[]', ["s.toml:11: joint[0].between: must be the name of one"]),
         ('kind="rod"\nbetween=["a","b","a"]', ["s.toml:11: joint[0].between: "]),
         ('kind="rod"\nbetween=["a",5]', ["s.toml:11: joint[0].between[1]: must be text in quotes, is 5"]),
-        ('kind="rod"\nbetween=["a","q"]', ["s.toml:11: joint[0].between[1]: no body is named 'q'; there are 'a', 'b'"]),
-        ('kind="rod"\nbetween=["a","a"]', ["s.toml:11: joint[0].between: these are one and the same body"]),
+        ('kind="rod"\nbetween=["a","q"]', ["s.toml:11: joint[0].between[1]: no body is named 'q'; bodies: 'a', 'b'"]),
+        ('kind="rod"\nbetween=["a","a"]', ["s.toml:11: joint[0].between: names one body twice"]),
         (
             'kind="rod"\nbetween=["a","b"]\nlenght=1',
             ["s.toml:12: joint[0].lenght: unknown key; did you mean 'length'?"],
         ),
         ('kind="pin"\nbetween=["a","b"]\nstiffness=1', ["s.toml:12: joint[0].stiffness: unknown key; "]),
-        ('kind="rod"\nbetween=["a","b"]\nlength=0', ["s.toml:12: joint[0].length: a rod of no length"]),
+        ('kind="rod"\nbetween=["a","b"]\nlength=0', ["s.toml:12: joint[0].length: must be at least"]),
         ('kind="rod"\nbetween=["a","b"]\nlength=true', ["s.toml:12: joint[0].length: must be a number, is true"]),
-        ('kind="rod"\nbetween=["a"]', ["s.toml:11: joint[0].between: the two points that it holds start at (0, 0) m"]),
-        ('kind="rod"\nbetween=["a","b"]\nanchors=[[5,0],[0,0]]', ["s.toml:12: joint[0].anchors: the two points"]),
+        ('kind="rod"\nbetween=["a"]', ["s.toml:11: joint[0].between: both points start at (0, 0) m"]),
+        ('kind="rod"\nbetween=["a","b"]\nanchors=[[5,0],[0,0]]', ["s.toml:12: joint[0].anchors: both points"]),
         ('kind="slide"\nbetween=["a"]', ["s.toml:9: joint[0].most: is missing"]),
-        ('kind="slide"\nbetween=["a"]\nmost=1\nleast=2', ["s.toml:12: joint[0].most: is smaller than `least`"]),
-        ('kind="rotary_limit"\nbetween=["a"]\nmost=1\nleast=2', ["s.toml:12: joint[0].most: is smaller than `least`"]),
-        ('kind="groove"\nbetween=["a"]\ngroove=[[1,1],[1,1]]', ["s.toml:12: joint[0].groove: has no length"]),
+        (
+            'kind="slide"\nbetween=["a"]\nmost=1\nleast=2',
+            ["s.toml:12: joint[0].most: must not be smaller than `least`"],
+        ),
+        (
+            'kind="rotary_limit"\nbetween=["a"]\nmost=1\nleast=2',
+            ["s.toml:12: joint[0].most: must not be smaller than `least`"],
+        ),
+        ('kind="groove"\nbetween=["a"]\ngroove=[[1,1],[1,1]]', ["s.toml:12: joint[0].groove: is too short"]),
         ('kind="groove"\nbetween=["a"]\ngroove=[[1,1]]', ["s.toml:12: joint[0].groove: must be an array of 2, has 1"]),
         (
             'kind="pivot"\nbetween=["a"]',
-            ["s.toml:9: joint[0].at: state either `at`, a place in the world, or `anchors`"],
+            ["s.toml:9: joint[0].at: must have either `at`, a point in the world, or `anchors`"],
         ),
-        ('kind="pivot"\nbetween=["a"]\nat=[0,0]\nanchors=[[0,0],[1,0]]', ["s.toml:12: joint[0].at: state either `at`"]),
+        (
+            'kind="pivot"\nbetween=["a"]\nat=[0,0]\nanchors=[[0,0],[1,0]]',
+            ["s.toml:12: joint[0].at: must have either `at`"],
+        ),
         (
             'kind="motor"\nbetween=["a"]\nrate=1\nmax_torque=0',
             ["s.toml:13: joint[0].max_torque: must be greater than 0, is 0"],
         ),
-        ('kind="gear"\nbetween=["a"]\nratio=0', ["s.toml:12: joint[0].ratio: is next to nothing"]),
-        ('kind="gear"\nbetween=["a"]\nratio=-1e-9', ["s.toml:12: joint[0].ratio: is next to nothing"]),
+        ('kind="gear"\nbetween=["a"]\nratio=0', ["s.toml:12: joint[0].ratio: must be at least"]),
+        ('kind="gear"\nbetween=["a"]\nratio=-1e-9', ["s.toml:12: joint[0].ratio: must be at least"]),
         (
             'kind="spring"\nbetween=["a"]\nstiffness=-1\ndamping=inf',
             [
@@ -109,14 +118,14 @@ def test_fault_of_a_joint_is_told_with_line_and_path(text: str, told: list[str])
             '[[thrust]]\nbody="a"\nforce=[1]\nkey="spc"',
             ["s.toml:11: thrust[0].force: must be an array of 2, has 1", "s.toml:12: thrust[0].key: must be one of"],
         ),
-        ('[[thrust]]\nbody="a"\nforce=[1,0]\nbegin=3\nend=3', ["s.toml:13: thrust[0].end: is not later than `begin`"]),
+        ('[[thrust]]\nbody="a"\nforce=[1,0]\nbegin=3\nend=3', ["s.toml:13: thrust[0].end: must be later than `begin`"]),
         (
             '[[thrust]]\nname="t"\nbody="a"\nforce=[1,0]\n[[thrust]]\nname="t"\nbody="b"\nforce=[1,0]',
-            ["s.toml:14: thrust.t.name: a second thrust named 't'"],
+            ["s.toml:14: thrust.t.name: another thrust is also named 't'"],
         ),
         (
             '[[thrust]]\nname="thrust-2"\nbody="a"\nforce=[1,0]\n[[thrust]]\nbody="b"\nforce=[1,0]',
-            ["s.toml:13: thrust[1].name: a second thrust named 'thrust-2'"],
+            ["s.toml:13: thrust[1].name: another thrust is also named 'thrust-2'"],
         ),
     ],
 )
@@ -131,19 +140,19 @@ def test_fault_of_a_force_is_told_with_line_and_path(text: str, told: list[str])
 def test_tables_that_are_none_are_told(joint: str) -> None:
     (found,) = faults(joint + TWO)
     assert found.startswith("s.toml:1: ")
-    assert "a table" in found or "tables, each headed" in found
+    assert "a table" in found or "tables, each under a heading" in found
 
 
 def test_names_of_joints_are_unique() -> None:
     joint = '[[joint]]\nname="x"\nkind="motor"\nrate=1\nbetween=["a"]\n'
     (found,) = faults(TWO + joint + joint)
-    assert found.startswith("s.toml:15: joint.x.name: a second joint named 'x'")
+    assert found.startswith("s.toml:15: joint.x.name: another joint is also named 'x'")
 
 
 def test_joint_between_fixed_bodies_is_refused() -> None:
     found = faults(FIXED + '[[joint]]\nkind="rod"\nbetween=["a","b"]\n[[joint]]\nkind="rod"\nbetween=["b"]\n')
     assert [each.split(": ")[1] for each in found] == ["joint[0].between", "joint[1].between"]
-    assert all("nothing here can move" in each for each in found)
+    assert all("all its bodies are fixed" in each for each in found)
 
 
 @pytest.mark.parametrize("strength", ["0", "-1.0", "inf", "true"])

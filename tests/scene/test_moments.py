@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from shapely.geometry import Polygon
 
-from sandbox.scene.moments import Moments, capsule_moments, disc_moments, polygon_moments
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
+from sandbox.scene.geometry.polygon import Moments, capsule_moments, disc_moments, polygon_moments
 
 EXACT = 1e-12  # a handful of roundings of 1e-16 each, over sums of up to a few hundred terms
 

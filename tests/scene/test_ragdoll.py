@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sandbox.arrays import FloatArray
 from sandbox.engines.registry import start
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, load, loads
-from sandbox.scene.links import LinkKind
-from sandbox.scene.model import Scene
-from sandbox.scene.ragdoll import segments
-from sandbox.scene.shipped import find
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.description.generators import segments
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import dumps, from_document, load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 MASSES = {
     "head": 6.9, "pelvis": 21.75, "chest": 21.75, "upper-arm": 2.7, "forearm": 1.6, "hand": 0.6, "thigh": 14.2,
@@ -150,7 +150,7 @@ def test_only_limbs_of_one_ragdoll_overlap_without_a_contact(engine: str) -> Non
 @pytest.mark.parametrize(
     ("ragdoll", "key", "message"),
     [
-        ({"density": 2.0}, "density", "share its mass"),
+        ({"density": 2.0}, "density", "divide its mass"),
         ({"height": 0.0}, "height", "must be at least 0.001"),
         ({"facing": "up"}, "facing", "'right' or 'left'"),
         ({"mass": 0.0}, "mass", "must be greater than 0"),

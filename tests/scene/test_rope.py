@@ -8,13 +8,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from sandbox.arrays import FloatArray
 from sandbox.engines.registry import start
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, load, loads
-from sandbox.scene.links import WORLD, LinkKind
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import dumps, from_document, load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 ROPE = {"start": [0.0, 0.0], "end": [3.0, 4.0], "links": 5}
 SPRINGS = {"kind": "springs", "stiffness": 200.0}
@@ -169,20 +169,20 @@ def test_joints_of_the_file_come_first() -> None:
 @pytest.mark.parametrize(
     ("rope", "key", "message"),
     [
-        ({"length": 4.9}, "length", "shorter than from start to end, 5.0 m"),
+        ({"length": 4.9}, "length", "at least the distance from start to end, 5.0 m"),
         ({"length": 4.9, **PLANKS}, "length", "planks do not stretch"),
         ({"end": [0.0, 0.0]}, "end", "1e-09 to 1e+09 m"),
-        ({"links": 1, "length": 6.0}, "links", "two or more to hang"),
+        ({"links": 1, "length": 6.0}, "links", "2 or more"),
         ({"kind": "springs"}, "stiffness", "is missing"),
-        ({"stiffness": 3.0}, "stiffness", "kind is 'rods'"),
-        ({"damping": 3.0, **PLANKS}, "damping", "kind is 'planks'"),
-        ({"angle": 1.0, **PLANKS}, "angle", "leave this out"),
+        ({"stiffness": 3.0}, "stiffness", "is 'rods'"),
+        ({"damping": 3.0, **PLANKS}, "damping", "is 'planks'"),
+        ({"angle": 1.0, **PLANKS}, "angle", "remove it"),
         ({"collides": "all", **PLANKS, "radius": 0.5}, "radius", "overlap"),
         ({"collides": "all", "radius": 1.0}, "radius", "overlap"),
         ({"tie": {"end": "c"}}, "tie.end", "no body is named 'c'"),
         ({"tie": {"end": "rope-1-2"}}, "tie.end", "of the rope itself"),
         ({"tie": {"end": "b"}, "fix": ["end"]}, "fix", "not both"),
-        ({"tie": {"end": "b", "start": "b"}, "links": 1}, "tie", "one and the same"),
+        ({"tie": {"end": "b", "start": "b"}, "links": 1}, "tie", "names one body twice"),
         ({"links": 0}, "links", "must be at least 1"),
         ({"links": 2_000_000}, "links", "must be at most 1e+06"),
         ({"kind": "wire"}, "kind", "'rods', 'springs' or 'planks'"),

@@ -5,10 +5,11 @@ from typing import Any, get_args
 
 import pytest
 
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Part
-from sandbox.scene.schema import dumps, schema
-from sandbox.scene.shipped import SCHEMA, folder
+from sandbox.scene.description.base import Part
+from sandbox.scene.description.game_tables import lazy_table
+from sandbox.scene.files.json_schema import dumps, schema
+from sandbox.scene.files.shipped_scenes import SCHEMA, folder
+from sandbox.scene.scene import Scene
 
 
 @cache
@@ -29,7 +30,8 @@ def parts(model: type[Part]) -> Iterator[type[Part]]:
     """A model and all that its fields are made of."""
     yield model
     for field in model.model_fields.values():
-        for inner in (field.annotation, *get_args(field.annotation)):
+        table = lazy_table(field)
+        for inner in (field.annotation if table is None else table.model, *get_args(field.annotation)):
             if isinstance(inner, type) and issubclass(inner, Part):
                 yield from parts(inner)
 
@@ -64,9 +66,11 @@ def test_nothing_may_be_null_for_toml_has_none() -> None:
 def test_docstrings_below_fields_become_descriptions() -> None:
     document = whole()
     ball = document["$defs"]["Ball"]["properties"]
-    assert ball["fixed"]["description"] == "Never moves: infinitely heavy."
-    assert ball["mass"]["description"] == "kg; without mass or density, 1"  # written in a class that Ball extends
-    assert document["properties"]["about"]["description"] == "What to look for."
+    assert ball["fixed"]["description"] == "Never moves, as if infinitely heavy."
+    assert (
+        ball["mass"]["description"] == "mass, kg; default 1 if neither mass nor density is given"
+    )  # written in a class that Ball extends
+    assert document["properties"]["about"]["description"] == "What to observe."
     assert document["properties"]["ball"]["description"] == "One ball; on a `[surface]` a sphere, I = ⅖ m r²."
 
 
@@ -94,7 +98,7 @@ def test_descriptions_of_quantities_name_their_units(table: str, key: str, unit:
 def test_ranges_and_defaults_are_those_of_the_model() -> None:
     tables = whole()["$defs"]
     assert tables["Ball"]["properties"]["radius"] == {
-        "description": "of the disc, m",
+        "description": "radius of the disc, m",
         "type": "number",
         "minimum": 1e-9,
         "maximum": 1e9,

@@ -3,7 +3,9 @@
 import pytest
 from pydantic import ValidationError
 
-from sandbox.scene.settings import Settings
+from sandbox.engines.registry import ENGINES
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import from_document
 
 
 def test_substep_is_the_frame_step_divided() -> None:
@@ -29,3 +31,16 @@ def test_choices_left_to_the_engine_are_none() -> None:
     left = {key for key, value in Settings().model_dump().items() if value is None}
     words = {"integrator", "detection", "response", "impact", "broad_phase", "joints"}
     assert left == words | {"slop", "bias", "persistence", "stiffness", "damping", "stretch"}
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_choices_of_an_engine_are_settings_at_the_ends_of_size_and_mass(engine: str) -> None:
+    corners = [[-1e15, -1e15], [1e15, -1e15], [1e15, 1e15], [-1e15, 1e15]]
+    giant = {"position": [0, 0], "points": corners, "mass": 1e30}
+    plane = {"point": [0, -2e15], "normal": [0, 1]}
+    solver, world = {"dt": 1e-9}, {"duration": 1e-9}
+    scene = from_document({"polygon": [giant], "plane": [plane], "solver": solver, "world": world})
+    settings = scene.solver if engine == "pymunk" else scene.solver.replace(response="penalty")
+    chosen = ENGINES[engine].resolve(scene, settings)
+    assert chosen.slop == 1e9
+    assert chosen.stiffness == (None if engine == "pymunk" else 1e30)

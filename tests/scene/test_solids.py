@@ -8,10 +8,10 @@ import pytest
 import strategies
 from hypothesis import given, settings
 
-from sandbox.scene.document import to_document
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, loads
-from sandbox.scene.model import Scene
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import dumps, from_document, loads
+from sandbox.scene.scene import Scene
 
 FLOOR = {"point": [0, 0], "normal": [0, 1]}
 GON = [[round(math.cos(k), 6), round(math.sin(k), 6)] for k in np.linspace(0, 2 * math.pi, 1002)[:-1]]
@@ -60,7 +60,7 @@ def test_scene_of_solids_and_joints_is_read_back_as_it_was_written(scene: Scene)
             ["s.toml:5: polygon[0].points[2]: points[1] and points[2] are 0 m apart"],
         ),
         (f"[[polygon]]\npoints={GON}\n", ["s.toml:2: polygon[0].points: "]),
-        ("[[body]]\nposition=[0,0]\n", ["s.toml:1: body[0]: has no part; give it a [[body.ball]]"]),
+        ("[[body]]\nposition=[0,0]\n", ["s.toml:1: body[0]: has no parts; add a [[body.ball]]"]),
         (
             "[[body]]\nposition=[0,0]\n[[body.box]]\nsize=[1,-1]\n",
             ["s.toml:4: body[0].box[0].size[1]: must be greater than 0, is -1"],
@@ -92,7 +92,7 @@ def test_scene_of_solids_and_joints_is_read_back_as_it_was_written(scene: Scene)
         ),
         (
             "[[box]]\nposition=[0,0]\nsize=[1,1]\nmass=1\ndensity=2\n",
-            ["s.toml:5: box[0].density: mass and density are"],
+            ["s.toml:5: box[0].density: cannot be combined with `mass`"],
         ),
         (
             "[[box]]\nposition=[0,0]\nsize=[1e9,1e9]\ndensity=1e29\n",
@@ -108,11 +108,11 @@ def test_scene_of_solids_and_joints_is_read_back_as_it_was_written(scene: Scene)
         ),
         (
             '[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n[[box]]\nname="a"\nposition=[5,0]\nsize=[1,1]\n',
-            ["s.toml:6: box.a.name: a second body or fixed thing is called 'a'"],
+            ["s.toml:6: box.a.name: another body or fixed object is also named 'a'"],
         ),
         (
             "[[box]]\nposition=[0,0]\nsize=[1,1]\nfixed=true\nvelocity=[1,0]\n",
-            ["s.toml:5: box[0].velocity: a fixed body never moves"],
+            ["s.toml:5: box[0].velocity: a fixed body cannot move"],
         ),
     ],
 )
@@ -136,7 +136,7 @@ def test_all_faults_of_solids_are_told_at_once() -> None:
 def test_fault_of_an_outline_hides_no_unknown_names() -> None:
     found = faults('[[polygon]]\npoints=[[0,0],[1,1],[1,0],[0,1]]\n[[thrust]]\nbody="zz"\nforce=[0,0]\n')
     assert len(found) == 2
-    assert "thrust[0].body: no body is named 'zz'; there are 'polygon-1'" in found[1]
+    assert "thrust[0].body: no body is named 'zz'; bodies: 'polygon-1'" in found[1]
 
 
 def crowd(count: int, **one: Any) -> dict[str, Any]:
@@ -146,7 +146,7 @@ def crowd(count: int, **one: Any) -> dict[str, Any]:
 
 def test_crowd_of_bodies_hollow_at_their_centres_is_refused() -> None:
     assert isinstance(from_document(crowd(50)), Scene)
-    with pytest.raises(SceneError, match="pairs of pieces so near each other"):
+    with pytest.raises(SceneError, match="pairs of pieces so close"):
         from_document(crowd(900))
     assert isinstance(from_document(crowd(900, collides="none")), Scene)
 
@@ -154,7 +154,7 @@ def test_crowd_of_bodies_hollow_at_their_centres_is_refused() -> None:
 def test_fixed_body_of_too_many_parts_in_one_place_is_refused() -> None:
     part = {"size": [1, 1]}
     bodies = [{"position": [0, 0], "fixed": True, "box": [part] * 1000} for _ in range(6)]
-    with pytest.raises(SceneError, match="in one place more than 5,000 times") as caught:
+    with pytest.raises(SceneError, match="more than 5,000 identical objects") as caught:
         from_document({"body": bodies, "plane": [FLOOR]})
     assert caught.value.faults[0].path == "body[5]"
 

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.engines.registry import start
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, load, loads
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import dumps, from_document, load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 PYRAMID = {"base": [1.0, 2.0], "size": [0.4, 0.2], "columns": 4, "rows": 4, "fewer": 1}
 
@@ -95,7 +95,7 @@ def test_stack_has_its_count_in_rows_about_its_base(
 ) -> None:
     figures = {"columns": columns, "rows": rows, "fewer": fewer, "gap": gap, "size": [width, height], "base": [0, 0]}
     if fewer * (rows - 1) >= columns:
-        assert any("would hold no box" in fault for fault in faults_of(**figures))
+        assert any("is empty" in fault for fault in faults_of(**figures))
         return
     scene = scene_of(**figures)
     bodies = scene.bodies
@@ -117,11 +117,11 @@ def test_row_that_would_hold_no_box_is_a_fault_with_its_line() -> None:
 
 
 def test_too_many_boxes_are_a_fault() -> None:
-    assert any("at most 1,000,000" in fault for fault in faults_of(columns=1001, rows=1000, fewer=0))
+    assert any("the limit is 1,000,000" in fault for fault in faults_of(columns=1001, rows=1000, fewer=0))
 
 
 def test_boxes_of_a_stack_can_meet_each_other() -> None:
-    meet = meetings(scene_of())
+    meet = contact_matrix(scene_of())
     assert meet.mutual
     assert meet.solids
     assert not meet.ball_ball

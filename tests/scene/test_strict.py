@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import from_document, loads
-from sandbox.scene.model import Scene
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import from_document, loads
+from sandbox.scene.scene import Scene
 
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
 
@@ -80,8 +80,36 @@ def test_unknown_key_is_refused_with_the_one_meant(typo: str, meant: str) -> Non
         loads(typo)
 
 
+@pytest.mark.parametrize(
+    ("word", "key"),
+    [
+        ("elasticity", "restitution"), ("bounciness", "restitution"), ("pos", "position"), ("vel", "velocity"),
+        ("rotation", "angle"), ("Rot", "angle"), ("mu", "friction"),
+    ],
+)  # fmt: skip
+def test_word_of_another_engine_is_answered_with_the_key(word: str, key: str) -> None:
+    with pytest.raises(SceneError, match=f"{word}: unknown key; did you mean '{key}'"):
+        loads(f"{BALL}{word} = 1")
+
+
+@pytest.mark.parametrize(
+    ("word", "table"),
+    [("circle", "ball"), ("crate", "box"), ("rectangles", "box"), ("segment", "wall"), ("line", "wall")],
+)
+def test_table_of_another_engine_is_answered_with_the_table(word: str, table: str) -> None:
+    with pytest.raises(SceneError, match=f"{word}: unknown key; did you mean '{table}'"):
+        loads(f"{BALL}[[{word}]]")
+
+
+def test_static_is_answered_with_what_does_not_move() -> None:
+    with pytest.raises(SceneError, match="static: unknown key; did you mean fixed = true"):
+        loads(f"{BALL}static = true")
+    with pytest.raises(SceneError, match="static: unknown key; did you mean plane, wall or post"):
+        loads(f"{BALL}[[static]]")
+
+
 def test_unknown_key_unlike_any_lists_those_there_are() -> None:
-    with pytest.raises(SceneError, match=r"zzzz: unknown key; known here: .*position.*radius"):
+    with pytest.raises(SceneError, match=r"zzzz: unknown key; known keys: .*position.*radius"):
         loads(f"{BALL}zzzz = 1")
 
 

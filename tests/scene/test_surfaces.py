@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given
 from touching import coefficient, elements, touching_scenes
 
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
-from sandbox.scene.surfaces import mix, surfaces_of
+from sandbox.scene.compile.contacts import mix, pair_table
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 
 def of_two(a: dict[str, Any], b: dict[str, Any], **more: Any) -> tuple[float, float]:
     """Return restitution and friction of two balls."""
     at = {"position": [0.0, 0.0], "radius": 1.0}
     scene = from_document({"ball": [{**at, **a}, {**at, **b}], **more})
-    surfaces = surfaces_of(scene, scene.bodies)
+    surfaces = pair_table(scene, scene.bodies)
     i, j = surfaces.of_body
     assert surfaces.restitution[i, j] == surfaces.restitution[j, i]
     assert surfaces.friction[i, j] == surfaces.friction[j, i]
@@ -89,7 +89,7 @@ def test_pair_of_a_material_with_itself() -> None:
 
 @given(touching_scenes())
 def test_every_pair_has_the_coefficients_of_its_things(scene: Scene) -> None:
-    surfaces = surfaces_of(scene, scene.bodies)
+    surfaces = pair_table(scene, scene.bodies)
     things = [*elements(scene), *scene.fixed]
     number = [*surfaces.of_body, *surfaces.of_fixed]
     assert len(number) == len(things)
@@ -101,7 +101,7 @@ def test_every_pair_has_the_coefficients_of_its_things(scene: Scene) -> None:
 
 @given(touching_scenes())
 def test_matrices_are_symmetric_and_within_bounds(scene: Scene) -> None:
-    surfaces = surfaces_of(scene, scene.bodies)
+    surfaces = pair_table(scene, scene.bodies)
     count = len(surfaces.surfaces)
     assert len(set(surfaces.surfaces)) == count
     assert surfaces.restitution.shape == surfaces.friction.shape == (count, count)
@@ -116,11 +116,11 @@ def test_things_alike_share_a_surface_and_materials_no_pair_names_are_not_told_a
     materials = [{"name": "m", "friction": 0.5}, {"name": "n", "friction": 0.5}]
     balls = [{**at, "material": "m"}, {**at, "material": "n"}, {**at, "friction": 0.5}, at]
     scene = from_document({"ball": balls, "material": materials})
-    assert surfaces_of(scene, scene.bodies).of_body.tolist() == [0, 0, 0, 1]
+    assert pair_table(scene, scene.bodies).of_body.tolist() == [0, 0, 0, 1]
     scene = from_document({"ball": balls, "material": materials, "pair": [{"between": ["m", "m"]}]})
-    assert surfaces_of(scene, scene.bodies).of_body.tolist() == [0, 1, 1, 2]
+    assert pair_table(scene, scene.bodies).of_body.tolist() == [0, 1, 1, 2]
 
 
 def test_scene_without_things_has_no_surfaces() -> None:
-    surfaces = surfaces_of(Scene(), Scene().bodies)
+    surfaces = pair_table(Scene(), Scene().bodies)
     assert surfaces.restitution.shape == surfaces.friction.shape == (0, 0)

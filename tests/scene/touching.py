@@ -7,8 +7,10 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Ball, Disc, Scene, Surfaced
+from sandbox.scene.description.base import HasMaterial
+from sandbox.scene.description.discs import Ball, Disc
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 FIGURES = [0.0, 0.25, 0.5, 1.0]
 
@@ -69,7 +71,7 @@ def meets_fixed_things(disc: Disc) -> bool:
     return not is_fixed(disc) and disc.collides != "none"
 
 
-def coefficient(scene: Scene, a: Surfaced, b: Surfaced, key: str) -> float:
+def coefficient(scene: Scene, a: HasMaterial, b: HasMaterial, key: str) -> float:
     """Return restitution or friction of a contact."""
     for pair in scene.pairs:
         stated = getattr(pair, key)

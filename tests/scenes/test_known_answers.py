@@ -7,11 +7,12 @@ import pytest
 from scipy.special import ellipk
 
 import sandbox
+from sandbox.arrays import FloatArray
 from sandbox.measure.energy import energies
-from sandbox.scene.file import load
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 G = 9.81
 both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
@@ -41,7 +42,7 @@ def test_pendulum_has_the_period_that_it_names(engine: str, degrees: int, tolera
     assert found == pytest.approx(period, rel=tolerance)
 
 
-@both
+@pytest.mark.parametrize("engine", ["pymunk", pytest.param("reference", marks=pytest.mark.slow)])
 def test_double_pendulum_as_it_is_recommended_keeps_its_energy(engine: str) -> None:
     ways = ("solver.joints=rattle", "solver.integrator=velocity_verlet") if engine == "reference" else ()
     scene, done = ran("double_pendulum", engine, *ways)

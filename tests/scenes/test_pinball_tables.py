@@ -11,14 +11,14 @@ import shapely.affinity
 from shapely import LineString, Point, Polygon, unary_union
 
 from sandbox.action import Drive, Toggle
-from sandbox.engines.rebound import rebound
+from sandbox.engines.common.restitution import rebound
 from sandbox.engines.registry import start
-from sandbox.scene.document import to_document
-from sandbox.scene.drives import PlungerDrive
-from sandbox.scene.file import from_document, load
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
-from sandbox.scene.zone import GROUND
+from sandbox.scene.description.fixed import GROUND
+from sandbox.scene.description.forces import PlungerDrive
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 TABLES = ("pinball/classic", "pinball/full")
 RADIUS = 0.01349

@@ -5,8 +5,8 @@ from itertools import pairwise
 import pytest
 
 import sandbox
-from sandbox.scene.file import load
-from sandbox.scene.shipped import find
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import find
 
 STAGES = [
     ("marble", "domino-1"), ("domino-1", "domino-2"), ("domino-8", "domino-9"), ("domino-9", "pusher"),

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from sandbox.engines.registry import start
-from sandbox.scene.demands import Demand, demands
-from sandbox.scene.file import dumps, load, loads
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import SCHEMA, ShippedScene, find, shipped
+from sandbox.scene.compile.demands import Demand, demands
+from sandbox.scene.files.load import dumps, load, loads
+from sandbox.scene.files.shipped_scenes import SCHEMA, ShippedScene, find, shipped
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 SCENES = shipped()

@@ -7,14 +7,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.compare.truth import Truth, TruthKind, truth_of
 from sandbox.measure.energy import energies
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import load
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 G = 9.81
 SIN, COS = 0.5, math.sqrt(0.75)

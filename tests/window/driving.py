@@ -18,7 +18,7 @@ from PIL import Image, ImageGrab
 
 from sandbox.recording import Recording
 
-LIMIT = 100.0
+LIMIT = 250.0
 """s, after which what is waited for will never come"""
 SCREEN = (1024, 768)
 SIZE = (900, 600)

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from driving import Play, Shot
 from looking import at, laid_out, on_screen
 from rooms import written
@@ -9,6 +10,8 @@ from rooms import written
 from sandbox.action import Reshape
 from sandbox.measure.replay import rerun
 from sandbox.recording import Recording
+
+pytestmark = pytest.mark.slow  # a real window in real time
 
 FIELD = f"""
 title = "Field"

@@ -1,10 +1,13 @@
 """Curling in a real window: the broom is held and a stone thrown by real keys, and the session keeps the match."""
 
+import pytest
 from driving import Play
 from looking import differ
 
 from sandbox.action import Action, Move
 from sandbox.measure.replay import rerun
+
+pytestmark = pytest.mark.slow  # a real window in real time
 
 
 def moves(actions: tuple[Action, ...], body: str) -> list[Move]:

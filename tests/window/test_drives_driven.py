@@ -7,7 +7,9 @@ from driving import Play
 
 from sandbox.action import Drive
 from sandbox.measure.replay import rerun
-from sandbox.scene.file import load
+from sandbox.scene.files.load import load
+
+pytestmark = pytest.mark.slow  # a real window in real time
 
 FLIPPER = Path(__file__).parents[2] / "scenes" / "joints" / "flipper.toml"
 

@@ -1,8 +1,11 @@
 """A game with rules in a real window: played by real keys, saved, started again."""
 
+import pytest
 from driving import Play
 
 from sandbox.measure.replay import rerun
+
+pytestmark = pytest.mark.slow  # a real window in real time
 
 
 def test_keys_fly_the_ship_and_the_session_keeps_the_game(drive: Play) -> None:

@@ -14,6 +14,8 @@ from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import GREEN, SKY, VERMILION
 from sandbox.recording import Recording
 
+pytestmark = pytest.mark.slow  # a real window in real time
+
 BALL = (-1.0, 0.0)
 THERE = (1.2, 0.4)
 WITHIN = 6.0  # px: the line from ball to hand, and what is told of the picked ball, cover some of its pixels

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 from driving import SIZE, Play
 from looking import HUD, count, paused
 from PIL import Image
@@ -12,6 +13,8 @@ from rooms import MOVING, written
 from sandbox.measure.replay import rerun
 from sandbox.play.drawing.palette import WARNING
 from sandbox.recording import Recording
+
+pytestmark = pytest.mark.slow  # a real window in real time
 
 
 def test_screenshot_is_what_is_seen(drive: Play, tmp_path: Path) -> None:

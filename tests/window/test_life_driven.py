@@ -54,7 +54,7 @@ def test_no_display_is_one_line(tmp_path: Path, driver: str | None) -> None:
     assert done.returncode == 1
     assert done.stdout == ""
     (line,) = done.stderr.splitlines()
-    assert line.startswith("no window can be opened: ")
+    assert line.startswith("cannot open a window: ")
 
 
 def test_no_audio_is_told_and_the_window_stays(drive: Play, tmp_path: Path) -> None:

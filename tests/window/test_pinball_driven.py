@@ -10,8 +10,10 @@ from looking import count, laid_out, middle, on_screen
 from sandbox.measure.replay import rerun
 from sandbox.play.drawing.palette import hex_colour
 from sandbox.recording import Recording
-from sandbox.scene.file import load
-from sandbox.scene.model import Drive
+from sandbox.scene.description.forces import Drive
+from sandbox.scene.files.load import load
+
+pytestmark = pytest.mark.slow  # a real window in real time
 
 CLASSIC = Path(__file__).parents[2] / "scenes" / "pinball" / "classic.toml"
 COLOUR = hex_colour("#f2c230")

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pygame
+import pytest
 from driving import SIZE, Driven, Play
 from looking import count, middle, near, on_screen, paused
 from rooms import FALLING, MOVING, written
@@ -37,6 +38,7 @@ def ball_at(window: Driven, film: Film, time: float) -> None:
     window.wait_until(lambda shot: near(middle(shot, SKY), place, WITHIN), f"the ball as it was at {time:g} s")
 
 
+@pytest.mark.slow
 def test_stored_run_is_played_to_its_end_and_scrubbed_by_clicks(drive: Play, tmp_path: Path) -> None:
     film = stored(tmp_path, MOVING)
     window = drive("replay", "run.npz")
@@ -58,6 +60,7 @@ def test_stored_run_is_played_to_its_end_and_scrubbed_by_clicks(drive: Play, tmp
     ball_at(window, film, film.scene.solver.dt)
 
 
+@pytest.mark.slow
 def test_stored_run_cannot_be_changed_and_says_so(drive: Play, tmp_path: Path) -> None:
     stored(tmp_path, MOVING)
     window = drive("replay", "run", "--paused", "--record", "all.json")
@@ -71,6 +74,7 @@ def test_stored_run_cannot_be_changed_and_says_so(drive: Play, tmp_path: Path) -
     assert window.complained() == "--record: all.json: there is no session to save\n"
 
 
+@pytest.mark.slow
 def test_stored_run_is_the_ghost_of_another_engine(drive: Play, tmp_path: Path) -> None:
     film = stored(tmp_path, FALLING)
     window = drive("replay", "run.npz", "--engine", "reference", "--paused")

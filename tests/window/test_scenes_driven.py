@@ -39,7 +39,7 @@ def test_without_a_scene_the_picker_is_seen_first(drive: Play) -> None:
     window = drive("play")
     assert window.title() == "sandbox"
     window.key("Escape", "p", "e", "comma", "ctrl+s")  # there is nothing on, and nothing that this could do
-    window.wait_for(lambda: window.said() == ["there is no session yet"], "that there is no session")
+    window.wait_for(lambda: window.said() == ["no session to save"], "that there is no session")
     window.key("ctrl+o")
     window.type("bounce")
     window.key("Return")

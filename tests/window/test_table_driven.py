@@ -12,6 +12,8 @@ from sandbox.action import Move, Strike
 from sandbox.measure.replay import rerun
 from sandbox.play.camera import Camera
 
+pytestmark = pytest.mark.slow  # a real window in real time
+
 TABLE = """
 title = "Table"
 [billiards]

@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
+import pytest
 from driving import Play
 from looking import ARENA, HUD, STEP_ROW, differ, laid_out, middle, near, on_screen, paused
 from rooms import AT_REST, MOVING, written
 
 from sandbox.play.drawing.palette import SKY
+
+pytestmark = pytest.mark.slow  # a real window in real time
 
 
 def test_window_starts_running(drive: Play, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pygame
+import pytest
 from driving import SIZE, Driven, Play, Shot
 from looking import count, differ, laid_out, middle, near, on_screen, paused
 from rooms import AT_REST, RESTING, written
@@ -11,6 +12,8 @@ from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import PANEL, SKY
 from sandbox.play.mouse import NOTCH
 from sandbox.play.sight import OVERLAYS
+
+pytestmark = pytest.mark.slow  # a real window in real time
 
 BALL = (-1.0, 0.0)
 PANEL_BOX = pygame.Rect(640, 0, 260, 600)

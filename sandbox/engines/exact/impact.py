@@ -1,210 +1,204 @@
-"""Impact: what a hit does to velocity and spin. Discs: normal and tangential impulse do not disturb each other."""
+"""Motion of a ball between events, and collision response: restitution, Coulomb friction and kicks.
+
+Collisions are instantaneous and act on one pair. The tangential impulse ends the slip or is limited by μ times the
+normal impulse.
+"""
 
 import math
 
-from sandbox.engines.exact.arena import (
-    ABOVE,
-    ACCOUNTING,
-    ANGLE,
-    AX,
-    AY,
-    BALL,
-    COAT,
-    FALLOFF,
-    FRICTION,
-    HOP,
-    KICKS,
-    KNOB,
-    KNOB_TO_APPROACH,
-    LAST_KIND,
-    LAST_TIME,
-    LAST_WHO,
-    LATE,
-    LIGHTNESS,
-    RADIUS,
-    READINESS,
-    RESTITUTION,
-    SPIN,
-    SURFACE,
-    THING,
-    VX,
-    VY,
-    Arena,
-    T,
-    X,
-    Y,
-)
-from sandbox.engines.exact.booking import book_strike
-from sandbox.engines.exact.log import add_impulse, log_rest, open_row
-from sandbox.engines.exact.motion import place, turned
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.kernel import bare_kernel as kernel
+from sandbox.engines.common.restitution import compiled_kick_gain, compiled_kicked, compiled_rebound
+from sandbox.engines.exact import state as c
+from sandbox.engines.exact.record import account_fixed_hit, add_impulse, add_row, log_support
 from sandbox.engines.exact.roots import NOISE
-from sandbox.engines.kernel import bare_kernel as kernel
-from sandbox.engines.rebound import compiled_kick_gain, compiled_kicked, compiled_rebound
-from sandbox.trajectory import FloatArray, IntArray
+from sandbox.engines.exact.state import EventState
+
+
+@kernel
+def position_at(state: FloatArray, i: int, t: float, residual: float) -> tuple[float, float, float, float]:
+    """Return position, m, and velocity, m/s, of a ball at time t + residual."""
+    tau = (t - state[i, c.T]) + (residual - state[i, c.TIME_RESIDUAL])
+    vx, vy = state[i, c.VX] + state[i, c.AX] * tau, state[i, c.VY] + state[i, c.AY] * tau
+    x = state[i, c.X] + (state[i, c.VX] + 0.5 * state[i, c.AX] * tau) * tau
+    y = state[i, c.Y] + (state[i, c.VY] + 0.5 * state[i, c.AY] * tau) * tau
+    return x, y, vx, vy
+
+
+@kernel
+def angle_at(state: FloatArray, i: int, t: float, residual: float) -> tuple[float, float]:
+    """Return angle, rad, and spin, rad/s, of a ball at time t + residual."""
+    tau = (t - state[i, c.T]) + (residual - state[i, c.TIME_RESIDUAL])
+    spin = state[i, c.SPIN] + state[i, c.ALPHA] * tau
+    return state[i, c.ANGLE] + (state[i, c.SPIN] + 0.5 * state[i, c.ALPHA] * tau) * tau, spin
+
 
 ALMOST_STILL = 1e-9
-"""m/s: two things, at least one of them round, that meet more slowly than this, or than a hop where there is gravity,
-part as fast as they met. This ends the endless series of hits into which inelastic balls otherwise collapse."""
+"""m/s: two bodies, at least one of them round, that approach more slowly than this (or than a micro-bounce, under
+gravity) separate with the speed of approach. This ends the infinite series of collisions of inelastic collapse (Zeno
+behaviour)."""
 
 
 @kernel
-def bring(state: FloatArray, tags: IntArray, log: FloatArray, i: int, t: float, late: float) -> None:
-    """Bring a ball's row to a time, that of an event of its own."""
-    log_rest(state, tags, log, i, t)
-    x, y, vx, vy = place(state, i, t, late)
-    angle, spin = turned(state, i, t, late)
-    state[i, X], state[i, Y], state[i, VX], state[i, VY] = x, y, vx, vy
-    state[i, ANGLE], state[i, SPIN] = angle, spin
-    state[i, T], state[i, LATE] = t, late
+def move_to(state: FloatArray, tags: IntArray, log: FloatArray, i: int, t: float, residual: float) -> None:
+    """Advance the row of a ball to time t + residual, the time of its event."""
+    log_support(state, tags, log, i, t)
+    x, y, vx, vy = position_at(state, i, t, residual)
+    angle, spin = angle_at(state, i, t, residual)
+    state[i, c.X], state[i, c.Y], state[i, c.VX], state[i, c.VY] = x, y, vx, vy
+    state[i, c.ANGLE], state[i, c.SPIN] = angle, spin
+    state[i, c.T], state[i, c.TIME_RESIDUAL] = t, residual
 
 
 @kernel
-def note(state: FloatArray, tags: IntArray, i: int, kind: int, partner: int) -> None:
-    """Note whom a ball has just met."""
-    tags[i, LAST_KIND], tags[i, LAST_WHO] = kind, partner
-    state[i, LAST_TIME] = state[i, T]
+def record_partner(state: FloatArray, tags: IntArray, i: int, kind: int, partner: int) -> None:
+    """Store kind and partner of a ball's latest event."""
+    tags[i, c.LAST_KIND], tags[i, c.LAST_PARTNER] = kind, partner
+    state[i, c.LAST_TIME] = state[i, c.T]
 
 
 @kernel
-def rubbed(slip: float, mass: float, friction: float, normal: float) -> float:
-    """Return the impulse that friction gives: what would end the slip, and no more than μ of the normal one."""
-    most = friction * normal
-    return max(min(-slip / mass, most), -most)
+def friction_impulse(slip: float, mass: float, friction: float, normal: float) -> float:
+    """Return the tangential impulse: the one that ends the slip, limited to μ times the normal impulse."""
+    limit = friction * normal
+    return max(min(-slip / mass, limit), -limit)
 
 
 @kernel
-def strike(
-    arena: Arena, i: int, nx: float, ny: float, parting: float, kick: float, friction: float
+def collide_fixed(
+    data: EventState, i: int, nx: float, ny: float, separation: float, kick: float, friction: float
 ) -> tuple[float, float]:
-    """Let a ball bounce off something fixed.
+    """Apply a collision with a static collider to a ball.
 
     Args:
-        arena: everything.
+        data: state arrays.
         i: ball.
-        nx: normal out of the fixed thing.
+        nx: normal out of the collider.
         ny: likewise.
-        parting: speed along the normal after it, m/s, by itself.
-        kick: on top of that, m/s.
-        friction: coefficient.
+        separation: speed of separation without the kick, m/s.
+        kick: speed that a kick adds, m/s.
+        friction: coefficient of friction.
 
     Returns:
         The impulse on the ball, N·s.
     """
-    state, r = arena.state, arena.state[i, RADIUS]
-    im, ii = arena.state[i, LIGHTNESS], arena.state[i, READINESS]
-    closing = -(state[i, VX] * nx + state[i, VY] * ny)
-    normal = max((closing + parting + kick) / im, 0.0)
+    state, r = data.state, data.state[i, c.RADIUS]
+    im, ii = data.state[i, c.INVERSE_MASS], data.state[i, c.INVERSE_INERTIA]
+    closing = -(state[i, c.VX] * nx + state[i, c.VY] * ny)
+    normal = max((closing + separation + kick) / im, 0.0)
     across = 0.0
     if friction > 0.0:
-        slip = -state[i, VX] * ny + state[i, VY] * nx - state[i, SPIN] * r
-        across = rubbed(slip, im + r * r * ii, friction, normal)
+        slip = -state[i, c.VX] * ny + state[i, c.VY] * nx - state[i, c.SPIN] * r
+        across = friction_impulse(slip, im + r * r * ii, friction, normal)
     jx, jy = normal * nx - across * ny, normal * ny + across * nx
-    state[i, VX] += jx * im
-    state[i, VY] += jy * im
-    state[i, SPIN] -= r * across * ii
-    if arena.counts[ACCOUNTING] != 0:
-        # From `parting` on the impulse is the kick's: half of it finds the speed before it, half that after.
-        book_strike(arena, i, nx, ny, normal, across, kick / im * (parting + 0.5 * kick))
+    state[i, c.VX] += jx * im
+    state[i, c.VY] += jy * im
+    state[i, c.SPIN] -= r * across * ii
+    if data.counts[c.ACCOUNTING] != 0:
+        # The kick takes the speed from `separation` to `separation + kick`: work is impulse times their mean.
+        account_fixed_hit(data, i, nx, ny, normal, across, kick / im * (separation + 0.5 * kick))
     return jx, jy
 
 
 @kernel
-def parting_speed(hop: float, closing: float, restitution: float, falloff: float, press: float) -> float:
-    """Return how fast two things part of which at least one is round.
+def separation_speed(micro_bounce: float, closing: float, restitution: float, falloff: float, press: float) -> float:
+    """Return the speed of separation, m/s, of two bodies of which at least one is round.
 
-    e times the closing speed; all of it where that is next to nothing; and where gravity presses them together, no
-    less than a hop's speed: there is no rest on anything round.
+    It is e times the speed of approach; the full speed of approach if that is negligible; and at least the speed of a
+    micro-bounce if acceleration presses the two together, because balls do not rest on round bodies.
     """
-    parting = compiled_rebound(restitution, falloff, closing)
-    if closing <= max(hop, ALMOST_STILL):
-        parting = max(closing, 0.0)
+    separation = compiled_rebound(restitution, falloff, closing)
+    if closing <= max(micro_bounce, ALMOST_STILL):
+        separation = max(closing, 0.0)
     if press > 0.0:
-        parting = max(parting, hop)
-    return parting
+        separation = max(separation, micro_bounce)
+    return separation
 
 
 @kernel
-def hit_knob(arena: Arena, i: int, k: int) -> None:
-    """Let a ball hit a post or the end of a segment."""
-    state = arena.state
-    dx, dy = arena.knobs[k, 0] - state[i, X], arena.knobs[k, 1] - state[i, Y]
+def hit_vertex(data: EventState, i: int, k: int) -> None:
+    """Collide a ball with a vertex: a post or the end of a segment."""
+    state = data.state
+    dx, dy = data.vertices[k, c.CENTRE_X] - state[i, c.X], data.vertices[k, c.CENTRE_Y] - state[i, c.Y]
     distance = math.sqrt(dx * dx + dy * dy)
     if distance == 0.0:
         return
     nx, ny = dx / distance, dy / distance
-    closing = state[i, VX] * nx + state[i, VY] * ny
-    across = -state[i, VX] * ny + state[i, VY] * nx
-    press = state[i, AX] * nx + state[i, AY] * ny - across * across / distance
-    mine, its = arena.tags[i, SURFACE], arena.knob_tags[k, COAT]
-    restitution, falloff = arena.surfaces[RESTITUTION, mine, its], arena.surfaces[FALLOFF, mine, its]
-    parting = parting_speed(arena.world[HOP], closing, restitution, falloff, press)
-    kick = compiled_kicked(arena.knobs[k, KICKS], arena.knobs[k, ABOVE], False, 0.5, closing)
-    kick = compiled_kick_gain(restitution, falloff, kick, arena.knobs[k, KNOB_TO_APPROACH] != 0.0, closing)
-    jx, jy = strike(arena, i, -nx, -ny, parting, kick, arena.surfaces[FRICTION, mine, its])
-    r = arena.state[i, RADIUS]
-    row = open_row(arena, i, -1 - arena.knob_tags[k, THING], state[i, X] + r * nx, state[i, Y] + r * ny, nx, ny)
-    add_impulse(arena, row, -jx, -jy)
-    note(state, arena.tags, i, KNOB, k)
+    closing = state[i, c.VX] * nx + state[i, c.VY] * ny
+    across = -state[i, c.VX] * ny + state[i, c.VY] * nx
+    press = state[i, c.AX] * nx + state[i, c.AY] * ny - across * across / distance
+    mine, its = data.tags[i, c.SURFACE], data.vertex_tags[k, c.COLLIDER_SURFACE]
+    restitution, falloff = data.surfaces[c.RESTITUTION, mine, its], data.surfaces[c.FALLOFF, mine, its]
+    separation = separation_speed(data.world[c.MICRO_BOUNCE], closing, restitution, falloff, press)
+    kick = compiled_kicked(data.vertices[k, c.VERTEX_KICK], data.vertices[k, c.VERTEX_THRESHOLD], False, 0.5, closing)
+    kick = compiled_kick_gain(restitution, falloff, kick, data.vertices[k, c.VERTEX_TO_APPROACH] != 0.0, closing)
+    jx, jy = collide_fixed(data, i, -nx, -ny, separation, kick, data.surfaces[c.FRICTION, mine, its])
+    r = data.state[i, c.RADIUS]
+    row = add_row(data, i, -1 - data.vertex_tags[k, c.COLLIDER], state[i, c.X] + r * nx, state[i, c.Y] + r * ny, nx, ny)
+    add_impulse(data, row, -jx, -jy)
+    record_partner(state, data.tags, i, c.VERTEX, k)
 
 
 @kernel
 def hit_ball(
-    state: FloatArray, tags: IntArray, surfaces: FloatArray, hop: float, i: int, j: int
+    state: FloatArray, tags: IntArray, surfaces: FloatArray, micro_bounce: float, i: int, j: int
 ) -> tuple[float, float, float, float]:
-    """Let two balls hit each other, of which the second may be fixed.
+    """Collide two balls, of which the second may be fixed.
 
     Args:
         state: of all balls.
         tags: likewise.
-        surfaces: of all pairs.
-        hop: m/s, as in `Arena`.
+        surfaces: coefficients of all pairs of surfaces.
+        micro_bounce: speed of a micro-bounce, m/s.
         i: ball.
         j: ball.
 
     Returns:
-        The impulse that i gives to j, N·s, and the normal from i to j.
+        The impulse of i on j, N·s, and the normal from i to j.
     """
-    dx, dy = state[j, X] - state[i, X], state[j, Y] - state[i, Y]
+    dx, dy = state[j, c.X] - state[i, c.X], state[j, c.Y] - state[i, c.Y]
     distance = math.sqrt(dx * dx + dy * dy)
     if distance == 0.0:
         return 0.0, 0.0, 1.0, 0.0
     nx, ny = dx / distance, dy / distance
-    vx, vy = state[j, VX] - state[i, VX], state[j, VY] - state[i, VY]
+    vx, vy = state[j, c.VX] - state[i, c.VX], state[j, c.VY] - state[i, c.VY]
     closing, across = -(vx * nx + vy * ny), -vx * ny + vy * nx
-    pull = (state[j, AX] - state[i, AX]) * nx + (state[j, AY] - state[i, AY]) * ny
+    pull = (state[j, c.AX] - state[i, c.AX]) * nx + (state[j, c.AY] - state[i, c.AY]) * ny
     press = -pull - across * across / distance
-    if abs(pull) <= NOISE * (abs(state[i, AX]) + abs(state[i, AY]) + abs(state[j, AX]) + abs(state[j, AY])):
-        press = 0.0  # they fall alike: nothing presses them together
-    mine, its = tags[i, SURFACE], tags[j, SURFACE]
-    parting = parting_speed(hop, closing, surfaces[RESTITUTION, mine, its], surfaces[FALLOFF, mine, its], press)
-    ri, rj = state[i, RADIUS], state[j, RADIUS]
-    mi, mj = state[i, LIGHTNESS], state[j, LIGHTNESS]
-    ii, ij = state[i, READINESS], state[j, READINESS]
-    normal = max((closing + parting) / (mi + mj), 0.0)
+    if abs(pull) <= NOISE * (abs(state[i, c.AX]) + abs(state[i, c.AY]) + abs(state[j, c.AX]) + abs(state[j, c.AY])):
+        press = 0.0  # equal accelerations do not press them together
+    mine, its = tags[i, c.SURFACE], tags[j, c.SURFACE]
+    separation = separation_speed(
+        micro_bounce, closing, surfaces[c.RESTITUTION, mine, its], surfaces[c.FALLOFF, mine, its], press
+    )
+    ri, rj = state[i, c.RADIUS], state[j, c.RADIUS]
+    mi, mj = state[i, c.INVERSE_MASS], state[j, c.INVERSE_MASS]
+    ii, ij = state[i, c.INVERSE_INERTIA], state[j, c.INVERSE_INERTIA]
+    normal = max((closing + separation) / (mi + mj), 0.0)
     rub = 0.0
-    friction = surfaces[FRICTION, mine, its]
+    friction = surfaces[c.FRICTION, mine, its]
     if friction > 0.0:
-        slip = across - (state[i, SPIN] * ri + state[j, SPIN] * rj)
-        rub = rubbed(slip, mi + mj + ri * ri * ii + rj * rj * ij, friction, normal)
-    jx, jy = normal * nx - rub * ny, normal * ny + rub * nx  # given by i to j
-    state[i, VX] -= jx * mi
-    state[i, VY] -= jy * mi
-    state[j, VX] += jx * mj
-    state[j, VY] += jy * mj
-    state[i, SPIN] -= ri * rub * ii
-    state[j, SPIN] -= rj * rub * ij
-    note(state, tags, i, BALL, j)
-    note(state, tags, j, BALL, i)
+        slip = across - (state[i, c.SPIN] * ri + state[j, c.SPIN] * rj)
+        rub = friction_impulse(slip, mi + mj + ri * ri * ii + rj * rj * ij, friction, normal)
+    jx, jy = normal * nx - rub * ny, normal * ny + rub * nx  # of i on j
+    state[i, c.VX] -= jx * mi
+    state[i, c.VY] -= jy * mi
+    state[j, c.VX] += jx * mj
+    state[j, c.VY] += jy * mj
+    state[i, c.SPIN] -= ri * rub * ii
+    state[j, c.SPIN] -= rj * rub * ij
+    record_partner(state, tags, i, c.BALL, j)
+    record_partner(state, tags, j, c.BALL, i)
     return jx, jy, nx, ny
 
 
 @kernel
-def log_hit(arena: Arena, i: int, j: int, jx: float, jy: float, nx: float, ny: float) -> None:
-    """Log that two balls have hit each other."""
-    state = arena.state
-    r = state[i, RADIUS]
-    px, py = state[i, X] + r * nx, state[i, Y] + r * ny
+def log_hit(data: EventState, i: int, j: int, jx: float, jy: float, nx: float, ny: float) -> None:
+    """Add a collision of two balls to the contact log."""
+    state = data.state
+    r = state[i, c.RADIUS]
+    px, py = state[i, c.X] + r * nx, state[i, c.Y] + r * ny
     if i < j:
-        add_impulse(arena, open_row(arena, i, j, px, py, nx, ny), jx, jy)
+        add_impulse(data, add_row(data, i, j, px, py, nx, ny), jx, jy)
     else:
-        add_impulse(arena, open_row(arena, j, i, px, py, -nx, -ny), -jx, -jy)
+        add_impulse(data, add_row(data, j, i, px, py, -nx, -ny), -jx, -jy)

@@ -1,221 +1,165 @@
-"""ExactSimulation: a scene running from event to event."""
+"""Event-driven simulation of discs among planes, walls and posts."""
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
-from sandbox.action import Action
-from sandbox.engines.account import Account, Cause
-from sandbox.engines.acting import perform
-from sandbox.engines.booked import booked
-from sandbox.engines.contact_log import MAX_ROWS
-from sandbox.engines.exact.advance import (
-    DONE,
-    FULL,
-    PAUSED,
+from sandbox.arrays import IntArray
+from sandbox.engines.common.energy_balance import booked
+from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.exact import state as c
+from sandbox.engines.exact.bodies import EventDrivenBodies
+from sandbox.engines.exact.event_driven import FIRST_LOG_ROWS, EventDrivenSimulation, last_event_bodies
+from sandbox.engines.exact.events import (
+    BATCHES_PER_BUDGET,
+    MAX_BATCH_RATE,
+    TOO_DENSE,
+    TOO_FAST,
     advance,
-    arrive,
-    changed,
+    advance_to,
     evaluate,
-    look_ahead,
-    renew,
-    start,
+    predict_all,
+    rebuild_motion,
+    restart,
+    update_motion,
 )
-from sandbox.engines.exact.arena import (
-    ANGLE,
-    BUDGET,
-    EVENTS,
-    LIGHTNESS,
-    NOW,
-    NOW_LATE,
-    PAIR_TESTS,
-    PREDICTIONS,
-    RECORDING,
-    ROWS,
-    SINCE,
-    SPIN,
-    STAMP,
-    SUPPORT,
-    VX,
-    VY,
-    Arena,
-    T,
-    X,
-    Y,
-    arena_of,
-    renewed,
-    reshaped,
-)
-from sandbox.engines.exact.books import Books
-from sandbox.engines.exact.driven import EventDriven
-from sandbox.engines.exact.excess import too_many
-from sandbox.engines.exact.hold import freed
-from sandbox.engines.exact.log import log_rests, open_rest, taken, with_room
-from sandbox.engines.exact.predict import predict
-from sandbox.engines.exact.support import knocked
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import Contacts, Frame, IntArray
+from sandbox.engines.exact.prediction import predict_next_event
+from sandbox.engines.exact.record import account_slips, drain_log, log_supports, open_support_row, with_log_rows
+from sandbox.engines.exact.rest import recheck_supports, release_supports
+from sandbox.engines.exact.state import EventState, make_state, rebuilt, with_new_walls
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.trajectory import Contacts
 
 PER_SECOND, PER_SECOND_AND_BALL = 1_000_000, 1_000
-"""Events that one simulated second may have: the first, or the second for each ball where that is more."""
-
-FIRST_ROWS = 1024
-"""Rows that the log of contacts starts with."""
+"""Largest number of events in one simulated second: the first, or the second for each ball if that is more."""
 
 
-class ExactSimulation(EventDriven):
-    """A running scene.
+class ExactSimulation(EventDrivenSimulation[EventState]):
+    """A running scene of discs. Balls rest, slide and roll on lines in closed form.
 
-    Between events every ball moves in closed form from its own last event on; frames are read off and change nothing.
-    So positions do not depend on dt, bit for bit.
+    The end of a series of bounces is accounted to restitution, and the energy of a micro-bounce is phantom energy.
     """
 
-    def __init__(self, scene: Scene, settings: Settings) -> None:
-        super().__init__(scene, settings)
-        self._books: Books | None = None
-        self._arena: Arena = arena_of(self._troupe)
-        self._allow()
+    ENERGY_COLUMNS: ClassVar[Mapping[Cause, tuple[int, ...]]] = {
+        Cause.RESTITUTION: (c.BY_NORMAL,),
+        Cause.FRICTION: (c.BY_FRICTION,),
+        Cause.KICKS: (c.BY_KICKS,),
+        Cause.PHANTOM: (c.BY_PHANTOM,),
+    }
+
+    def __init__(self, setup: Setup, settings: Settings) -> None:
+        store = EventDrivenBodies(setup, settings.dt)
+        super().__init__(settings, make_state(store), store)
+        self._set_event_limit()
         with np.errstate(all="ignore"):
-            start(self._arena)
+            restart(self._data)
 
     @property
     def events(self) -> int:
-        """How many events there have been."""
-        return int(self._arena.counts[EVENTS])
-
-    @property
-    def work(self) -> Mapping[str, int]:
-        """What was done so far: events, predictions, and at how many others, flats and knobs these looked."""
-        counts = self._arena.counts
-        return {
-            "events": self.events,
-            "predictions": int(counts[PREDICTIONS]),
-            "pair_tests": int(counts[PAIR_TESTS]),
-        }
-
-    def apply(self, action: Action) -> None:
-        """Do what an action says, now.
-
-        Raises:
-            ActionError: it cannot be done. Nothing has changed then.
-        """
-        with self._turn, np.errstate(all="ignore"):
-            self._check_running()
-            self._troupe.settled()
-            with booked(self._outside, Cause.ACTIONS, self):
-                leaving = perform(action, self._troupe)
-            self._acted()
-            if leaving is not None:
-                self._take_out(np.asarray([leaving]))
-
-    def frame(self) -> Frame:
-        """Return the present state."""
-        troupe = self._troupe
-        return Frame(
-            self.time,
-            troupe.position.copy(),
-            troupe.velocity.copy(),
-            troupe.angle.copy(),
-            troupe.angular_velocity.copy(),
-            troupe.present.copy(),
-        )
+        """Number of events so far."""
+        return int(self._data.counts[c.EVENTS])
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
-        arena, now = self._arena, self.time
+        data, now = self._data, self.time
         with np.errstate(all="ignore"):
-            if not arena.counts[RECORDING]:
-                self._arena = arena = with_room(arena, max(FIRST_ROWS, 4 * len(arena.state)))
-                arena.counts[RECORDING], arena.world[NOW] = 1, now
-                arena.state[:, SINCE] = now
-                for i, which in np.argwhere(arena.tags[:, SUPPORT : SUPPORT + 2] >= 0).tolist():
-                    open_rest(arena, i, which)
-            log_rests(arena, now)
-        return taken(arena)
+            if not data.counts[c.RECORDING]:
+                self._data = data = with_log_rows(data, max(FIRST_LOG_ROWS, 4 * len(data.state)))
+                data.counts[c.RECORDING], data.world[c.NOW] = 1, now
+                data.state[:, c.LOGGED_UNTIL] = now
+                for i, which in np.argwhere(data.tags[:, c.SUPPORT : c.SUPPORT + 2] >= 0).tolist():
+                    open_support_row(data, i, which)
+            log_supports(data, now)
+        return drain_log(data)
 
-    def account(self) -> Mapping[Cause, float]:
-        """Return the energy that each cause has brought since the first call, J; that call starts the accounting."""
-        with np.errstate(all="ignore"):
-            if self._books is None:
-                self._books = Books(self._arena, self.time)
-            return self._books.entries(self._arena, self.time)
+    def _call_event_loop(self, until: float) -> int:
+        return advance(self._data, until)
 
-    @property
-    def _outside(self) -> Account | None:
-        return None if self._books is None else self._books.account
+    def _too_many_events(self, status: int) -> str:
+        """Return the message for an exceeded event limit, with the time, the limit and the bodies of the last event."""
+        counts, limit = self._data.counts, int(self._data.counts[c.MAX_EVENTS])
+        if status == TOO_FAST:
+            count, span = 2 * limit // BATCHES_PER_BUDGET, 2.0 / (MAX_BATCH_RATE * BATCHES_PER_BUDGET)
+            many = f"{count:,} events within {span:.3g} s where the limit is {limit:,} per second"
+        elif status == TOO_DENSE:
+            many = f"more than {int(counts[c.IN_INSTANT]) - 1:,} events within an instant"
+        else:
+            many = f"more than {int(counts[c.IN_SECOND]) - 1:,} events within one second"
+        kinds = c.LINE, c.VERTEX, c.BALL
+        last = last_event_bodies(self._data, self.bodies.names, self.scene.fixed_names, kinds)
+        return (
+            f"at {float(self._data.world[c.NOW]):.9g} s: {many}, last of {last}; engines with time steps can continue: "
+            "pymunk, reference"
+        )
 
-    def _advance(self, until: float) -> None:
-        """Let all events up to a time happen, and make room in the log."""
-        self._through(lambda: advance(self._arena, until), DONE, self._halted)
+    def _double_log(self) -> None:
+        self._data = with_log_rows(self._data, 2 * len(self._data.log))
 
-    def _halted(self, status: int) -> None:
-        if status == FULL:
-            rows = int(self._arena.counts[ROWS])
-            if rows > MAX_ROWS:
-                self._stop(f"more than {MAX_ROWS:,} contacts in one run")
-            self._arena = with_room(self._arena, 2 * len(self._arena.log))
-        elif status != PAUSED:
-            self._stop(too_many(self._arena, self.bodies.names, self._troupe.scene.fixed_names, status))
+    def _start_accounting(self) -> None:
+        self._data.state[:, c.ENERGY_UNTIL], self._data.state[:, c.ENERGY_RESIDUAL] = self.time, 0.0
 
-    @property
-    def _last_event(self) -> float:
-        return float(self._arena.world[NOW])
+    def _account_motion(self) -> None:
+        account_slips(self._data, self.time, 0.0)
 
     def _evaluate(self) -> None:
-        troupe = self._troupe
+        store = self._store
         with np.errstate(all="ignore"):
-            state = (troupe.position, troupe.velocity, troupe.angle, troupe.angular_velocity)
-            evaluate(self._arena, self.time, *state)
+            state = (store.position, store.velocity, store.angle, store.angular_velocity)
+            evaluate(self._data, self.time, *state)
 
-    def _acted(self) -> None:
-        """Bring into the kernels' arrays what an action has done to the roster."""
-        troupe, now = self._troupe, self.time
-        touched = sorted(troupe.kicked | troupe.moved)
+    def _load_bodies(self) -> None:
+        """Copy the changes of an action from the body store into the state arrays, and predict again."""
+        store, now = self._store, self.time
+        touched = sorted(store.velocity_set | store.position_set)
         for i in touched:
-            arrive(self._arena, i, now, 0.0)
-            self._arena.state[i, X : Y + 1], self._arena.state[i, VX : VY + 1] = troupe.position[i], troupe.velocity[i]
-            self._arena.state[i, ANGLE], self._arena.state[i, SPIN] = troupe.angle[i], troupe.angular_velocity[i]
-        arena = self._arena
-        for i in troupe.moved:
-            freed(arena, i)
-        if troupe.reshaped:
-            for i in arena.movers.tolist():
-                arrive(arena, i, now, 0.0)
-                freed(arena, i)
-            self._arena = arena = reshaped(arena, troupe)
-        if troupe.renewed:
-            known = len(arena.state)
-            self._arena = arena = renewed(arena, troupe)
-            arena.state[known:, T] = now  # who has just been spawned has not moved before
-            self._allow()
-            renew(arena, now)
+            advance_to(self._data, i, now, 0.0)
+            self._data.state[i, c.X : c.Y + 1], self._data.state[i, c.VX : c.VY + 1] = (
+                store.position[i],
+                store.velocity[i],
+            )
+            self._data.state[i, c.ANGLE], self._data.state[i, c.SPIN] = store.angle[i], store.angular_velocity[i]
+        data = self._data
+        for i in store.position_set:
+            release_supports(data, i)
+        if store.walls_changed:
+            for i in data.movers.tolist():
+                advance_to(data, i, now, 0.0)
+                release_supports(data, i)
+            self._data = data = with_new_walls(data, store)
+        if store.scene_changed:
+            known = len(data.state)
+            self._data = data = rebuilt(data, store)
+            data.state[known:, c.T] = now  # the rows of spawned bodies begin now
+            self._set_event_limit()
+            rebuild_motion(data, now)
             return
-        arena.world[NOW], arena.world[NOW_LATE] = now, 0.0
+        data.world[c.NOW], data.world[c.NOW_RESIDUAL] = now, 0.0
         for i in touched:
-            if arena.state[i, LIGHTNESS] > 0.0:
-                knocked(arena, i)
-                changed(arena, i)
+            if data.state[i, c.INVERSE_MASS] > 0.0:
+                recheck_supports(data, i)
+                update_motion(data, i)
         if any(self.bodies.fixed[i] for i in touched):
-            look_ahead(arena)  # others may now be in the way of what stood elsewhere
+            predict_all(data)  # a fixed body that has moved may now be in the path of any ball
         for i in touched:
-            if arena.state[i, LIGHTNESS] > 0.0:
-                predict(arena, i, now, 0.0)
+            if data.state[i, c.INVERSE_MASS] > 0.0:
+                predict_next_event(data, i, now, 0.0)
 
-    def _take_out(self, numbers: IntArray) -> None:
-        """Remove bodies; they stay where they are, with no velocity."""
+    def _remove(self, numbers: IntArray) -> None:
+        """Remove bodies by index; they keep their positions and have no velocity."""
         now = self.time
         with np.errstate(all="ignore"):
             for i in numbers.tolist():
-                arrive(self._arena, i, now, 0.0)
-                freed(self._arena, i)
-                self._arena.state[i, VX : SPIN + 2] = 0.0
-                self._arena.next_time[i] = np.inf
-                self._arena.tags[i, STAMP] += 1
-        with booked(self._outside, Cause.RETIRED, self):
-            self._troupe.take_out(numbers, now)
-        self._arena = renewed(self._arena, self._troupe)
+                advance_to(self._data, i, now, 0.0)
+                release_supports(self._data, i)
+                self._data.state[i, c.VX : c.SPIN + 2] = 0.0
+                self._data.next_time[i] = np.inf
+                self._data.tags[i, c.VERSION] += 1
+        with booked(self._ledger, Cause.RETIRED, self):
+            self._store.take_out(numbers, now)
+        self._data = rebuilt(self._data, self._store)
 
-    def _allow(self) -> None:
-        """Set how many events a second may have."""
-        self._arena.counts[BUDGET] = max(PER_SECOND, PER_SECOND_AND_BALL * len(self._arena.movers))
+    def _set_event_limit(self) -> None:
+        """Set the largest number of events in one second."""
+        self._data.counts[c.MAX_EVENTS] = max(PER_SECOND, PER_SECOND_AND_BALL * len(self._data.movers))

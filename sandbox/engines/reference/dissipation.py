@@ -13,10 +13,10 @@ give none. All the p(s) lie within the friction cones, which are convex, and lea
 
 import numpy as np
 
-from sandbox.engines.kernel import kernel
-from sandbox.engines.reference.impulses import work_at
-from sandbox.engines.reference.manifolds import Manifolds
-from sandbox.trajectory import BoolArray, FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.kernel import kernel
+from sandbox.engines.reference.manifold import Manifolds
+from sandbox.engines.reference.sequential_impulses import work_at
 
 ROUNDING = 1e-13
 """Part of what impulses turn over that is no gain of energy but rounding."""
@@ -42,27 +42,32 @@ class Bilinear:
         return out, turnover
 
 
-def largest_shares(work: FloatArray, slope: FloatArray, curve: FloatArray) -> FloatArray:
+def largest_fractions(work: FloatArray, slope: FloatArray, curve: FloatArray) -> FloatArray:
     """Return the largest s ≤ 1, (N,), at which work + slope·s + curve·s² ≤ 0, curve ≥ 0; 0 where there is none."""
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(np.maximum(slope * slope - 4.0 * curve * work, 0.0))
         # Two forms of the larger root: that which subtracts nothing
-        share = np.where(slope > 0.0, -2.0 * work / (slope + root), (root - slope) / (2.0 * curve))
-    share = np.where(work + slope + curve <= 0.0, 1.0, share)
-    return np.where(np.isfinite(share), np.clip(share, 0.0, 1.0), 0.0)
+        fraction = np.where(slope > 0.0, -2.0 * work / (slope + root), (root - slope) / (2.0 * curve))
+    fraction = np.where(work + slope + curve <= 0.0, 1.0, fraction)
+    return np.where(np.isfinite(fraction), np.clip(fraction, 0.0, 1.0), 0.0)
 
 
 @kernel
 def join_groups(first: IntArray, second: IntArray, moves: BoolArray, group: IntArray) -> None:
     """Write into group (N,) the lowest number of the bodies that contacts connect each with, fixed ones aside."""
-    changed = True
-    while changed:
-        changed = False
-        for k in range(len(first)):
-            i, j = first[k], second[k]
-            if j >= 0 and moves[i] and moves[j] and group[i] != group[j]:
-                group[i] = group[j] = min(group[i], group[j])
-                changed = True
+    for k in range(len(first)):
+        i, j = first[k], second[k]
+        if j < 0 or not (moves[i] and moves[j]):
+            continue
+        while group[i] != i:  # halving the ways to the lowest keeps them short: a long chain would take its square
+            group[i] = group[group[i]]
+            i = group[i]
+        while group[j] != j:
+            group[j] = group[group[j]]
+            j = group[j]
+        group[max(i, j)] = min(i, j)
+    for i in range(len(group)):  # the lowest is a body before it
+        group[i] = group[group[i]]
 
 
 @kernel

@@ -1,25 +1,50 @@
-"""ReferenceEngine: what the reference can model, and how its choices are filled in. Imports no solver until started."""
+"""The engine `reference`: its capabilities, refusals and default choices. No solver is imported before the start."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sandbox.engines.overlap import BIAS, slop_of
-from sandbox.engines.reference.driven.lacks import drives_lack
-from sandbox.scene.demands import BALLS, Demand, demands, unmodelled
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.engines.common.base import BIAS, slop_of
+from sandbox.engines.common.workload import overload
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.demands import BALLS, Demand, demands, unmodelled
+from sandbox.scene.compile.drives import names_of
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 if TYPE_CHECKING:
     from sandbox.engines.reference.simulation import ReferenceSimulation
+
+
+def drives_lack(setup: Setup, wanted: frozenset[Demand], settings: Settings) -> list[str]:
+    """Return what a scene with drives, which demands this, asks for beyond what can be had."""
+    lacks = []
+    if settings.detection in ("bisect", "swept"):
+        lacks.append(f"detection {settings.detection!r} does not support drives; 'discrete' and 'shrink' do")
+    if Demand.ATTRACTION in wanted:
+        lacks.append("it does not model attraction and drives together")
+    held = _joined(setup)
+    if held is not None:
+        body, drive = held
+        lacks.append(f"it does not model a joint to {body!r}, whose motion the drive {drive!r} prescribes")
+    return lacks
+
+
+def _joined(setup: Setup) -> tuple[str, str] | None:
+    """Return a driven body that a joint holds as well, and its drive."""
+    scene, numbers = setup.scene, setup.bodies.number_of
+    joined = setup.links.held(len(setup.bodies))
+    for drive, name in zip(scene.drives, names_of(scene), strict=True):
+        if drive.body in numbers and joined[numbers[drive.body]]:
+            return drive.body, name
+    return None
+
 
 WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
 """What is chosen where nothing is stated: what pymunk does, and the tutorial."""
 
 SUITED = {"relaxation": "semi_implicit_euler", "xpbd": "semi_implicit_euler", "rattle": "velocity_verlet"}
 """What goes with ways to hold joints by their positions: kicks come before positions are put right."""
-
-BALLS_ALONE = "detection 'swept' knows times of impact of balls alone, not of polygons; 'bisect' does"
 
 HELD = {Demand.RODS, Demand.PIVOTS, Demand.SLIDES, Demand.ROTARY_LIMITS}
 """Joints that hold, other than springs, which are forces."""
@@ -40,7 +65,7 @@ class ReferenceEngine:
     """
 
     name: str = "reference"
-    about: str = "by hand, fixed step: integrators, broad phases, times of impact, impulses or penalty springs"
+    about: str = "hand-written, fixed step: choice of integrator, broad phase, detection and response"
     capabilities: frozenset[Demand] = BALLS | {
         Demand.FALLOFF,
         Demand.KICKS,
@@ -60,104 +85,104 @@ class ReferenceEngine:
         Demand.DRIVES,
     }
 
-    def missing(self, scene: Scene, settings: Settings) -> tuple[str, ...]:
+    def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return what scene and settings ask for that the reference lacks."""
-        wanted = demands(scene)
-        lacks = unmodelled(scene, self.capabilities)
+        setup = Setup.of(start)
+        wanted = demands(setup)
+        lacks = unmodelled(setup, self.capabilities)
         lacks += self._detection_lacks(wanted, settings)
         if Demand.DRIVES in wanted:
-            lacks += drives_lack(scene, wanted, settings)
+            lacks += drives_lack(setup, wanted, settings)
         if settings.broad_phase == "oriented" and Demand.POLYGONS not in wanted:
-            lacks.append("broad_phase 'oriented' is for polygons, of which the scene has none; 'grid' or 'sweep' do")
+            lacks.append("broad_phase 'oriented' needs polygons, and the scene has none; use 'grid' or 'sweep'")
         if settings.stretch is not None and settings.joints != "relaxation":
-            lacks.append("stretch is for joints held by relaxation; solver.joints is not 'relaxation'")
+            lacks.append("stretch applies to joints = 'relaxation' only")
         if settings.half_kick:
-            lacks.append("half_kick is a remedy for pymunk's scheme; integrator 'velocity_verlet' has it built in")
+            lacks.append("half_kick applies to pymunk only; use integrator 'velocity_verlet'")
         if settings.impact == "dissipative" and (wanted & HELD or Demand.DRIVES in wanted):
-            lacks.append(
-                "impact 'dissipative' weighs the energy of contacts alone, without joints and drives; 'newton' works"
-            )
+            lacks.append("impact 'dissipative' does not support joints and drives; use 'newton'")
         if settings.persistence not in (None, 1):
-            lacks.append(f"persistence {settings.persistence}: it remembers contacts for 1 substep")
+            lacks.append(f"persistence {settings.persistence} is not supported; it keeps contacts for 1 substep")
         if settings.response == "penalty":
-            lacks += self._penalty_lacks(scene, settings)
+            lacks += self._penalty_lacks(setup, settings)
             if settings.impact is not None:
-                lacks.append("impact is a law of impulses; solver.response is not 'impulse'")
+                lacks.append("impact applies to response 'impulse' only")
             for demand in (Demand.FALLOFF, Demand.KICKS):
                 if demand in wanted:
-                    lacks.append(
-                        f"response 'penalty' does not model {demand}: its springs part what meets; 'impulse' does"
-                    )
+                    lacks.append(f"response 'penalty' does not model {demand}; 'impulse' does")
         else:
             lacks += [
-                f"{key} is a figure of penalty springs; solver.response is not 'penalty'"
+                f"{key} applies to response 'penalty' only"
                 for key in ("stiffness", "damping")
                 if getattr(settings, key) is not None
             ]
-        return tuple(lacks)
+        return (*lacks, *overload(setup, settings))
 
     def _detection_lacks(self, wanted: frozenset[Demand], settings: Settings) -> list[str]:
         """Say what a detection of impacts in time cannot do."""
         lacks = []
         if settings.detection == "swept" and Demand.POLYGONS in wanted:
-            lacks.append(BALLS_ALONE)
+            lacks.append("detection 'swept' supports balls only; 'bisect' supports polygons too")
         if settings.detection in ("bisect", "swept") and wanted & HELD:
-            lacks.append(
-                f"detection {settings.detection!r} resolves impacts one by one, apart from joints; 'shrink' does not"
-            )
+            lacks.append(f"detection {settings.detection!r} does not support joints; 'shrink' does")
         return lacks
 
-    def _penalty_lacks(self, scene: Scene, settings: Settings) -> list[str]:
-        from sandbox.engines.reference.stability import unstable
+    def _penalty_lacks(self, setup: Setup, settings: Settings) -> list[str]:
+        from sandbox.engines.reference.penalty import unstable
 
         lacks = [
-            f"{key} corrects overlap by impulses; penalty springs need theirs"
+            f"{key} applies to response 'impulse' only"
             for key in ("slop", "bias", "persistence")
             if getattr(settings, key) is not None
         ]
         if settings.detection in ("bisect", "swept"):
-            lacks.append(f"detection {settings.detection!r} leaves no overlap, which penalty springs act by")
-        reason = unstable(scene, self.resolve(scene, settings), settings.stiffness is not None)
+            lacks.append(f"detection {settings.detection!r} leaves no overlap, but penalty springs need one")
+        reason = unstable(setup, self.resolve(setup, settings), settings.stiffness is not None)
         return lacks if reason is None else [*lacks, reason]
 
-    def resolve(self, scene: Scene, settings: Settings) -> Settings:
+    def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:
         """Return the settings with every choice filled in."""
-        own: dict[str, object] = {**WORDS, "slop": slop_of(scene), "bias": BIAS, "persistence": 1}
-        if len(scene.links):
+        setup = Setup.of(start)
+        own: dict[str, object] = {**WORDS, "slop": slop_of(setup), "bias": BIAS, "persistence": 1}
+        if len(setup.links):
             own["joints"] = "impulses"
-        if demands(scene) & {Demand.SPRINGS, Demand.ROTARY_SPRINGS, Demand.ATTRACTION}:
+        if demands(setup) & {Demand.SPRINGS, Demand.ROTARY_SPRINGS, Demand.ATTRACTION}:
             own["integrator"] = "semi_implicit_euler"  # explicit Euler makes what swings gain energy
         own["integrator"] = SUITED.get(settings.joints or "impulses", own["integrator"])
         if settings.response == "penalty":
-            from sandbox.engines.reference.stability import suited
+            from sandbox.engines.reference.penalty import suited
 
             own["integrator"] = "semi_implicit_euler"  # explicit Euler makes springs gain energy
-            own["stiffness"] = suited(scene, settings)
+            own["stiffness"] = suited(setup, settings)
         else:
             own["impact"] = "newton"
-        own["broad_phase"] = _suitable(scene)
+        own["broad_phase"] = _suitable(setup)
         return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
 
-    def start(self, scene: Scene, settings: Settings | None = None) -> "ReferenceSimulation":
+    def start(self, start: Scene | Setup, settings: Settings | None = None) -> "ReferenceSimulation":
         """Set a scene up.
 
         Raises:
-            Refusal: the reference lacks something that is asked for.
+            Refusal: the reference lacks something that is asked for, or the first look at what is near takes too much.
         """
-        from sandbox.engines.contract import Refusal
+        from sandbox.engines.contract import Exhaustion, Refusal
         from sandbox.engines.reference.simulation import ReferenceSimulation
 
-        settings = scene.solver if settings is None else settings
-        missing = self.missing(scene, settings)
+        setup = Setup.of(start)
+        settings = setup.scene.solver if settings is None else settings
+        missing = self.missing(setup, settings)
         if missing:
             raise Refusal(self.name, missing, ())
-        return ReferenceSimulation(scene, self.resolve(scene, settings))
+        try:
+            return ReferenceSimulation(setup, self.resolve(setup, settings))
+        except Exhaustion as exhaustion:
+            raise Refusal(self.name, (str(exhaustion),), ()) from None
 
 
-def _suitable(scene: Scene) -> str:
+def _suitable(setup: Setup) -> str:
     """Return the broad phase that suits a scene's balls."""
-    bodies = scene.bodies
-    radius = bodies.radius[meetings(scene).touches | bodies.fixed]
+    bodies = setup.bodies
+    radius = bodies.radius[contact_matrix(setup).touches | bodies.fixed]
     if len(radius) <= FEW:
         return "all_pairs"
     return "grid" if radius.max() <= ONE_SIZE * radius.min() else "sweep"

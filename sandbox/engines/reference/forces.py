@@ -1,22 +1,161 @@
-"""Forces: what acts on the bodies of a run, but contacts: gravity, steady forces, air, springs, fields."""
+"""External forces: gravity, drag, attraction, thrust and springs, as inputs of the integrators."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
-from sandbox.engines.reference.joints.field import Field
-from sandbox.engines.reference.joints.solver import JointSolver
-from sandbox.engines.reference.motion import Inputs, State
-from sandbox.engines.roster import Roster
-from sandbox.scene.links import LinkKind
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.kernel import bare_kernel
+from sandbox.engines.reference.integrators import Inputs, State
+from sandbox.engines.reference.joint_data import line
+from sandbox.engines.reference.joints import JointSolver
+from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
+from sandbox.scene.geometry.shapes import form_of
 
 
-def forces_on(roster: Roster, field: Field, joints: JointSolver | None, coordinates: int) -> Inputs:
+@bare_kernel
+def attract(
+    pose: FloatArray,
+    target: IntArray,
+    place: FloatArray,
+    strength: FloatArray,
+    softening: FloatArray,
+    inverse_mass: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Add the accelerations of N bodies by A attractions, and what they give back to the bodies that attract.
+
+    A strength is G·M. The attracting body's own mass counts only in its answer: it is pulled with the force that it
+    gives. What coincides with its target is not pulled. Costs A·N.
+
+    Args:
+        pose: (N, 2 or 3) m.
+        target: (A,) body number, or −1 for a place.
+        place: (A, 2) m, of those with none.
+        strength: (A,) m³/s².
+        softening: (A,) m.
+        inverse_mass: (N,) 1/kg; where 0, no pull is felt.
+        out: (N, 2 or 3) m/s², added to.
+    """
+    for k in range(len(target)):
+        own = target[k]
+        x, y = (pose[own, 0], pose[own, 1]) if own >= 0 else (place[k, 0], place[k, 1])
+        for i in range(len(pose)):
+            if i == own or inverse_mass[i] == 0.0:
+                continue
+            distance, nx, ny = line(x - pose[i, 0], y - pose[i, 1])
+            if distance == 0.0:
+                continue
+            pull = strength[k] / (distance * distance + softening[k] * softening[k])
+            out[i, 0] += pull * nx
+            out[i, 1] += pull * ny
+            if own >= 0:
+                answer = pull * (inverse_mass[own] / inverse_mass[i])
+                out[own, 0] -= answer * nx
+                out[own, 1] -= answer * ny
+
+
+@bare_kernel
+def thrust(
+    pose: FloatArray,
+    body: IntArray,
+    point: FloatArray,
+    force: FloatArray,
+    throttle: FloatArray,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Add the accelerations by T thrusts.
+
+    Args:
+        pose: (N, 3) m and rad.
+        body: (T,) index of the body that each drives.
+        point: (T, 2) m, where it acts, in the body's own frame about its centre of mass.
+        force: (T, 2) N, in that frame, at full throttle.
+        throttle: (T,) the share of it that acts.
+        inverse_mass: (N,) 1/kg.
+        inverse_moment: (N,) 1/(kg·m²).
+        out: (N, 3) m/s² and rad/s², added to.
+    """
+    for k in range(len(body)):
+        i = body[k]
+        x, y = throttle[k] * force[k, 0], throttle[k] * force[k, 1]
+        cos, sin = math.cos(pose[i, 2]), math.sin(pose[i, 2])
+        out[i, 0] += inverse_mass[i] * (cos * x - sin * y)
+        out[i, 1] += inverse_mass[i] * (sin * x + cos * y)
+        out[i, 2] += inverse_moment[i] * (point[k, 0] * y - point[k, 1] * x)
+
+
+class ForceField:
+    """What acts on the bodies of a running scene from afar and from within."""
+
+    def __init__(self, roster: BodyStore) -> None:
+        self._roster, self._began = roster, roster.setup.time
+        scene, bodies = roster.scene, roster.bodies
+        number = {name: k for k, name in enumerate(bodies.names)}
+        # Bodies that left before an earlier engine handed over attract no more, and carry nothing.
+        attractions = [a for a in scene.attractions if not isinstance(a.toward, str) or a.toward in number]
+        which = [k for k, thrust in enumerate(scene.thrusts) if thrust.body in number]
+        thrusts = [scene.thrusts[k] for k in which]
+        toward = [a.toward for a in attractions]
+        self._target: IntArray = np.asarray([number[t] if isinstance(t, str) else WORLD for t in toward], np.int64)
+        places = [(0.0, 0.0) if isinstance(t, str) else t for t in toward]
+        self._place: FloatArray = np.asarray(places, np.float64).reshape(-1, 2)
+        self._strength: FloatArray = np.asarray([a.strength for a in attractions], np.float64)
+        self._softening: FloatArray = np.asarray([a.softening for a in attractions], np.float64)
+        self._thrust: IntArray = np.asarray(which, np.int64)
+        self._body: IntArray = np.asarray([number[t.body] for t in thrusts], np.int64)
+        centres = [form_of(bodies.elements[bodies.element[n]]).centre for n in self._body.tolist()]
+        points = [(t.point[0] - c[0], t.point[1] - c[1]) for t, c in zip(thrusts, centres, strict=True)]
+        self._point: FloatArray = np.asarray(points, np.float64).reshape(-1, 2)
+        self._force: FloatArray = np.asarray([t.force for t in thrusts], np.float64).reshape(-1, 2)
+        self._begin: FloatArray = np.asarray([t.begin for t in thrusts], np.float64)
+        self._end: FloatArray = np.asarray([math.inf if t.end is None else t.end for t in thrusts], np.float64)
+
+    @property
+    def empty(self) -> bool:
+        """Nothing acts."""
+        return not (len(self._target) or len(self._body))
+
+    def __call__(self, time: float, x: State) -> FloatArray:
+        """Return the accelerations (N, D) at a time, s, in a state (2, N, D), m/s² and rad/s²."""
+        roster = self._roster
+        out: FloatArray = np.zeros_like(x[1])
+        if len(self._target):
+            there = np.append(roster.present, True)[self._target]  # the world, −1, finds the last
+            some = self._target[there], self._place[there], self._strength[there], self._softening[there]
+            attract(x[0], *some, roster.inverse_mass, out[: len(roster.inverse_mass)])
+        self._drive(time, x, out)
+        return out
+
+    @property
+    def thrusting(self) -> bool:
+        """There are thrusts."""
+        return len(self._body) > 0
+
+    def thrusts(self, time: float, x: State) -> FloatArray:
+        """Return the accelerations (N, D) by thrusts alone, as all of them are returned when called."""
+        out: FloatArray = np.zeros_like(x[1])
+        self._drive(time, x, out)
+        return out
+
+    def _drive(self, time: float, x: State, out: FloatArray) -> None:
+        """Add the accelerations by thrusts."""
+        if self.thrusting:
+            roster, now = self._roster, self._began + time
+            level = roster.throttles[self._thrust] * ((self._begin <= now) & (now < self._end))
+            inverse = roster.inverse_mass, roster.inverse_moment
+            thrust(x[0], self._body, self._point, self._force, level, *inverse, out)
+
+
+def forces_on(roster: BodyStore, field: ForceField, joints: JointSolver | None, coordinates: int) -> Inputs:
     """Return what acts on the bodies of a roster.
 
     Args:
-        roster: who is there, and what pushes whom.
+        roster: the bodies, and the steady forces on them.
         field: what acts from afar and from within.
         joints: what holds the scene's links, if it has any.
         coordinates: of a state: 2, or 3 where something turns.
@@ -31,8 +170,8 @@ def forces_on(roster: Roster, field: Field, joints: JointSolver | None, coordina
     if coordinates == 3:
         steady[:, 2] = roster.torque * roster.inverse_moment
     forces: list[Callable[[float, State], FloatArray]] = [] if field.empty else [field]
-    springs = roster.scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
-    if joints is not None and joints.how != "xpbd" and len(springs):
+    springs = roster.setup.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
+    if joints is not None and joints.method != "xpbd" and len(springs):
         forces.append(lambda _, x: joints.forces(x))
     return Inputs(
         steady,

@@ -1,4 +1,6 @@
-"""Integrators: one function each, from the state at t to the state at t + h. INTEGRATORS is the table of them.
+"""Fixed-step integrators, the state vector that they advance, and its derivative ẋ = f(t, x, u).
+
+Integrators: one function each, from the state at t to the state at t + h. INTEGRATORS is the table of them.
 
 Each takes the state transition function as an argument: step(f, t, x, u, h) -> x'. Errors for a projectile after a
 time T, and for an oscillator of angular frequency ω:
@@ -9,28 +11,142 @@ time T, and for an oscillator of angular frequency ω:
 | semi_implicit_euler | −g·h·T/2 | in a band, ωh < 2 |
 | velocity_verlet, leapfrog | exact | in a band, frequency (2/h)·asin(ωh/2), ωh < 2 |
 | rk4 | exact | loses (ωh)⁶/72 of its energy a step, ωh < 2√2 |
+
+Motion: the state vector x of a scene, and the state transition function ẋ = f(t, x, u).
+
+x is one array (2, N, D): x[0] the poses, x[1] their rates. D is 2 (x, y) where nothing turns, else 3 (x, y, angle).
+u is what acts on it from outside: gravity, air, steady forces, and penalty contacts where those are chosen.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from sandbox.engines.reference.motion import Inputs, State, Transition
-from sandbox.engines.reference.tableau import CLASSIC_4, EULER, runge_kutta
+from sandbox.arrays import FloatArray
+
+State: TypeAlias = FloatArray
+"""(2, N, D) poses, m and rad, and rates, m/s and rad/s"""
+
+
+_ALL = np.ones((1, 1))
+
+
+class Inputs(NamedTuple):
+    """u: all that acts on N bodies during one substep."""
+
+    steady: FloatArray
+    """(N, D) acceleration by gravity, steady forces and torques, m/s² and rad/s²; 0 for what is fixed"""
+    linear_drag: float = 0.0
+    """1/s"""
+    quadratic_drag: float = 0.0
+    """1/m"""
+    wind: tuple[float, float] = (0.0, 0.0)
+    """m/s"""
+    mobile: FloatArray = _ALL
+    """(N, 1) or (1, 1): 1 for what air can brake, 0 for what is fixed or gone"""
+    contacts: Callable[[State], FloatArray] | None = None
+    """Penalty contacts: the acceleration (N, D) that they add in a state."""
+    forces: tuple[Callable[[float, State], FloatArray], ...] = ()
+    """What else acts, by time and state: springs, attraction, thrusts; the acceleration (N, D) that each adds."""
+    rubbing: bool = False
+    """Some of these forces depend on velocity."""
+
+    @property
+    def dragged(self) -> bool:
+        """There is drag."""
+        return self.linear_drag > 0.0 or self.quadratic_drag > 0.0
+
+    @property
+    def damped(self) -> bool:
+        """Acceleration depends on velocity, so that a scheme needs to know the velocity where it asks."""
+        return self.dragged or self.rubbing or self.contacts is not None
+
+
+Transition: TypeAlias = Callable[[float, State, Inputs], State]
+"""ẋ = f(t, x, u)"""
+
+
+def transition(t: float, x: State, u: Inputs) -> State:
+    """Return ẋ: the rates, and the accelerations a = g + F/m − k w − c |w| w + Σ f(t, x), where w = v − wind.
+
+    Args:
+        t: s.
+        x: (2, N, D).
+        u: what acts.
+
+    Returns:
+        (2, N, D).
+    """
+    derivative = np.empty_like(x)
+    derivative[0] = x[1]
+    derivative[1] = u.steady
+    if u.dragged:
+        wind = x[1, :, :2] - u.wind
+        rate = u.linear_drag + u.quadratic_drag * np.sqrt(wind[:, :1] ** 2 + wind[:, 1:] ** 2)
+        derivative[1, :, :2] -= u.mobile * rate * wind
+    for force in u.forces:
+        derivative[1] += force(t, x)
+    if u.contacts is not None:
+        derivative[1] += u.contacts(x)
+    return derivative
+
+
+class Tableau(NamedTuple):
+    """An explicit Runge–Kutta method of s stages."""
+
+    a: tuple[tuple[float, ...], ...]
+    """Row i holds the weights of the slopes before stage i."""
+    b: tuple[float, ...]
+    """(s,) weights of the slopes in the step; they sum to 1"""
+    c: tuple[float, ...]
+    """(s,) where in the step each stage stands; the sum of its row of `a`"""
+
+
+EULER = Tableau(a=((),), b=(1.0,), c=(0.0,))
+
+CLASSIC_4 = Tableau(
+    a=((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
+    b=(1 / 6, 1 / 3, 1 / 3, 1 / 6),
+    c=(0.0, 0.5, 0.5, 1.0),
+)
+"""The classic method of fourth order, Kutta 1901."""
+
+
+def runge_kutta(table: Tableau) -> Callable[[Transition, float, State, Inputs, float], State]:
+    """Return the step function of a table: kᵢ = f(t + cᵢ h, x + h Σ aᵢⱼ kⱼ, u), x ← x + h Σ bᵢ kᵢ."""
+
+    def step(f: Transition, t: float, x: State, u: Inputs, h: float) -> State:
+        slopes: list[State] = []
+        for weights, c in zip(table.a, table.c, strict=True):
+            slopes.append(f(t + c * h, _moved(x, h, weights, slopes), u))
+        return _moved(x, h, table.b, slopes)
+
+    return step
+
+
+def _moved(x: State, h: float, weights: tuple[float, ...], slopes: list[State]) -> State:
+    """Return x + h Σ wⱼ kⱼ."""
+    total: State | None = None
+    for weight, slope in zip(weights, slopes, strict=True):
+        if weight:
+            term = slope if weight == 1.0 else weight * slope
+            total = term if total is None else total + term
+    return x if total is None else np.asarray(x + h * total)
+
 
 Step = Callable[[Transition, float, State, Inputs, float], State]
 
 
 class Integrator(NamedTuple):
-    """A scheme, and what a contact solver must know of it."""
+    """Integration scheme, with the properties that a contact solver needs."""
 
     step: Step
     order: int
-    """Global error falls as h to this power, with drag too."""
-    share: float
-    """The part of a kick that the same step's positions already have: x' moves by share·h·Δv when a kick within the
-    step is changed by Δv. 0 where positions move before the kick, 1 where after it, ½ where in the middle."""
+    """order: the global error decreases as h to this power, with drag too"""
+    fraction: float
+    """Fraction of a velocity change that the positions of the same step include: x' moves by fraction·h·Δv if the
+    velocity change within the step changes by Δv. 0 if positions move before it, 1 if after it, ½ if in the middle."""
 
 
 def semi_implicit_euler(f: Transition, t: float, x: State, u: Inputs, h: float) -> State:
@@ -75,11 +191,11 @@ def leapfrog(f: Transition, t: float, x: State, u: Inputs, h: float) -> State:
 
 INTEGRATORS: dict[str, Integrator] = {
     # The tutorial's: drift by the old velocity, then kick. pymunk's too, in free flight bit for bit.
-    "explicit_euler": Integrator(runge_kutta(EULER), order=1, share=0.0),
-    "semi_implicit_euler": Integrator(semi_implicit_euler, order=1, share=1.0),
-    "velocity_verlet": Integrator(velocity_verlet, order=2, share=0.5),
-    "leapfrog": Integrator(leapfrog, order=2, share=0.5),
-    "rk4": Integrator(runge_kutta(CLASSIC_4), order=4, share=0.5),
+    "explicit_euler": Integrator(runge_kutta(EULER), order=1, fraction=0.0),
+    "semi_implicit_euler": Integrator(semi_implicit_euler, order=1, fraction=1.0),
+    "velocity_verlet": Integrator(velocity_verlet, order=2, fraction=0.5),
+    "leapfrog": Integrator(leapfrog, order=2, fraction=0.5),
+    "rk4": Integrator(runge_kutta(CLASSIC_4), order=4, fraction=0.5),
 }
 
 

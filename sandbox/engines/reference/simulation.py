@@ -1,187 +1,239 @@
 """ReferenceSimulation: a scene running on the hand-written solvers, one fixed step after the other."""
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
 
-from sandbox.action import Action, ActionError, Spawn
-from sandbox.engines.account import Cause
-from sandbox.engines.acting import perform
-from sandbox.engines.contact_log import ContactLog
+from sandbox.action import Action, ActionError, Impulse, Spawn
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.actions import apply_action
+from sandbox.engines.common.base import BEYOND, BaseSimulation
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, joined
+from sandbox.engines.common.kernel import tell_if_slow
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
-from sandbox.engines.kernel import tell_if_slow
-from sandbox.engines.limits import BEYOND
-from sandbox.engines.reference.detection import DETECTIONS
-from sandbox.engines.reference.engine import BALLS_ALONE
-from sandbox.engines.reference.manifolds import Manifolds
-from sandbox.engines.reference.motion import State
-from sandbox.engines.reference.stage import Stage
-from sandbox.engines.reference.zoned_roster import ZonedRoster
-from sandbox.engines.roster import Roster
-from sandbox.engines.running import Running
-from sandbox.engines.touching import NOTHING, Touching, joined
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Disc, Scene, Single
-from sandbox.scene.settings import Settings
-from sandbox.scene.surfaces import bearers_of
-from sandbox.trajectory import Contacts, FloatArray, Frame, IntArray
+from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.reference.continuous import DETECTIONS
+from sandbox.engines.reference.energy import StepEnergyLedger
+from sandbox.engines.reference.joints import JointBreaker
+from sandbox.engines.reference.manifold import Manifolds
+from sandbox.engines.reference.step import StepRecord, WorldState
+from sandbox.engines.reference.zones import ZonedBodyStore
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import bearers_of
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import BodySpec
+from sandbox.scene.description.discs import Disc
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Contacts, Frame
 
 ROUNDING = 1e-12
-"""Less than this share of the contact distance is no overlap, less than this share of the speed no kick."""
+"""Less than this fraction of the contact distance is no overlap, less than this fraction of the speed no impulse."""
 
 
-class ReferenceSimulation(Running):
-    """A running scene. A substep reads as the tutorial's: apply forces, advance, detect and resolve.
+class ReferenceSimulation(BaseSimulation):
+    """A running scene. A substep is the tutorial's: apply forces, advance, detect and resolve; see `step.step`.
 
-    Zones look where centres are at its end: how late one notes who comes in depends on the substep, whatever is chosen.
+    Zones detect centres at the end of a substep, so the delay until a zone acts depends on the substep alone.
     """
 
-    def __init__(self, scene: Scene, settings: Settings) -> None:
+    def __init__(self, setup: Setup, settings: Settings) -> None:
+        """Start from a setup.
+
+        Raises:
+            Exhaustion: the first collision detection needs more memory or work than its limit.
+        """
         assert settings.detection is not None
         super().__init__(settings)
-        self._zoned = ZonedRoster(scene, settings.h) if scene.zones else None
-        self._roster = self._zoned or Roster(scene, settings.h)
-        self._stage = Stage(self._roster, settings)
-        self._advance = DETECTIONS[settings.detection]
+        self._zoned = ZonedBodyStore(setup, settings.h) if setup.scene.zones else None
+        self._roster = self._zoned or BodyStore(setup, settings.h)
+        self._world = WorldState(self._roster, settings)
+        self._detection = DETECTIONS[settings.detection]
+        self._energy: StepEnergyLedger | None = None
+        self._breaker = JointBreaker(setup.links) if np.isfinite(setup.links.strength).any() else None
+        """finds the joints that break; None if no joint can break any more"""
+        self._removes = setup.scene.world.bounds is not None or bool(np.isfinite(setup.bodies.lifetime).any())
+        """whether bodies are removed outside of bounds, or at the end of a lifetime; bodies added later have none"""
+        self._h = settings.h
         self._ledger: ContactLog | None = None
         self._observer: Observer | None = None
-        self._now = NOTHING  # what touched when last recorded
-        self._came: Touching | None = None  # who was in zones when the recording began
-        tell_if_slow(len(scene.bodies))
+        self._now = NO_CONTACTS  # what touched when last recorded
+        self._came: ContactBatch | None = None  # bodies in zones when the recording began
+        self._world.pipeline.check_limits(self._world.x[0])  # what takes too much is refused before the run begins
+        tell_if_slow(len(setup.bodies))
 
     @property
-    def scene(self) -> Scene:
-        """What runs, with all that was set since."""
-        return self._roster.scene
+    def setup(self) -> Setup:
+        """State from which the simulation started, with the changes that actions have made to its scene."""
+        return self._roster.setup
 
     @property
     def bodies(self) -> Bodies:
-        """The bodies by number, as they started; spawned ones join at the end."""
+        """Bodies at their start as arrays; spawned bodies are appended."""
         return self._roster.bodies
 
     @property
     def retired(self) -> Mapping[int, float]:
-        """When each body that is no longer there was gone: number → s."""
+        """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
         return self._roster.retired
 
     @property
     def broken(self) -> Mapping[int, float]:
-        """When each joint broke that did: its number in `scene.links` → s."""
+        """Time in s, by index in `setup.links`, at which joints broke."""
         return self._roster.broken
 
     @property
     def work(self) -> Mapping[str, int]:
-        """What was done so far, all that the contract names but events."""
-        return {"substeps": self.substeps, **self._stage.finder.work}
+        """Work counters since the start: all those of the contract but events and predictions."""
+        return {"substeps": self.substeps, **self._world.work}
 
     def step(self) -> None:
         """Advance by one dt.
 
         Raises:
-            Divergence: a body is no longer finite, or beyond all bounds. The state can still be read.
-            Exhaustion: a substep would have to be cut into too many pieces, or contacts outgrow memory.
+            Divergence: the state of a body is not finite, or exceeds the bounds. It can still be read.
+            Exhaustion: a substep would be divided into too many pieces, or contacts exceed memory.
         """
         with self._turn, np.errstate(all="ignore"):
             self._check_running()
-            for k in range(self._settings.substeps):
-                begin = self._steps * self._settings.dt + k * self._settings.h
-                self._substep(begin, self._settings.h)
-                self._stage.tear(self._settings.h, self._after(k + 1))
-                if self._zoned is not None:
-                    self._visit(begin + self._settings.h, self._zoned)
+            self._advance(self._settings.substeps)
             self._steps += 1
             self._settle()
 
     def finish(self, part: float) -> None:
-        """Advance by a last part of dt, 0 < part < 1: whole substeps, then one that is as long as is left.
+        """Advance by a last fraction of dt, 0 < part < 1: whole substeps, then a shorter one.
 
         Raises:
             Divergence: as `step`.
-            ValueError: there is no such part.
+            ValueError: `part` is out of range.
         """
         self._check_part(part)
         with self._turn, np.errstate(all="ignore"):
             self._check_running()
             whole, rest = divmod(part * self._settings.substeps, 1.0)
-            begin, h = self._steps * self._settings.dt, self._settings.h
-            for k in range(int(whole)):
-                self._substep(begin + k * h, h)
-                self._stage.tear(h, self._after(k + 1))
-                if self._zoned is not None:
-                    self._visit(begin + k * h + h, self._zoned)
-            if rest > 0.0:
-                self._substep(begin + whole * h, rest * h)
+            self._advance(int(whole), rest, (self._steps + part) * self._settings.dt)
             self._part = part
-            if rest > 0.0:
-                self._stage.tear(rest * h, self.time)
-                if self._zoned is not None:
-                    self._visit(self.time, self._zoned)
             self._settle()
             self._ended = True
 
-    def _substep(self, time: float, h: float) -> None:
-        """Advance by h under the forces that apply: advance, detect and resolve, in the chosen detection's way.
+    def _advance(self, whole: int, rest: float = 0.0, end: float = 0.0) -> None:
+        """Advance by whole substeps, then by a fraction `rest` of one, which ends at `end`, s; 0 for none."""
+        begin, h = self._steps * self._settings.dt, self._h
+        for k in range(whole):
+            start = begin + k * h
+            self._substep(start, h)
+            self._end_substep(h, self._after(k + 1), start + h)
+        if rest > 0.0:
+            self._substep(begin + whole * h, rest * h)
+            self._end_substep(rest * h, end, end)
 
-        Which forces apply (`Stage.apply_forces`) changes only when an action does something, not from step to step.
-        """
-        self._stage.time = time
+    def _substep(self, time: float, h: float) -> None:
+        """Advance by h, s, from a time, s, and read what each step of it did."""
+        self._world.time = time
         try:
-            self._advance(self._stage, h)
+            for record in self._detection(self._world, h):
+                self._observe(record)
         except Exhaustion:
             self._ended = True
             raise
 
-    def _visit(self, time: float, roster: ZonedRoster) -> None:
-        """Let zones do what they do, and note at a time, s, who came in."""
-        self._stage.visit(roster)
-        came = roster.visiting.told()
-        if self._ledger is not None and came is not None:  # else it is nobody's concern
-            # What touches has been entered with its impulses: it goes on, beside the notes.
+    def _observe(self, record: StepRecord) -> None:
+        """Pass the record of a step to the energy ledger, the joint breaker, the contact log and the one-way walls."""
+        world = self._world
+        if self._energy is not None:
+            self._energy.book(record)
+        if self._breaker is not None and world.joints is not None:
+            self._breaker.add(record.h * world.joints.load(record.after))
+        if self._ledger is not None:
+            self._log_contacts(self._ledger, record)
+        if world.walls is not None:  # last: it detects collisions anew, which ends the life of the record's contacts
+            world.walls.settle(world.pipeline.at_one_way_walls(record.after[0]), world.centres(record.after))
+
+    def _end_substep(self, h: float, broken_at: float, noted_at: float) -> None:
+        """Break joints that were overloaded in a substep of h, s, and let zones act; at the times, s, of both."""
+        if self._breaker is not None:
+            self._break_joints(self._breaker.find_broken(h), broken_at)
+            if not self._breaker.any_breakable:
+                self._breaker = None
+        if self._zoned is not None:
+            self._visit_zones(noted_at, self._zoned)
+
+    def _break_joints(self, broken: IntArray, time: float) -> None:
+        if len(broken):
+            self._world.write_state()
+            with self._booked(Cause.PARTED):
+                self._roster.part(broken, time)
+                self._rebuild()
+
+    def _visit_zones(self, time: float, roster: ZonedBodyStore) -> None:
+        """Let zones act on the bodies that entered or left one, and log the visits at a time, s."""
+        if roster.look(self._world.centres(self._world.x)):
+            self._world.write_state()
+            with self._booked(Cause.DRIVES):
+                if roster.settle():
+                    self._rebuild()
+        visits = roster.visiting.drain_entries()
+        if self._ledger is not None and visits is not None:
+            # Contacts were logged with their impulses: they last, beside the visits.
             lasting = self._now._replace(impulse=np.zeros_like(self._now.impulse))
-            self._ledger.record(time, joined(lasting, came))
+            self._ledger.record(time, joined(lasting, visits))
+
+    def _rebuild(self) -> None:
+        """Derive the world and the energy ledger anew from the body store."""
+        self._world.rebuild()
+        if self._energy is not None:
+            self._energy.rebuild()
+
+    def _booked(self, cause: Cause) -> AbstractContextManager[None]:
+        """Book the change of energy by all that is done to the body store meanwhile to one cause."""
+        return nullcontext() if self._energy is None else self._energy.booking(cause)
 
     def _settle(self) -> None:
-        """Write the state down, stop what is no longer finite and bounded, retire whose time is up."""
-        self._stage.leave()
+        """Write the state to the body store, check that it is finite and bounded, remove bodies whose time is up."""
+        self._world.write_state()
         beyond = self._roster.beyond()
         if beyond is not None:
             self._ended = True
             raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
-        going = self._roster.going(self.time)
-        if len(going):
-            self._take_out(going)
+        if self._removes:
+            going = self._roster.expired(self.time)
+            if len(going):
+                self._take_out(going)
 
     def _take_out(self, numbers: IntArray) -> None:
-        with self._stage.books.doing(Cause.RETIRED):
+        with self._booked(Cause.RETIRED):
             self._roster.take_out(numbers, self.time)
-            self._stage.enter()
+            self._rebuild()
 
     def apply(self, action: Action) -> None:
-        """Do what an action says, now.
+        """Apply an action at once.
 
         Raises:
-            ActionError: it cannot be done. Nothing has changed then.
+            ActionError: the action cannot be applied. The simulation is left unchanged.
         """
         with self._turn:
             self._check_running()
             if isinstance(action, Spawn):
                 self._check_shape(action.single)
-            with self._stage.books.doing(Cause.ACTIONS):
-                leaving = perform(action, self._roster)
-                self._stage.enter()
+            with self._booked(Cause.ACTIONS):
+                leaving = apply_action(action, self._roster)
+                if not (isinstance(action, Impulse) and self._world.read_velocities()):
+                    self._rebuild()
             if leaving is not None:
                 self._take_out(np.asarray([leaving]))
 
-    def _check_shape(self, single: Single) -> None:
-        """Refuse a body that the chosen detection or response knows nothing of.
+    def _check_shape(self, single: BodySpec) -> None:
+        """Refuse a body that the chosen detection or response does not support.
 
         Raises:
-            ActionError: it does not.
+            ActionError: it is not supported.
         """
         if self._settings.detection == "swept" and single.collides != "none" and not isinstance(single, Disc):
-            raise ActionError(BALLS_ALONE)
+            raise ActionError("detection 'swept' supports balls only; 'bisect' supports polygons too")
         if self._settings.response == "penalty" and _falls_off(single, self.scene):
-            raise ActionError("penalty springs have no restitution that falls with speed; response 'impulse' has")
+            raise ActionError("response 'penalty' does not support restitution_falloff; response 'impulse' does")
 
     def frame(self) -> Frame:
         """Return the present state."""
@@ -190,46 +242,46 @@ class ReferenceSimulation(Running):
         layer = r.layer.copy() if len(r.scene.layers) > 1 else None
         visits = r.visits.copy() if r.scene.zones else None
         drives = r.drives.copy() if len(r.drives) else None
-        present, passing = r.present.copy(), self._stage.passing
+        present, passing = r.present.copy(), None if self._world.walls is None else self._world.walls.passing
         return Frame(self.time, position, velocity, angle, spin, present, None, layer, visits, drives, passing)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
-            self._ledger = ContactLog(len(self._roster.scene.fixed_names), joints=True)
-            self._stage.witness = self._witness
-            overlaps = self._stage.overlaps(self._stage.x)
+            self._ledger = ContactLog(len(self._roster.scene.fixed_names), can_repeat_pairs=True)
+            overlaps = self._world.solver.detect(self._world.x)
             now = _touching(overlaps, np.zeros((overlaps.size, 2)))
-            if self._zoned is not None:  # who is in a zone is told now, and with the first substep
-                self._came = self._zoned.visiting.told()
+            if self._zoned is not None:  # bodies in zones are logged now, and with the first substep
+                self._came = self._zoned.visiting.drain_entries()
             self._ledger.record(self.time, now if self._came is None else joined(now, self._came))
         return self._ledger.take()
 
     def account(self) -> Mapping[Cause, float]:
-        """Return the energy, J, that each cause has brought since the first call."""
-        return self._stage.open_account().entries()
+        """Return the energy change, J, by each cause since the first call."""
+        if self._energy is None:
+            self._energy = StepEnergyLedger(self._roster, self._world)
+        return self._energy.account.entries()
 
     def watch(self, observer: Observer) -> None:
-        """Have an observer called after every substep, and at every impact within one; this records contacts too."""
+        """Register an observer, called after every substep and every impact within one; records contacts too."""
         if self._ledger is None:
             self.contacts()
         self._observer = observer
 
-    def _witness(
-        self, start: float, end: float, before: State, after: State, contacts: Manifolds, impulse: FloatArray
-    ) -> None:
-        assert self._ledger is not None
-        self._now = now = _touching(*_real(contacts, impulse, after[1], self._roster.inverse_mass))
-        came, self._came = self._came, None
-        self._ledger.record(end, now if came is None else joined(now, came))
+    def _log_contacts(self, log: ContactLog, record: StepRecord) -> None:
+        """Log the contacts of a step, and call the observer."""
+        end = self._world.time
+        self._now = now = _touching(*_real(*record.all_contacts(), record.after[1], self._roster.inverse_mass))
+        visits, self._came = self._came, None
+        log.record(end, now if visits is None else joined(now, visits))
         if self._observer is not None:
             # The observer may keep what it is given: these arrays are never written to again.
-            centres = self._stage.centres
-            self._observer(start, centres(before), centres(after), self._ledger.pairs())
+            centres = self._world.centres
+            self._observer(record.time, centres(record.before), centres(record.after), log.pairs())
 
 
-def _falls_off(single: Single, scene: Scene) -> bool:
-    """Tell whether restitution falls with speed at some contact of a body that is to be added."""
+def _falls_off(single: BodySpec, scene: Scene) -> bool:
+    """Return whether restitution falls with speed at a contact of a body that is to be added."""
     own = {bearer.material for bearer in bearers_of((single,))}
     figures = [bearer.restitution_falloff for bearer in bearers_of((single,))]
     figures += [material.restitution_falloff for material in scene.materials if material.name in own]
@@ -240,7 +292,7 @@ def _falls_off(single: Single, scene: Scene) -> bool:
 def _real(
     contacts: Manifolds, impulse: FloatArray, rates: FloatArray, inverse_mass: FloatArray
 ) -> tuple[Manifolds, FloatArray]:
-    """Leave out what overlaps and pushes by rounding alone: two that go side by side after an impact."""
+    """Drop contacts whose overlap and impulse are rounding: bodies that move side by side after an impact."""
     if not contacts.size:
         return contacts, impulse
     first, second = contacts.first, contacts.second
@@ -253,11 +305,11 @@ def _real(
     return (contacts, impulse) if real.all() else (contacts.of(real), impulse[real])
 
 
-def _touching(contacts: Manifolds, impulse: FloatArray) -> Touching:
-    """Return contacts as the ledger takes them: complex numbers, the impulse on the first."""
+def _touching(contacts: Manifolds, impulse: FloatArray) -> ContactBatch:
+    """Return contacts as the contact log stores them: complex numbers, with the impulse on the first body."""
     if not contacts.size:
-        return NOTHING
+        return NO_CONTACTS
     normal = contacts.normal[:, 0] + 1j * contacts.normal[:, 1]
     point = contacts.point[:, 0] + 1j * contacts.point[:, 1]
     given = normal * (impulse[:, 0] + 1j * impulse[:, 1])
-    return Touching(contacts.first.copy(), contacts.second.copy(), -given, normal, point)
+    return ContactBatch(contacts.first.copy(), contacts.second.copy(), -given, normal, point)

@@ -9,13 +9,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.games.artillery.flight import landing
 from sandbox.games.artillery.ground import Ground
 from sandbox.games.artillery.tanks import Muzzle
+from sandbox.games.artillery.terrain import Edges
 from sandbox.games.artillery.volley import Volley
-from sandbox.scene.artillery.described import Edges
-from sandbox.scene.model import World
-from sandbox.trajectory import FloatArray
+from sandbox.scene.description.world import World
 
 COARSE, CLOSE = 0.08, 0.04
 """s, steps of the first fan and of the finer ones: 2.4 m at 60 m/s, two columns or so"""

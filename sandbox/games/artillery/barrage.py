@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from sandbox.action import Action, Move, Remove, Spawn
+from sandbox.arrays import FloatArray
 from sandbox.games.artillery.field import LIFT, Field
 from sandbox.games.artillery.flight import landing
 from sandbox.games.artillery.shells import MASS, RADIUS, Shell, Step, returned
@@ -12,9 +13,8 @@ from sandbox.games.artillery.shot import Shot
 from sandbox.games.artillery.tanks import Tank
 from sandbox.games.artillery.weapons import FRAGMENTS, SPREAD, Weapon
 from sandbox.games.rules import Seen
-from sandbox.scene.discs import Ball
-from sandbox.scene.model import World
-from sandbox.trajectory import FloatArray
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.world import World
 
 ROLLER = 0.5
 """m, the radius of what rolls"""

@@ -8,8 +8,8 @@ from sandbox.games.artillery.aim import Aim, Range, Search
 from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.tanks import Tank, Tanks
 from sandbox.games.artillery.weapons import WEAPONS
-from sandbox.scene.model import World
-from sandbox.scene.streams import Stream, draws
+from sandbox.scene.description.world import World
+from sandbox.scene.random_streams import Stream, draws
 
 ANGLE_ERROR, SPEED_ERROR = math.radians(6.0), 0.08
 """Standard deviations of angle, rad, and speed, as a share of it, of who has no skill at all."""

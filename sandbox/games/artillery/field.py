@@ -8,14 +8,16 @@ import numpy as np
 
 from sandbox.action import Action, Move, Remove, Reshape
 from sandbox.games.artillery.ground import Crater, Ground, Loose
+from sandbox.games.artillery.landscape import columns_of
+from sandbox.games.artillery.preset import GROUND
 from sandbox.games.artillery.tanks import PER_METRE, SAFE_FALL, Tank, Tanks
+from sandbox.games.artillery.terrain import Artillery
 from sandbox.games.artillery.weapons import WRECK, Weapon
 from sandbox.games.rules import Seen, UnfitError
-from sandbox.scene.artillery.columns import columns_of
-from sandbox.scene.artillery.expanding import GROUND
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Point
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.game_tables import table_of
+from sandbox.scene.scene import Scene
 
 STILL = 0.1
 """m/s: slower, tanks count as at rest"""
@@ -50,11 +52,12 @@ class Field:
         """
         wall = next((wall for wall in scene.walls if wall.name == GROUND), None)
         columns = None if wall is None else columns_of(wall.points)
-        if scene.artillery is None or columns is None:
+        artillery = table_of(scene, Artillery)
+        if artillery is None or columns is None:
             raise UnfitError("artillery needs [artillery] with players, and a [terrain] that they stand on")
-        self.artillery = scene.artillery
+        self.artillery = artillery
         self.ground = Ground(np.asarray(columns[0]), columns[1])
-        self.tanks = Tanks(scene.artillery, bodies.names)
+        self.tanks = Tanks(artillery, bodies.names)
         self.falling: list[tuple[float, tuple[Loose, ...]]] = []
         """(s, dirt): since when it falls"""
         self.blasts: list[Blast] = []

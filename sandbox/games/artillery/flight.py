@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.engines.reference.motion import Inputs
+from sandbox.arrays import FloatArray
+from sandbox.engines.reference.integrators import Inputs
 from sandbox.games.artillery.ground import Ground
 from sandbox.games.artillery.roots import bracketed
-from sandbox.scene.artillery.described import Edges
-from sandbox.scene.flight import free_flight
-from sandbox.scene.model import World
-from sandbox.trajectory import FloatArray
+from sandbox.games.artillery.terrain import Edges
+from sandbox.scene.compile.ballistics import free_flight
+from sandbox.scene.description.world import World
 
 FINE = 1.0 / 128.0
 """s: halved, it moves no landing of a shell at up to 100 m/s with c up to 0.02 by more than 1e-9 m"""
@@ -97,7 +97,7 @@ class Landing(NamedTuple):
     """m"""
 
 
-NOBODY: FloatArray = np.empty((0, 3))
+NO_DISCS: FloatArray = np.empty((0, 3))
 
 
 def landing(
@@ -106,7 +106,7 @@ def landing(
     velocity: FloatArray,
     ground: Ground,
     edges: Edges = "open",
-    discs: FloatArray = NOBODY,
+    discs: FloatArray = NO_DISCS,
 ) -> Landing | None:
     """Return where a shot comes down on ground or strikes a disc; None where it leaves for good.
 

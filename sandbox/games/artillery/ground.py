@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.scene.artillery.columns import QUANTUM, course_of
-from sandbox.scene.part import Point
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
+from sandbox.games.artillery.landscape import QUANTUM, course_of
+from sandbox.scene.description.base import Point
 
 
 class Loose(NamedTuple):

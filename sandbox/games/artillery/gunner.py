@@ -7,11 +7,11 @@ from sandbox.games.artillery.weapons import WEAPONS
 from sandbox.games.rules import Control
 
 CONTROLS = (
-    Control("left", "turn the barrel to the left", ("left",), pad="left -leftx"),
-    Control("right", "turn the barrel to the right", ("right",), pad="right +leftx"),
+    Control("left", "turn the barrel left", ("left",), pad="left -leftx"),
+    Control("right", "turn the barrel right", ("right",), pad="right +leftx"),
     Control("up", "more power", ("up",), pad="up -lefty"),
     Control("down", "less power", ("down",), pad="down +lefty"),
-    Control("weapon", "the next weapon that there is money for", ("w",), pad="x"),
+    Control("weapon", "next affordable weapon", ("w",), pad="x"),
     Control("fire", "fire", ("space",), pad="a"),
 )
 

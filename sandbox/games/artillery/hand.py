@@ -10,7 +10,7 @@ from sandbox.games.artillery.rules import ArtilleryRules
 from sandbox.games.artillery.tanks import Tank
 from sandbox.games.rules import Rules, Seen, UnfitError
 from sandbox.games.skill import checked_skill
-from sandbox.scene.streams import Stream, draws
+from sandbox.scene.random_streams import Stream, draws
 
 NEAR = 12.0
 """Taps, from which on a key is no longer held but tapped."""
@@ -37,7 +37,7 @@ class ArtilleryHand:
             UnfitError: the rules are those of another game.
         """
         if not isinstance(rules, ArtilleryRules):
-            raise UnfitError("this player plays artillery alone")
+            raise UnfitError("this player only plays artillery")
         step, self._time = seen.time - self._time, seen.time
         wanted: set[str] = set()
         if rules.phase == "aim" and rules.shooter.player.bot is None:

@@ -1,21 +1,24 @@
 """Miss: how far from where it should a shot comes down on level ground, by engine, integrator and step."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.registry import ENGINES, start
-from sandbox.games.artillery.flight import LONGEST, NOBODY, Landing, landing
+from sandbox.games.artillery.flight import LONGEST, NO_DISCS, Landing, landing
 from sandbox.games.artillery.ground import Ground
 from sandbox.games.artillery.shells import MASS, RADIUS, Step
-from sandbox.scene.discs import Ball
-from sandbox.scene.model import Scene, World
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray, Frame
+from sandbox.interrupt import heeded
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.world import Settings, World
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Frame
 
 STEPS = 1 / 15, 1 / 60, 1 / 240
 """s, of the table"""
@@ -53,9 +56,13 @@ class Table(NamedTuple):
     rows: tuple[Missed, ...]
     refused: tuple[tuple[str, str], ...]
     """engines that do not fly it, and why"""
+    interrupted: bool = False
+    """Ctrl-C was pressed before every row was found."""
 
 
-def miss_table(world: World, speed: float, angle: float, dts: Sequence[float] = STEPS) -> Table:
+def miss_table(
+    world: World, speed: float, angle: float, dts: Sequence[float] = STEPS, told: Callable[[str], None] | None = None
+) -> Table:
     """Fly a shot over level ground on every engine, with every integrator and step, and return by how much each misses.
 
     The truth is the closed form, or with quadratic drag Runge–Kutta's flight at steps of 1/128 s.
@@ -65,6 +72,7 @@ def miss_table(world: World, speed: float, angle: float, dts: Sequence[float] = 
         speed: m/s.
         angle: rad, anticlockwise from the right.
         dts: steps, s.
+        told: called with what is flown.
 
     Raises:
         ValueError: the shot does not come down, or so late or far away that it is not followed.
@@ -73,18 +81,26 @@ def miss_table(world: World, speed: float, angle: float, dts: Sequence[float] = 
     world = World(**{key: getattr(world, key) for key in ("gravity", "linear_drag", "quadratic_drag", "wind")})
     true = _exact(world, velocity)
     rows: list[Missed] = []
-    refused: list[tuple[str, str]] = []
-    for engine, integrator in _ways():
-        for dt in dts:
-            settings = Settings().replace(dt=dt, integrator=integrator)
-            try:
-                down = flown(world, velocity, engine, settings)
-            except Refusal as refusal:
-                refused.append((engine, "; ".join(refusal.reasons)))
-                break
-            x, time = down.place[0], down.time
-            rows.append(Missed(engine, integrator, dt, x, time, x - true.place[0], time - true.time))
-    return Table(true.place[0], true.time, tuple(rows), tuple(refused))
+    refused: dict[tuple[str, str | None], str] = {}
+    interrupted = False
+    for (engine, integrator), dt in product(_ways(), dict.fromkeys(dts)):
+        if (engine, integrator) in refused:
+            continue
+        if told is not None:
+            told(f"{engine}{f', {integrator}' if integrator else ''}, dt {dt:g} s")
+        settings = Settings().replace(dt=dt, integrator=integrator)
+        try:
+            down = flown(world, velocity, engine, settings)
+        except Refusal as refusal:
+            refused[engine, integrator] = "; ".join(refusal.reasons)
+            continue
+        except KeyboardInterrupt:
+            interrupted = True
+            break
+        x, time = down.place[0], down.time
+        rows.append(Missed(engine, integrator, dt, x, time, x - true.place[0], time - true.time))
+    reasons = dict.fromkeys((engine, reason) for (engine, _), reason in refused.items())
+    return Table(true.place[0], true.time, tuple(rows), tuple(reasons), interrupted)
 
 
 def _ways() -> Iterator[tuple[str, str | None]]:
@@ -111,6 +127,7 @@ def _from(half: float, world: World, velocity: FloatArray) -> Landing:
     return down._replace(place=(down.place[0] - half, down.place[1]))
 
 
+@heeded()
 def flown(world: World, velocity: FloatArray, engine: str, settings: Settings) -> Landing:
     """Return where an engine lets a shot come down on level ground, from the cubic through its last two frames.
 
@@ -134,7 +151,7 @@ def flown(world: World, velocity: FloatArray, engine: str, settings: Settings) -
     simulation.close()
     half = 1.0 + 2.0 * abs(float(now.position[0, 0]))
     step = Step(_state(before, half), _state(now, half), now.time - before.time)
-    found = step.meets(Ground(np.zeros(2), 2.0 * half), NOBODY, 1.0)
+    found = step.meets(Ground(np.zeros(2), 2.0 * half), NO_DISCS, 1.0)
     share = 1.0 if found is None else found[0]
     return Landing(before.time + share * (now.time - before.time), (float(step.at(share)[0]) - half, 0.0))
 

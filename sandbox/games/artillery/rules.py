@@ -16,8 +16,8 @@ from sandbox.games.artillery.shot import Shot
 from sandbox.games.artillery.tanks import Tank
 from sandbox.games.artillery.weapons import WEAPONS
 from sandbox.games.rules import Control, Seen
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.scene import Scene
 
 HEIGHTS = 33
 """of the ground, evenly from side to side, that gauges tell"""
@@ -140,7 +140,7 @@ class ArtilleryRules:
         side = "to the right" if wind > 0 else "to the left"
         told.append(("wind", f"{abs(wind):.1f} m/s {side}" if wind else "none"))
         tank, weapon = self.shooter, WEAPONS[self.shooter.weapon]
-        gun = f"{math.degrees(tank.angle):.1f}°, {tank.power:.1%}, {self.speed(tank):.1f} m/s"
+        gun = f"{math.degrees(tank.angle):.1f}°, {100.0 * tank.power:.1f} %, {self.speed(tank):.1f} m/s"
         told.append(("gun", f"{tank.name} is thinking" if self.thinking else gun))
         told.append(("weapon", f"{weapon.name}, ${weapon.cost:,}" if weapon.cost else weapon.name))
         if self.shots:
@@ -181,7 +181,7 @@ class ArtilleryRules:
         """Let the next who is alive have the gun, in a wind of the turn's own; or end the game."""
         tanks, alive = self.field.tanks.every, self.field.tanks.alive
         if len(alive) < 2:
-            return self._end(f"{alive[0].name} wins" if alive else "nobody is left")
+            return self._end(f"{alive[0].name} wins" if alive else "no tank is left: a draw")
         if self.turn >= self.artillery.rounds * len(tanks):
             best = max(tanks, key=lambda tank: (tank.points, tank.health))
             return self._end(f"out of shells; {best.name} wins on points")

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.games.artillery.flight import Landing, crossing, past, strike
 from sandbox.games.artillery.ground import Ground
 from sandbox.games.artillery.roots import bracketed
 from sandbox.games.artillery.tanks import Tank
+from sandbox.games.artillery.terrain import Edges
 from sandbox.games.artillery.weapons import Weapon
-from sandbox.scene.artillery.described import Edges
-from sandbox.trajectory import FloatArray
 
 RADIUS = 0.25
 """m"""

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 
 class Shot(NamedTuple):
@@ -35,11 +35,11 @@ class Shot(NamedTuple):
     @property
     def brief(self) -> str:
         """The same in fewer words."""
-        landed = "gone" if self.place is None else f"{self.place[0]:.2f} m"
+        landed = "out of bounds" if self.place is None else f"{self.place[0]:.2f} m"
         if self.disturbed:
-            return f"{landed}; the air changed on its way"
+            return f"{landed}; wind or gravity changed during the flight"
         if self.exact is None:
-            return landed if self.place is None else f"{landed}, exact solution gone"
+            return landed if self.place is None else f"{landed}, exact solution out of bounds"
         exact = f"{landed}, exact solution {self.exact[0]:.2f} m"
         if self.place is None:
             return exact

@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
+from sandbox.games.artillery.terrain import Artillery, Player
 from sandbox.games.artillery.weapons import Weapon
-from sandbox.scene.artillery.described import Artillery, Player
-from sandbox.scene.part import Point
-from sandbox.trajectory import FloatArray, Frame
+from sandbox.scene.description.base import Point
+from sandbox.trajectory import Frame
 
 WHOLE = 100.0
 """health that a tank begins with"""

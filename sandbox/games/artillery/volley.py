@@ -5,13 +5,12 @@ It flies by and by: whoever asks for a part of the way, and then for the next, g
 
 import numpy as np
 
-from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.engines.reference.motion import transition
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.engines.reference.integrators import INTEGRATORS, transition
 from sandbox.games.artillery.flight import inputs_of
 from sandbox.games.artillery.ground import Ground
-from sandbox.scene.artillery.described import Edges
-from sandbox.scene.model import World
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.games.artillery.terrain import Edges
+from sandbox.scene.description.world import World
 
 LONGEST = 30.0
 """s, of a flight in thought"""

@@ -2,30 +2,35 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from time import perf_counter
 from typing import Any, Protocol
 
 import numpy as np
 from pydantic import TypeAdapter
 
 from sandbox.action import Action
-from sandbox.engines.contract import Simulation
-from sandbox.engines.relay import start
+from sandbox.engines.contract import Divergence, Exhaustion, Simulation
+from sandbox.engines.switching import start
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Call, Decision
 from sandbox.games.billiards.rules.happening import GameError
 from sandbox.recording import Recording
-from sandbox.scene.cue import Stroke
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.surface import Stroke
 from sandbox.trajectory import Contacts
 
 LONGEST = 300.0
 """s, that a shot may take"""
 
-MOST_TURNS = 2000
-"""of a frame: what goes on for ever ends there, without a winner"""
+MAX_TURNS = 1000
+"""of a frame, decisions and shots: one that has no end by then is given up, without a winner"""
 
 STILL = 1e-9
 """m/s and rad/s: what is slower rests"""
+
+
+class NoRestError(GameError):
+    """A shot does not come to rest."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,8 @@ class Frame:
     turns: tuple[Turn, ...]
     session: Recording
     """scene and actions: the same engine gets to the same state again, bit for bit"""
+    unfinished: str | None = None
+    """why it was given up; none where it came to its end"""
 
     @property
     def shots(self) -> tuple[Turn, ...]:
@@ -97,6 +104,7 @@ class Frame:
             "game": self.match.rules.name,
             "winner": state.winner,
             "over": state.over,
+            "unfinished": self.unfinished,
             "scores": list(state.scores),
             "shots": len(self.shots),
             "duration": self.session.duration,
@@ -115,14 +123,14 @@ class Script:
         """Return the next decision."""
         turn = next(self._turns, None)
         if turn is None or turn.decision is None or turn.player != match.turn:
-            raise GameError("the frame did not come to this decision")
+            raise GameError("the frame does not reach this decision")
         return turn.decision
 
     def plan(self, match: Match) -> Plan:
         """Return the next shot."""
         turn = next(self._turns, None)
         if turn is None or turn.plan is None or turn.player != match.turn:
-            raise GameError("the frame did not come to this shot")
+            raise GameError("the frame does not reach this shot")
         return turn.plan
 
 
@@ -131,7 +139,8 @@ def play(
     players: Sequence[Player],
     engine: str = "exact",
     *,
-    most: int = MOST_TURNS,
+    most: int = MAX_TURNS,
+    time_limit: float | None = None,
     told: Callable[[Turn, Match], None] | None = None,
 ) -> Frame:
     """Play a match to its end.
@@ -141,14 +150,19 @@ def play(
         players: one for each.
         engine: by name.
         most: how many turns.
+        time_limit: s of the clock after which no further turn is begun; none by default.
         told: called after every turn.
 
+    Returns:
+        The frame, `unfinished` where it was given up: by one of the two limits, or as a shot did not come to rest, left
+        all bounds, or was too much for the engine.
+
     Raises:
-        GameError: a player does what may not be done, or a shot does not come to rest.
+        GameError: a player does what may not be done.
         Refusal: the engine cannot play this table.
     """
     if len(players) != match.state.players:
-        raise GameError(f"{match.state.players} play, not {len(players)}")
+        raise GameError(f"the match has {match.state.players} players, not {len(players)}")
     simulation = start(match.scene, engine)
     simulation.contacts()  # the recording begins
     first, actions, turns = match, list[Action](), list[Turn]()
@@ -158,7 +172,15 @@ def play(
             simulation.apply(action)
         actions.extend(some)
 
-    while not match.over and len(turns) < most:
+    unfinished: str | None = None
+    began_at = perf_counter()
+    while not match.over:
+        if len(turns) >= most:
+            unfinished = f"not finished after {len(turns):,} turns"
+        elif time_limit is not None and perf_counter() - began_at > time_limit:
+            unfinished = f"not finished after {time_limit:g} s and {len(turns):,} turns"
+        if unfinished is not None:
+            break
         player, who = players[match.turn], match.turn
         decision: Decision | None = None
         plan: Plan | None = None
@@ -173,7 +195,11 @@ def play(
             act(match.moves(simulation.frame().position, simulation.time))
             began = simulation.time
             act((match.strike(plan.stroke, began),))
-            contacts = roll_out(simulation)
+            try:
+                contacts = roll_out(simulation)
+            except (NoRestError, Divergence, Exhaustion) as error:
+                unfinished = f"turn {len(turns) + 1}: {error}"
+                break
             match = match.played(contacts, simulation.frame().position, plan.call, began)
         verdict = match.verdict
         told_of = ((), (), ()) if verdict is None else (verdict.fouls, verdict.points, verdict.messages)
@@ -184,14 +210,16 @@ def play(
         match.scene, engine, match.scene.solver, tuple(actions), simulation.time, simulation.state_hash()
     )
     simulation.close()
-    return Frame(first, match, tuple(turns), session)
+    return Frame(first, match, tuple(turns), session, unfinished)
 
 
 def roll_out(simulation: Simulation) -> Contacts:
     """Step until everything rests; return the contacts since they were last asked for.
 
     Raises:
-        GameError: it does not come to rest.
+        NoRestError: it does not come to rest.
+        Divergence: a ball left all bounds.
+        Exhaustion: the engine cannot go on.
     """
     until = simulation.time + LONGEST
     while True:
@@ -202,7 +230,7 @@ def roll_out(simulation: Simulation) -> Contacts:
         if fastest <= STILL:
             break
         if simulation.time > until:
-            raise GameError(f"a shot does not come to rest within {LONGEST:g} s")
+            raise NoRestError(f"a shot does not come to rest within {LONGEST:g} s")
     return simulation.contacts()
 
 

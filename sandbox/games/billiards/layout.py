@@ -9,9 +9,9 @@ from typing import Self
 
 import numpy as np
 
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Point, Vector
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
+from sandbox.scene.description.base import Point, Vector
+from sandbox.scene.scene import Scene
 
 TOUCH = 1e-6
 """m: balls no farther apart touch, for the rules; an engine's own rounding is far below"""
@@ -34,9 +34,7 @@ class Layout:
     @classmethod
     def of(cls, scene: Scene) -> Self:
         """Return the layout of a scene, its own shots left out: in a game players make them."""
-        quiet = scene.model_copy(update={"shots": ()})
-        quiet.__dict__.pop("bodies", None)  # a copy keeps what was derived, here with the shots' velocities
-        return cls(quiet)
+        return cls(scene.model_copy(update={"shots": ()}))
 
     @cached_property
     def names(self) -> tuple[str, ...]:

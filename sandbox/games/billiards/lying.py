@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from sandbox.games.billiards.layout import TOUCH, Disc
 from sandbox.games.billiards.rules.verdict import Lie
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 
 def touching(cue: Disc, others: dict[str, Disc]) -> tuple[str, ...]:

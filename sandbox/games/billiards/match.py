@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from sandbox.action import Move, Strike
+from sandbox.arrays import FloatArray
 from sandbox.games.billiards.layout import TOUCH, Disc, Layout
 from sandbox.games.billiards.lying import lie_of
 from sandbox.games.billiards.needs import require
@@ -20,10 +21,10 @@ from sandbox.games.billiards.rules.state import State
 from sandbox.games.billiards.rules.verdict import Lie, Verdict
 from sandbox.games.billiards.telling import happenings_of, touching_pairs
 from sandbox.games.billiards.upkeep import racked, respotted, ways
-from sandbox.scene.cue import Stroke
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Point
-from sandbox.trajectory import Contacts, FloatArray
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.surface import Stroke
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Contacts
 
 
 @dataclass(frozen=True)
@@ -221,7 +222,7 @@ class Match:
             placed = _points(position, layout)
             return cls(layout, rules, state, placed, None if before is None else _points(before, layout), shots)
         except (KeyError, TypeError, ValueError) as error:
-            raise GameError(f"no match of this scene: {error}") from None
+            raise GameError(f"not a match of this scene: {error}") from None
 
     @cached_property
     def against(self) -> frozenset[tuple[int, int]]:
@@ -312,5 +313,5 @@ class Match:
 def _points(plain: Any, layout: Layout) -> tuple[Point, ...]:
     points = tuple((float(x), float(y)) for x, y in plain)
     if len(points) != len(layout.names):
-        raise ValueError(f"{len(points)} positions of {len(layout.names)} bodies")
+        raise ValueError(f"expected {len(layout.names)} positions, one a body, but got {len(points)}")
     return points

@@ -24,9 +24,9 @@ def require(layout: Layout, rules: Rules[Any], state: State) -> None:
     spots = [name for name in SPOTS.get(rules.rack, COLOURS) if name not in layout.spots and rules.name != "free"]
     wrong = [
         *([f"no ball {', '.join(missing)}"] if missing else []),
-        *([f"it has no use for {', '.join(idle)}"] if idle else []),
+        *([f"the game does not use {', '.join(idle)}"] if idle else []),
         *([f"no spot {', '.join(spots)}; state a [[play.spot]]"] if spots else []),
-        *(["no floor; state a [surface]"] if layout.scene.surface is None else []),
+        *(["it is no billiard table, as it has no [surface]"] if layout.scene.surface is None else []),
         *(["no pockets"] if not layout.pockets and rules.name in ("8-ball", "9-ball", "snooker") else []),
         *(["carom has no pockets"] if layout.pockets and rules.rack == "carom" else []),
     ]

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.games.billiards.layout import HAIR, Disc, Layout
 from sandbox.games.billiards.rules.state import Place
-from sandbox.scene.part import Point
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.scene.description.base import Point
 
 ROUNDING = 1e-9
 """m, that a place may be beyond a line"""
@@ -35,7 +35,7 @@ def refusal(layout: Layout, place: Place, at: Point, radius: float, others: Sequ
     if not np.all(np.isfinite(point)) or layout.room(point)[0] < radius - ROUNDING:
         return "the ball would be outside the cushions"
     if not _within(layout, place, point)[0]:
-        return f"the ball is to be put {place}"
+        return f"the ball must be placed {place}"
     if _apart(point, radius, others)[0] < -ROUNDING:
         return "another ball is there"
     return None

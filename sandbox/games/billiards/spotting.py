@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from sandbox.games.billiards.layout import HAIR, Disc, Layout
 from sandbox.games.billiards.rules.happening import GameError
 from sandbox.games.billiards.rules.verdict import Respot
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 
 def spotted(layout: Layout, respot: Respot, radius: float, others: Sequence[Disc]) -> Point:

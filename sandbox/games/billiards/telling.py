@@ -4,7 +4,7 @@ import math
 
 from sandbox.games.billiards.layout import TOUCH, Layout
 from sandbox.games.billiards.rules.happening import Happening
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 from sandbox.trajectory import Contacts
 
 AT_ONCE = 5e-3

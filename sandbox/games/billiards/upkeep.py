@@ -9,7 +9,7 @@ from sandbox.games.billiards.rules.rules import Rules
 from sandbox.games.billiards.rules.state import State
 from sandbox.games.billiards.rules.verdict import Respot
 from sandbox.games.billiards.spotting import spotted
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 ASIDE = 1.0
 """m, from the playing area's corner: where balls wait"""

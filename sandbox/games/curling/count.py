@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 
 from sandbox.games.curling.sheet import BACK, HOG, RINGS, STONE, WIDTH
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 PROTECTED = 5
 """Deliveries of an end in which no guard of the other team may be put out of play."""

@@ -1,8 +1,8 @@
 """Delivery: how a stone has to be let go to come to a place, by the closed form of a puck that curls.
 
 As complex numbers a stone that leaves at v goes v² / (μg) · (1 − s^(2−iκ)) / (2 − iκ), s the share of its speed that is
-left; `engines.floor.curl` says where that is from. So where it stops, what it takes to get there is known at once; and
-for a stone that only passes a place, the share of its speed there is sought.
+left; `engines.tabletop.motion` says where that is from. So where it stops, what it takes to get there is known at once;
+and for a stone that only passes a place, the share of its speed there is sought.
 """
 
 import cmath
@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 from sandbox.games.curling.sheet import RELEASE
-from sandbox.scene.floor import Floor
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.surface import Floor
 
 SPIN = 1.0
 """rad/s with which stones are let go: some two turns and a half until they rest"""

@@ -13,14 +13,15 @@ from collections.abc import Sequence
 from sandbox.action import Action, Impulse, Move, SetParameter
 from sandbox.games.curling.count import PROTECTED, beyond, counted, guards, short
 from sandbox.games.curling.delivery import Delivery, Ice
+from sandbox.games.curling.match import CurlingMatch
 from sandbox.games.curling.score import Score
 from sandbox.games.curling.sheet import RELEASE, STONES, TEAMS, WIDTH, gone, stone, waiting
 from sandbox.games.curling.team import Team
 from sandbox.games.rules import Control, Seen, UnfitError
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.curling import CurlingMatch
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Point
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.game_tables import table_of
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 BROOM = "broom"
@@ -41,8 +42,8 @@ CONTROLS = (
     Control("harder", "more weight", ("up",), "up -lefty"),
     Control("softer", "less weight", ("down",), "down +lefty"),
     Control("turn", "reverse the turn", ("t",), "y"),
-    Control("throw", "release", ("space",), "a"),
-    Control("sweep", "sweep: further and straighter", ("s", "left shift"), "b rt"),
+    Control("throw", "release the stone", ("space",), "a"),
+    Control("sweep", "sweep: the stone runs farther and straighter", ("s", "left shift"), "b rt"),
 )
 
 
@@ -57,13 +58,13 @@ class Curling:
         Raises:
             UnfitError: the scene has no ice, or lacks stones or the broom.
         """
-        floor, match = scene.surface, scene.play.curling or CurlingMatch()
+        floor, match = scene.surface, table_of(scene.play, CurlingMatch) or CurlingMatch()
         self._names = [stone(team, k) for team in (0, 1) for k in range(STONES)]
         lacking = [name for name in (*self._names, BROOM) if name not in bodies.names]
         if floor is None or floor.bodies != "pucks" or not floor.sliding_friction or lacking:
             raise UnfitError(
                 'curling needs a [surface] with bodies = "pucks" and a sliding_friction, the bodies red-1 … red-8 and '
-                f"yellow-1 … yellow-8, and a {BROOM!r}" + (f"; it lacks {', '.join(lacking)}" if lacking else "")
+                f"yellow-1 … yellow-8, and a {BROOM!r}" + (f"; missing: {', '.join(lacking)}" if lacking else "")
             )
         self._numbers = [bodies.names.index(name) for name in self._names]
         self._moment = [float(bodies.moment[number]) for number in self._numbers]
@@ -206,14 +207,14 @@ class Curling:
         if current in places and short(places[current]) and not self._hits:
             del places[current]
             moves.append(self._put(current, gone(*divmod(current, STONES))))
-            self._told = "short of the hog line"
+            self._told = "stone removed: short of the hog line"
         zone = {k for k, place in self._before.items() if guards(place)} | self._deemed
         theirs = [k for k in zone if k // STONES != self._score.team]
         if self._score.thrown < PROTECTED and any(k not in places for k in theirs):
             moves += [self._put(k, place) for k, place in self._before.items()]
             moves.append(self._put(current, gone(*divmod(current, STONES))))
             self._places = dict(self._before)
-            self._told = "a guard was taken out too soon"
+            self._told = "free guard zone: stones replaced"
         else:
             met = {k for pair in self._hits if not zone.isdisjoint(pair) for k in pair}
             self._deemed = {k for k in met | self._deemed if k in places and short(places[k])}
@@ -228,7 +229,7 @@ class Curling:
     def _count(self) -> None:
         team, points = counted([(k // STONES, place) for k, place in self._places.items()])
         self._score = self._score.after_end(team, points)
-        self._told = "a blank end" if team is None else f"{TEAMS[team]} scores {points}"
+        self._told = "blank end" if team is None else f"{TEAMS[team]} scores {points}"
         self._cues.append("score" if points else "blank")
         if self._score.over is not None:
             self._cues.append("win" if self._people != 1 or self._score.points[0] > self._score.points[1] else "lose")
@@ -255,7 +256,7 @@ class Curling:
         red, yellow = score.points
         end = f"{min(score.played + 1, max(score.ends, score.played))} of {score.ends}"
         if score.played >= score.ends and score.over is None:
-            end = "an extra one"
+            end = "extra"
         shown = [("red : yellow", f"{red} : {yellow}"), ("end", end)]
         if score.over is None:
             shown += [
@@ -289,7 +290,7 @@ class Curling:
 
 def _weight(beyond_tee: float) -> str:
     if beyond_tee < -1.9:
-        return f"guard, {-beyond_tee:.1f} m before the tee"
+        return f"guard, {-beyond_tee:.1f} m short of the tee"
     if beyond_tee <= 1.9:
         return f"draw, tee {beyond_tee:+.1f} m"
     return f"take-out, {beyond_tee:.1f} m past the tee"

@@ -8,7 +8,7 @@ button; stones of at most 19.96 kg and a circumference of at most 91.44 cm.
 
 import math
 
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 LENGTH, WIDTH = 45.720, 5.000
 HOG, BACK, TEES = 6.401, 1.829, 34.747

@@ -12,8 +12,8 @@ import numpy as np
 from sandbox.games.curling.count import counted, in_house
 from sandbox.games.curling.delivery import Delivery, Ice
 from sandbox.games.curling.sheet import RELEASE, STONE
-from sandbox.scene.part import Point
-from sandbox.scene.streams import Stream, draws
+from sandbox.scene.description.base import Point
+from sandbox.scene.random_streams import Stream, draws
 
 LENGTH, LINE = 0.006, 0.0025
 """Of the speed, and rad: standard errors of a delivery at error 1."""

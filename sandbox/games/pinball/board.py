@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from sandbox.games.rules import UnfitError
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Ball, Plane, Post, Scene, Wall
-from sandbox.scene.part import Point, Vector
-from sandbox.scene.parts import PlayPart, Role
-from sandbox.scene.surfaces import surfaces_of
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import pair_table
+from sandbox.scene.description.base import Point, Vector
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.description.play import PlayPart, Role
+from sandbox.scene.scene import Scene
 
 Fixed = Plane | Wall | Post
 
@@ -207,9 +209,9 @@ def _thresholds(scene: Scene, bodies: Bodies, ball: int) -> dict[str, float]:
     """Return the impulse over mass, m/s, above which the switch of each struck thing closes, by name.
 
     A ball that comes with v leaves with e(v)·v, so the impulse tells v, whatever else the step has done to the ball.
-    The law is that of `engines.rebound`, which is not imported for one line: it wakes the compiler.
+    The law is that of `engines.common.restitution`, which is not imported for one line: it wakes the compiler.
     """
-    surfaces, roles = surfaces_of(scene, bodies), {part.name: part.role for part in scene.play.parts}
+    surfaces, roles = pair_table(scene, bodies), {part.name: part.role for part in scene.play.parts}
     fires = {}
     for number, (name, thing) in enumerate(zip(scene.fixed_names, scene.fixed, strict=False)):
         if roles.get(name) not in FIRES:

@@ -1,7 +1,7 @@
 """Coil: how evenly a solenoid throws a ball."""
 
-from sandbox.scene.part import Vector
-from sandbox.scene.streams import Stream, draws
+from sandbox.scene.description.base import Vector
+from sandbox.scene.random_streams import Stream, draws
 
 WEAKEST = 0.95
 """of its whole speed: no coil throws alike each time, and a ball that flew alike each time might fly in a ring"""

@@ -14,10 +14,10 @@ SELDOM = 0.05
 """of the presses of other controls, those of a nudge by whoever presses at chance: three of a ball are a tilt"""
 
 CONTROLS = (
-    Control(LEFT, "raise the left flipper while held; lights of lanes move left", ("left shift", "z"), "lb lt"),
-    Control(RIGHT, "raise the right flipper while held; lights of lanes move right", ("right shift", "/"), "rb rt"),
+    Control(LEFT, "left flipper; lane lights move left", ("left shift", "z"), "lb lt"),
+    Control(RIGHT, "right flipper; lane lights move right", ("right shift", "/"), "rb rt"),
     Control(PLUNGER, "hold to pull the plunger, release to shoot", ("enter",), "a +righty", True),
-    Control("nudge", "jolt the table: balls go up", ("space",), "y up", True, SELDOM),
-    Control("nudge left", "jolt the table: balls go left", ("left",), "left", True, SELDOM),
-    Control("nudge right", "jolt the table: balls go right", ("right",), "right", True, SELDOM),
+    Control("nudge", "nudge the table: balls move up", ("space",), "y up", True, SELDOM),
+    Control("nudge left", "nudge the table: balls move left", ("left",), "left", True, SELDOM),
+    Control("nudge right", "nudge the table: balls move right", ("right",), "right", True, SELDOM),
 )

@@ -85,7 +85,7 @@ class Course:
             if not now.frame.present[ball]:
                 self.holes.forget(ball)
                 self.trough.lose(ball)
-                yield Say("ball gone")
+                yield Say("ball lost")
             elif not self.board.inside(*now.frame.position[ball].tolist()):
                 yield from self.take(ball, now)
                 if not self.nudge.tilted:

@@ -8,7 +8,7 @@ from sandbox.action import Toggle
 from sandbox.games.pinball.board import Board, Element
 from sandbox.games.pinball.effects import Award, Cue, Effect, Light, Machine, Now, points_of
 from sandbox.games.pinball.switches import Hit
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 FALL = 0.26
 """s, that a target takes to fall. Source: Visual Pinball, 60 units at its default drop speed"""

@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeAlias
 from sandbox.action import Action
 from sandbox.games.pinball.sheet import Sheet
 from sandbox.games.pinball.switches import Hit
-from sandbox.scene.parts import Role
+from sandbox.scene.description.play import Role
 from sandbox.trajectory import Frame
 
 POINTS: dict[Role, int] = {

@@ -9,7 +9,7 @@ from sandbox.games.pinball.pinball import Pinball
 from sandbox.games.pinball.trough import SLOW
 from sandbox.games.rules import Rules, Seen, UnfitError
 from sandbox.games.skill import checked_skill
-from sandbox.scene.streams import Stream, draws
+from sandbox.scene.random_streams import Stream, draws
 
 LEAD = 0.03
 """s, that a flipper takes to get up, and so ahead of which a player looks. Source: Visual Pinball's stroke of 34 ms"""
@@ -60,7 +60,7 @@ class PinballHand:
             UnfitError: these are no rules of pinball.
         """
         if not isinstance(rules, Pinball):
-            raise UnfitError("this player plays pinball alone")
+            raise UnfitError("this player only plays pinball")
         found = [(control, 0.0) for control, until in sorted(self._until.items()) if until <= seen.time]
         for control, _ in found:
             del self._until[control]

@@ -6,7 +6,7 @@ from sandbox.games.pinball.board import Board, Element
 from sandbox.games.pinball.effects import Again, Award, Cue, Effect, Light, Machine, Now, Say
 from sandbox.games.pinball.sheet import MOST
 from sandbox.games.pinball.switches import Hit
-from sandbox.scene.parts import Role
+from sandbox.scene.description.play import Role
 
 FULL: dict[Role, int] = {"rollover": 10_000, "standup": 20_000}
 """points of a set"""

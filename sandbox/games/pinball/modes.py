@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from sandbox.games.pinball.board import Board
 from sandbox.games.pinball.effects import Award, Cue, Effect, Light, Machine, Now, Say
-from sandbox.scene.parts import Role
+from sandbox.scene.description.play import Role
 
 
 class Mode(NamedTuple):
@@ -94,5 +94,5 @@ class Modes(Machine):
         if not self.to_go:
             self.mode = None
             yield Cue("reward")
-            yield Say(f"{mode.name} done")
+            yield Say(f"{mode.name} complete")
             yield Award("mode done", mode.reward, bonus=5_000)

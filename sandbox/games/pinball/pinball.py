@@ -23,8 +23,8 @@ from sandbox.games.pinball.switches import Hit, Switches
 from sandbox.games.pinball.targets import Targets
 from sandbox.games.pinball.trough import Trough
 from sandbox.games.rules import Control, Seen
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.scene import Scene
 
 SAID = 3.0
 """s, that a message stays"""

@@ -10,7 +10,7 @@ from sandbox.games.pinball.effects import Cue, Effect, Machine, Now, Save, Say, 
 from sandbox.games.pinball.holes import Holes
 from sandbox.games.pinball.switches import Hit
 from sandbox.games.pinball.trough import SLOW
-from sandbox.scene.streams import Stream, draws
+from sandbox.scene.random_streams import Stream, draws
 
 PATIENCE = 10.0
 """s without a switch, the balls slow"""

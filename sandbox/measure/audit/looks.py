@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sandbox.trajectory import BoolArray, IntArray
+from sandbox.arrays import BoolArray, IntArray
 
 
 class Looks:

@@ -8,13 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.measure.audit.looks import Looks
 from sandbox.measure.audit.neighbours import Neighbours
 from sandbox.measure.audit.obstacles import Obstacles, Paths
 from sandbox.measure.audit.sweep import CLEAR, DEEP, JUMP, approaching, closest_to_origin, dot
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray, FloatArray, IntArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.scene import Scene
 
 LONGEST_BATCH = 32
 """Substeps examined together: spreads the cost of a call of numpy."""
@@ -60,16 +61,18 @@ class Audit:
     planes), and among balls with the pairs that are near.
     """
 
-    def __init__(self, scene: Scene, bodies: Bodies | None = None) -> None:
+    def __init__(self, start: Scene | Setup, bodies: Bodies | None = None) -> None:
+        setup = Setup.of(start)
+        scene = setup.scene
         self._obstacles = Obstacles.of(scene)
-        self._apart = scene.links.apart()
+        self._apart = setup.links.apart()
         self._led = frozenset(drive.body for drive in scene.drives if drive.kind != "torque")
         self._times: list[FloatArray] = []
         self._pairs: list[IntArray] = []
         self._looks = Looks()
         self._looks.add(np.empty((0, 2), np.int64))
         self._on: IntArray = np.zeros((0, 0), np.int64)  # layers, as bits; without rows where there is one alone
-        self._lay_out(scene.bodies if bodies is None else bodies)
+        self._lay_out(setup.bodies if bodies is None else bodies)
 
     def joined(self, bodies: Bodies) -> None:
         """Take note that bodies were added; `bodies` are all of them."""

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from sandbox.scene.near import CHUNK, near_pairs
-from sandbox.trajectory import BoolArray, FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.scene.geometry.neighbours import CHUNK, near_pairs
 
 BUILDING = 20_000
 """What building a list costs, in entries of rows (measured), beside `BUILDING_EACH` for each body."""

@@ -6,6 +6,7 @@ from typing import Self
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.measure.audit.looks import Looks
 from sandbox.measure.audit.sweep import (
     CLEAR,
@@ -17,10 +18,9 @@ from sandbox.measure.audit.sweep import (
     dot,
     from_segment,
 )
-from sandbox.scene.model import Plane, Post, Scene, Wall
-from sandbox.scene.part import BACKING, Point
-from sandbox.scene.zone import mask_of
-from sandbox.trajectory import BoolArray, FloatArray, IntArray
+from sandbox.scene.description.base import BACKING, Point
+from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
+from sandbox.scene.scene import Scene
 
 PLANE_ROUNDING = 1e-11
 """m: the tolerance at planes is no less; engines make them of shapes kilometres large, which round at 3e-13 m."""

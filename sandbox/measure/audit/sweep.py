@@ -6,7 +6,7 @@ segment, with the radii added up. All functions take K rows at once and return n
 
 import numpy as np
 
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.arrays import BoolArray, FloatArray
 
 TOLERANCE = 5e-3
 """Depth, as a part of the contact distance, up to which a contact does not count: between equal balls 1 % of a

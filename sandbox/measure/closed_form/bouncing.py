@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.closed_form.form import Motion
 from sandbox.measure.closed_form.given import TOUCH, Given, normal_of, parallel
-from sandbox.trajectory import ContactEvent, FloatArray
+from sandbox.trajectory import ContactEvent
 
 PLANE = -1
 """The number of the one fixed thing, in contacts."""

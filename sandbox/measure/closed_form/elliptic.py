@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
 
 CONVERGED = 1e-9
 """As a share of the mean, a difference that vanishes beside it once it is squared, as each next one is."""

@@ -1,7 +1,7 @@
 """Flight: why it may have no closed form."""
 
-from sandbox.scene.flight import free_flight
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.ballistics import free_flight
+from sandbox.scene.scene import Scene
 
 __all__ = ["free_flight", "why_not"]
 

@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.closed_form.given import Given
-from sandbox.trajectory import ContactEvent, FloatArray
+from sandbox.trajectory import ContactEvent
 
 
 class Motion(NamedTuple):

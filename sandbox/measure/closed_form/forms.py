@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.measure.closed_form.bouncing import bouncing_alone
 from sandbox.measure.closed_form.flight import free_flight, why_not
 from sandbox.measure.closed_form.form import Assembler, Form, Motion, Recogniser, Together
@@ -14,9 +15,9 @@ from sandbox.measure.closed_form.on_plane import on_plane
 from sandbox.measure.closed_form.oscillator import oscillator
 from sandbox.measure.closed_form.pendulum import pendulum
 from sandbox.measure.closed_form.standing import standing
-from sandbox.scene.demands import on_floor
-from sandbox.scene.model import Scene
-from sandbox.trajectory import ContactEvent, Contacts, FloatArray, IntArray
+from sandbox.scene.compile.demands import on_floor
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import ContactEvent, Contacts
 
 ALONE: tuple[Recogniser, ...] = (on_plane, bouncing_alone, oscillator, pendulum, kepler)
 """Forms of one body, tried in this order, where no two that move can meet."""
@@ -55,7 +56,8 @@ class Solution:
         position = np.repeat(bodies.position[None], len(time), axis=0)
         velocity = np.where(bodies.fixed[:, None], 0.0, np.repeat(bodies.velocity[None], len(time), axis=0))
         angle, spin = bodies.angle + time[:, None] * spins, np.repeat(spins[None], len(time), axis=0)
-        for part in np.array_split(self.flying, max(1, len(self.flying) * len(time) // CHUNK)):
+        chunks = max(1, len(self.flying) * len(time) // CHUNK)
+        for part in np.array_split(self.flying, chunks) if len(self.flying) else ():
             start = bodies.position[part], bodies.velocity[part]
             position[:, part], velocity[:, part] = free_flight(time, *start, self.scene.world)
         for number, form in self.alone.items():

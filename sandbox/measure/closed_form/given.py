@@ -6,11 +6,13 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.links import WORLD, LinkKind, Links
-from sandbox.scene.meetings import Meetings, meetings
-from sandbox.scene.model import Plane, Scene, World
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.joint_arrays import WORLD, LinkKind, Links
+from sandbox.scene.description.fixed import Plane
+from sandbox.scene.description.world import World
+from sandbox.scene.scene import Scene
 
 TOUCH = 1e-9
 """m: an overlap or a gap up to this still counts as touching."""
@@ -36,7 +38,7 @@ class Given:
 
     scene: Scene
     bodies: Bodies
-    meet: Meetings
+    meet: ContactMatrix
     links: Links
     thrust: BoolArray
     """(N,) carries a thrust, or has a drive"""
@@ -45,7 +47,7 @@ class Given:
     def of(cls, scene: Scene) -> Self:
         """Derive it."""
         bodies = scene.bodies
-        return cls(scene, bodies, meetings(scene), scene.links, thrust_on(scene, bodies))
+        return cls(scene, bodies, contact_matrix(scene), scene.links, thrust_on(scene, bodies))
 
     @property
     def world(self) -> World:

@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.closed_form.form import Motion
 from sandbox.measure.closed_form.given import SQUARE, TOUCH, Given, cross, direction, parallel
-from sandbox.trajectory import BoolArray, ContactEvent, FloatArray
+from sandbox.trajectory import ContactEvent
 
 MOST_BALLS = 16
 MOST_IMPACTS = 1000

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.closed_form.form import Motion
 from sandbox.measure.closed_form.given import Given
-from sandbox.trajectory import ContactEvent, FloatArray
+from sandbox.trajectory import ContactEvent
 
 OPEN = 1e-6
 """Where r/a is no larger, the ellipse or hyperbola is so long that its anomalies lose their digits: refused."""

@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.closed_form.bouncing import PLANE
 from sandbox.measure.closed_form.form import Motion
 from sandbox.measure.closed_form.given import SQUARE, TOUCH, Given, across, normal_of
 from sandbox.measure.lying import pieces_over_time
-from sandbox.trajectory import ContactEvent, FloatArray
+from sandbox.trajectory import ContactEvent
 
 EDGE = 1e-9
 """Friction this close, as a share, to what is needed to stick may or may not hold: refused. So is a body that stands

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.closed_form.elliptic import first_kind, jacobi, quarter_period
 from sandbox.measure.closed_form.form import Motion
 from sandbox.measure.closed_form.given import SQUARE, Given, Tie, cross, direction
-from sandbox.scene.links import LinkKind
-from sandbox.trajectory import ContactEvent, FloatArray
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.trajectory import ContactEvent
 
 
 @dataclass(frozen=True, eq=False)

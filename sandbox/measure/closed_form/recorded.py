@@ -5,14 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.closed_form.bouncing import Bouncing, bouncing
 from sandbox.measure.closed_form.flight import free_flight, why_not
 from sandbox.measure.closed_form.forms import solution
 from sandbox.measure.closed_form.given import TOUCH, Given, normal_of, thrust_on
 from sandbox.measure.lying import gap_above
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray, FloatArray, Trajectory
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 
 class ClosedForm(NamedTuple):

@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.closed_form.bouncing import PLANE
 from sandbox.measure.closed_form.form import Motion
 from sandbox.measure.closed_form.given import TOUCH, Given, across, normal_of, parallel
-from sandbox.trajectory import BoolArray, ContactEvent, FloatArray
+from sandbox.trajectory import ContactEvent
 
 MOST_BOXES = 1000
 """Every two of them are looked at."""

@@ -7,7 +7,7 @@ from typing import Literal
 
 from sandbox.measure.compare.errors import divergence_times
 from sandbox.measure.compare.touches import CLOSE, Touch, touches
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 GAP = 5.0
@@ -21,22 +21,22 @@ Choice = Literal["match", "above", "left"]
 
 @dataclass(frozen=True)
 class Event:
-    """A contact of the truth beside that of the run; what one of them lacks is None."""
+    """Contact of the truth and the matching contact of the run; values of an unmatched side are None."""
 
     kind: Kind
     between: tuple[str, str]
     time: float | None
-    """of the truth's, s"""
+    """s, time in the truth"""
     engine_time: float | None
-    """of the run's, s"""
+    """s, time in the run"""
     delta_time: float | None = None
-    """s, positive where the run is late"""
+    """s, positive if the run is late"""
     delta_position: float | None = None
-    """between the points of the first touch, m"""
+    """m, distance between the contact points at the first touch"""
     delta_impulse: float | None = None
-    """size of the difference, N·s; None where the contact lasts beyond the end"""
+    """N·s, size of the difference of the impulses; None if the contact lasts beyond the end"""
     lasting: bool = False
-    """It is more than one impact: the two stay, or keep bouncing too fast to be told apart."""
+    """whether it is a lasting contact, or a series of impacts too fast to be resolved, and not a single impact"""
 
     @property
     def when(self) -> float:

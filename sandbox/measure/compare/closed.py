@@ -2,14 +2,15 @@
 
 import numpy as np
 
-from sandbox.engines.expiry import SLACK
+from sandbox.arrays import FloatArray
+from sandbox.engines.common.lifetimes import SLACK
 from sandbox.measure.closed_form import Solution, solution
 from sandbox.measure.compare.runs import frames_as_run
 from sandbox.measure.recorder import frame_count
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 
 def frame_times(scene: Scene, settings: Settings) -> FloatArray:
@@ -50,7 +51,7 @@ def _retire(
     It is nan for never.
     """
     retired = np.full(len(bodies), np.nan)
-    end = bodies.born + bodies.lifetime - scene.began
+    end = bodies.born + bodies.lifetime
     if scene.world.bounds is None and not np.isfinite(end).any():
         return retired
     gone = time[:, None] + SLACK * dt >= end

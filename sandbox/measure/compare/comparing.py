@@ -1,24 +1,36 @@
-"""Comparing: one scene on several engines, each run, timed and scored."""
+"""Comparing: run one scene on several engines, or with several values, and time and score each run."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sandbox.engines.registry import ENGINES, engine_named
+from sandbox.engines.registry import ENGINES, USUAL, able, engine_named
+from sandbox.interrupt import uninterrupted
 from sandbox.measure.compare.alignment import aligned
 from sandbox.measure.compare.comparison import Comparison, Row
 from sandbox.measure.compare.drift import energy_drift, momentum_drift
 from sandbox.measure.compare.errors import Score, errors, usual_tolerance
+from sandbox.measure.compare.sweep import (
+    Sweep,
+    Variant,
+    physics_of,
+    set_text,
+    short_key,
+    truth_settings,
+    variants_of,
+)
 from sandbox.measure.compare.truth import Truth, seek_truth
 from sandbox.measure.compare.why import turned, verdict
 from sandbox.measure.recorder import require_memory
 from sandbox.measure.run import run
 from sandbox.measure.told import Told, nobody
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import as_scene
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 WORTH_REPEATING = 5.0
@@ -28,7 +40,65 @@ NEGLIGIBLE = 1e-6
 
 
 def compare(
-    scene: Scene,
+    scene: Scene | str | Path,
+    engines: Sequence[str] | None = None,
+    *,
+    sweep: Sweep | None = None,
+    tolerance: float | None = None,
+    why: bool = False,
+    truth: Truth | None = None,
+    told: Told | None = None,
+    **settings: Any,
+) -> Comparison:
+    """Run a scene on several engines, or with several values of a setting, and score each run against the truth.
+
+    The truth is the closed form of the scene, if it has one. Otherwise it is `exact`, or a fixed step refined until it
+    converges, up to the time to which a second method confirms it. Errors, contacts and divergence are measured up to
+    `trusted_until`, drifts of energy and momentum over the whole run.
+
+        sandbox.compare(scene, sweep={"solver.integrator": ["explicit_euler", "velocity_verlet", "rk4"]})
+
+    Args:
+        scene: the scene, or its name or path, as `load` takes it.
+        engines: names of the engines, or one name; default: all. An engine that cannot run the scene gets a
+            row with the reason. With a sweep, the default is the engines that can run every value.
+        sweep: values by key, such as `{"solver.dt": [0.01, 0.001]}`. Each value is a row; several keys give each
+            combination of their values.
+        tolerance: position error beyond which a run has diverged from the truth, m; default: 1 % of the smallest radius
+            or half width of the moving bodies.
+        why: rerun each engine whose error is not negligible with other settings, and report the changes that lower the
+            error.
+        truth: truth of this scene, with its frames and the tolerance, if already known; not with a sweep.
+        told: progress callback, called with a description of each stage.
+        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
+
+    Returns:
+        One row for each engine and combination of values; after Ctrl-C the finished rows, if there are any.
+
+    Raises:
+        UnknownEngineError: no engine has one of the names.
+        TooLargeError: the frames of all runs would not fit into memory together.
+        ValueError: the tolerance is not positive and finite; or a sweep is empty, too large, or has a key that
+            `settings` sets too.
+        SceneError: a swept key or value is invalid.
+        pydantic.ValidationError: a setting is invalid.
+    """
+    scene = as_scene(scene)
+    both = [key for key in sweep or () if short_key(key) in settings]
+    if both:
+        raise ValueError(f"{', '.join(both)}: is swept and set; leave one out")
+    if sweep and truth is not None:
+        raise ValueError("truth: is of one scene and one set of frames; leave it out with a sweep")
+    wanted = scene.solver.replace(**settings) if settings else scene.solver
+    scene_as_set = scene.model_copy(update={"solver": wanted}) if settings and sweep else scene
+    variants = variants_of(scene_as_set, sweep) if sweep else [Variant(scene)]
+    return compare_variants(
+        variants, engines, tolerance=tolerance, why=why, truth=truth, told=told, **({} if sweep else settings)
+    )
+
+
+def compare_variants(
+    variants: Sequence[Variant],
     engines: Sequence[str] | None = None,
     *,
     tolerance: float | None = None,
@@ -37,55 +107,102 @@ def compare(
     told: Told | None = None,
     **settings: Any,
 ) -> Comparison:
-    """Run a scene on several engines and hold each against the best known truth.
-
-    The truth is the scene's closed form, else `exact`, else a fixed step refined until it agrees with itself, as far
-    as a second method confirms it. Errors, contacts and divergence count up to `trusted_until`, drifts of energy and
-    momentum over the whole run.
+    """Run the variants of a scene on engines, and score each run against the truth of its variant.
 
     Args:
-        scene: what to run.
-        engines: their names; by default all there are. One that cannot run the scene is a row that says why.
-        tolerance: of positions, m: beyond it a run has diverged from the truth. By default 1 % of the radius of
-            the smallest ball that moves, or of the half width of what is thinner.
-        why: rerun each engine that is off with other settings (`why`), and say which lower the error.
-        truth: of this scene, its frames and the tolerance, where it is known already.
-        told: who is told what is being done.
-        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
+        variants: at least one variant; if there are several, `set` of each has its swept values.
+        engines: names of the engines; defaults as in `compare`.
+        tolerance: tolerance of positions, m.
+        why: explain the errors.
+        truth: truth of the first variant.
+        told: progress callback, called with a description of each stage.
+        settings: changes to `[solver]`.
 
     Raises:
         UnknownEngineError: no engine has one of the names.
         TooLargeError: the frames of all runs would not fit into memory together.
         ValueError: the tolerance is not positive and finite.
-        pydantic.ValidationError: a setting is wrong.
+        pydantic.ValidationError: a setting is invalid.
     """
-    names = list(dict.fromkeys(ENGINES if engines is None else engines))
-    for name in names:
+    engines = [engines] if isinstance(engines, str) else engines
+    for name in engines or ():
         engine_named(name)
-    wanted = scene.solver.replace(**settings) if settings else scene.solver
-    tolerance = usual_tolerance(scene) if tolerance is None else tolerance
+    first = variants[0].scene
+    wanted = [each.scene.solver.replace(**settings) if settings else each.scene.solver for each in variants]
+    plan = list(zip(variants, wanted, _engines_of(variants, wanted, engines), strict=True))
+    if tolerance is None:
+        tolerance = min(usual_tolerance(each.scene) for each in variants)
     if not 0.0 < tolerance < math.inf:
-        raise ValueError(f"a tolerance of {tolerance} m; it is positive and finite")
-    # All runs are held at once: the engines', the truth, and while it is sought, two more.
-    require_memory(scene, wanted, len(scene.bodies) * (len(names) + 3))
+        raise ValueError(f"a tolerance of {tolerance} m; it must be positive and finite")
+    count = sum(len(names) for _, _, names in plan)
+    for variant, own, _ in plan:
+        # All runs are held at once: the engines', the truths, and while one is sought, two more.
+        require_memory(variant.scene, own, len(variant.scene.bodies) * (count + len(variants) + 2))
 
-    say, doubt = told or nobody, None
-    if truth is None:
-        say("the truth")
-        sought = seek_truth(scene, wanted, tolerance)
-        truth, doubt = (sought, None) if isinstance(sought, Truth) else (None, sought)
-    rows, runs = [], {}
-    for name in names:
-        say(name)
-        found = timed(scene, name, wanted)
-        row = judged(scene, name, wanted, found, truth, tolerance)
-        if why and truth is not None and _is_off(row, tolerance):
-            say(f"{name}: why")
-            row = _explained(scene, row, wanted, truth)
-        rows.append(row)
-        if len(found.time):
-            runs[name] = found
-    return Comparison(scene, truth, tolerance, tuple(rows), runs, doubt)
+    say = told or nobody
+    truths: dict[tuple[str, float, int], Truth | str] = {}
+    if truth is not None:
+        truths[_frames_of(first, wanted[0])] = truth
+    rows, runs, row_truths, interrupted = list[Row](), dict[str, Trajectory](), dict[str, Truth | None](), False
+    try:
+        for variant, own, names in plan:
+            key = _frames_of(variant.scene, own)
+            if key not in truths:
+                say("the truth")
+                truths[key] = seek_truth(variant.scene, truth_settings(own, wanted), tolerance)
+            sought = truths[key]
+            best = sought if isinstance(sought, Truth) else None
+            for name in names:
+                say(", ".join(filter(None, (name, set_text(variant.set)))))
+                found = timed(variant.scene, name, own)
+                row = replace(judged(variant.scene, name, own, found, best, tolerance), set=variant.set)
+                if why and best is not None and _is_off(row, tolerance):
+                    say(f"{row.name}: why")
+                    row = _explained(variant.scene, row, own, best)
+                with uninterrupted():
+                    rows.append(row)
+                    row_truths[row.name] = best
+                    if len(found.time):
+                        runs[row.name] = found
+    except KeyboardInterrupt:
+        if not rows:
+            raise
+        interrupted = len(rows) < count
+    answer = truths[_frames_of(first, wanted[0])]
+    best, doubt = (answer, None) if isinstance(answer, Truth) else (None, answer)
+    return Comparison(
+        first,
+        best,
+        tolerance,
+        tuple(rows),
+        runs,
+        doubt,
+        interrupted,
+        truths=row_truths,
+        same_scene=len(variants) == 1 or len({physics_of(each.scene) for each in variants}) == 1,
+    )
+
+
+def _engines_of(
+    variants: Sequence[Variant], wanted: Sequence[Settings], engines: Sequence[str] | None
+) -> list[list[str]]:
+    """Return the engines that run each variant.
+
+    Those that are named; else, of a sweep, those that can run every variant, or where none can, those that can run
+    the one; else all.
+    """
+    if engines is not None:
+        return [list(dict.fromkeys(engines))] * len(variants)
+    if not variants[0].set:
+        return [list(ENGINES)] * len(variants)
+    each = [able(variant.scene, own) for variant, own in zip(variants, wanted, strict=True)]
+    common = [name for name in ENGINES if all(name in names for names in each)]
+    return [common or list(names) or [USUAL] for names in each]
+
+
+def _frames_of(scene: Scene, settings: Settings) -> tuple[str, float, int]:
+    """Return what a truth depends on: the scene, and the times of its frames."""
+    return physics_of(scene), settings.dt, settings.record_every
 
 
 def timed(scene: Scene, engine: str, settings: Settings) -> Trajectory:

@@ -11,7 +11,8 @@ from sandbox.measure.compare.errors import errors
 from sandbox.measure.compare.horizon import agree_until, perturb
 from sandbox.measure.compare.runs import common_frames, there
 from sandbox.measure.compare.truth import truth_of
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 
@@ -47,7 +48,9 @@ class Disagreement:
             ValueError: there are none, or more than two.
         """
         if not 1 <= len(engines) <= 2:
-            raise ValueError(f"a disagreement is one engine's with the truth, or that of two; not of {len(engines)}")
+            raise ValueError(
+                f"a disagreement is between one engine and the truth, or between two engines, not {len(engines)}"
+            )
         self.engines, self.tolerance = tuple(engines), tolerance
 
     def __str__(self) -> str:
@@ -67,15 +70,15 @@ class Disagreement:
         """
         deadline = working() + patience
 
-        def ran(which: Scene, engine: str) -> Trajectory:
-            return bounded_run(which, engine, which.solver, math.inf, deadline, audit=False)[0]
+        def ran(which: Setup, engine: str) -> Trajectory:
+            return bounded_run(which, engine, which.scene.solver, math.inf, deadline, audit=False)[0]
 
         if len(self.engines) == 1:
             truth = truth_of(scene, scene.solver, self.tolerance)
             if truth is None:
                 return None
-            return self._parting(scene, ran(scene, self.engines[0]), truth.trajectory, truth.trusted_until)
-        one, other = (ran(scene, engine) for engine in self.engines)
+            return self._parting(scene, ran(Setup.of(scene), self.engines[0]), truth.trajectory, truth.trusted_until)
+        one, other = (ran(Setup.of(scene), engine) for engine in self.engines)
         parting = self._parting(scene, one, other, scene.world.duration)
         moved = perturb(scene) if parting is not None else None
         if parting is None or moved is None:

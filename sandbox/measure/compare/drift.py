@@ -7,8 +7,8 @@ import numpy as np
 
 from sandbox.measure.energy import energies
 from sandbox.measure.recorder import frame_count
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 TREMBLING = 1e-4

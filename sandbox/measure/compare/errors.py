@@ -1,31 +1,32 @@
-"""Errors: how far a run is from the truth, frame by frame."""
+"""Errors: distance of a run from the truth, frame by frame."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.compare.runs import common_frames, there
-from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray, FloatArray, Trajectory
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 CHUNK = 2_000_000
 """Frames × bodies worked on at once."""
 TOLERANCE = 0.01
-"""The share of the smallest radius, or half width, of what moves that is the tolerance where none is given."""
+"""Default tolerance as a fraction of the smallest radius, or half width, of the moving bodies."""
 
 
 class Score(NamedTuple):
-    """Errors over all frames up to a time and all bodies that move; None where there is nothing to score."""
+    """Errors over all moving bodies and all frames up to a time; None if there are no such frames or bodies."""
 
     max_position: float | None
-    """m"""
+    """m, largest position error"""
     rms_position: float | None
-    """m, root of the mean square over frames and bodies"""
+    """m, root mean square over frames and bodies"""
     max_velocity: float | None
-    """m/s"""
+    """m/s, largest velocity error"""
     rms_velocity: float | None
-    """m/s"""
+    """m/s, root mean square over frames and bodies"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,15 +6,17 @@ from itertools import pairwise
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.distance import hull_distance
 from sandbox.measure.lying import gap_above, pieces_over_time
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.driven import driven_in
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Plane, Post, Scene, Wall, Zone
-from sandbox.scene.near import near_pairs
-from sandbox.scene.precinct import pieces_of
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.drives import driven_in
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
+from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.geometry.shapes import pieces_of
+from sandbox.scene.scene import Scene
 
 Pair = tuple[int, int]
 """Numbers as in `Contacts`: the second may be −1 − k for the k-th fixed thing."""
@@ -55,32 +57,33 @@ def gap(scene: Scene, bodies: Bodies, position: FloatArray, angle: FloatArray, p
     return gaps
 
 
-def close_pairs(scene: Scene, reach: float = 0.0) -> list[tuple[Pair, float]]:
+def close_pairs(start: Scene | Setup, reach: float = 0.0) -> list[tuple[Pair, float]]:
     """Return all that can meet, of which one can move, and whose gap at the start is at most `reach`, with that, m.
 
     A negative gap is an overlap. Pairs are numbered as in `Contacts`.
     """
-    bodies, meet = scene.bodies, meetings(scene)
+    setup = Setup.of(start)
+    scene, bodies, meet = setup.scene, setup.bodies, contact_matrix(setup)
     still = bodies.fixed | driven_in(scene, bodies)
     meeting = meet.touches | bodies.fixed
     found = []
     for i, j in _near(bodies, meeting, reach):
         if not (still[i] and still[j]) and (bodies.group[i] != bodies.group[j] or bodies.group[i] == 0):
-            found.append(((i, j), _gap(scene, (i, j))))
-    apart = set(map(tuple, scene.links.apart().tolist()))  # joined, and kept from meeting
+            found.append(((i, j), _gap(setup, (i, j))))
+    apart = set(map(tuple, setup.links.apart().tolist()))  # joined, and kept from meeting
     found = [(pair, clear) for pair, clear in found if clear <= reach and pair not in apart]
     movable = np.flatnonzero(~still & meeting)
     for k, thing in enumerate(scene.fixed):
-        clear = _bounding_gaps(bodies, thing)
+        clear = bounding_gaps(thing, bodies.position, bodies.radius)
         near = ((number, -1 - k) for number in movable[clear[movable] <= reach].tolist())
-        exact = ((p, float(clear[p[0]]) if bodies.round[p[0]] else _gap(scene, p)) for p in near)
+        exact = ((p, float(clear[p[0]]) if bodies.round[p[0]] else _gap(setup, p)) for p in near)
         found += [(pair, own) for pair, own in exact if own <= reach]
     return found
 
 
-def _gap(scene: Scene, pair: Pair) -> float:
-    bodies = scene.bodies
-    return float(gap(scene, bodies, bodies.position[None], bodies.angle[None], pair)[0])
+def _gap(setup: Setup, pair: Pair) -> float:
+    bodies = setup.bodies
+    return float(gap(setup.scene, bodies, bodies.position[None], bodies.angle[None], pair)[0])
 
 
 def _near(bodies: Bodies, meeting: BoolArray, reach: float) -> Iterator[Pair]:
@@ -95,12 +98,12 @@ def _near(bodies: Bodies, meeting: BoolArray, reach: float) -> Iterator[Pair]:
         yield from zip(i[close].tolist(), j[close].tolist(), strict=True)
 
 
-def _bounding_gaps(bodies: Bodies, thing: Plane | Wall | Post) -> FloatArray:
-    """Return how far each body's bounding disc is from a fixed thing, (N,) m; of a ball that is its gap."""
+def bounding_gaps(thing: Plane | Wall | Post, position: FloatArray, radius: FloatArray) -> FloatArray:
+    """Return how far bounding discs, (N, 2) m and (N,) m, are from a fixed thing, (N,) m; of balls that is the gap."""
     if isinstance(thing, Plane):
         normal = np.asarray(thing.normal) / math.hypot(*thing.normal)
-        return np.asarray((bodies.position - np.asarray(thing.point)) @ normal - bodies.radius)
-    return _of_disc(bodies.position, bodies.radius, thing, bodies.position, 0.0)
+        return np.asarray((position - np.asarray(thing.point)) @ normal - radius)
+    return _of_disc(position, radius, thing, position, 0.0)
 
 
 def _from_zone(centre: FloatArray, zone: Zone) -> FloatArray:

@@ -5,13 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.measure.compare.errors import errors
 from sandbox.measure.compare.gaps import Pair, close_pairs, gap
 from sandbox.measure.joint_error import HOLDING
-from sandbox.scene.driven import driven_in
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray, IntArray, Trajectory
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.drives import driven_in
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 NUDGE = 1e-12
 """m"""
@@ -23,7 +25,7 @@ PARALLEL = 1e-6
 """Sine of the angle up to which two contact normals count as parallel: their numerical derivative has seven digits."""
 
 
-def perturb(scene: Scene, amount: float = NUDGE, seed: int = 0) -> Scene | None:
+def perturb(start: Scene | Setup, amount: float = NUDGE, seed: int = 0) -> Setup | None:
     """Return the scene with every body that can meet, or is drawn by, something moved by `amount`.
 
     Each body moves in a direction of its own, which follows from its state and the seed and not from its number: a
@@ -33,21 +35,21 @@ def perturb(scene: Scene, amount: float = NUDGE, seed: int = 0) -> Scene | None:
     m/s. Polygons that touch nothing also turn, by `amount` over their radius. Fixed and driven bodies stay.
 
     Args:
-        scene: to be perturbed; it stays as it was.
+        start: scene or setup to be perturbed; it stays as it was.
         amount: m.
         seed: of the directions.
 
     Returns:
         None where there is no such body: no difference can grow then.
     """
-    bodies = scene.bodies
-    meet = meetings(scene)
+    setup = Setup.of(start)
+    scene, bodies, meet = setup.scene, setup.bodies, contact_matrix(setup)
     still = bodies.fixed | driven_in(scene, bodies)
     able = ~still & (~meet.free | bool(scene.attractions))
     if not able.any():
         return None
-    touching = touching_pairs(scene, max(TOUCH, 2.0 * amount))
-    links = scene.links.of(*HOLDING)
+    touching = touching_pairs(setup, max(TOUCH, 2.0 * amount))
+    links = setup.links.of(*HOLDING)
     joined = [edge for edge in zip(links.a.tolist(), links.b.tolist(), strict=True) if edge[0] >= 0]
     normals: dict[int, list[FloatArray]] = {}
     for edge, normal in touching:
@@ -82,24 +84,25 @@ def perturb(scene: Scene, amount: float = NUDGE, seed: int = 0) -> Scene | None:
         elif len(members) == 1 and not bodies.round[label]:
             angle[label] += math.copysign(amount, direction[0]) / bodies.radius[label]
         position[members] += _shift(position[members], amount * direction)
-    return scene.placed(replace(bodies, position=position, velocity=velocity, angle=angle), scene.began)
+    return replace(setup, bodies=replace(bodies, position=position, velocity=velocity, angle=angle))
 
 
-def touching_pairs(scene: Scene, touch: float = TOUCH) -> list[tuple[Pair, FloatArray]]:
+def touching_pairs(start: Scene | Setup, touch: float = TOUCH) -> list[tuple[Pair, FloatArray]]:
     """Return which pairs touch at the start of a scene, and a normal of each, (2,).
 
     Args:
-        scene: whose bodies and fixed things; numbered as in `Contacts`. Of a pair, one can move.
+        start: scene or setup with bodies and static objects; numbered as in `Contacts`. Of a pair, one can move.
         touch: m; a gap or an overlap of no more is a touch.
     """
-    still = scene.bodies.fixed | driven_in(scene, scene.bodies)
-    pairs = [pair for pair, clear in close_pairs(scene, touch) if clear >= -touch]
-    return [((i, j), _normal(scene, j if still[i] else i, (i, j))) for i, j in pairs]
+    setup = Setup.of(start)
+    still = setup.bodies.fixed | driven_in(setup.scene, setup.bodies)
+    pairs = [pair for pair, clear in close_pairs(setup, touch) if clear >= -touch]
+    return [((i, j), _normal(setup, j if still[i] else i, (i, j))) for i, j in pairs]
 
 
-def _normal(scene: Scene, number: int, pair: Pair) -> FloatArray:
+def _normal(setup: Setup, number: int, pair: Pair) -> FloatArray:
     """Return the direction in which the gap of a pair grows as one of its bodies moves, (2,), of length 1."""
-    bodies = scene.bodies
+    bodies = setup.bodies
     place = bodies.position[number]
     if min(pair) >= 0 and bodies.round[[*pair]].all():
         apart = bodies.position[pair[1]] - bodies.position[pair[0]]
@@ -107,7 +110,7 @@ def _normal(scene: Scene, number: int, pair: Pair) -> FloatArray:
     step = max(1e-7 * float(bodies.radius[number]), 1e5 * float(np.spacing(np.abs(place)).max()))
     position = np.repeat(bodies.position[None], 4, axis=0)
     position[:, number] += step * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-    gaps = gap(scene, bodies, position, np.repeat(bodies.angle[None], 4, axis=0), pair)
+    gaps = gap(setup.scene, bodies, position, np.repeat(bodies.angle[None], 4, axis=0), pair)
     slope = np.array([gaps[0] - gaps[1], gaps[2] - gaps[3]])
     length = math.hypot(*slope)
     return slope / length if length > 0.0 else np.zeros(2)

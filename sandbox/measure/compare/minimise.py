@@ -24,9 +24,9 @@ from sandbox.measure.compare.simpler import fewer, optional, rounded, shorter, u
 from sandbox.measure.compare.spelled import BONDS, FIXED, Document, Spelled, spelled
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.told import Told, nobody
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import dumps, from_document, loads
-from sandbox.scene.model import Scene
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import dumps, from_document, loads
+from sandbox.scene.scene import Scene
 
 MOST_RUNS = 1000
 """Scenes that are tried, at most; each is run on both engines, and perturbed."""
@@ -120,7 +120,9 @@ class Search:
                 self._smaller()
             except _EnoughError as error:
                 ended = str(error)
-            return ended if self._is_confirmed() else "an engine's answer hangs on chance, so nothing was left out"
+            return (
+                ended if self._is_confirmed() else "the result of an engine is not reproducible, so nothing was removed"
+            )
         except KeyboardInterrupt:
             return "interrupted"
 
@@ -156,13 +158,13 @@ class Search:
         if self.runs >= self._most_runs:
             raise _EnoughError(f"{self._most_runs:,} scenes have been tried")
         if left <= 0.0:
-            raise _EnoughError("its time is over")
+            raise _EnoughError("the time limit was reached")
         self.runs += 1
-        self._told(f"{len(self.scene.bodies):,} bodies, {len(self.scene.fixed):,} fixed things; try {self.runs:,}")
+        self._told(f"{len(self.scene.bodies):,} bodies, {len(self.scene.fixed):,} fixed objects; try {self.runs:,}")
         try:
             parting = self._asked.of(scene, left)
         except TookTooLongError:
-            raise _EnoughError("its time is over") from None
+            raise _EnoughError("the time limit was reached") from None
         except TooLargeError:
             return None
         return (scene, parting) if self._is_the_same(parting) else None

@@ -7,15 +7,16 @@ from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.bounded_run import TookTooLongError, bounded_run
-from sandbox.measure.compare.errors import errors
+from sandbox.measure.compare.errors import Errors, errors
 from sandbox.measure.compare.horizon import agree_until, perturb
 from sandbox.measure.joint_error import HOLDING
 from sandbox.measure.recorder import frame_count
-from sandbox.scene.links import LinkKind
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.part import MAX_STEPS
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import MAX_STEPS
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 WORK = 5e6
@@ -45,7 +46,7 @@ PREFERENCES: tuple[dict[str, object], ...] = (
 JOINED: dict[str, object] = {"integrator": "velocity_verlet", "joints": "rattle"}
 """Before all others where bodies are joined: of second order, where impulses alone leave an error of the first."""
 SMOOTH: dict[str, object] = {"integrator": "rk4"}
-"""Before all others where springs, attraction and thrusts are all there is: nothing jumps, and order 4 pays."""
+"""Before all others where nothing can collide and no joint is rigid: forces are smooth, and order 4 pays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,8 @@ class Refined:
     """s, within the tolerance itself"""
     about: str
     """why it was refined no further"""
+    difference: float
+    """m, largest distance from the previous halving, as long as the two agree"""
     horizon: float
     """s, until when a perturbation changes nothing beyond the tolerance"""
     work: int
@@ -96,11 +99,9 @@ def refined(scene: Scene, settings: Settings, tolerance: float) -> Refined | Non
 
 def preferences(scene: Scene) -> tuple[dict[str, object], ...]:
     """Return the ways of doing things that agree soonest with a finer step, the best first."""
-    if not (len(scene.links) or scene.attractions or scene.thrusts):
-        return PREFERENCES
     if len(scene.links.of(*HOLDING, LinkKind.MOTOR)):
         return JOINED, *PREFERENCES
-    return PREFERENCES if meetings(scene).touches.any() else (SMOOTH, *PREFERENCES)
+    return PREFERENCES if contact_matrix(scene).touches.any() else (SMOOTH, *PREFERENCES)
 
 
 def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> Refined | None:
@@ -116,13 +117,14 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
         return None
     left = LIMIT
     work = each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
-    agrees, halvings, about = 0.0, 0, "it was halved no further"
+    agrees, halvings, about = 0.0, 0, "dt was not halved further"
+    last: Errors | None = None
     horizon: float | None = None
     while halvings < HALVINGS:
         each *= 2
         finer = half(settings)
         if work + each > WORK:
-            about = "more halvings would be too much work"
+            about = "further halving would take too long"
             break
         if finer is None or scene.world.duration / finer.dt > MAX_STEPS:
             about = "dt cannot be halved further"
@@ -137,27 +139,29 @@ def _halved(scene: Scene, engine: str, settings: Settings, tolerance: float) -> 
             missed = float(np.min(fine.missed_time, initial=np.inf))
             close = min(agree_until(fine, coarse, scene, AGREE * tolerance), missed)
             agrees = min(agree_until(fine, coarse, scene, tolerance), missed)
+            last = errors(fine, coarse, ~scene.bodies.fixed)
             coarse, settings, halvings, work = fine, finer, halvings + 1, work + each
             horizon = None
             if close >= enough:
                 horizon, jumps = _horizon(scene, other, engine, settings, coarse, tolerance)
                 enough = max(enough, horizon)
                 if close >= enough and not jumps:  # a jump is as high as a step is long: a smaller one makes less of it
-                    about = f"agrees with the halving before within {AGREE * tolerance:.2g} m"
+                    about = f"agrees with the previous halving within {AGREE * tolerance:.2g} m"
                     break
         except TookTooLongError:
-            about = "more halvings would be too much work"
+            about = "further halving would take too long"
             break
     try:
         if horizon is None:
             horizon, _ = _horizon(scene, other, engine, settings, coarse, tolerance)
     except TookTooLongError:
         horizon = min(enough, agrees)
-    return Refined(engine, settings, halvings, coarse, agrees, about, horizon, work)
+    difference = 0.0 if last is None else last.until(min(agrees, horizon)).max_position or 0.0
+    return Refined(engine, settings, halvings, coarse, agrees, about, difference, horizon, work)
 
 
 def _horizon(
-    scene: Scene, other: Scene | None, engine: str, settings: Settings, found: Trajectory, tolerance: float
+    scene: Scene, other: Setup | None, engine: str, settings: Settings, found: Trajectory, tolerance: float
 ) -> tuple[float, bool]:
     """Return until when a run of the scene agrees with one of the perturbed scene, s, and whether they jump apart then.
 

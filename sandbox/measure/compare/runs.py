@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from sandbox.scene.document import to_document
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import BoolArray, Contacts, FloatArray, IntArray, Trajectory
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.document import to_document
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Contacts, Trajectory
 
 SAME_TIME = 1e-6
 """Frames closer than this share of a run's shortest interval are of the same time: the rounding of k·dt."""

@@ -4,10 +4,11 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
-from sandbox.scene.document import to_document
-from sandbox.scene.elements import mover_of
-from sandbox.scene.model import Emitter, Grid, Mover, Scatter, Scene, Stack
-from sandbox.scene.surfaced import GROUND
+from sandbox.scene.description.base import GROUND, BodySource
+from sandbox.scene.description.discs import Emitter, Grid, Scatter
+from sandbox.scene.description.generators import Stack
+from sandbox.scene.files.document import to_document
+from sandbox.scene.scene import Scene
 
 Document = dict[str, Any]
 Place = tuple[str, int]
@@ -104,7 +105,7 @@ def spelled(scene: Scene, whole: bool = False) -> Spelled:
 def _numbers(scene: Scene) -> list[list[int]]:
     """Return the numbers of the bodies of each mover."""
     numbers: list[list[int]] = [[] for _ in scene.movers]
-    mover = [mover_of(scene, element) for element in range(len(scene.elements))]
+    mover = [scene.mover_of(element) for element in range(len(scene.elements))]
     for number, element in enumerate(scene.bodies.element.tolist()):
         numbers[mover[element]].append(number)
     return numbers
@@ -115,11 +116,11 @@ def _fixed_names(scene: Scene) -> list[tuple[str, int, str]]:
     return [(kind, k, name) for (kind, k), name in zip(places, scene.fixed_names, strict=False)]
 
 
-def _is_single_bodies(mover: Mover) -> bool:
+def _is_single_bodies(mover: BodySource) -> bool:
     return isinstance(mover, Grid | Scatter | Stack) or (isinstance(mover, Emitter) and mover.lifetime is None)
 
 
-def _body(scene: Scene, generator: Mover, number: int) -> tuple[str, Document]:
+def _body(scene: Scene, generator: BodySource, number: int) -> tuple[str, Document]:
     """Return the heading and the table of one body of a generator."""
     bodies = scene.bodies
     table: Document = {"name": bodies.names[number]}

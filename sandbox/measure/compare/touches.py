@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.collisions import together
 from sandbox.measure.compare.gaps import gap
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 CLOSE = 4.0
 """Rows of one pair that follow within so many steps are one touch."""

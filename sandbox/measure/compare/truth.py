@@ -12,9 +12,9 @@ from sandbox.measure.compare.refined import refined
 from sandbox.measure.compare.witness import confirmed
 from sandbox.measure.forecast.events import event_warnings
 from sandbox.measure.run import run
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 LIMIT = 120.0
@@ -27,16 +27,22 @@ TruthKind = Literal["closed_form", "exact", "refined"]
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What a scene does, as well as it can be known."""
+    """Best known solution of a scene."""
 
     kind: TruthKind
     about: str
-    """where it is from, in a few words"""
+    """source of the truth, in a few words"""
     trajectory: Trajectory
     trusted_until: float
-    """s; the last frame up to which no finer step, second method or perturbation moves a body beyond the tolerance"""
+    """s; last frame up to which no finer step, second method or perturbation moves a body by more than the tolerance"""
     witness: str | None = None
-    """the second method that confirms a refined truth"""
+    """second method that confirms a refined truth"""
+    difference: float = 0.0
+    """m; of a refined truth, its largest distance from the previous halving of dt: smaller errors mean nothing"""
+
+    def __repr__(self) -> str:
+        """Return kind, source and end of the truth."""
+        return f"<Truth {self.kind}: {self.about}; trusted until {self.trusted_until:.4g} s>"
 
 
 def bare(settings: Settings) -> Settings:
@@ -74,11 +80,11 @@ def seek_truth(scene: Scene, settings: Settings, tolerance: float) -> Truth | st
     note = ""
     exact = ENGINES.get("exact")
     if exact is not None and not exact.missing(scene, bare(settings)):
-        doubtful = next(event_warnings(scene, meetings(scene)), None) is not None
+        doubtful = next(event_warnings(scene, contact_matrix(scene)), None) is not None
         try:
             found, _ = bounded_run(scene, "exact", bare(settings), DOUBTFUL if doubtful else LIMIT, audit=False)
         except TookTooLongError as error:
-            note = f"; exact was given up: {error}"
+            note = f"; exact was stopped: {error}"
         else:
             if found.status == "ok":
                 until = _horizon(scene, "exact", bare(settings), found, tolerance)
@@ -88,7 +94,7 @@ def seek_truth(scene: Scene, settings: Settings, tolerance: float) -> Truth | st
     finest = refined(scene, settings, tolerance)
     if finest is None:
         able = any(not engine.missing(scene, settings) for engine in ENGINES.values())
-        why = "no engine gets to an answer that a finer step confirms" if able else "no engine here can run the scene"
+        why = "no engine reaches a result that a smaller step confirms" if able else "no engine can run the scene"
         return f"{why}{note}"
     until = min(finest.agrees_until, finest.horizon)
     cause = f"; {finest.about}" if until == finest.agrees_until else _limit(scene, until)
@@ -97,12 +103,12 @@ def seek_truth(scene: Scene, settings: Settings, tolerance: float) -> Truth | st
     method = f"{finest.engine}, dt halved {times}"
     if confirmation.until < until:
         until = confirmation.until
-        cause = f"; there is no truth beyond {until:.4g} s: {confirmation.about}"
+        cause = f"; no truth is known after {until:.4g} s: {confirmation.about}"
     if until == 0.0 and scene.world.duration > 0.0:
-        return f"{confirmation.about or finest.about} (the answer in question: {method}){note}"
+        return f"{confirmation.about or finest.about} (unconfirmed result: {method}){note}"
     if confirmation.by is not None:
         method = f"{method}, confirmed by {confirmation.by}"
-    return Truth("refined", f"{method}{cause}{note}", finest.trajectory, until, confirmation.by)
+    return Truth("refined", f"{method}{cause}{note}", finest.trajectory, until, confirmation.by, finest.difference)
 
 
 def _horizon(scene: Scene, engine: str, settings: Settings, found: Trajectory, tolerance: float) -> float:
@@ -115,5 +121,5 @@ def _horizon(scene: Scene, engine: str, settings: Settings, found: Trajectory, t
 
 
 def _limit(scene: Scene, until: float) -> str:
-    moved = f"; moving every body by {NUDGE:g} m changes what comes later"
+    moved = f"; later motion is chaotic: it changes if every body is moved by {NUDGE:g} m"
     return moved if until < scene.world.duration else ""

@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.bounded_run import TookTooLongError, bounded_run
 from sandbox.measure.compare.errors import errors
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 MATTERS = 0.9
@@ -29,35 +29,36 @@ ROUNDING = 1e-9
 """A change that leaves no more of the error than this has removed it."""
 FACTOR = 4
 """By which a count is raised: iterations, substeps, persistence."""
-NOT_TRIED: Mapping[str, str] = {"record_every": "it says which frames are kept; the run is the same"}
+NOT_TRIED: Mapping[str, str] = {"record_every": "it selects the recorded frames and does not change the run"}
 """Settings that are not changed, and why."""
 
 
 @dataclass(frozen=True)
 class Knob:
-    """One choice changed, all others as they were."""
+    """Result of a rerun with one or two settings changed."""
 
     knob: str
-    """the setting"""
+    """name of the setting"""
     value: float | str
-    """what it was changed to; of two, a text that names both"""
+    """new value; for two settings, a text with both"""
     status: str
-    """`ok`, `diverged`, `failed`, `refused`, `stopped` where it took too long, `same` where it was that already"""
+    """`ok`, `diverged`, `failed`, `refused`, `stopped` if it took too long, `same` if the setting had that value
+    already"""
     reason: str | None
     max_position_error: float | None
     """m, up to the same time"""
     ratio: float | None
-    """of that to the error before: below 1 is better"""
+    """new error / old error; below 1 is better"""
     changes: Mapping[str, Any] = field(default_factory=dict)
     """all settings that differ"""
 
     def document(self) -> dict[str, Any]:
-        """Return it as a JSON object."""
+        """Return the result as a JSON object."""
         return {**vars(self), "changes": dict(self.changes)}
 
     @property
     def label(self) -> str:
-        """What was changed to what, such as `dt = 0.005`."""
+        """Setting and new value, such as `dt = 0.005`."""
         return self.knob if " = " in self.knob else f"{self.knob} = {_text(self.value)}"
 
 
@@ -121,7 +122,7 @@ def turned(
 
     def tried(knob: str, value: Any, changes: dict[str, Any]) -> Knob:
         if all(getattr(filled, key) == new for key, new in changes.items()):
-            return Knob(knob, value, "same", "it is so already", before, 1.0, changes)
+            return Knob(knob, value, "same", "already set", before, 1.0, changes)
         try:
             settings = asked.replace(**changes)
         except ValidationError as error:
@@ -180,7 +181,10 @@ def verdict(engine: str, tried: tuple[Knob, ...], before: float) -> str:
     if _ratio(best) > MATTERS:
         return f"{engine}: no other setting lowers the error of {before:.3g} m by more than {1 - MATTERS:.0%}"
     left = "0 m" if best.max_position_error == 0.0 else f"{best.max_position_error:.3g} m"
-    return f"{engine}: largest gain by {best.label}: ×{best.ratio:.2g} of the error is left, {left} of {before:.3g} m"
+    return (
+        f"{engine}: the most effective change is {best.label}: it reduces the error from {before:.3g} m to "
+        f"{left} (×{best.ratio:.2g})"
+    )
 
 
 def _ratio(knob: Knob) -> float:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.bounded_run import TookTooLongError, bounded_run
 from sandbox.measure.compare.drift import momentum_drift
@@ -18,10 +19,10 @@ from sandbox.measure.compare.errors import Errors, errors, usual_tolerance
 from sandbox.measure.compare.refined import Refined, half, preferences
 from sandbox.measure.energy import energies
 from sandbox.measure.recorder import frame_count
-from sandbox.scene.demands import Demand, demands
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.compile.demands import Demand, demands
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 SHARE = 0.5
 """Of the work of the answer, what one witness may take, if three runs do not take more; all may take twice that."""
@@ -109,13 +110,11 @@ def confirmed(scene: Scene, found: Refined, settings: Settings, tolerance: float
         if testimony.until >= until:
             return Confirmation(until, by, limit)
         if testimony.contradicts:
-            what = f"{found.engine} and {by} converge to different answers, {testimony.apart:.2g} m apart"
+            what = f"{found.engine} and {by} converge to different results, {testimony.apart:.2g} m apart"
             return Confirmation(testimony.until, by if testimony.until > 0.0 else None, what)
         if best is None or testimony.until > best.until:
-            best = Confirmation(testimony.until, by, f"{by} has not converged and confirms no more")
-    return best or Confirmation(
-        0.0, None, "no second engine or method can run the scene and confirm what the first one says"
-    )
+            best = Confirmation(testimony.until, by, f"{by} has not converged and confirms nothing later")
+    return best or Confirmation(0.0, None, "no second engine or method can run the scene to confirm the first")
 
 
 def _witnesses(scene: Scene, found: Refined, settings: Settings) -> Iterator[tuple[str, Settings]]:
@@ -243,10 +242,10 @@ def _lawful_until(scene: Scene, run: Trajectory, tolerance: float) -> tuple[floa
     end = scene.world.duration
     drift = momentum_drift(run, scene)
     if drift is not None and abs(drift) > GROWTH:
-        return 0.0, f"the momentum in {run.info['engine']} changes by {abs(drift):.1%} without a cause"
+        return 0.0, f"the momentum in {run.info['engine']} changes by {abs(drift):.1%} without a force"
     needed = demands(scene)
     windy = Demand.DRAG in needed and any(scene.world.wind)
-    if windy or needed & SOURCES or (scene.bodies.born > scene.began).any():
+    if windy or needed & SOURCES or (scene.bodies.born > 0.0).any():
         return end, ""
     energy = energies(run, scene)
     kept = run.time < np.nanmin(run.retired_time, initial=np.inf)  # what is retired takes its energy along

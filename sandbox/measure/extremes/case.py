@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 Parameters = Mapping[str, float]

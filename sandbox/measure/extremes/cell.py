@@ -8,10 +8,10 @@ Word = Literal["exact", "degraded", "refused", "failed"]
 
 WORDS: tuple[Word, ...] = ("exact", "degraded", "refused", "failed")
 MEANINGS: dict[Word, str] = {
-    "exact": "within 1e-6 of what is known",
-    "degraded": "off, but breaks no rule",
-    "refused": "declined beforehand, with a reason",
-    "failed": "broke a rule, or is of no use",
+    "exact": "within 1e-6 of the known solution",
+    "degraded": "inaccurate, but no rule is broken",
+    "refused": "refused before the run, with a reason",
+    "failed": "a rule is broken, or the error is too large to be useful",
 }
 PASSED = ("exact", "degraded")
 

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from sandbox.measure.extremes.axis import Axis
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import from_document
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.load import from_document
 
 
 def check_overrides(overrides: Sequence[str], axes: Sequence[Axis]) -> None:
@@ -23,7 +23,7 @@ def check_overrides(overrides: Sequence[str], axes: Sequence[Axis]) -> None:
                     faults.setdefault(fault.message, Fault("--set", None, f"{override} ({axis.name})", fault.message))
                 continue
             if len(scenes) == 2 and scenes[0] == scenes[1]:
-                message = f"sets what the axis {axis.name!r} varies; leave it out, or choose other --axes"
+                message = f"sets the value that the axis {axis.name!r} varies; remove it, or choose other --axes"
                 faults.setdefault(message, Fault("--set", None, override, message))
     if faults:
         raise SceneError(tuple(faults.values()))

@@ -28,11 +28,11 @@ def judge(seen: Evidence) -> Outcome:
             if run.info["joint_error"] is not None:
                 figures["joints"] = run.info["joint_error"]
     if case.error is None:
-        return Outcome("degraded", "no rule is broken; what it should be is not known", figures=figures)
+        return Outcome("degraded", "no rule is broken; the exact solution is not known", figures=figures)
     error = case.error(seen.scene, run)
     if error > case.useless:
-        reason = f"off by {error:.3g} of {case.error_of}; from {case.useless:g} on it is of no use"
+        reason = f"the error is {error:.3g} of {case.error_of}; the limit is {case.useless:g}"
         return Outcome("failed", reason, "truth", error, figures=figures)
     if error <= EXACT:
         return Outcome("exact", f"within {EXACT:g} of {case.error_of}", None, error, figures=figures)
-    return Outcome("degraded", f"off by {error:.3g} of {case.error_of}", None, error, figures=figures)
+    return Outcome("degraded", f"the error is {error:.3g} of {case.error_of}", None, error, figures=figures)

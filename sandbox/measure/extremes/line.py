@@ -52,7 +52,7 @@ def axis_line(
     # Where time was up, another machine gets farther: that is worth no halving.
     hung = next((cell.outcome.slow for cell in cells.values() if cell.verdict == "failed"), False)
     found = boundary(known, None if hung or not halve else lambda level: look(level).passed, axis.scale)
-    reason, rule = "nothing failed", None
+    reason, rule = "no level failed", None
     if found.first_failure is not None:
         worst = cells[found.first_failure].outcome
         reason, rule = worst.reason, worst.rule

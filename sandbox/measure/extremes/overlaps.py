@@ -4,13 +4,15 @@ import math
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.collisions import can_meet
 from sandbox.measure.compare.gaps import gap
 from sandbox.measure.lying import gap_above
-from sandbox.scene.meetings import meetings, reach
-from sandbox.scene.model import Plane, Scene
-from sandbox.scene.near import near_pairs
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.compile.contacts import contact_matrix, reach
+from sandbox.scene.description.fixed import Plane
+from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 MOST_DISCS, MOST_SHAPES = 100_000, 10_000
 """Frames × bodies looked at, of discs alone and of other shapes: of more, frames are left out."""
@@ -38,7 +40,7 @@ def deepest(run: Trajectory, scene: Scene) -> FloatArray:
     """
     bodies = scene.bodies
     found = np.zeros(len(run.time))
-    able = np.flatnonzero(meetings(scene).touches & ~bodies.fixed)
+    able = np.flatnonzero(contact_matrix(scene).touches & ~bodies.fixed)
     for plane in scene.planes:
         point, normal = np.asarray(plane.point), np.asarray(plane.normal) / math.hypot(*plane.normal)
         discs = able[bodies.round[able]]
@@ -50,7 +52,9 @@ def deepest(run: Trajectory, scene: Scene) -> FloatArray:
             found = np.maximum(found, -above)
     others = [-1 - k for k, thing in enumerate(scene.fixed) if not isinstance(thing, Plane) and thing.solid]
     pairs = [(number, thing) for number in able[:MOST_APART].tolist() for thing in others]
-    mutual = meetings(scene).mutual and len(scene.layers) == 1  # which of two pass over each other is not looked into
+    mutual = (
+        contact_matrix(scene).mutual and len(scene.layers) == 1
+    )  # which of two pass over each other is not looked into
     if mutual and not bodies.round[able].all():
         pairs += _beside(scene)
     # Who can change its layer may lie over what it does not meet: only what can do nothing else is looked at.
@@ -60,7 +64,7 @@ def deepest(run: Trajectory, scene: Scene) -> FloatArray:
     for pair in pairs:
         found = np.maximum(found, -gap(scene, bodies, run.position, run.angle, pair))
     if mutual and bodies.round.all():
-        among = np.flatnonzero(meetings(scene).touches)
+        among = np.flatnonzero(contact_matrix(scene).touches)
         farthest = 2.0 * float(bodies.radius[among].max())
         for k, position in enumerate(run.position[:, among]):
             for i, j in near_pairs(position, farthest):

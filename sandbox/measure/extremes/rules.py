@@ -12,14 +12,15 @@ from functools import cached_property
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.compare.drift import momentum_drift
 from sandbox.measure.energy import energies
 from sandbox.measure.extremes.case import Case
 from sandbox.measure.extremes.overlaps import deepest, looked_at
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 SPREAD = 10.0
 """How many times farther than its start and its fall would carry it a body may get: chains have come to be 1e9 m long
@@ -90,7 +91,10 @@ def bounded(seen: Evidence) -> str | None:
     reach = SPREAD * (extent + fastest * time + 0.5 * math.hypot(*world.gravity) * time**2)
     worst = int(seen.moved.argmax())
     if seen.moved[worst] > reach:
-        return f"{bodies.names[worst]!r} got {seen.moved[worst]:.3g} m away; {reach:.3g} m are {SPREAD:g} times enough"
+        return (
+            f"{bodies.names[worst]!r} moved {seen.moved[worst]:.3g} m; the limit is {reach:.3g} m, "
+            f"{SPREAD:g} times the possible distance"
+        )
     return None
 
 
@@ -99,7 +103,7 @@ def energy(seen: Evidence) -> str | None:
     gain = seen.case.gain
     band = gain(seen.scene, seen.settings, str(seen.run.info["engine"])) if callable(gain) else gain
     if seen.gained > band:
-        return f"energy rose by {seen.gained:.3g} of the {seen.stake:.3g} J at stake; {band:.3g} may be"
+        return f"energy rose by {seen.gained:.3g} of the {seen.stake:.3g} J available; the limit is {band:.3g}"
     return None
 
 
@@ -107,7 +111,7 @@ def momentum(seen: Evidence) -> str | None:
     """Momentum as it was, but for what gravity and fixed things gave."""
     drift = momentum_drift(seen.run, seen.scene)
     if drift is not None and drift > MOMENTUM:
-        return f"momentum is off by {drift:.3g}; rounding leaves {MOMENTUM:g}"
+        return f"momentum changed by {drift:.3g}; the limit for rounding is {MOMENTUM:g}"
     return None
 
 
@@ -123,11 +127,11 @@ def overlap(seen: Evidence) -> str | None:
     """
     run, scene, h = seen.few, seen.scene, seen.settings.h
     fastest = np.maximum.accumulate(np.hypot(run.velocity[..., 0], run.velocity[..., 1]).max(axis=1))
-    closing = (2.0 if meetings(scene).mutual else 1.0) * (fastest + math.hypot(*scene.world.gravity) * h)
+    closing = (2.0 if contact_matrix(scene).mutual else 1.0) * (fastest + math.hypot(*scene.world.gravity) * h)
     deep, allowed = deepest(run, scene), SLOPS * (seen.settings.slop or 0.0) + closing * h + GRAZE
     worst = int((deep - allowed).argmax())
     if deep[worst] > allowed[worst]:
-        most = f"{SLOPS:g} slop + v·h is {allowed[worst]:.3g} m"
+        most = f"the limit {SLOPS:g} slop + v·h is {allowed[worst]:.3g} m"
         return f"an overlap of {deep[worst]:.3g} m at {run.time[worst]:.3g} s; {most}"
     return None
 
@@ -137,7 +141,7 @@ def parted(seen: Evidence) -> str | None:
     last = seen.run.at([-1])
     left, slop = float(deepest(last, seen.scene)[0]), seen.settings.slop or 0.0
     if left > SLOPS * slop + GRAZE:
-        return f"an overlap of {left:.3g} m is left; slop is {slop:.3g} m"
+        return f"an overlap of {left:.3g} m remains; slop is {slop:.3g} m"
     return None
 
 
@@ -165,7 +169,7 @@ def joints(seen: Evidence) -> str | None:
     """Joints hold to within a hundredth."""
     off = seen.run.info["joint_error"]
     if off is not None and off > JOINTS:
-        return f"a joint is off by {off:.3g} of its length"
+        return f"the error of a joint is {off:.3g} of its length"
     return None
 
 

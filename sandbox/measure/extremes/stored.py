@@ -2,17 +2,22 @@
 
 import json
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sandbox.echo import short_repr
 from sandbox.measure.extremes.boundary import TOLERANCE, Limit
 from sandbox.measure.extremes.matrix import Extremes
-from sandbox.whole import whole
+from sandbox.scene.files.nesting import check_text
+from sandbox.whole import read_whole, whole
 
 SLACK = 2.0
 """How many times the tolerance a boundary may have moved: both are known only to within it."""
+
+MAX_BYTES = 64 * 2**20
 
 Stored = Sequence[Mapping[str, Any]]
 
@@ -36,7 +41,7 @@ class Change:
         """Say it in a line."""
         word = "worse" if self.worse else "better"
         then, since = (_told(value) for value in (self.before, self.now))
-        return f"{self.axis} on {self.setup}: {word}: passed up to {then}, now up to {since}: {self.why}"
+        return f"{self.axis} on {self.setup}: {word}: passed up to {then} before, up to {since} now: {self.why}"
 
     def document(self) -> dict[str, Any]:
         """Return it as JSON can hold it."""
@@ -73,18 +78,29 @@ def read(path: str | Path) -> list[dict[str, Any]]:
         StoredError: the file cannot be read, or holds none.
     """
     try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        text = read_whole(Path(path), MAX_BYTES).decode("utf-8")
+        check_text(text)
+        document = json.loads(text)
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise StoredError(f"{path}: cannot be read: {reason}") from None
     limits = document.get("limits") if isinstance(document, dict) else None
-    needed = {"axis", "setup", "limit", "first_failure"}
-    if not isinstance(limits, list) or not all(isinstance(each, dict) and needed <= set(each) for each in limits):
-        raise StoredError(f"{path}: holds no boundaries; `sandbox extremes --out DIR` writes some, DIR/extremes.json")
+    if not isinstance(limits, list) or not all(isinstance(each, dict) and _is_limit(each) for each in limits):
+        raise StoredError(f"{path}: contains no boundaries; use an extremes.json of `sandbox extremes --out DIR`")
     for each in limits:
-        if not all(isinstance(each[key], int | float | None) for key in ("limit", "first_failure")):
-            raise StoredError(f"{path}: a limit of {each['axis']!r} is no number")
+        if not all(each[key] is None or _is_number(each[key]) for key in ("limit", "first_failure")):
+            raise StoredError(f"{path}: a limit of {short_repr(each['axis'])} is not a number")
     return limits
+
+
+def _is_limit(document: dict[str, Any]) -> bool:
+    named = all(isinstance(document.get(key), str) for key in ("axis", "setup"))
+    return named and {"limit", "first_failure"} <= document.keys()
+
+
+def _is_number(value: Any) -> bool:
+    """Tell whether a JSON value is a number that is finite as a float."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def changes(before: Stored, now: Sequence[Limit], tolerance: float = TOLERANCE) -> list[Change]:

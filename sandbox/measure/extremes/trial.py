@@ -13,10 +13,10 @@ from sandbox.measure.extremes.rules import Evidence
 from sandbox.measure.forecast import warnings
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.run import run
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 MOST_FRAMES = 2_000
 """Kept of a run: of more, only every n-th."""
@@ -34,10 +34,10 @@ def attempt(task: Task) -> Outcome:
         scene = from_document(case.document(task.parameters), "the scene", task.overrides)
         settings = _settings(scene, task)
     except SceneError as error:
-        return Outcome("refused", f"the scene format refuses: {error.faults[0].message}")
+        return Outcome("refused", f"invalid scene: {error.faults[0].message}")
     except ValidationError as error:
         first = error.errors()[0]
-        return Outcome("refused", f"the scene format refuses: {'.'.join(map(str, first['loc']))}: {first['msg']}")
+        return Outcome("refused", f"invalid scene: {'.'.join(map(str, first['loc']))}: {first['msg']}")
     predicted = tuple(dict.fromkeys(warning.kind for warning in warnings(scene, settings, task.engine)))
     engine = engine_named(task.engine)
     missing = engine.missing(scene, settings)
@@ -51,11 +51,11 @@ def attempt(task: Task) -> Outcome:
         if outcome.verdict != "failed":
             again = run(scene, task.engine, audit=False, **settings.model_dump())
             if again.info["state_hash"] != done.info["state_hash"]:
-                outcome = Outcome("failed", "the same run again ended in another state", "repeat")
+                outcome = Outcome("failed", "a repeated run ended in a different state", "repeat")
     except TooLargeError as error:
         return Outcome("refused", str(error), predicted=predicted, solver=solver)
     except MemoryError:
-        outcome = Outcome("failed", "ran out of memory", "process")
+        outcome = Outcome("failed", "out of memory", "process")
     return replace(outcome, predicted=predicted, solver=solver, seconds=perf_counter() - began)
 
 

@@ -1,4 +1,7 @@
-"""Warden: keeps one worker, asks it, and starts another where it hangs or dies."""
+"""Warden: keeps one worker, asks it, and starts another where it hangs or dies.
+
+A worker that was killed from outside says nothing of its task, which another worker gets again.
+"""
 
 import json
 import os
@@ -21,6 +24,10 @@ STARTING = 120.0
 """s until a worker has to be ready."""
 ALONE = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
 """Workers share the cores among themselves, and threads that do nothing take address space."""
+ATTEMPTS = 3
+"""times that a task is asked whose worker is killed from outside"""
+OUTSIDE = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
+"""Signals that come from outside: a limit of time or memory that a task exceeds raises none of them."""
 LAST_WORDS = 200
 """Characters of what a worker said before it died."""
 
@@ -49,6 +56,8 @@ class Warden:
         self._said: SimpleQueue[str | None] = SimpleQueue()
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115, closed with the warden
         self._closed = False
+        self._was_killed = False
+        """whether the task asked last ended by a signal from outside"""
         self._lock = threading.Lock()
         self.started = 0
         """how many workers there have been"""
@@ -60,6 +69,15 @@ class Warden:
             WorkerError: no worker can be started.
             InterruptedError: the warden has been closed meanwhile.
         """
+        for _ in range(ATTEMPTS):
+            self._was_killed = False
+            outcome = self._asked(task)
+            if not self._was_killed:
+                break
+        return outcome
+
+    def _asked(self, task: Task) -> Outcome:
+        """Ask once."""
         process = self._running()
         assert process.stdin is not None
         self._complaints.seek(0)
@@ -127,7 +145,7 @@ class Warden:
             if self._closed:
                 raise InterruptedError
             why = self._dead().reason
-            raise WorkerError(f"no worker can be started: {why}")
+            raise WorkerError(f"no worker process could be started: {why}")
         return self._process
 
     def _dead(self) -> Outcome:
@@ -141,6 +159,7 @@ class Warden:
         words = text.splitlines()[-1].strip()[-LAST_WORDS:] if text else ""
         self._end()
         reason = cause_of_death(status)
+        self._was_killed = reason.endswith(OUTSIDE)
         return Outcome("failed", f"{reason}: {words}" if words else reason, "process")
 
     def _end(self) -> None:

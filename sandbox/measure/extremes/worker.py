@@ -38,7 +38,7 @@ def serve(answer: Answer, memory: int) -> None:
         try:
             told = answer(asked["task"])
         except MemoryError:
-            told = {"verdict": "failed", "reason": "ran out of memory", "rule": "process"}
+            told = {"verdict": "failed", "reason": "out of memory", "rule": "process"}
         speak.write(json.dumps(told) + "\n")
 
 
@@ -50,9 +50,9 @@ def _own_output() -> TextIO:
 
 
 def _tell_of_compiling(speak: TextIO) -> None:
-    from sandbox.engines.compiling import COMPILING
+    from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 
-    COMPILING.on_begin = lambda _: print('{"compiling": true}', file=speak)
+    COMPILE_CLOCK.on_begin = lambda _: print('{"compiling": true}', file=speak)
 
 
 def _attempted(document: Mapping[str, Any]) -> Document:
@@ -66,7 +66,7 @@ def _attempted(document: Mapping[str, Any]) -> Document:
 
 def main() -> None:
     """Serve what is asked on standard input."""
-    import sandbox.engines.kernel
+    import sandbox.engines.common.kernel
     import sandbox.measure.extremes.trial  # noqa: F401, what takes long is imported before it says that it is ready
 
     serve(_attempted, int(sys.argv[1]))

@@ -12,12 +12,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sandbox.arrays import IntArray
 from sandbox.measure.forecast.speeds import top_speeds
 from sandbox.measure.forecast.warning import Figures, Warning, at_most
-from sandbox.scene.demands import FLOOR, demands
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.near import IntArray, near_pairs
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.demands import FLOOR, demands
+from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.scene import Scene
 
 FEW = 3
 """Balls below which there is no break."""
@@ -35,7 +36,7 @@ def break_notes(scene: Scene) -> Iterator[Warning]:
     bodies = scene.bodies
     if scene.surface is None or not demands(scene) & FLOOR or not bodies.round.all():
         return
-    meet = meetings(scene)
+    meet = contact_matrix(scene)
     all_meet = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
     balls = np.flatnonzero(all_meet & ~bodies.fixed)
     if len(balls) < FEW:
@@ -44,8 +45,8 @@ def break_notes(scene: Scene) -> Iterator[Warning]:
     touching = _touching(scene, balls)
     if touching >= FEW - 1:
         message = (
-            f"{touching:,} pairs of balls touch: they are hit at one instant, and rounding may say in which order; "
-            "positions after that can depend on dt and engine; gaps of 1e-8 m or more make them definite"
+            f"{touching:,} pairs of balls touch: they collide at one instant, and rounding decides in which order; "
+            "later positions can depend on dt and engine; gaps of 1e-8 m or more define the order"
         )
         yield Warning("rack", message, {"pairs": touching})
     speed = float(top_speeds(scene, meet)[balls].max())
@@ -53,8 +54,8 @@ def break_notes(scene: Scene) -> Iterator[Warning]:
     if way > FAR:
         safe = FAR * radius * scene.solver.substeps / speed
         message = (
-            f"at up to {speed:.3g} m/s balls go {way:.3g} radii in a substep, and pymunk may miss that they graze each "
-            f"other: positions can then be trusted until about the first such graze; dt <= {at_most(safe)} s sees all"
+            f"balls move up to {way:.3g} radii per substep ({speed:.3g} m/s), and pymunk may miss grazing contacts: "
+            f"positions are reliable until about the first one; dt <= {at_most(safe)} s detects all"
         )
         figures: Figures = {"speed": speed, "radii": way, "safe_dt": safe}
         yield Warning("graze", message, figures)

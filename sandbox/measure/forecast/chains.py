@@ -20,13 +20,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sandbox.engines.overlap import BIAS
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.base import BIAS
 from sandbox.measure.forecast.modes import Product, extremes, groups
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most, enough_work
-from sandbox.scene.links import LinkKind, Links
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray, IntArray
+from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 MEASURED = 0.93
 """The share of r/(2λ) at which chains were found to hold."""
@@ -62,21 +62,21 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Warning]:
         alike = MEASURED * 0.5 * rate / slowest(some, (inverse > 0.0).astype(np.float64))
         iterations, dt = enough_work(needed, settings.h, settings.substeps)
         figures: Figures = {"joints": len(some), "joint": some.names[0], "needed": needed, "has": has, "safe_dt": dt}
-        right = f"{needed:.3g} holds: solver.iterations >= {iterations:,}, or dt <= {at_most(dt)} s"
-        short = f"{settings.iterations} iterations every {settings.h:.3g} s are {has:.3g} a second"
+        right = f"use solver.iterations >= {iterations:,} or dt <= {at_most(dt)} s ({needed:.3g} a second)"
+        short = f"with {settings.iterations} iterations every {settings.h:.3g} s ({has:.3g} a second)"
         k, ratio = _most_unequal(some, inverse)
         if alike <= has * (1.0 + ROUNDING) and ratio >= UNEQUAL:
             first, second = bodies.names[int(some.a[k])], bodies.names[int(some.b[k])]
             message = (
-                f"the joint {some.names[k]!r} is between {first!r} and {second!r}, of which one is {ratio:.3g} times "
-                f"as heavy; {short}, and it would be torn apart; {right}"
+                f"the joint {some.names[k]!r} connects {first!r} and {second!r}, one of which is {ratio:.3g} times as "
+                f"heavy; {short} it would come apart; {right}"
             )
             yield Warning("mass_ratio", message, {**figures, "joint": some.names[k], "ratio": ratio})
         else:
-            message = (
-                f"{len(some):,} joints hang together with {some.names[0]!r}; {short}, and they would be torn apart; "
-                f"{right}"
-            )
+            name = f"the joint {some.names[0]!r} is heavily loaded"
+            if len(some) > 1:
+                name = f"{len(some):,} joints, {some.names[0]!r} among them, are connected"
+            message = f"{name}; {short} {'it' if len(some) == 1 else 'they'} would come apart; {right}"
             yield Warning("chain", message, figures)
 
 

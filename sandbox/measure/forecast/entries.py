@@ -6,14 +6,14 @@ import numpy as np
 
 from sandbox.measure.forecast.speeds import top_speeds
 from sandbox.measure.forecast.warning import ROUNDING, Warning, at_most
-from sandbox.scene.meetings import Meetings, reach
-from sandbox.scene.model import Scene
-from sandbox.scene.precinct import width_of
-from sandbox.scene.settings import Settings
-from sandbox.scene.zone import mask_of
+from sandbox.scene.compile.contacts import ContactMatrix, reach
+from sandbox.scene.description.fixed import mask_of
+from sandbox.scene.description.world import Settings
+from sandbox.scene.geometry.shapes import width_of
+from sandbox.scene.scene import Scene
 
 
-def entry_warnings(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
+def entry_warnings(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Warning]:
     """Yield a warning for each zone that the fastest body can fly through, where it is narrowest, in a substep."""
     noted = np.flatnonzero(meet.noted)
     if not len(noted):
@@ -31,8 +31,8 @@ def entry_warnings(scene: Scene, settings: Settings, meet: Meetings) -> Iterator
             continue
         safe = width / speed * settings.substeps
         message = (
-            f"{who!r} can get to {speed:.4g} m/s, {speed * settings.h:.3g} m a substep, and fly through the zone "
-            f"{name!r}, {width:.3g} m wide where it is narrowest, without being noted: odds up to {100 * odds:.3g} %; "
-            f"dt <= {at_most(safe)} s would be safe"
+            f"{who!r} can reach {speed:.4g} m/s, {speed * settings.h:.3g} m per substep, and pass through the zone "
+            f"{name!r}, {width:.3g} m wide at its narrowest, undetected: odds up to {100 * odds:.3g} %; "
+            f"dt <= {at_most(safe)} s is safe"
         )
         yield Warning("entry", message, {"ball": who, "thing": name, "speed": speed, "odds": odds, "safe_dt": safe})

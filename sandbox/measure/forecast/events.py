@@ -13,8 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from sandbox.measure.forecast.warning import Figures, Warning
-from sandbox.scene.meetings import Meetings
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.contacts import ContactMatrix
+from sandbox.scene.scene import Scene
 
 ALLOWED, ALLOWED_EACH = 1_000_000, 1_000
 """Events a simulated second: the first, or the second for each ball where that is more, as `exact` has them."""
@@ -24,7 +24,7 @@ STEADY = 10.0
 """m/s² of gravity up to which that holds."""
 
 
-def event_rate(scene: Scene, meet: Meetings) -> float:
+def event_rate(scene: Scene, meet: ContactMatrix) -> float:
     """Return an upper estimate of the events a second that `exact` has once all balls lie on each other.
 
     Counted are the balls that start above others: they may yet come to lie beside them. 0 where nothing can come to
@@ -55,7 +55,7 @@ def _columns(scene: Scene) -> int:
     return columns
 
 
-def event_warnings(scene: Scene, meet: Meetings) -> Iterator[Warning]:
+def event_warnings(scene: Scene, meet: ContactMatrix) -> Iterator[Warning]:
     """Yield a warning where `exact` would give up, as it has more events than it allows."""
     warning = event_warning(event_rate(scene, meet), len(scene.bodies))
     if warning is not None:
@@ -67,10 +67,10 @@ def event_warning(rate: float, bodies: int) -> Warning | None:
     allowed = max(ALLOWED, ALLOWED_EACH * bodies)
     if rate <= allowed:
         return None
-    many = f"{rate:.2g} times a second" if math.isfinite(rate) else "ever more often"
+    many = f"{rate:.2g} times a second" if math.isfinite(rate) else "without bound"
     message = (
-        f"balls that come to rest on each other hop {many} on `exact`, which allows {allowed:,} events a simulated "
-        "second and stops with an error beyond; pymunk and reference let them lie"
+        f"balls that come to rest on each other collide {many} on `exact`, which allows {allowed:,} events a simulated "
+        "second and stops with an error beyond; pymunk and reference let them rest"
     )
     figures: Figures = {"rate": min(rate, MOST_RATE), "allowed": allowed}
     return Warning("event_rate", message, figures)

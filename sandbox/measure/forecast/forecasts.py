@@ -13,17 +13,17 @@ from sandbox.measure.forecast.joint_starts import joint_start_warnings
 from sandbox.measure.forecast.kicks import kick_warnings
 from sandbox.measure.forecast.laid import Laid, laid
 from sandbox.measure.forecast.orbits import orbit_warnings
-from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, Passage, farther, meet_each_other, passages
+from sandbox.measure.forecast.overlaps import overlap_warnings
+from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY, Passage, farther, passages
 from sandbox.measure.forecast.speeds import Speeds
 from sandbox.measure.forecast.springs import damper_warnings, spring_warnings
 from sandbox.measure.forecast.stacks import stack_warnings
 from sandbox.measure.forecast.stretch import stretch_warnings
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most
-from sandbox.scene.meetings import Meetings, meetings, reach
-from sandbox.scene.model import Plane, Scene
-from sandbox.scene.settings import Settings
-from sandbox.scene.starts import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps
-from sandbox.scene.zone import mask_of
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix, reach
+from sandbox.scene.description.fixed import Plane, mask_of
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 ENOUGH_ITERATIONS = 3
 """With fewer, bouncing groups can gain energy on pymunk. Measured on break shots of 6 to 36 balls, e = 0.95 and 1, 240
@@ -43,9 +43,6 @@ FAILED = "failed_forecast"
 EVENT_DRIVEN = frozenset({"exact"})
 """Engines that take no steps, and refuse what overlaps."""
 
-GRAZE = 1e-6
-"""The share of a half width by which bodies that were laid out to touch may overlap: rounding."""
-
 
 @dataclass(frozen=True)
 class Situation:
@@ -55,9 +52,9 @@ class Situation:
     settings: Settings
 
     @cached_property
-    def meet(self) -> Meetings:
+    def meet(self) -> ContactMatrix:
         """Which bodies can touch what."""
-        return meetings(self.scene)
+        return contact_matrix(self.scene)
 
     @cached_property
     def close(self) -> Laid:
@@ -99,13 +96,13 @@ def warnings(scene: Scene, settings: Settings | None = None, engine: str | None 
 def _duration(scene: Scene, settings: Settings) -> Iterator[Warning]:
     if settings.dt > scene.world.duration * (1.0 + ROUNDING):
         message = (
-            f"dt, {settings.dt:g} s, is longer than the run, {scene.world.duration:g} s: its end is a part of one "
+            f"dt, {settings.dt:g} s, is longer than the run, {scene.world.duration:g} s: it ends within its first "
             "step, in which no contact is found"
         )
         yield Warning("duration", message, {"dt": settings.dt, "duration": scene.world.duration})
 
 
-def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
+def _tunnelling(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Warning]:
     times = farther(settings)
     at_risk = [passage for passage in passages(scene, meet) if passage.odds(settings.h / times) > ROUNDING]
     own = {passage.thing for passage in at_risk if not passage.struck}
@@ -123,8 +120,8 @@ def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Wa
         if passage.struck:
             ball += ", struck by others,"
         message = (
-            f"{ball} can close on {thing} at up to {passage.speed:.4g} m/s, {way:.3g} m a substep, "
-            f"and pass through unseen: odds up to {100 * odds:.3g} %; dt <= {at_most(safe)} s would be safe"
+            f"{ball} can approach {thing} at up to {passage.speed:.4g} m/s, {way:.3g} m per substep, and tunnel "
+            f"through it undetected: odds up to {100 * odds:.3g} %; dt <= {at_most(safe)} s is safe"
         )
         figures: Figures = {
             "ball": passage.ball,
@@ -139,7 +136,7 @@ def _tunnelling(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Wa
         yield Warning("tunnelling", message, figures)
 
 
-def _depth(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
+def _depth(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Warning]:
     """Yield what gets behind the surface of a plane by more than its half width before the contact is found.
 
     A contact is found at the end of a substep, up to v·h deep; a plane pushes a body out from there. `bisect`, `swept`
@@ -167,8 +164,8 @@ def _depth(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning
         safe = settings.dt * half / way
         more = f" and {others:,} other{'s' if others > 1 else ''} like it" if others else ""
         message = (
-            f"{body!r} can meet {name!r}{more} at up to {top:.4g} m/s and be {way:.3g} m deep in it when the contact "
-            f"is found; dt <= {at_most(safe)} s keeps that below its half width, {half:.3g} m"
+            f"{body!r} can hit {name!r}{more} at up to {top:.4g} m/s and penetrate by {way:.3g} m before the contact "
+            f"is detected; dt <= {at_most(safe)} s keeps that below its half width, {half:.3g} m"
         )
         figures: Figures = {"ball": body, "thing": name, "speed": top, "depth": way, "safe_dt": safe}
         yield Warning("depth", message, figures)
@@ -184,42 +181,18 @@ def alike(found: Iterable[Passage]) -> list[tuple[Passage, int]]:
     return list(groups.values())
 
 
-def _overlaps(scene: Scene, meet: Meetings, close: Laid) -> Iterator[Warning]:
-    """Count what overlaps at the start, other than what joints keep from meeting."""
-    bodies = scene.bodies
-    if not meet.mutual:
-        return
-    among = np.flatnonzero(meet_each_other(bodies) & meet.touches & ~bodies.fixed & bodies.round)
-    most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(among)  # a scene with more is refused
-    owner = np.where(bodies.group > 0, bodies.group, -1 - np.arange(len(bodies)))[among]
-    balls = count_overlaps(bodies.position[among], bodies.radius[among], most, owner)
-    first, second = scene.links.apart().T
-    joined = np.isin(first, among) & np.isin(second, among)
-    joined &= (bodies.group[first] == 0) | (bodies.group[first] != bodies.group[second])
-    away = (
-        np.hypot(*(bodies.position[first] - bodies.position[second]).T) - bodies.radius[first] - bodies.radius[second]
-    )
-    balls -= int((joined & (away < 0.0)).sum())
-    deep = close.gap < -GRAZE * np.minimum(bodies.thin[close.first], bodies.thin[close.second])
-    deep &= ~bodies.fixed[close.first] & ~bodies.fixed[close.second]
-    pairs = balls + int(deep.sum())
-    if pairs > 0:
-        what = "bodies" if deep.any() else "balls"
-        message = f"{pairs:,} pair(s) of {what} overlap at the start; the engine will push them apart"
-        yield Warning("overlap", message, {"pairs": pairs})
-
-
-def _iterations(settings: Settings, meet: Meetings) -> Iterator[Warning]:
+def _iterations(settings: Settings, meet: ContactMatrix) -> Iterator[Warning]:
     if meet.mutual and settings.iterations < ENOUGH_ITERATIONS and meet.restitution > 0:
         what = "balls" if meet.ball_ball else "bodies"
+        noun = "iteration" if settings.iterations == 1 else "iterations"
         message = (
-            f"{settings.iterations} iteration(s) with bouncing {what}: groups can gain energy; "
-            f"iterations >= {ENOUGH_ITERATIONS} is sound"
+            f"{settings.iterations} {noun} with bouncing {what}: groups can gain energy; "
+            f"use iterations >= {ENOUGH_ITERATIONS}"
         )
         yield Warning("iterations", message, {"iterations": settings.iterations})
 
 
-def _rounding(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
+def _rounding(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Warning]:
     bodies = scene.bodies
     colliders = meet.touches & ~bodies.fixed
     if colliders.any():
@@ -229,7 +202,7 @@ def _rounding(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warn
             name = bodies.names[int(np.flatnonzero(colliders)[np.argmax(spacing)])]
             message = (
                 f"{name!r} is so far from the origin that its position is rounded to {worst:.2g} of its radius; "
-                "move the scene closer"
+                "move the scene closer to it"
             )
             yield Warning("rounding", message, {"ball": name, "share": worst})
             return
@@ -240,8 +213,8 @@ def _rounding(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warn
         if worst > LOST:
             name = bodies.names[int(np.flatnonzero(colliders)[np.argmax(lost)])]
             message = (
-                f"{name!r} is so far from the origin that its way of {way[np.argmax(lost)]:.3g} m in a substep is "
-                f"rounded by up to {worst:.2g} of itself; move the scene closer"
+                f"{name!r} is so far from the origin that rounding changes its displacement of "
+                f"{way[np.argmax(lost)]:.3g} m per substep by up to {100 * worst:.2g} %; move the scene closer to it"
             )
             yield Warning("rounding", message, {"ball": name, "share": worst})
 
@@ -251,7 +224,7 @@ FORECASTS: dict[str, Forecast] = {
     "tunnelling": Forecast(lambda s: _tunnelling(s.scene, s.settings, s.meet)),
     "depth": Forecast(lambda s: _depth(s.scene, s.settings, s.meet)),
     "entry": Forecast(lambda s: entry_warnings(s.scene, s.settings, s.meet)),
-    "overlap": Forecast(lambda s: _overlaps(s.scene, s.meet, s.close)),
+    "overlap": Forecast(lambda s: overlap_warnings(s.scene, s.meet, s.close)),
     "iterations": Forecast(lambda s: _iterations(s.settings, s.meet), frozenset({"pymunk"})),
     "rounding": Forecast(lambda s: _rounding(s.scene, s.settings, s.meet)),
     "kicks": Forecast(lambda s: kick_warnings(s.scene, s.settings, s.meet)),

@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 
-from sandbox.scene.links import WORLD, LinkKind
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
+from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
+from sandbox.scene.scene import Scene
 
 Ways = list[list[tuple[int, float]]]
 

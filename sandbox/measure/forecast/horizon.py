@@ -17,8 +17,8 @@ import numpy as np
 
 from sandbox.measure.compare.horizon import NUDGE
 from sandbox.measure.forecast.warning import Figures, Warning
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.scene import Scene
 
 TOLERANCE = 0.01
 """The share of the smallest radius that is too much, as where engines are compared."""
@@ -35,7 +35,7 @@ def horizon(scene: Scene) -> float | None:
 
     A gas are balls that meet each other in a box of level and upright planes, without gravity, joints or drag.
     """
-    bodies, world, meet = scene.bodies, scene.world, meetings(scene)
+    bodies, world, meet = scene.bodies, scene.world, contact_matrix(scene)
     movers = meet.touches & ~bodies.fixed
     count = int(movers.sum())
     if not meet.mutual or count < FEWEST or not bodies.round.all() or len(scene.links) or scene.attractions:
@@ -77,8 +77,8 @@ def horizon_notes(scene: Scene) -> Iterator[Warning]:
     until = horizon(scene)
     if until is not None and until < scene.world.duration:
         message = (
-            f"positions are chaotic: 1e-12 m grow to a hundredth of a radius in about {until:.2g} s of "
-            f"{scene.world.duration:g}; beyond, compare energy, momentum and speeds"
+            f"positions are chaotic: an error of 1e-12 m grows to 1 % of a radius in about {until:.2g} s of "
+            f"{scene.world.duration:g} s; after that, compare only energy, momentum and speeds"
         )
         figures: Figures = {"until": until}
         yield Warning("horizon", message, figures)

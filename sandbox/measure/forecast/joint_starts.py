@@ -4,11 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sandbox.arrays import BoolArray
 from sandbox.measure.forecast.warning import Figures, Warning
 from sandbox.measure.joint_error import sizes, starting_errors
-from sandbox.scene.links import WORLD, LinkKind, Links
-from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray
+from sandbox.scene.compile.joint_arrays import WORLD, LinkKind, Links
+from sandbox.scene.scene import Scene
 
 LOOSE = 0.01
 """An error below this part of a joint's length is rounding of the figures in a file, which have two or three digits."""
@@ -19,7 +19,7 @@ FAR = 2.0
 ANGLES = (LinkKind.ROTARY_LIMIT, LinkKind.GEAR)
 ANCHORED = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.SPRING)
 
-ORDER = "of a joint with one body, the first of its `anchors` is in the body's frame and the second in the world"
+ORDER = "in a joint with one body, the first of `anchors` is in the frame of the body, the second in world coordinates"
 
 
 def joint_start_warnings(scene: Scene) -> Iterator[Warning]:
@@ -43,8 +43,8 @@ def joint_start_warnings(scene: Scene) -> Iterator[Warning]:
         name, body = links.names[k], scene.bodies.names[int(links.b[k])]
         x, y = links.anchor_b[k].tolist()
         message = (
-            f"the joint {name!r} holds {body!r} by the point ({x:g}, {y:g}), {np.hypot(x, y):.3g} m from its centre "
-            f"and outside it: {ORDER}; swapped, they would fit{_and_others(others)}"
+            f"the joint {name!r} is attached to {body!r} at ({x:g}, {y:g}), outside the body and "
+            f"{np.hypot(x, y):.3g} m from its centre: {ORDER}; swapped, they would fit{_and_others(others)}"
         )
         yield Warning("anchors", message, {"joint": name, "body": body, "others": others})
 
@@ -53,7 +53,7 @@ def _off(links: Links, k: int, error: float, others: int) -> Warning:
     """Return the warning for a joint that starts off by an error, m or rad."""
     unit, name = "rad" if links.kind[k] in ANGLES else "m", links.names[k]
     message = (
-        f"the joint {name!r} starts {error:.3g} {unit} away from what it holds{_and_others(others)}; "
+        f"the joint {name!r} starts with an error of {error:.3g} {unit}{_and_others(others)}; "
         "the first steps correct it, which adds energy"
     )
     figures: Figures = {"joint": name, "error": error, "others": others}
@@ -61,7 +61,7 @@ def _off(links: Links, k: int, error: float, others: int) -> Warning:
 
 
 def _and_others(count: int) -> str:
-    return f" (and {count:,} other{'s' if count > 1 else ''} too)" if count else ""
+    return f" (and {count:,} other{'s' if count > 1 else ''})" if count else ""
 
 
 def _swapped(scene: Scene, links: Links) -> BoolArray:

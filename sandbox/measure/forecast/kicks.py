@@ -6,12 +6,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from sandbox.measure.forecast.warning import Warning, at_most
-from sandbox.scene.meetings import Meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.contacts import ContactMatrix
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 
-def kick_warnings(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
+def kick_warnings(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Warning]:
     """Yield a warning where a step of gravity alone makes what comes to lie as fast as a hit.
 
     Contacts are found at the end of a substep: until then what touches has fallen on, by g·h more.
@@ -23,7 +23,7 @@ def kick_warnings(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[
         if kick is not None and bool(np.asarray(touched)[number]) and fall >= kick.threshold:
             safe = settings.dt * kick.threshold / fall
             message = (
-                f"{name!r} kicks what closes at {kick.threshold:g} m/s, which a substep of gravity gives to what only "
-                f"comes to lie there; dt < {at_most(safe)} s, or a higher threshold, would be safe"
+                f"{name!r} kicks bodies that approach at {kick.threshold:g} m/s, which one substep of gravity gives to "
+                f"a body that rests there; use dt < {at_most(safe)} s or a higher threshold"
             )
             yield Warning("kick_threshold", message, {"thing": name, "threshold": kick.threshold, "fall": fall})

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.measure.distance import hull_distance
 from sandbox.measure.forecast.passages import meet_each_other
 from sandbox.measure.lying import pieces_over_time
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.scene.near import near_pairs
-from sandbox.trajectory import FloatArray, IntArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.scene import Scene
 
 CLOSE = 0.02
 """The share of the thinner one's half width within which two bodies lie on each other."""

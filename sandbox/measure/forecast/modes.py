@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sandbox.trajectory import FloatArray, IntArray
+from sandbox.arrays import FloatArray, IntArray
 
 DENSE = 400
 """Rows up to which a matrix is written out and solved at once."""

@@ -9,10 +9,11 @@ from sandbox.measure.forecast.breaks import break_notes
 from sandbox.measure.forecast.horizon import horizon_notes
 from sandbox.measure.forecast.speeds import top_speeds
 from sandbox.measure.forecast.warning import Warning
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Mover, Scene
-from sandbox.scene.shapes import form_of
-from sandbox.scene.solids import Compound, Polygon, PolygonPart
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.description.base import BodySource
+from sandbox.scene.description.bodies import Compound, Polygon, PolygonPart
+from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.scene import Scene
 
 MOST_TOLD = 20
 """Outlines told of one by one."""
@@ -41,7 +42,7 @@ def _pixels(scene: Scene) -> Iterator[Warning]:
         points = ", and points up, as y does here" if upward > 0.0 else ""
         message = (
             f"bodies are {width:.3g} m wide, and gravity is {pull:.4g} m/s²{points}: are these pixels? Lengths are in "
-            "metres, y points up; with, say, 100 pixels a metre, divide lengths, speeds and gravity by 100"
+            "metres and y points up; for 100 pixels per metre, divide lengths, speeds and gravity by 100"
         )
         yield Warning("pixels", message, {"width": width, "gravity": pull})
 
@@ -57,7 +58,7 @@ FIRST_ORDER = (None, "explicit_euler", "semi_implicit_euler")
 def _flight(scene: Scene) -> Iterator[Warning]:
     """Yield a note where a first-order integrator puts a body off by more than its half width within one flight."""
     bodies, solver, pull = scene.bodies, scene.solver, math.hypot(*scene.world.gravity)
-    meet = meetings(scene)
+    meet = contact_matrix(scene)
     able = np.flatnonzero(meet.touches & ~bodies.fixed & (bodies.thin > 0.0))
     if pull == 0.0 or not len(able) or solver.half_kick or solver.integrator not in FIRST_ORDER:
         return
@@ -68,7 +69,7 @@ def _flight(scene: Scene) -> Iterator[Warning]:
         return
     body, scheme = bodies.names[able[k]], solver.integrator or "explicit_euler"
     message = (
-        f"{scheme} puts {body!r} off by g·h·t/2 = up to {off[k]:.3g} m within one flight of {time[k]:.3g} s, more than "
+        f"{scheme} displaces {body!r} by g·h·t/2, up to {off[k]:.3g} m within one flight of {time[k]:.3g} s, more than "
         f"its half width, {bodies.thin[able[k]]:.3g} m; solver.half_kick on pymunk, velocity_verlet on the reference, "
         "and `exact` have no such error"
     )
@@ -86,11 +87,11 @@ def _outlines(scene: Scene) -> Iterator[Warning]:
             if told > MOST_TOLD:
                 return
             which = f"the outline of {name!r}" if part is None else f"outline {part + 1} of {name!r}"
-            message = f"{which} is concave and is cut into {count} convex pieces"
+            message = f"{which} is concave and is decomposed into {count} convex pieces"
             yield Warning("outline", message, {"body": name, "pieces": count})
 
 
-def _pieces(element: Mover) -> list[tuple[int | None, int]]:
+def _pieces(element: BodySource) -> list[tuple[int | None, int]]:
     """Return which outlines of an element are cut, by their number among its polygons, and into how many pieces."""
     pieces = form_of(element).pieces
     if isinstance(element, Polygon):
@@ -109,14 +110,14 @@ def _pieces(element: Mover) -> list[tuple[int | None, int]]:
 
 def _audit(scene: Scene) -> Iterator[Warning]:
     bodies = scene.bodies
-    some = meetings(scene).touches & ~bodies.round
+    some = contact_matrix(scene).touches & ~bodies.round
     count, without = int(some.sum()), int((some & (bodies.core <= 0.0)).sum())
     if not count:
         return
     message = (
-        f"missed contacts are a least figure: of {count:,} bodies that are no balls one counts only where the largest "
-        "disc inside, about the centre of mass, went through"
+        f"missed contacts are a lower bound: of the {count:,} bodies that are not balls, only passages of the largest "
+        "inscribed disc about the centre of mass are counted"
     )
     if without:
-        message += f"; {without:,} have no such disc, and theirs are not counted"
+        message += f"; {without:,} have no such disc and are not counted"
     yield Warning("audit", message, {"bodies": count, "without": without})

@@ -10,24 +10,24 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.forecast.speeds import Speeds
 from sandbox.measure.forecast.warning import Figures, Warning, at_most
-from sandbox.scene.meetings import Meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.contacts import ContactMatrix
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 TURN = 0.2
 """rad: with less, symplectic schemes keep the energy of an orbit within some percent."""
 
 
-def orbit_warnings(scene: Scene, settings: Settings, meet: Meetings) -> Iterator[Warning]:
+def orbit_warnings(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Warning]:
     """Yield a warning for each attraction that turns a body's velocity by more than `TURN` in a substep."""
     bodies, speeds = scene.bodies, Speeds(scene, meet)
     for number, each in enumerate(scene.attractions):
         if each.strength <= 0.0:
             continue
-        own = bodies.names.index(each.toward) if isinstance(each.toward, str) else None
+        own = bodies.number_of[each.toward] if isinstance(each.toward, str) else None
         place = bodies.position[own] if own is not None else np.asarray(each.toward)
         away, velocity = bodies.position - place, bodies.velocity
         distance, speed = np.hypot(*away.T), np.hypot(*velocity.T)
@@ -59,9 +59,9 @@ def orbit_warnings(scene: Scene, settings: Settings, meet: Meetings) -> Iterator
         name = each.name or f"attraction {number + 1}"
         safe = settings.dt * TURN / float(turn[k])
         message = (
-            f"{name!r} turns the velocity of {bodies.names[k]!r} by {min(float(turn[k]), MOST_TURN):.3g} rad within a "
-            f"substep where it is nearest, {nearest[k]:.3g} m: energy is not kept; "
-            + (f"dt <= {at_most(safe)} s would be right" if safe > 0.0 else "some softening would be right")
+            f"{name!r} turns the velocity of {bodies.names[k]!r} by {min(float(turn[k]), MOST_TURN):.3g} rad in one "
+            f"substep at its closest distance, {nearest[k]:.3g} m, so energy is not conserved; "
+            + (f"dt <= {at_most(safe)} s is safe" if safe > 0.0 else "add softening")
         )
         figures: Figures = {"body": bodies.names[k], "turn": min(float(turn[k]), MOST_TURN), "safe_dt": safe}
         yield Warning("orbit", message, figures)

@@ -11,16 +11,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.measure.forecast.speeds import Speeds
 from sandbox.measure.forecast.warning import ROUNDING
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.meetings import Meetings, meetings
-from sandbox.scene.meetings import reach as reach_of
-from sandbox.scene.model import Plane, Post, Scene, Wall
-from sandbox.scene.near import BoolArray, FloatArray, IntArray
-from sandbox.scene.part import BACKING
-from sandbox.scene.settings import Settings
-from sandbox.scene.zone import mask_of
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.contacts import reach as reach_of
+from sandbox.scene.description.base import BACKING
+from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 ANOTHER = "another ball"
 ANOTHER_BODY = "another body"
@@ -59,7 +59,7 @@ def largest_safe_dt(scene: Scene, settings: Settings | None = None) -> float | N
     that no formula bounds.
     """
     settings = scene.solver if settings is None else settings
-    meet = meetings(scene)
+    meet = contact_matrix(scene)
     found, times = passages(scene, meet), farther(settings)
     if found and math.isfinite(times) and Speeds(scene, meet).unknown:
         return None
@@ -83,13 +83,13 @@ ALIKE = 1.1
 """Ratio of the shortest substeps of two bodies up to which they are one passage."""
 
 
-def passages(scene: Scene, meet: Meetings | None = None) -> list[Passage]:
+def passages(scene: Scene, meet: ContactMatrix | None = None) -> list[Passage]:
     """Return for each thing, and for bodies among themselves, which bodies can pass it, each at its own speed.
 
     Bodies about as fast for their size are one passage, which has the figures of the worst of them. Where impacts by
     others can make a body faster than any is by itself, the worst such passage is added.
     """
-    meet = meetings(scene) if meet is None else meet
+    meet = contact_matrix(scene) if meet is None else meet
     bodies = scene.bodies
     movers = np.flatnonzero(meet.touches & ~bodies.fixed)
     if not len(movers):

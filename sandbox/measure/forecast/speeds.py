@@ -6,16 +6,17 @@ from functools import cached_property
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.forecast.held import farthest_fall
 from sandbox.measure.forecast.warning import ROUNDING
-from sandbox.scene.forces import Attraction
-from sandbox.scene.links import LinkKind
-from sandbox.scene.meetings import Meetings, meetings
-from sandbox.scene.model import Plane, Post, Scene, Wall
-from sandbox.scene.near import FloatArray
-from sandbox.scene.part import MAX_SPEED
-from sandbox.scene.potential import Potential
-from sandbox.scene.starts import height_above
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.potential import Potential
+from sandbox.scene.description.base import MAX_SPEED
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.description.forces import Attraction
+from sandbox.scene.scene import Scene
+from sandbox.scene.validate.bodies import height_above
 
 MOST_CLASSES = 200
 """Masses that are told apart in a chain of impacts; of more, neighbouring ones count as one."""
@@ -26,7 +27,7 @@ class Speeds:
     """Bounds of the speeds of a scene's N bodies."""
 
     scene: Scene
-    meet: Meetings
+    meet: ContactMatrix
 
     @cached_property
     def unknown(self) -> tuple[str, ...]:
@@ -39,7 +40,7 @@ class Speeds:
         if len(scene.links.of(LinkKind.MOTOR)):
             found.append("motors")
         if any(thrust.key is not None for thrust in scene.thrusts):
-            found.append("thrusts by key")
+            found.append("thrusts on keys")
         return tuple(found)
 
     @cached_property
@@ -76,8 +77,8 @@ class Speeds:
         scene, bodies = self.scene, self.scene.bodies
         added = np.zeros(len(bodies))
         for each in scene.thrusts:
-            if each.key is None and each.body in bodies.names:
-                number = bodies.names.index(each.body)
+            if each.key is None and each.body in bodies.number_of:
+                number = bodies.number_of[each.body]
                 end = scene.world.duration if each.end is None else min(each.end, scene.world.duration)
                 added[number] += math.hypot(*each.force) * max(0.0, end - each.begin) / bodies.mass[number]
         return added
@@ -173,7 +174,7 @@ class Speeds:
         """Return how near its centre bodies can get at most, m: to what is solid there."""
         scene, bodies = self.scene, self.scene.bodies
         if isinstance(attraction.toward, str):
-            core = float(bodies.core[bodies.names.index(attraction.toward)])
+            core = float(bodies.core[bodies.number_of[attraction.toward]])
             return core if self.meet.mutual else 0.0
         posts = (
             post for post in scene.posts if post.solid and math.dist(post.position, attraction.toward) < post.radius
@@ -188,7 +189,7 @@ class Speeds:
         """Return the integral of 1/(r² + ε²) over each body's way to the centre, or far away from it, (N,) 1/m."""
         bodies, soft, near = self.scene.bodies, attraction.softening, self.core(attraction)
         toward = attraction.toward
-        place = bodies.position[bodies.names.index(toward)] if isinstance(toward, str) else np.asarray(toward)
+        place = bodies.position[bodies.number_of[toward]] if isinstance(toward, str) else np.asarray(toward)
         away = np.maximum(np.hypot(*(bodies.position - place).T), near)
         drawn = attraction.strength > 0.0
         if soft == 0.0:
@@ -241,16 +242,16 @@ class Speeds:
 
 def unknown_speeds(scene: Scene) -> tuple[str, ...]:
     """Return what makes bodies of a scene faster by an amount that no formula bounds."""
-    return Speeds(scene, meetings(scene)).unknown
+    return Speeds(scene, contact_matrix(scene)).unknown
 
 
-def top_speeds(scene: Scene, meet: Meetings) -> FloatArray:
+def top_speeds(scene: Scene, meet: ContactMatrix) -> FloatArray:
     """Return about how fast each body can get, (N,) m/s: an upper bound where `Speeds.bounded`."""
     speeds = Speeds(scene, meet)
     return np.maximum(speeds.own, speeds.struck)
 
 
-def _kicked(meet: Meetings) -> float:
+def _kicked(meet: ContactMatrix) -> float:
     """Return how fast kicks make a body, m/s, that always comes back; by one kick where there is no end."""
     surfaces, fastest = meet.surfaces, 0.0
     for b in np.flatnonzero(surfaces.kicks).tolist():

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.measure.forecast.modes import extremes, groups
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most
-from sandbox.scene.links import LinkKind, Links
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray, IntArray
+from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 LIMITS = {"semi_implicit_euler": 2.0, "velocity_verlet": 2.0, "leapfrog": 2.0, "rk4": 2.0 * math.sqrt(2.0)}
 """ω·h from which on a scheme makes a swing grow. Explicit Euler does at any."""
@@ -43,9 +43,9 @@ def spring_warnings(scene: Scene, settings: Settings) -> Iterator[Warning]:
                 growth = math.exp(rate) if rate < math.log(MOST_GROWTH) else MOST_GROWTH
                 more = f"{growth:.3g}" if growth < MOST_GROWTH else f"more than {MOST_GROWTH:g}"
                 message = (
-                    f"{mode.swings} at up to ω = {mode.omega:.4g} rad/s, and explicit_euler makes that grow at any "
-                    f"step, here {more} times a second in amplitude on the reference; leave solver.integrator out, or "
-                    "use semi_implicit_euler"
+                    f"{mode.swings} at up to ω = {mode.omega:.4g} rad/s, and explicit_euler amplifies that at any "
+                    f"step, here by a factor of {more} a second on reference; remove solver.integrator or set it to "
+                    "semi_implicit_euler"
                 )
                 yield Warning("spring", message, {**figures, "growth": growth})
             continue
@@ -53,10 +53,10 @@ def spring_warnings(scene: Scene, settings: Settings) -> Iterator[Warning]:
         if z < NEAR * limit:
             continue
         safe = NEAR * limit / mode.omega * settings.substeps
-        what = "grows without bound" if z >= limit * (1.0 - ROUNDING) else "is close to growing"
+        what = "is unstable" if z >= limit * (1.0 - ROUNDING) else "is almost unstable"
         message = (
-            f"{mode.swings} at up to ω = {mode.omega:.4g} rad/s: ω·h = {z:.3g} {what}, the limit is {limit:.3g}; "
-            f"dt <= {at_most(safe)} s would be right"
+            f"{mode.swings} at up to ω = {mode.omega:.4g} rad/s: ω·h = {z:.3g} {what} (limit {limit:.3g}); "
+            f"dt <= {at_most(safe)} s is stable"
         )
         yield Warning("spring", message, {**figures, "limit": limit, "safe_dt": safe})
 
@@ -82,8 +82,8 @@ def damper_warnings(scene: Scene, settings: Settings) -> Iterator[Warning]:
             continue
         safe = settings.dt * limit / damped
         message = (
-            f"the damping of {mode.group} is too strong for the step on the reference: c·h/m = {damped:.3g}, and "
-            f"from {limit:.3g} on velocities grow without bound; dt <= {at_most(safe)} s, or pymunk, would be right"
+            f"the damping of {mode.group} is too strong for the step on reference: c·h/m = {damped:.3g} is "
+            f"unstable (limit {limit:.3g}); use dt <= {at_most(safe)} s or the engine pymunk"
         )
         figures: Figures = {"joint": mode.joint, "damping_h": damped, "limit": limit, "safe_dt": safe}
         yield Warning("spring", message, figures)
@@ -109,15 +109,15 @@ class Mode(NamedTuple):
         return (
             f"the {self.springs:,} springs connected with {self.joint!r}"
             if self.springs > 1
-            else f"spring {self.joint!r}"
+            else f"the spring {self.joint!r}"
         )
 
     @property
     def swings(self) -> str:
         """The group and its verb."""
         if self.springs > 1:
-            return f"the {self.springs:,} springs that hang together with {self.joint!r} swing"
-        return f"the spring {self.joint!r} swings"
+            return f"the {self.springs:,} springs connected with {self.joint!r} oscillate"
+        return f"the spring {self.joint!r} oscillates"
 
 
 def fastest(scene: Scene) -> list[Mode]:

@@ -4,7 +4,10 @@ Measured on pymunk 7.3.1, boxes laid out to touch, friction 0.5, gravity 9.81 m/
 
 A tower of n boxes, s high each, 5 to 20 of 0.5 and 1 m, 60 to 480 Hz, 10 s: it falls while iterations/h is below
 c·n·√(g/s) with c = 55 to 65, leans by up to a box and a half up to c = 100, and stands within a third from 150 on. So
-10 boxes of 1 m take 1900 a second to stand at all: 16 iterations at 120 Hz or 10 at 240 do, 10 at 120 do not. Fewer
+10 boxes of 1 m take 1900 a second to stand at all: 16 iterations at 120 Hz or 10 at 240 do, 10 at 120 do not. A tower
+that falls in 10 s only leans before: 6 boxes of 0.5 m at 60 Hz and 10 iterations lean 0.63 of a box in 3 s, with 20
+iterations 0.51, with 27 (c = 61) 0.37. At c = 150 towers of 5 to 10 boxes lean by at most 0.05 of a box in 3 s and 0.52
+in 10 s, whether by more iterations (67) or by substeps (7); 15 boxes by 0.2 and 1.7, by substeps 0.02 and 0.9. Fewer
 than 5 boxes stand with less, smaller boxes fall with more: at 0.1 m 10 fall with 15,000.
 
 A heavy box on a light one, M times as heavy, both 1 m, 60 to 240 Hz, 4 s: the light one is crushed below 16·M
@@ -17,14 +20,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sandbox.arrays import IntArray
 from sandbox.measure.forecast.laid import Laid
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most, enough_work
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import IntArray
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 TOWER = 60.0
 """Iterations in the time √(s/g) for each box of a tower."""
+UPRIGHT = 150.0
+"""The same, with which a tower still stands upright after some seconds: what the warning advises."""
 TALL = 5
 """Boxes from which on it is one."""
 CRUSHED = 24.0
@@ -34,7 +39,7 @@ UNEQUAL = 10.0
 
 
 def stack_warnings(scene: Scene, settings: Settings, close: Laid) -> Iterator[Warning]:
-    """Yield a warning for the tallest tower that will fall, and for the light body that will be crushed worst.
+    """Yield a warning for the tallest tower that will lean or fall, and for the light body that will be crushed worst.
 
     Args:
         scene: of what; without gravity nothing stands.
@@ -55,11 +60,18 @@ def stack_warnings(scene: Scene, settings: Settings, close: Laid) -> Iterator[Wa
     needed = TOWER * count * math.sqrt(gravity / height)
     if needed > has * (1.0 + ROUNDING):
         name = scene.bodies.names[base]
+        advised = needed * UPRIGHT / TOWER
+        iterations, _ = enough_work(advised, settings.h, settings.substeps)
+        dt = settings.iterations * settings.substeps / advised
+        substeps = math.ceil(advised * settings.dt / settings.iterations * (1.0 - ROUNDING))
+        remedy = f"solver.substeps >= {substeps:,}, solver.iterations >= {iterations:,} or dt <= {at_most(dt)} s"
         message = (
-            f"{count} bodies are stacked on {name!r}, itself included; {_short(settings, has)}, and the tower would "
-            f"fall; {_right(needed, settings)}"
+            f"{count} bodies are stacked, {name!r} at the bottom; {_short(settings, has)} the tower would lean "
+            f"or fall; use {remedy} ({advised:.3g} a second)"
         )
-        yield Warning("stack", message, _figures(needed, has, settings) | {"body": name, "bodies": count})
+        yield Warning(
+            "stack", message, _figures(needed, has, settings) | {"body": name, "bodies": count, "safe_dt": dt}
+        )
 
 
 def _crushed(scene: Scene, settings: Settings, upper: IntArray, lower: IntArray, has: float) -> Iterator[Warning]:
@@ -75,8 +87,8 @@ def _crushed(scene: Scene, settings: Settings, upper: IntArray, lower: IntArray,
     if ratio[k] >= UNEQUAL and needed > has * (1.0 + ROUNDING):
         heavy, light = bodies.names[int(upper[k])], bodies.names[int(lower[k])]
         message = (
-            f"{heavy!r} stands on {light!r} and is {ratio[k]:.3g} times as heavy; {_short(settings, has)}, and it "
-            f"would crush it; {_right(needed, settings)}"
+            f"{heavy!r} stands on {light!r} and is {ratio[k]:.3g} times as heavy; {_short(settings, has)} it would "
+            f"sink into it; {_right(needed, settings)}"
         )
         figures: Figures = {"body": heavy, "other": light, "ratio": float(ratio[k])}
         yield Warning("mass_ratio", message, _figures(needed, has, settings) | figures)
@@ -107,12 +119,12 @@ def _tower(upper: IntArray, lower: IntArray, count: int) -> tuple[int, int]:
 
 
 def _short(settings: Settings, has: float) -> str:
-    return f"{settings.iterations} iterations every {settings.h:.3g} s are {has:.3g} a second"
+    return f"with {settings.iterations} iterations every {settings.h:.3g} s ({has:.3g} a second)"
 
 
 def _right(needed: float, settings: Settings) -> str:
     iterations, dt = enough_work(needed, settings.h, settings.substeps)
-    return f"it takes at least {needed:.3g}: solver.iterations >= {iterations:,}, or dt <= {at_most(dt)} s"
+    return f"use solver.iterations >= {iterations:,} or dt <= {at_most(dt)} s ({needed:.3g} a second)"
 
 
 def _figures(needed: float, has: float, settings: Settings) -> Figures:

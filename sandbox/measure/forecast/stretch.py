@@ -11,9 +11,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from sandbox.measure.forecast.warning import Figures, Warning, at_most
-from sandbox.scene.links import LinkKind
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 GIVING = 1.6
 """c, as above."""
@@ -43,9 +43,9 @@ def stretch_warnings(scene: Scene, settings: Settings) -> Iterator[Warning]:
         more = share / TOO_FAR
         iterations, dt = math.ceil(settings.iterations * more), settings.dt / math.sqrt(more)
         message = (
-            f"a chain hangs {deep:,} joints deep with {links.names[0]!r}; {settings.joints} at {settings.iterations} "
-            f"iterations every {settings.h:.3g} s lets it give way by {share:.2g} of a joint's length; "
-            f"solver.iterations >= {iterations:,}, or dt <= {at_most(dt)} s would keep it to {TOO_FAR:g}"
+            f"a chain with {links.names[0]!r} hangs {deep:,} joints deep; {settings.joints} with {settings.iterations} "
+            f"iterations every {settings.h:.3g} s stretches it by {share:.2g} of a joint's length; "
+            f"solver.iterations >= {iterations:,} or dt <= {at_most(dt)} s keeps that to {TOO_FAR:g}"
         )
         figures: Figures = {"joints": deep, "joint": links.names[0], "share": share, "safe_dt": dt}
         yield Warning("chain", message, figures)

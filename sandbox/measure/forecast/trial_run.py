@@ -25,11 +25,12 @@ from sandbox.measure.forecast.passages import ANOTHER, ANOTHER_BODY
 from sandbox.measure.forecast.stacks import UNEQUAL
 from sandbox.measure.forecast.warning import Figure, Figures, Warning, at_most
 from sandbox.measure.run import run
-from sandbox.scene.links import LinkKind
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Plane, Post, Scene, Wall
-from sandbox.scene.settings import Settings
-from sandbox.scene.starts import height_above
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
+from sandbox.scene.validate.bodies import height_above
 from sandbox.trajectory import Trajectory
 
 MOST_SUBSTEPS, MOST_BODY_SUBSTEPS = 10_000, 60_000
@@ -132,10 +133,10 @@ class Trial:
             reach = float(bodies.thin[a]) + (float(bodies.thin[b]) if b >= 0 else self._half(-1 - b))
             thing = bodies.names[b] if b >= 0 else self.scene.fixed_names[-1 - b]
             safe = reach / speed * self.settings.substeps if speed > 0.0 else math.inf
-            right = f"; dt <= {at_most(safe)} s would be safe at that speed" if math.isfinite(safe) else ""
+            right = f"; dt <= {at_most(safe)} s is safe at that speed" if math.isfinite(safe) else ""
             message = (
-                f"{bodies.names[a]!r} passes {thing!r} unseen, or is noticed too late, at {time:.3g} s of "
-                f"{self.said}, closing at {speed:.4g} m/s, {speed * self.settings.h:.3g} m a substep{right}"
+                f"{bodies.names[a]!r} tunnels through {thing!r}, or is detected too late, at {time:.3g} s of "
+                f"{self.said}, at {speed:.4g} m/s or {speed * self.settings.h:.3g} m per substep{right}"
             )
             figures: Figures = {"ball": bodies.names[a], "thing": thing, "speed": speed, "time": time, "odds": 1.0}
             if math.isfinite(safe):
@@ -164,8 +165,8 @@ class Trial:
             body = bodies.names[discs[k]]
             speed = float(np.hypot(*run.velocity[max(0, int(frame) - 1), discs[k]]))
             message = (
-                f"the centre of {body!r} gets {depth[frame, k]:.3g} m behind the surface of {name!r} at "
-                f"{run.time[frame]:.3g} s of {self.said}, before the contact is found"
+                f"the centre of {body!r} is {depth[frame, k]:.3g} m behind the surface of {name!r} at "
+                f"{run.time[frame]:.3g} s of {self.said}, before the contact is detected"
             )
             figures: Figures = {"ball": body, "thing": name, "depth": float(depth[frame, k]), "speed": speed}
             figures["time"] = float(run.time[frame])
@@ -174,7 +175,7 @@ class Trial:
     def _torn(self) -> Iterator[Warning]:
         error = self.run.info["joint_error"]
         if error is not None and error > TORN:
-            message = f"a joint is off by {error:.2g} of its length in {self.said}"
+            message = f"the joint error reaches {error:.2g} of a joint's length in {self.said}"
             yield Warning("chain", message, {"share": min(float(error), 1e300)})
 
     def _fallen(self) -> Iterator[Warning]:
@@ -196,8 +197,8 @@ class Trial:
         mass_a, mass_b = bodies.mass[close.first[both]], bodies.mass[close.second[both]]
         ratio = float((np.maximum(mass_a, mass_b) / np.minimum(mass_a, mass_b)).max(initial=1.0))
         message = (
-            f"{bodies.names[stacked[k]]!r}, which is stacked, moves by {share[k]:.3g} of its width in {self.said}; "
-            "more solver.iterations, or a shorter dt, may hold the stack"
+            f"the stacked body {bodies.names[stacked[k]]!r} moves by {share[k]:.3g} of its width in {self.said}; "
+            "more solver.iterations or a smaller dt may stabilise the stack"
         )
         kind = "mass_ratio" if ratio >= UNEQUAL else "stack"
         yield Warning(kind, message, {"body": bodies.names[stacked[k]], "moved": float(share[k])})
@@ -206,24 +207,28 @@ class Trial:
         gain = gained(self.run, self.scene)
         if gain > GAINED:
             springs = len(self.scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)) > 0
-            message = f"energy rises by {gain:.3g} of all that is at stake in {self.said}{self._by_impacts()}"
+            message = (
+                f"energy rises by a fraction {gain:.3g} of the exchanged energy in {self.said}{self._by_impacts()}"
+            )
             yield Warning("spring" if springs else "energy", message, {"gained": min(gain, 1e300)})
 
     def _by_impacts(self) -> str:
         """Say that impacts may be the cause: Newton's restitution with friction, off the centre of mass."""
-        meet = meetings(self.scene)
+        meet = contact_matrix(self.scene)
         surfaces = meet.surfaces
         rough = bool((meet.touching & (surfaces.restitution > 0.0) & (surfaces.friction > 0.0)).any())
         if not (meet.solids and rough) or self.run.info["settings"].get("impact") != "newton":
             return ""
         return (
-            "; restitution with friction can create energy where shapes are no balls: the reference does not with "
-            "solver.impact 'dissipative'"
+            "; restitution with friction can create energy for shapes other than balls: on reference, "
+            "solver.impact = 'dissipative' prevents that"
         )
 
 
 def gained(run: Trajectory, scene: Scene) -> float:
-    """Return the most by which energy exceeded that of the start, as a share of what is at stake; 0 where work is done.
+    """Return the most by which energy exceeded that of the start, as a share of what is at stake.
+
+    0 where work is done, and where the energy of the start is not finite.
 
     At stake is the kinetic energy of the start, and what gravity, springs and attraction gave or took since; at
     least what lifts each body by its own width.
@@ -231,10 +236,12 @@ def gained(run: Trajectory, scene: Scene) -> float:
     links = scene.links
     if scene.thrusts or scene.drives or any(scene.world.wind) or len(links.of(LinkKind.MOTOR)):
         return 0.0
-    if meetings(scene).surfaces.kicks.any():
+    if contact_matrix(scene).surfaces.kicks.any():
         return 0.0
     every = energies(run, scene)
     total = every.total
+    if not math.isfinite(total[0]):  # bodies that attract each other start in one place: their potential is infinite
+        return 0.0
     with np.errstate(over="ignore", invalid="ignore"):
         gain = float(np.nanmax(total - total[0]))
         stake = float(every.kinetic[0]) + float(np.nanmax(np.abs(every.potential - every.potential[0])))
@@ -409,7 +416,7 @@ FAMILY = {"mass_ratio": "stack", "energy": "iterations", "orbit": "iterations"}
 
 
 def _note(refuted: Warning, trial: Trial) -> Warning:
-    message = f"{trial.said} showed nothing of this, but another phase, seed or engine may: {refuted.message}"
+    message = f"{trial.said} did not show this, but another phase, seed or engine may: {refuted.message}"
     return Warning(refuted.kind, message, refuted.figures)
 
 

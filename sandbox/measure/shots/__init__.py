@@ -1,4 +1,4 @@
-"""Shots asked about: how likely they are, what they hang on, and until when anybody could tell."""
+"""Analysis of billiard shots: success odds, aim windows, sensitivity and predictability horizon."""
 
 from sandbox.measure.shots.horizon import horizon
 from sandbox.measure.shots.odds import odds

@@ -1,14 +1,15 @@
-"""Attempt: a shot that is asked about: the table as it stands, whose ball is struck, and how it is meant."""
+"""Attempt: a shot to be analysed, with its table, the struck ball and the intended stroke."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from sandbox.engines.exact.rolling.fan import Fan
-from sandbox.engines.exact.rolling.outcome import Outcome
-from sandbox.engines.exact.rolling.table import Table
-from sandbox.scene.cue import Stroke
-from sandbox.scene.model import Scene, default_name
+from sandbox.echo import short_repr
+from sandbox.engines.exact.tabletop.shot_result import ShotResult
+from sandbox.engines.exact.tabletop.shots import ShotBatch, Table
+from sandbox.scene.description.scene import default_name
+from sandbox.scene.description.surface import Stroke
+from sandbox.scene.scene import Scene
 
 Variable = Literal["aim", "speed", "side", "height"]
 VARIABLES: tuple[Variable, ...] = ("aim", "speed", "side", "height")
@@ -16,26 +17,35 @@ UNITS: dict[Variable, str] = {"aim": "rad", "speed": "m/s", "side": "R", "height
 
 
 class NoSuchShotError(ValueError):
-    """A scene has no such shot, ball or pocket; `str()` says which it has."""
+    """The scene has no such shot, ball or pocket; `str()` lists those that it has."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Attempt:
-    """A stroke on a table, and what it is to be called."""
+    """Intended stroke at a ball of a table."""
 
     table: Table
+    """the table before the stroke"""
     ball: str
+    """name of the struck ball"""
     stroke: Stroke
+    """intended stroke"""
     name: str
+    """name of the shot"""
+
+    def __repr__(self) -> str:
+        """Return scene, shot, ball and stroke."""
+        title = short_repr(self.table.scene.title)
+        return f"<Attempt {title}: shot {short_repr(self.name)} at {short_repr(self.ball)}, {self.stroke!r}>"
 
     @property
     def pockets(self) -> tuple[str, ...]:
-        """The names of the table's pockets, in scene order."""
+        """Names of the table's pockets, in scene order."""
         scene = self.table.scene
         return scene.fixed_names[len(scene.fixed) :][: len(scene.pockets)]
 
     def number(self, ball: str) -> int:
-        """Return a ball's number.
+        """Return the index of a ball.
 
         Raises:
             NoSuchShotError: no ball has that name.
@@ -43,7 +53,7 @@ class Attempt:
         return _place(ball, self.table.names, "ball")
 
     def pocket(self, name: str) -> int:
-        """Return a pocket's number, from 0.
+        """Return the index of a pocket, from 0.
 
         Raises:
             NoSuchShotError: no pocket has that name.
@@ -51,44 +61,44 @@ class Attempt:
         return _place(name, self.pockets, "pocket")
 
     def changed(self, variable: Variable, by: float) -> Stroke:
-        """Return the stroke with one thing of it other than meant, in its own unit."""
+        """Return the stroke with one variable changed by an amount in its unit."""
         changed: Stroke = self.stroke.model_copy(update={variable: getattr(self.stroke, variable) + by})
         return changed
 
-    def played(self, stroke: Stroke | None = None, ways: bool = False) -> Outcome:
-        """Play a stroke, by default as it is meant.
+    def played(self, stroke: Stroke | None = None, ways: bool = False) -> ShotResult:
+        """Play a stroke; default: the intended stroke.
 
         Raises:
             Exhaustion: as `Table.shoot`.
         """
         return self.table.shoot(self.stroke if stroke is None else stroke, self.ball, ways=ways)
 
-    def fan(self, strokes: Sequence[Stroke], threads: int = 1) -> Fan:
-        """Play many strokes, each for itself."""
+    def fan(self, strokes: Sequence[Stroke], threads: int = 1) -> ShotBatch:
+        """Play many independent strokes."""
         return self.table.fan(strokes, self.ball, threads=threads)
 
     def document(self) -> dict[str, Any]:
-        """Return what is asked about as one JSON object."""
+        """Return the attempt as one JSON object."""
         asked: dict[str, float] = {variable: getattr(self.stroke, variable) for variable in VARIABLES}
         return {"name": self.name, "ball": self.ball, **asked, "cue_mass": self.stroke.cue_mass}
 
 
 def attempt_of(scene: Scene | Attempt, shot: str | None = None) -> Attempt:
-    """Return one of a scene's shots, to be asked about.
+    """Return a shot of a scene for analysis.
 
     Args:
-        scene: with a `[surface]` and a `[[shot]]`; an attempt is returned as it is.
-        shot: which, by its name; by default the first.
+        scene: scene with a `[surface]` and a `[[shot]]`; an `Attempt` is returned unchanged.
+        shot: name of the shot; default: the first.
 
     Raises:
         NoSuchShotError: the scene has no such shot.
-        Refusal: the exact engine lacks something.
+        Refusal: the exact engine does not support the scene.
     """
     if isinstance(scene, Attempt):
         return scene
     named = {each.name or default_name("shot", k): each for k, each in enumerate(scene.shots)}
     if not named:
-        raise NoSuchShotError("the scene has no [[shot]]; state one, with `aim` and `speed`")
+        raise NoSuchShotError("the scene has no [[shot]]; add one with `ball`, `aim` and `speed`")
     name = next(iter(named)) if shot is None else shot
     found = named[_named(name, tuple(named), "shot")]
     stroke = Stroke(**{key: getattr(found, key) for key in Stroke.model_fields})
@@ -101,5 +111,5 @@ def _named(name: str, names: Sequence[str], kind: str) -> str:
 
 def _place(name: str, names: Sequence[str], kind: str) -> int:
     if name not in names:
-        raise NoSuchShotError(f"no {kind} is named {name!r}; there are: {', '.join(names) or 'none'}")
+        raise NoSuchShotError(f"no {kind} is named {short_repr(name)}; known names: {', '.join(names) or 'none'}")
     return list(names).index(name)

@@ -6,10 +6,10 @@ changes, as when a ball begins to miss another, it has a kink or a jump.
 
 from collections.abc import Mapping
 
-from sandbox.engines.exact.rolling.outcome import Outcome
+from sandbox.engines.exact.tabletop.shot_result import ShotResult
 
 
-def courses(outcome: Outcome) -> Mapping[str, int]:
+def courses(outcome: ShotResult) -> Mapping[str, int]:
     """Return a number for each ball's course; equal courses have equal ones, within one process.
 
     What concerns other balls alone does not count, nor does in which order such things happen.

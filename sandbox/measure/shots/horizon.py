@@ -1,8 +1,8 @@
-"""Horizon: until when a shot can be foretold, if how it is struck is known only so well.
+"""Horizon: time up to which a shot is predictable, given the accuracy of the stroke.
 
-A hit turns what it meets by 1/(2R cos φ) for each metre that the balls' centres are off; over a way g to the next hit
-that makes 2R out of it g/(2R) times as much. So errors grow by a factor a hit, and every digit of aim buys as long as
-that factor takes to make ten.
+A collision changes the direction of the struck ball by 1/(2R cos φ) rad per metre of offset of the balls' centres. Over
+a path g to the next collision, this multiplies the offset by about g/(2R). Errors therefore grow by a factor per
+collision, and each additional digit of aim extends the horizon by the time in which errors grow tenfold.
 """
 
 import math
@@ -13,69 +13,72 @@ from typing import Any, Literal
 import numpy as np
 
 from sandbox.engines.exact.engine import overlap_of
-from sandbox.engines.exact.rolling.outcome import Outcome
+from sandbox.engines.exact.tabletop.shot_result import ShotResult
 from sandbox.measure.shots.attempt import Attempt, attempt_of
 from sandbox.measure.shots.parting import Parting
 from sandbox.measure.shots.spread import Spread, sound, strayed
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 NUDGE = 1e-9
 """rad, or m"""
 
 TOLERANCE = 1e-3
-"""m, of what is still the same place"""
+"""m, distance up to which two positions count as equal"""
 
 LADDER = tuple(10.0**-k for k in range(2, 13))
-"""rad: nudges of aim that tell how horizons go with them"""
+"""rad, perturbations of the aim from which the growth of the horizon is measured"""
 
 By = Literal["aim", "place"]
 
 
 @dataclass(frozen=True, slots=True)
 class Parted:
-    """When shots that begin a nudge apart are no longer the same."""
+    """Separation of shots that start with a small perturbation."""
 
     nudge: float
-    """rad of aim, or m of place"""
+    """size of the perturbation: rad of aim, or m of position"""
     time: float | None
-    """s, when a ball first is farther from itself than the tolerance; None where none ever is"""
+    """s, first time at which a ball is farther than the tolerance from its unperturbed position; None if there is none
+    """
     ball: str | None
-    """which"""
+    """name of that ball"""
     hits: int
-    """balls' hits in a row, one by another, that led to it"""
+    """length of the longest chain of ball-ball collisions that leads to that ball"""
     growth_per_hit: float | None
-    """by what the distance grew each time, from the first hit on; None where nothing hit"""
+    """factor by which the distance grew at each collision, from the first on; None without collisions"""
     growth_per_second: float | None
-    """1/s, of its logarithm, likewise"""
+    """1/s, growth rate of the logarithm of the distance; None without collisions"""
     farthest: float
-    """m, by which a ball is elsewhere at most, up to the end"""
+    """m, largest distance of a ball from its unperturbed position, up to the end"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Horizon:
-    """Until when a shot can be foretold."""
+    """Predictability horizon of a shot."""
 
     by: By
+    """perturbed quantity: `aim`, or `place` for the position of the struck ball"""
     tolerance: float
-    """m"""
+    """m, tolerance of the final positions"""
     radius: float
-    """m, of the ball that is struck: the second tolerance"""
+    """m, radius of the struck ball, which is the second tolerance"""
     duration: float
-    """s, of the shot as it is meant"""
+    """s, duration of the intended shot"""
     parted: Parted
-    """by more than the tolerance"""
+    """separation beyond the tolerance"""
     by_a_radius: Parted
-    """by more than a radius"""
+    """separation beyond a radius"""
     player: Parted | None
-    """by more than a radius, where one thing of the stroke is off by one of a player's standard deviations"""
+    """separation beyond a radius, with one variable of the stroke off by one standard deviation of a player; None
+    without a spread"""
     ladder: tuple[Parted, ...]
-    """by more than the tolerance, from larger nudges of aim to smaller ones"""
+    """separation beyond the tolerance, from larger perturbations of the aim to smaller ones"""
 
     @property
     def digits_per_second(self) -> float | None:
-        """How many more digits of aim it takes to foretell one more second.
+        """Additional digits of aim needed to predict one more second.
 
-        The slope of a line through the ladder's horizons by least squares; None where fewer than two are known.
+        Slope of a least-squares line through the horizons of the ladder; None if fewer than two are known.
         """
         known = [(each.time, -math.log10(each.nudge)) for each in self.ladder if each.time is not None]
         if len({time for time, _ in known}) < 2:
@@ -87,7 +90,7 @@ class Horizon:
         return 1.0 / slope if slope > 0.0 else None
 
     def document(self) -> dict[str, Any]:
-        """Return it as one JSON object."""
+        """Return the horizon as one JSON object."""
         return {
             "by": self.by,
             "tolerance": self.tolerance,
@@ -110,25 +113,26 @@ def horizon(
     spread: Spread | None = None,
     ladder: Sequence[float] = LADDER,
 ) -> Horizon:
-    """Find the time from which on a shot is unpredictable.
+    """Find the time after which a shot is unpredictable.
 
     Args:
-        scene: with a `[surface]` and a `[[shot]]`.
-        shot: which, by its name; by default the first.
-        nudge: by how much shots differ: rad of aim to both sides, or m of the struck ball's place to four.
-        by: which of these.
-        tolerance: m, by which a ball may be elsewhere.
-        spread: of a player, to be told of too.
-        ladder: rad, further nudges of aim, which tell what digits are worth.
+        scene: scene with a `[surface]` and a `[[shot]]`.
+        shot: name of the shot; default: the first.
+        nudge: size of the perturbation: rad of aim on both sides, or m of the struck ball's position in four
+            directions.
+        by: perturbed quantity, `aim` or `place` (position).
+        tolerance: distance beyond which a ball is elsewhere, m.
+        spread: standard deviations of a player, for `Horizon.player`.
+        ladder: further perturbations of the aim, rad, for `Horizon.digits_per_second`.
 
     Raises:
         NoSuchShotError: the scene has no such shot.
-        Refusal: the exact engine lacks something.
+        Refusal: the exact engine does not support the scene.
         Exhaustion: a shot has too many events.
-        ValueError: the nudge or the tolerance is not positive; or the ball has no room to be nudged.
+        ValueError: the perturbation or the tolerance is not positive, or the ball has no room to be moved.
     """
     if not (nudge > 0.0 and tolerance > 0.0):
-        raise ValueError(f"a nudge of {nudge:g} and a tolerance of {tolerance:g} m; both are more than 0")
+        raise ValueError(f"a nudge of {nudge:g} and a tolerance of {tolerance:g} m; both must be greater than 0")
     attempt = attempt_of(scene, shot)
     meant = attempt.played(ways=True)
     others = _aside(attempt, nudge) if by == "aim" else _elsewhere(attempt, nudge)
@@ -154,11 +158,11 @@ def horizon(
     )
 
 
-def _aside(attempt: Attempt, nudge: float) -> list[Outcome]:
+def _aside(attempt: Attempt, nudge: float) -> list[ShotResult]:
     return [attempt.played(attempt.changed("aim", side), ways=True) for side in (-nudge, nudge)]
 
 
-def _elsewhere(attempt: Attempt, nudge: float) -> list[Outcome]:
+def _elsewhere(attempt: Attempt, nudge: float) -> list[ShotResult]:
     """Play from beside where the ball stands, on all four sides that have room for it."""
     table, number = attempt.table, attempt.number(attempt.ball)
     x, y = table.position[number].tolist()
@@ -170,18 +174,18 @@ def _elsewhere(attempt: Attempt, nudge: float) -> list[Outcome]:
             moved = table.with_balls({attempt.ball: place})
             played.append(moved.shoot(attempt.stroke, attempt.ball, ways=True))
     if not played:
-        raise ValueError(f"{attempt.ball!r} has no room to stand {nudge:g} m elsewhere")
+        raise ValueError(f"{attempt.ball!r} has no room to be moved by {nudge:g} m")
     return played
 
 
-def _as_a_player(attempt: Attempt, spread: Spread) -> list[Outcome]:
+def _as_a_player(attempt: Attempt, spread: Spread) -> list[ShotResult]:
     """Play what is off by one standard deviation, in one thing at a time and to either side."""
     off = np.diag([spread.aim, spread.speed, spread.side, spread.height])
     strokes, _ = sound(strayed(attempt.stroke, np.concatenate((-off, off))))
     return [attempt.played(stroke, ways=True) for stroke in strokes]
 
 
-def _parted(meant: Outcome, pairs: Sequence[Parting], nudge: float, tolerance: float) -> Parted:
+def _parted(meant: ShotResult, pairs: Sequence[Parting], nudge: float, tolerance: float) -> Parted:
     """Return when the first of some pairs parts."""
     found = [(*when, pair) for pair in pairs if (when := pair.beyond(tolerance)) is not None]
     farthest = max((pair.farthest for pair in pairs), default=0.0)
@@ -198,7 +202,7 @@ def _parted(meant: Outcome, pairs: Sequence[Parting], nudge: float, tolerance: f
     return Parted(nudge, time, meant.names[number], hits, per_hit, per_second, farthest)
 
 
-def _chain(outcome: Outcome, ball: str, until: float) -> tuple[float | None, int]:
+def _chain(outcome: ShotResult, ball: str, until: float) -> tuple[float | None, int]:
     """Return when the longest chain of hits that leads to a ball by a time began, s, and how many these are."""
     chains: dict[str, tuple[float | None, int]] = dict.fromkeys(outcome.names, (None, 0))
     for event in outcome.events:

@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from sandbox.engines.exact.rolling.outcome import Outcome
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
+from sandbox.engines.exact.tabletop.shot_result import ShotResult
 
 LOOKS = 4000
 """Moments at which two shots are compared; between the first that parts them and the one before, it is halved."""
@@ -17,7 +17,7 @@ HALVINGS = 40
 class Parting:
     """Two shots of N balls, with their ways."""
 
-    def __init__(self, one: Outcome, other: Outcome) -> None:
+    def __init__(self, one: ShotResult, other: ShotResult) -> None:
         """Look at two shots.
 
         Raises:
@@ -75,6 +75,6 @@ class Parting:
         return times, self.apart(times)
 
 
-def _falls(outcome: Outcome) -> Mapping[str, float]:
+def _falls(outcome: ShotResult) -> Mapping[str, float]:
     """Return when each ball fell, s."""
     return {event.ball: event.time for event in outcome.events if event.kind == "pocket"}

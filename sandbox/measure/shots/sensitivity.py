@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sandbox.engines.exact.rolling.outcome import Outcome
+from sandbox.arrays import FloatArray
+from sandbox.engines.exact.tabletop.shot_result import ShotResult
 from sandbox.measure.shots.attempt import UNITS, VARIABLES, Attempt, Variable, attempt_of
 from sandbox.measure.shots.courses import courses
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray
+from sandbox.scene.scene import Scene
 
 STEPS = tuple(2.0**-k for k in range(6, 31))
 """Tried from the largest on, in each variable's unit: 0.016 to 1e-9."""
@@ -36,24 +36,26 @@ AGREE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Slope:
-    """d(rest)/d(variable) of one ball."""
+    """Derivative of the final position of one ball with respect to one variable of the stroke."""
 
     ball: str
+    """name of the ball"""
     variable: Variable
+    """variable of the stroke"""
     value: tuple[float, float] | None
-    """m for each unit of the variable; None where the rest is not smooth, or the ball falls"""
+    """m per unit of the variable; None if the final position is not smooth, or the ball falls into a pocket"""
     error: float | None
-    """how well it is known, likewise"""
+    """estimated error of `value`, in the same unit"""
     fitted: tuple[float, float] | None
-    """the slope of a cubic through a fan of shots, likewise"""
+    """slope of a cubic fit through a fan of shots, in the same unit"""
     holds: float | None
-    """the largest step tried within which, to both sides, the ball keeps its course, as far as the shots in between
-    tell; None where it keeps it in none"""
+    """largest step tried on both sides up to which the ball has the same sequence of contacts, as far as the shots
+    show; None if there is none"""
     reason: str | None
-    """why there is no value"""
+    """reason why there is no value"""
 
     def document(self) -> dict[str, Any]:
-        """Return it as one JSON object."""
+        """Return the slope as one JSON object."""
         figures = {key: getattr(self, key) for key in ("value", "error", "fitted", "holds", "reason")}
         return {"ball": self.ball, "variable": self.variable, "unit": f"m/{UNITS[self.variable]}", **figures}
 
@@ -62,8 +64,8 @@ class _Pair(NamedTuple):
     """The shots to both sides, a step away."""
 
     step: float
-    below: Outcome
-    above: Outcome
+    below: ShotResult
+    above: ShotResult
     kept: Mapping[str, bool]
     """whether each ball keeps its course"""
 
@@ -71,16 +73,16 @@ class _Pair(NamedTuple):
 def sensitivity(
     scene: Scene | Attempt, shot: str | None = None, *, variables: Sequence[Variable] = VARIABLES
 ) -> tuple[Slope, ...]:
-    """Return how each ball's rest depends on how the cue ball is struck, for each variable and ball.
+    """Return the derivative of each ball's final position with respect to each variable of the stroke.
 
     Args:
-        scene: with a `[surface]` and a `[[shot]]`.
-        shot: which, by its name; by default the first.
-        variables: which.
+        scene: scene with a `[surface]` and a `[[shot]]`.
+        shot: name of the shot; default: the first.
+        variables: variables of the stroke.
 
     Raises:
         NoSuchShotError: the scene has no such shot.
-        Refusal: the exact engine lacks something.
+        Refusal: the exact engine does not support the scene.
         Exhaustion: a shot has too many events.
     """
     attempt = attempt_of(scene, shot)
@@ -94,7 +96,7 @@ def sensitivity(
     return tuple(found)
 
 
-def _pairs(attempt: Attempt, nominal: Outcome, variable: Variable) -> list[_Pair]:
+def _pairs(attempt: Attempt, nominal: ShotResult, variable: Variable) -> list[_Pair]:
     meant = courses(nominal)
     pairs = []
     for step in STEPS:
@@ -109,7 +111,7 @@ def _pairs(attempt: Attempt, nominal: Outcome, variable: Variable) -> list[_Pair
 
 def _slope(
     attempt: Attempt,
-    nominal: Outcome,
+    nominal: ShotResult,
     variable: Variable,
     pairs: list[_Pair],
     fits: dict[float, FloatArray],
@@ -125,7 +127,10 @@ def _slope(
         return Slope(ball, variable, None, None, None, holds, f"falls into {pocket!r}")
     if len(good) < FEWEST:
         least = pairs[-1].step
-        reason = f"not smooth: another course within {max(least, pairs[last - 1].step):.2g} {UNITS[variable]}"
+        reason = (
+            f"not smooth: the sequence of contacts changes within {max(least, pairs[last - 1].step):.2g} "
+            f"{UNITS[variable]}"
+        )
         return Slope(ball, variable, None, None, None, holds, reason)
     # Between steps that keep the course there may be a gap in which it is another; then the fit tells, and farther in
     # there is none.

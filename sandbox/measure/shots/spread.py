@@ -1,48 +1,56 @@
-"""Spread: by how much a player's strokes stray from what is meant, and strokes drawn so."""
+"""Spread: random errors of a player's strokes."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from sandbox.scene.cue import Stroke, miscues
-from sandbox.scene.streams import Stream, draws
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.scene.description.surface import Stroke, miscues
+from sandbox.scene.random_streams import Stream, draws
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Standard deviations of normal errors, each independent of the others."""
+    """Standard deviations of the independent normal errors of a stroke.
+
+    Raises:
+        ValueError: a value is negative or not finite.
+    """
 
     aim: float = 0.002
     """rad"""
     speed: float = 0.03
-    """of the speed that is meant"""
+    """fraction of the intended speed"""
     side: float = 0.0
-    """of the radius"""
+    """fraction of the ball radius"""
     height: float = 0.0
-    """likewise"""
+    """fraction of the ball radius"""
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
             if not 0.0 <= value < float("inf"):
-                raise ValueError(f"{name} = {value:g} is no spread; it is 0 or more, and finite")
+                raise ValueError(f"{name} = {value:g} is not a standard deviation; it must be 0 or more, and finite")
 
     def draw(self, count: int, seed: int) -> FloatArray:
-        """Return errors drawn at random, (M, 4): rad, share, of the radius twice.
+        """Return random errors, (M, 4): aim in rad, speed as a fraction, side and height as fractions of the radius.
 
-        The first of many are those of few.
+        A larger sample with the same seed begins with the smaller one.
+
+        Args:
+            count: M, the number of strokes.
+            seed: seed of the random numbers.
         """
         units = draws(Stream.SHOTS, seed).standard_normal((count, 4))
         return np.asarray(units * [self.aim, self.speed, self.side, self.height])
 
 
 def strayed(stroke: Stroke, errors: FloatArray) -> Sequence[Stroke | None]:
-    """Return a stroke with each of some errors; None where it miscues: the tip slips off, or never gets there.
+    """Return a stroke with each of some errors; None for a miscue: the tip slips off, or the speed is not positive.
 
     Args:
-        stroke: as it is meant.
-        errors: (M, 4) as `Spread.draw` gives them.
+        stroke: the intended stroke.
+        errors: (M, 4) as `Spread.draw` returns them.
     """
     made: list[Stroke | None] = []
     for aim, speed, side, height in errors.tolist():
@@ -59,5 +67,5 @@ def strayed(stroke: Stroke, errors: FloatArray) -> Sequence[Stroke | None]:
 
 
 def sound(strokes: Sequence[Stroke | None]) -> tuple[list[Stroke], BoolArray]:
-    """Return the strokes that do not miscue, and (M,) which those are."""
+    """Return the strokes that do not miscue, and the mask (M,) of these."""
     return [each for each in strokes if each is not None], np.asarray([each is not None for each in strokes], np.bool_)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sandbox.echo import short_repr
 from sandbox.measure.shots.attempt import Attempt, NoSuchShotError
 from sandbox.measure.shots.horizon import NUDGE, TOLERANCE, By, Horizon, horizon
 from sandbox.measure.shots.odds import COUNT, Odds, Progress, odds
@@ -21,6 +22,8 @@ class Study:
     slopes: tuple[Slope, ...] | None
     windows: tuple[Windows, ...]
     horizon: Horizon | None
+    interrupted: bool = False
+    """Ctrl-C was pressed before all that was asked for was found."""
 
     @property
     def answered(self) -> bool:
@@ -61,7 +64,7 @@ def study(
     tolerance: float = TOLERANCE,
     progress: Progress | None = None,
 ) -> Study:
-    """Ask about a shot; of one whose ensemble is interrupted nothing else.
+    """Ask about a shot; after Ctrl-C the study has what was found by then.
 
     Args:
         attempt: which.
@@ -83,14 +86,16 @@ def study(
     """
     chances = odds(attempt, spread=spread, count=count, seed=seed, threads=threads, progress=progress)
     if chances.interrupted:
-        return Study(attempt, chances, None, (), None)
-    return Study(
-        attempt,
-        chances,
-        sensitivity(attempt) if slopes else None,
-        tuple(windows(attempt, ball, pocket, threads=threads) for ball, pocket in pots),
-        horizon(attempt, nudge=nudge, by=by, tolerance=tolerance, spread=spread) if foretold else None,
-    )
+        return Study(attempt, chances, None, (), None, True)
+    slope, found, until, interrupted = None, list[Windows](), None, False
+    try:
+        slope = sensitivity(attempt) if slopes else None
+        for ball, pocket in pots:
+            found.append(windows(attempt, ball, pocket, threads=threads))
+        until = horizon(attempt, nudge=nudge, by=by, tolerance=tolerance, spread=spread) if foretold else None
+    except KeyboardInterrupt:
+        interrupted = True
+    return Study(attempt, chances, slope, tuple(found), until, interrupted)
 
 
 def pot_of(attempt: Attempt, text: str) -> tuple[str, str]:
@@ -99,13 +104,12 @@ def pot_of(attempt: Attempt, text: str) -> tuple[str, str]:
     Raises:
         NoSuchShotError: there is no such ball or pocket; the message has those that there are.
     """
-    parts = [(text[:k], text[k + 1 :]) for k, letter in enumerate(text) if letter == ":"]
-    for ball, pocket in parts:
-        if ball in attempt.table.names and pocket in attempt.pockets:
-            return ball, pocket
-    if not parts:
-        raise NoSuchShotError(f"{text!r} is not BALL:POCKET")
-    ball, pocket = parts[0]
+    for ball in attempt.table.names:
+        if text.startswith(f"{ball}:") and text[len(ball) + 1 :] in attempt.pockets:
+            return ball, text[len(ball) + 1 :]
+    ball, colon, pocket = text.partition(":")
+    if not colon:
+        raise NoSuchShotError(f"{short_repr(text)} is not BALL:POCKET")
     attempt.number(ball)
     attempt.pocket(pocket)
-    raise NoSuchShotError(f"{text!r} is not BALL:POCKET")
+    raise NoSuchShotError(f"{short_repr(text)} is not BALL:POCKET")

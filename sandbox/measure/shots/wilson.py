@@ -21,7 +21,7 @@ def wilson(hits: int, trials: int, z: float = LEVEL) -> tuple[float, float]:
         ValueError: there cannot be so many hits.
     """
     if not 0 <= hits <= trials:
-        raise ValueError(f"{hits} of {trials} is no count of trials")
+        raise ValueError(f"{hits} of {trials} is not a count of trials")
     if trials == 0:
         return 0.0, 1.0
     share, square = hits / trials, z * z / trials

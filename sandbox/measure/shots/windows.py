@@ -1,4 +1,4 @@
-"""Windows: between which angles of aim a ball falls into a pocket: what players ask."""
+"""Windows: intervals of the aim for which a ball falls into a pocket."""
 
 import math
 from collections.abc import Callable
@@ -7,42 +7,44 @@ from typing import Any
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.shots.attempt import Attempt, attempt_of
-from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.scene.scene import Scene
 
 REACH = 0.1
-"""rad to each side of what is meant that are looked through"""
+"""rad, default range of the search on each side of the intended aim"""
 
 SHOTS = 8001
-"""in that range, 25 µrad apart"""
+"""default number of shots in that range, 25 µrad apart"""
 
 CLOSE = 1e-9
-"""rad to which a window's ends are found"""
+"""rad, accuracy of the ends of a window"""
 
 WIDEST = 0.5 * math.pi
-"""rad to each side; farther off no window is followed"""
+"""rad on each side of the aim: a window is not followed beyond"""
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Angles of aim, rad, between which a ball falls into a pocket."""
+    """Interval of the aim, rad, in which a ball falls into a pocket."""
 
     low: float
+    """rad"""
     high: float
+    """rad"""
 
     @property
     def centre(self) -> float:
-        """The angle to aim at, rad."""
+        """Centre of the window, rad."""
         return 0.5 * (self.low + self.high)
 
     @property
     def half(self) -> float:
-        """How far off it the aim may be, rad."""
+        """Half the width of the window, rad: the largest error of an aim at its centre."""
         return 0.5 * (self.high - self.low)
 
     def off(self, aim: float) -> float:
-        """Return how far an aim is beside it, rad; 0 of one that is in it."""
+        """Return the distance of an aim from the window, rad; 0 inside it."""
         return max(self.low - aim, aim - self.high, 0.0)
 
     def __contains__(self, aim: float) -> bool:
@@ -51,25 +53,28 @@ class Window:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Windows:
-    """All the windows that were found about an aim."""
+    """All windows found around an intended aim."""
 
     ball: str
+    """name of the ball"""
     pocket: str
+    """name of the pocket"""
     aim: float
-    """rad, as it is meant"""
+    """rad, intended aim"""
     reach: float
-    """rad to each side that were looked through"""
+    """rad, range of the search on each side"""
     spacing: float
-    """rad between shots: a narrower window may have been overlooked, and so may a narrower gap in one"""
+    """rad between shots; narrower windows, and narrower gaps in a window, may be missed"""
     found: tuple[Window, ...]
+    """windows in ascending order"""
 
     @property
     def nearest(self) -> Window | None:
-        """The window that the aim is in, or the nearest one."""
+        """Window that contains the intended aim, or the nearest one; None if there is none."""
         return min(self.found, key=lambda one: one.off(self.aim), default=None)
 
     def document(self) -> dict[str, Any]:
-        """Return it as one JSON object."""
+        """Return the windows as one JSON object."""
         rows = [asdict(one) | {"centre": one.centre, "half": one.half} for one in self.found]
         nearest = self.nearest
         return {
@@ -93,22 +98,22 @@ def windows(
     shots: int = SHOTS,
     threads: int = 1,
 ) -> Windows:
-    """Look for the angles of aim at which a ball falls into a pocket, the stroke being otherwise as it is meant.
+    """Find the intervals of the aim for which a ball falls into a pocket; the rest of the stroke is unchanged.
 
-    A window that goes on beyond the range is followed, with shots farther apart. Ends are right to 1e-9 rad.
+    A window that extends beyond the range is followed with shots farther apart. Ends are accurate to 1e-9 rad.
 
     Args:
-        scene: with a `[surface]` and a `[[shot]]`.
-        ball: which.
-        pocket: which.
-        shot: which, by its name; by default the first.
-        reach: rad to each side that are looked through.
-        shots: how many are played in that range.
-        threads: how many play at once.
+        scene: scene with a `[surface]` and a `[[shot]]`.
+        ball: name of the ball.
+        pocket: name of the pocket.
+        shot: name of the shot; default: the first.
+        reach: range of the search on each side of the intended aim, rad.
+        shots: number of shots in that range.
+        threads: number of threads.
 
     Raises:
         NoSuchShotError: the scene has no such shot, ball or pocket.
-        Refusal: the exact engine lacks something.
+        Refusal: the exact engine does not support the scene.
     """
     attempt = attempt_of(scene, shot)
     number, hole = attempt.number(ball), attempt.pocket(pocket)

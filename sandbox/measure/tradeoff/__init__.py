@@ -1,4 +1,4 @@
-"""The trade of speed for accuracy: measured over engines and settings."""
+"""Trade-off of accuracy against computing time, measured over engines and settings."""
 
 from sandbox.measure.tradeoff.weighed import Tradeoff
 from sandbox.measure.tradeoff.weighing import tradeoff

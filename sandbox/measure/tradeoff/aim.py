@@ -5,12 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.echo import short_repr
 from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.joint_error import HOLDING
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS, Metric
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.scene import Scene
 
 USUAL = {"px": 1.0, "s": 0.05, "": 0.01}
 """Tolerances by unit where none is given; of lengths it is `compare`'s: 1 % of the smallest radius."""
@@ -36,7 +37,7 @@ class Aim(NamedTuple):
     """frames a second"""
     step: float = math.inf
     """s that a step of what is recommended may last: in between its error is not known"""
-    reason: str = "it was asked for"
+    reason: str = "it was requested"
     """why this metric"""
 
     @property
@@ -54,7 +55,7 @@ def metric_named(name: str) -> Metric:
     try:
         return METRICS[name]
     except KeyError:
-        raise UnknownMetricError(f"no metric {name!r}; metrics: {', '.join(METRICS)}") from None
+        raise UnknownMetricError(f"unknown metric {short_repr(name)}; metrics: {', '.join(METRICS)}") from None
 
 
 def choose_metric(judge: Judge) -> tuple[Metric, str]:
@@ -67,7 +68,7 @@ def choose_metric(judge: Judge) -> tuple[Metric, str]:
     """
     scene, duration = judge.scene, judge.scene.world.duration
     if not judge.moving.any():
-        return METRICS["energy"], "nothing in the scene can move"
+        return METRICS["energy"], "no body in the scene can move"
     if judge.truth is not None and judge.until >= duration:
         kind = judge.truth.kind.replace("_", " ")
         return METRICS["max_position"], f"the truth ({kind}) is trusted to the end, {duration:.4g} s"
@@ -76,16 +77,16 @@ def choose_metric(judge: Judge) -> tuple[Metric, str]:
     else:
         doubt = f"positions are predictable for {judge.until:.3g} s of {duration:.4g} s only"
     if np.isin(scene.links.kind, HOLDING).any():
-        return METRICS["joint_error"], f"{doubt}, and joints hold bodies together"
+        return METRICS["joint_error"], f"{doubt}, and the scene has joints"
     if keeps_energy(scene):
-        return METRICS["energy"], f"{doubt}, and nothing in the scene takes energy"
+        return METRICS["energy"], f"{doubt}, and energy is conserved"
     if judge.still.any():
-        return METRICS["drift"], f"{doubt}, and {int(judge.still.sum())} bodies should lie still"
-    if meetings(scene).touches.any():
-        return METRICS["penetration"], f"{doubt}, and bodies can touch"
+        return METRICS["drift"], f"{doubt}, and {int(judge.still.sum())} bodies should stay at rest"
+    if contact_matrix(scene).touches.any():
+        return METRICS["penetration"], f"{doubt}, and bodies can collide"
     if judge.truth is None:
         return METRICS["energy"], doubt
-    return METRICS["max_position"], f"{doubt}; it is counted up to then"
+    return METRICS["max_position"], f"{doubt}; errors count up to that time"
 
 
 def keeps_energy(scene: Scene) -> bool:
@@ -94,7 +95,7 @@ def keeps_energy(scene: Scene) -> bool:
         return False
     if scene.links.figures[:, 2].any():
         return False
-    meet = meetings(scene)
+    meet = contact_matrix(scene)
     elastic = (meet.surfaces.restitution == 1.0) & meet.surfaces.fixed_coefficients
     return bool(elastic[meet.touching].all() and meet.friction == 0.0)
 
@@ -108,15 +109,15 @@ def require_aim(metric: str | None, tolerance: float | None, budget: float | Non
     """
     counted = metric is not None and metric_named(metric).name in COUNTED
     if tolerance is not None and not (0.0 < tolerance < math.inf or (tolerance == 0.0 and counted)):
-        raise ValueError(f"a tolerance of {tolerance:g}; it is positive and finite")
+        raise ValueError(f"the tolerance is {tolerance:g}; it must be positive and finite")
     for what, value in (("budget", budget), ("fps", fps)):
         if value is not None and not 0.0 < value < math.inf:
-            raise ValueError(f"a {what} of {value:g}; it is positive and finite")
+            raise ValueError(f"the {what} is {value:g}; it must be positive and finite")
 
 
 def aim_at(judge: Judge, metric: str | None, tolerance: float | None, budget: float | None, fps: float) -> Aim:
     """Return what is asked, which makes sense (`require_aim`), with what was left open filled in."""
-    chosen, reason = choose_metric(judge) if metric is None else (metric_named(metric), "it was asked for")
+    chosen, reason = choose_metric(judge) if metric is None else (metric_named(metric), "it was requested")
     if tolerance is None:
         tolerance = 0.0 if chosen.name in COUNTED else USUAL.get(chosen.unit, usual_tolerance(judge.scene))
     return Aim(chosen, tolerance, budget, fps, reason=reason)

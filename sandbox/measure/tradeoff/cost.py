@@ -9,8 +9,8 @@ from sandbox.engines.registry import start
 from sandbox.interrupt import heeded
 from sandbox.measure.bounded_run import working
 from sandbox.measure.schedule import schedule
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 WARM_UP_STEPS = 5
 """Steps that are run before a setting is timed: the first ones load what later ones find in place."""

@@ -6,10 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.compare.errors import Errors, errors
 from sandbox.measure.compare.truth import Truth
-from sandbox.scene.model import Scene
-from sandbox.trajectory import BoolArray, FloatArray, Trajectory
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 SCREEN = 1280.0, 720.0
 """px of the window that a scene is thought to be shown in."""

@@ -1,4 +1,4 @@
-"""Metrics: what an error can be counted in. Each is a function of a run and its judge; None where it says nothing."""
+"""Metrics of the error. Each is a function of a run and its judge; None if it does not apply."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -6,24 +6,26 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.collisions import are_collisions, collisions, together
 from sandbox.measure.compare.drift import energy_drift
 from sandbox.measure.compare.gaps import gap
 from sandbox.measure.compare.runs import common_frames, there
 from sandbox.measure.joint_error import joint_error
 from sandbox.measure.tradeoff.judge import Judge, strayed
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.trajectory import Trajectory
 
 Measure = Callable[[Trajectory, Judge], float | None]
 
 
 class Metric(NamedTuple):
-    """One way to count an error."""
+    """Metric of the error."""
 
     name: str
     unit: str
-    """empty for plain numbers and shares"""
+    """unit; empty for counts and fractions"""
     about: str
+    """description"""
     measure: Measure
 
 
@@ -89,7 +91,11 @@ def joints(run: Trajectory, judge: Judge) -> float | None:
 
 
 def penetration(run: Trajectory, judge: Judge) -> float | None:
-    """Return the deepest overlap of any two that touched, in any frame, m. None where nothing touches."""
+    """Return the deepest overlap of any two that touched, in any frame, m. None where nothing touches.
+
+    An overlap that is there in the first frame is the scene's, not the engine's: of such a pair only that counts by
+    which the two get deeper again than they have been since.
+    """
     pairs = np.unique(run.contact_pair[are_collisions(run)], axis=0)
     if not len(pairs):
         return None
@@ -97,7 +103,8 @@ def penetration(run: Trajectory, judge: Judge) -> float | None:
     with np.errstate(over="ignore", invalid="ignore"):
         gaps = [gap(scene, scene.bodies, run.position, run.angle, (a, b)) for a, b in pairs.tolist()]
         gaps = [np.where(together(run, scene, (a, b)), each, np.inf) for each, (a, b) in zip(gaps, pairs, strict=True)]
-        return max(0.0, -min(float(np.nanmin(each, initial=np.inf)) for each in gaps))
+        depths = [np.maximum(0.0, -each) for each in gaps]
+        return max(float(np.nanmax(each - np.fmin.accumulate(each), initial=0.0)) for each in depths)
 
 
 def drift(run: Trajectory, judge: Judge) -> float | None:
@@ -160,14 +167,14 @@ METRICS: Mapping[str, Metric] = {
         Metric("final_position", "m", "distance from the truth at the end", final_position),
         Metric("rms_position", "m", "root of the mean square distance from the truth", rms_position),
         Metric("pixels", "px", "largest distance from the truth on the screen", pixels),
-        Metric("bounce_height", "m", "how much too high or low a body bounces", bounce_height),
-        Metric("energy", "", "drift of energy, as a fraction of the energy in motion", energy),
-        Metric("joint_error", "", "largest error of a joint, as a fraction of its length", joints),
-        Metric("penetration", "m", "deepest overlap", penetration),
-        Metric("drift", "m", "how far bodies move that should lie still", drift),
-        Metric("missed_contacts", "", "contacts that the engine never saw", missed_contacts),
-        Metric("passes", "", "fraction of the contacts that were passed through", passes),
-        Metric("settle_time", "s", "how much too early or late everything comes to rest", settle_time),
+        Metric("bounce_height", "m", "error of the bounce height", bounce_height),
+        Metric("energy", "", "drift of the energy as a fraction of the kinetic energy", energy),
+        Metric("joint_error", "", "largest error of a joint as a fraction of its length", joints),
+        Metric("penetration", "m", "deepest overlap, apart from that at the start", penetration),
+        Metric("drift", "m", "motion of bodies that should stay at rest", drift),
+        Metric("missed_contacts", "", "contacts that the engine missed", missed_contacts),
+        Metric("passes", "", "fraction of the contacts that were missed", passes),
+        Metric("settle_time", "s", "error of the time when all bodies are at rest", settle_time),
     )
 }
 

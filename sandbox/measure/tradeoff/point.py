@@ -1,47 +1,56 @@
-"""Point: one setting of one engine, with its error and its cost."""
+"""Point: one setting of one engine, with its error and cost."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from sandbox.measure.finite import finite
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
 
 
 @dataclass(frozen=True)
 class Point:
-    """What one setting costs, and what it buys. What is unknown is None."""
+    """Error and cost of one setting of one engine. Unknown values are None."""
 
     engine: str
+    """name of the engine"""
     asked: Settings
-    """what the engine was given; what is None there was left to it"""
+    """settings given to the engine; those that are None are chosen by it"""
     settings: Settings
-    """as the engine filled them in"""
+    """settings as the engine resolved them"""
     changes: Mapping[str, Any]
-    """what differs from the scene's own `[solver]`"""
+    """differences from the `[solver]` of the scene"""
     status: str
-    """`ok`, `diverged`, `failed`, `refused`, or `stopped` where it took too long"""
+    """`ok`, `diverged`, `failed`, `refused`, or `stopped` if it took too long"""
     reason: str | None
-    """why it is not `ok`"""
+    """reason for a status other than `ok`"""
     metrics: Mapping[str, float | None]
-    """every metric by name, in its unit; over several seeds the worst"""
+    """every metric by name, in its unit; the worst over the seeds"""
     error: float | None
-    """of the metric that was asked for; None where the run gives none"""
+    """value of the chosen metric; None if the run has none"""
     cost: float | None
-    """ms per simulated second: the least of separate repeats, nothing recorded"""
+    """ms per simulated second: the minimum of separate repeats without recording"""
     cost_median: float | None
+    """ms per simulated second: the median of the same repeats"""
     repeats: int
-    """0 where another point of its engine is as right and by far cheaper: the cost is then of the run that gave the
-    error, with its frames kept and audited"""
+    """number of separate repeats; 0 if another point of the engine is as accurate and much cheaper. The cost is then
+    that of the run that gave the error, including recording and audit"""
     counted: float | None
-    """ms per simulated second by the counters of the run (`counted_cost`): the same on every machine"""
+    """ms per simulated second computed from the work counters (`counted_cost`); equal on every machine"""
     is_own: bool
-    """whether it is the scene's own setting"""
+    """whether it is the setting of the scene"""
     work: Mapping[str, int]
     """deterministic counters: substeps, pair tests, contact iterations, events"""
 
+    def __repr__(self) -> str:
+        """Return engine, changes and status, error and cost."""
+        changes = ", ".join(f"{key} {value}" for key, value in self.changes.items()) or "as the scene has it"
+        error = "unknown" if self.error is None else f"{self.error:.3g}"
+        cost = "unknown" if self.cost is None else f"{self.cost:.3g} ms per simulated second"
+        return f"<Point {self.engine}, {changes}: {self.status}, error {error}, cost {cost}>"
+
     def document(self) -> dict[str, Any]:
-        """Return it as a JSON object; figures that are not finite are null."""
+        """Return the point as a JSON object; values that are not finite are null."""
         return {
             "engine": self.engine,
             "settings": self.settings.model_dump(mode="json"),
@@ -60,10 +69,16 @@ class Point:
 
     @property
     def usable(self) -> bool:
-        """Whether it has both figures, and these are finite, so that it can be weighed."""
+        """Whether the status is `ok`, and error and cost are finite."""
         return self.status == "ok" and finite(self.error) is not None and finite(self.cost) is not None
 
     def frame(self, fps: float) -> float:
-        """Return what the dearest frame of a game takes, ms: one step where dt is longer than a frame. It is usable."""
+        """Return the computing time of the most expensive frame of a game, ms, for a usable point.
+
+        If dt is longer than a frame, that is the time of one step.
+
+        Args:
+            fps: frames per second.
+        """
         assert self.cost_median is not None
         return self.cost_median * max(1.0 / fps, self.settings.dt)

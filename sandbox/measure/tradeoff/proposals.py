@@ -7,10 +7,11 @@ left out has changed nothing that anybody would see.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import IntArray
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.bounded_run import TookTooLongError, bounded_run, working
 from sandbox.measure.compare.closed import solved
@@ -18,37 +19,48 @@ from sandbox.measure.tradeoff.cost import seconds_of, warm_up
 from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.scene.document import to_document
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import from_document
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import IntArray
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 CHEAPER = 0.9
 """What a proposal may cost at most, as a share of what it stands in for: less is within the noise."""
 
-Simplification = tuple[str, Callable[[dict[str, Any]], None]]
+Change = Callable[[dict[str, Any]], None]
+
+
+class Simplification(NamedTuple):
+    """Part of the physics that may be left out."""
+
+    what: str
+    """short description of the simpler model"""
+    advice: str
+    """the same as a clause"""
+    change: Change
+    """removes it from the document of a scene"""
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A cheaper model that keeps to the tolerance."""
+    """Cheaper model of a scene whose error is within the tolerance."""
 
     what: str
+    """description of the model"""
     engine: str | None
-    """None for a formula"""
+    """name of the engine; None for a formula"""
     error: float
-    """by the metric asked for, against the truth of the scene as it is"""
+    """value of the chosen metric against the truth of the unchanged scene"""
     cost: float
     """ms per simulated second"""
     ratio: float
-    """of that to the setting it would stand in for, timed in turns"""
+    """cost / cost of the setting that it replaces, timed in turns"""
     sentence: str
 
     def document(self) -> dict[str, Any]:
-        """Return it as a JSON object."""
+        """Return the proposal as a JSON object."""
         own = {"what": self.what, "engine": self.engine, "error": self.error}
         return {**own, "cost_ms_per_second": self.cost, "ratio": self.ratio, "sentence": self.sentence}
 
@@ -76,7 +88,7 @@ def proposals(
         repeats: how often each is timed.
     """
     found = [*_formula(judges, metric, tolerance, engine, settings, repeats)]
-    for what, change in _simplifications(judges):
+    for what, advice, change in _simplifications(judges):
         error, simpler = 0.0, None
         for judge in judges:
             changed = _changed(judge.scene, change)
@@ -88,7 +100,7 @@ def proposals(
         if simpler is not None and error <= tolerance:
             own, its = _timed(judges[0].scene, simpler, engine, settings, repeats)
             if own is not None and its is not None and its <= CHEAPER * own:
-                found.append(_proposal(what, engine, error, its, own, judges[0].scene, metric))
+                found.append(_proposal(what, advice, engine, error, its, own, judges[0].scene, metric))
     return sorted(found, key=lambda each: each.ratio)
 
 
@@ -114,7 +126,12 @@ def _formula(
         solved(scene, settings)
         took.append(working() - began)
     if min(took) <= CHEAPER * own:
-        yield _proposal("no engine: the scene has a closed form", None, worst, min(took), own, scene, metric)
+        what = "no simulation: the scene has a closed-form solution"
+        advice = (
+            "as long as no input changes the motion, it can also be computed from a formula, without an engine (the "
+            "scene has a closed-form solution)"
+        )
+        yield _proposal(what, advice, None, worst, min(took), own, scene, metric)
 
 
 def _error(
@@ -146,7 +163,7 @@ def _timed(
     return min(taken[0]), min(taken[-1]) if other is not None else None
 
 
-def _changed(scene: Scene, change: Callable[[dict[str, Any]], None]) -> Scene | None:
+def _changed(scene: Scene, change: Change) -> Scene | None:
     """Return a scene that demands less; None where that is no sound scene, or lays its bodies out otherwise."""
     document = to_document(scene)
     change(document)
@@ -160,17 +177,27 @@ def _changed(scene: Scene, change: Callable[[dict[str, Any]], None]) -> Scene | 
 def _simplifications(judges: Sequence[Judge]) -> Iterator[Simplification]:
     """Yield what could be left out, by what the truths of all seeds and the scene say."""
     scene = judges[0].scene
-    world, meet = scene.world, meetings(scene)
+    world, meet = scene.world, contact_matrix(scene)
     met = _met(judges)
     if met is not None and meet.touches.any():
         if not len(met):
-            yield 'nothing meets anything: collides = "none" for all that moves', _collides(scene, "none")
+            yield Simplification(
+                'no collisions occur: collides = "none" for all moving bodies',
+                'the scene can also be simulated without collisions (collides = "none" for all moving bodies), '
+                "because none occur",
+                _collides(scene, "none"),
+            )
         elif meet.mutual and not (met >= 0).all(axis=1).any():
-            yield 'no two bodies meet: collides = "fixed" for all that moves', _collides(scene, "fixed")
+            yield Simplification(
+                'no two bodies collide: collides = "fixed" for all moving bodies',
+                'the scene can also be simulated without collisions between bodies (collides = "fixed" for all moving '
+                "bodies), because none occur",
+                _collides(scene, "fixed"),
+            )
     if world.linear_drag or world.quadratic_drag:
-        yield "no drag", _without_drag
+        yield Simplification("no drag", "the scene can also be simulated without drag", _without_drag)
     if any(each.friction for each in (*scene.materials, *scene.pairs, *scene.movers, *scene.fixed)):
-        yield "no friction", _without_friction
+        yield Simplification("no friction", "the scene can also be simulated without friction", _without_friction)
 
 
 def _met(judges: Sequence[Judge]) -> IntArray | None:
@@ -183,7 +210,7 @@ def _met(judges: Sequence[Judge]) -> IntArray | None:
     return np.concatenate(found)
 
 
-def _collides(scene: Scene, word: str) -> Callable[[dict[str, Any]], None]:
+def _collides(scene: Scene, word: str) -> Change:
     def change(document: dict[str, Any]) -> None:
         for heading in scene.kinds:
             for element in document.get(heading, ()):
@@ -206,11 +233,11 @@ def _without_friction(document: dict[str, Any]) -> None:
 
 
 def _proposal(
-    what: str, engine: str | None, error: float, took: float, instead: float, scene: Scene, metric: str
+    what: str, advice: str, engine: str | None, error: float, took: float, instead: float, scene: Scene, metric: str
 ) -> Proposal:
     cost, ratio = 1e3 * took / scene.world.duration, took / instead
     sentence = (
-        f"{what}: {metric} {figure(error, METRICS[metric].unit)}, {cost:.3g} ms a simulated second,"
-        f" {ratio:.2g} of what that setting takes"
+        f"{advice}: {metric} {figure(error, METRICS[metric].unit)}, {cost:.3g} ms per simulated second,"
+        f" {ratio:.2g} times the cost of simulating the scene as it is"
     )
     return Proposal(what, engine, error, cost, ratio, sentence)

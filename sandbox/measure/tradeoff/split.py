@@ -17,7 +17,7 @@ from sandbox.measure.bounded_run import TookTooLongError, bounded_run
 from sandbox.measure.compare.errors import errors
 from sandbox.measure.finite import finite
 from sandbox.measure.tradeoff.judge import Judge
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Trajectory
 
 MANY_ITERATIONS = 16
@@ -28,25 +28,25 @@ FINEST = 16
 
 @dataclass(frozen=True)
 class Split:
-    """The largest distances, m, between the settings' own run, the limits, and the truth."""
+    """Parts of the position error of a setting: largest distances, m, between its run, the limits and the truth."""
 
     engine: str
     settings: Settings
     total: float
-    """from the truth"""
+    """distance from the truth"""
     solver: float
-    """from the same step with many iterations"""
+    """distance from the run with the same step and many iterations"""
     time_step: float
-    """from there to the finest step"""
+    """distance of that run from the finest step"""
     model: float | None
-    """from there to the truth; None where the distance to it is still shrinking with the step"""
+    """distance of the finest step from the truth; None if it still decreases with the step"""
     left: float
-    """what the finest step is still off by; the model's part and what is left of the time step's"""
+    """error of the finest step: the part of the model and the rest of the part of the time step"""
     finest: int
-    """substeps in one of the settings' own, in the finest step"""
+    """substeps of the finest step in one substep of the setting"""
 
     def document(self) -> dict[str, Any]:
-        """Return it as a JSON object."""
+        """Return the split as a JSON object."""
         figures = ("total", "solver", "time_step", "model", "left")
         own = {"engine": self.engine, "settings": self.settings.model_dump(mode="json")}
         return {**own, **{key: finite(getattr(self, key)) for key in figures}, "finest": self.finest}

@@ -10,7 +10,7 @@ from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS, measured
 from sandbox.measure.tradeoff.variant import Space, Variant
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Trajectory
 
 

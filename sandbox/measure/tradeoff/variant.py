@@ -11,10 +11,10 @@ from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.refined import preferences
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.part import MAX_STEPS
-from sandbox.scene.settings import Detection, Integrator, Joints, Response, Settings
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.description.base import MAX_STEPS
+from sandbox.scene.description.world import Detection, Integrator, Joints, Response, Settings
+from sandbox.scene.scene import Scene
 
 MOST_SUBSTEPS, MOST_ITERATIONS = 512, 1000
 FEWEST_STEPS = 4
@@ -203,12 +203,12 @@ class Space:
     @cached_property
     def touches(self) -> bool:
         """Whether anything can meet anything."""
-        return bool(meetings(self.scene).touches.any())
+        return bool(contact_matrix(self.scene).touches.any())
 
     @cached_property
     def iterates(self) -> bool:
         """Whether more passes of the solver can change anything: where contacts or joints hang together."""
-        meet = meetings(self.scene)
+        meet = contact_matrix(self.scene)
         return bool(len(self.scene.links)) or (
             self.touches and (meet.mutual or len(self.scene.fixed) > 1 or meet.solids)
         )

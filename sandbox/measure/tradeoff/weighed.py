@@ -1,137 +1,171 @@
-"""Tradeoff: what came of weighing a scene's settings, as a frozen value and as a JSON document."""
+"""Tradeoff: errors and costs of the settings of a scene, as a frozen value and as a JSON document."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sandbox.echo import short_repr
+from sandbox.html_repr import HtmlRepr
 from sandbox.measure.compare.truth import Truth
 from sandbox.measure.finite import finite
+from sandbox.measure.forecast.warning import Warning
 from sandbox.measure.tradeoff.figure import figure
 from sandbox.measure.tradeoff.front import pareto
 from sandbox.measure.tradeoff.metrics import Metric
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.proposals import Proposal
 from sandbox.measure.tradeoff.split import Split
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
+
+MAX_SHOWN = 4
+"""Answers in the representation of a trade-off."""
 
 
 @dataclass(frozen=True)
 class Pick:
-    """A point that answers a question, and how it stood up to seeds that it was not chosen by."""
+    """Recommended point, with its error for seeds that were not used to choose it."""
 
     point: Point
+    """the setting, with error and cost"""
     sentence: str
+    """description of the setting, its error and its cost"""
     fresh_seeds: tuple[int, ...]
-    """on which it was run again; none where nothing in the scene is random"""
+    """seeds of the additional runs; empty if the scene has no randomness"""
     fresh_error: float | None
-    """the worst of these runs"""
+    """largest error of the additional runs, in the unit of the metric"""
+    warnings: tuple[Warning, ...] = ()
+    """problems that formulas predict for the setting (those of `sandbox check --no-trial`). The measured runs may not
+    show them: a body can tunnel at a slightly different speed"""
 
     def document(self) -> dict[str, Any]:
-        """Return it as a JSON object: the point, and what else there is."""
+        """Return the pick as a JSON object: the fields of the point, and its own."""
         more = {
             "sentence": self.sentence,
             "fresh_seeds": list(self.fresh_seeds),
             "fresh_error": finite(self.fresh_error),
+            "warnings": [_warning_document(each) for each in self.warnings],
         }
         return {**self.point.document(), **more}
 
 
 @dataclass(frozen=True, eq=False)
-class Tradeoff:
-    """Error against cost, over engines and settings."""
+class Tradeoff(HtmlRepr):
+    """Error and cost of engines and settings for one scene."""
 
     scene: Scene
+    """the scene"""
     best: Truth | None
+    """truth that errors are measured against; None if there is none"""
     doubt: str | None
-    """why there is no truth"""
+    """reason why there is no truth"""
     metric: Metric
+    """metric of the error: name, unit and description"""
     metric_reason: str
-    """why it is this one, as a clause"""
+    """reason for the choice of the metric, as a clause"""
     zoom: float
-    """px/m"""
+    """px/m, scale of errors in pixels"""
     points: tuple[Point, ...]
+    """all settings that were tried"""
     pareto: tuple[Point, ...]
-    """those that nothing beats in both, cheapest first"""
+    """points of the Pareto front, cheapest first: no other point is both cheaper and more accurate"""
     splits: tuple[Split, ...]
+    """position error of each engine, split into the parts of solver iterations, time step and model"""
     proposals: tuple[Proposal, ...]
+    """cheaper models of the scene whose error is within the tolerance"""
     tolerance: float
-    """in the metric's unit"""
+    """largest accepted error, in the unit of the metric"""
     budget: float | None
-    """ms a frame"""
+    """ms, computing time per frame; None if not given"""
     fps: float
     """frames per second of the budget"""
     within_tolerance: Pick | None
-    """the cheapest within the tolerance"""
+    """cheapest setting within the tolerance"""
     within_budget: Pick | None
-    """the best within the budget"""
+    """most accurate setting within the budget"""
     cheapest_by_engine: Mapping[str, Pick | None]
-    """the cheapest within the tolerance of each engine by itself"""
+    """cheapest setting within the tolerance for each engine"""
     nearest_to_tolerance: Pick | None
-    """what comes nearest where nothing is within the tolerance"""
+    """setting with the smallest error, if no setting is within the tolerance"""
     nearest_to_budget: Pick | None
-    """likewise of the budget"""
+    """setting with the smallest frame time, if no setting is within the budget"""
     seeds: tuple[int, ...]
-    """that errors are the worst of"""
+    """seeds over which errors are the largest"""
     untried: int
-    """variants left out, as they would have cost too much"""
+    """number of variants left out because of their cost"""
     effort: float
     """counted work that the search was allowed"""
     spent: float
-    """counted work that it did"""
+    """counted work that the search used"""
     out_of_time: bool
-    """whether the time limit ended it: another run may try more"""
+    """whether the time limit ended the search; another run may then try more settings"""
     machine: Mapping[str, Any]
+    """description of the machine"""
     versions: Mapping[str, str]
+    """versions of Python and of the packages used"""
+    max_dt: float = math.inf
+    """s, longest dt of a recommended setting: a frame, or the dt of the scene if that is longer"""
     interrupted: bool = False
-    """by the user: what was tried till then is here, with the times of the runs that were scored"""
+    """whether Ctrl-C ended the search; the points are those tried before, with the times of their recorded runs"""
+
+    def __repr__(self) -> str:
+        """Return the number of points, and the settings within the tolerance and the budget."""
+        engines = ", ".join(dict.fromkeys(point.engine for point in self.points))
+        head = f"<Tradeoff {short_repr(self.scene.title)}: {len(self.points):,} settings of {engines or 'no engine'}"
+        lines = [f"{head}, {len(self.pareto):,} on the Pareto front; error: {self.metric.name}"]
+        return "\n  ".join([*lines, *self.answers()[:MAX_SHOWN]]) + ">"
 
     @property
     def truth(self) -> str | None:
-        """`closed_form`, `exact` or `refined`; None where there is none."""
+        """Kind of the truth: `closed_form`, `exact` or `refined`; None if there is none."""
         return None if self.best is None else self.best.kind
 
     @property
     def floors(self) -> dict[str, float]:
-        """The error of each engine that no setting of its step and its iterations removes, m, where there is one."""
+        """Error of each engine that remains with a small step and many iterations, m.
+
+        Engines without such an error are left out.
+        """
         return {each.engine: each.model for each in self.splits if each.model is not None and math.isfinite(each.model)}
 
     @property
     def error_about(self) -> str:
-        """What errors are counted in, and why, in one sentence."""
-        return f"errors are {self.metric.name} ({self.metric.about}), because {self.metric_reason}"
+        """Metric of the error and the reason for it, as one sentence."""
+        return f"error metric: {self.metric.name} ({self.metric.about}), because {self.metric_reason}"
 
     def fronts(self) -> dict[str, list[Point]]:
-        """Return the Pareto front of each engine by itself, cheapest first."""
+        """Return the Pareto front of each engine, cheapest first."""
         names = dict.fromkeys(point.engine for point in self.points)
         return {name: front_of([p for p in self.points if p.engine == name]) for name in names}
 
     def answers(self) -> list[str]:
-        """Return the sentences that people come for."""
+        """Return the recommended settings as sentences."""
         ran = [point for point in self.points if point.status == "ok"]
         if ran and all(point.error is None for point in ran):
-            return [f"{self.metric.name} says nothing of this scene; choose another --metric"]
+            return [f"{self.metric.name} cannot be measured in this scene; choose another --metric"]
         unit = self.metric.unit
         wanted = f"cheapest setting with {self.metric.name} within {figure(self.tolerance, unit)}"
         lines = [f"{wanted}: {self._answer(self.within_tolerance, self.nearest_to_tolerance)}"]
         if self.budget is not None:
-            most = f"most accurate setting within {self.budget:g} ms a frame, at {self.fps:g} frames a second"
+            most = f"most accurate setting within {self.budget:g} ms per frame at {self.fps:g} fps"
             lines.append(f"{most}: {self._answer(self.within_budget, self.nearest_to_budget)}")
         overall = None if self.within_tolerance is None else self.within_tolerance.point
         others = {name: pick for name, pick in self.cheapest_by_engine.items() if pick and pick.point is not overall}
-        return lines + [f"cheapest of {name} within it: {pick.sentence}" for name, pick in others.items()]
+        return lines + [
+            f"cheapest setting of {name} within the tolerance: {pick.sentence}" for name, pick in others.items()
+        ]
 
     def _answer(self, found: Pick | None, nearest: Pick | None) -> str:
         if found is not None:
             return found.sentence
-        none = f"none of the {len(self.points)} that were tried"
+        none = f"none of the {len(self.points)} settings tried"
         return none if nearest is None else f"{none}; the nearest is {nearest.sentence}"
 
     def document(self, scene: str | None = None) -> dict[str, Any]:
         """Return the trade-off as one JSON document.
 
         Args:
-            scene: what the scene is called in it, such as its path; else its title.
+            scene: name of the scene in the document, such as its path; default: its title.
         """
         return {
             "scene": self.scene.title if scene is None else scene,
@@ -154,6 +188,7 @@ class Tradeoff:
             "tolerance": self.tolerance,
             "budget": self.budget,
             "fps": self.fps,
+            "max_dt": finite(self.max_dt),
             **{name: None if pick is None else pick.document() for name, pick in self._picks().items()},
             "cheapest_by_engine": {
                 name: None if pick is None else pick.document() for name, pick in self.cheapest_by_engine.items()
@@ -173,10 +208,15 @@ class Tradeoff:
         return {name: getattr(self, name) for name in names}
 
 
-def front_of(points: Sequence[Point]) -> list[Point]:
-    """Return the points that no other is both cheaper and more accurate than, cheapest first.
+def _warning_document(warning: Warning) -> dict[str, Any]:
+    figures = {key: finite(value) if isinstance(value, float) else value for key, value in warning.figures.items()}
+    return {"kind": warning.kind, "message": warning.message, **figures}
 
-    The time of a run whose frames were kept and audited says nothing beside one that was timed apart.
+
+def front_of(points: Sequence[Point]) -> list[Point]:
+    """Return the Pareto front of points, cheapest first.
+
+    If some points were timed separately, only these are used: the time of the others includes recording and audit.
     """
     usable = [point for point in points if point.usable]
     timed = [point for point in usable if point.repeats]

@@ -7,13 +7,20 @@ apart, counted work decides which is the cheaper.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+
+from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES, engine_named
 from sandbox.measure.bounded_run import working
 from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.compare.truth import Truth, seek_truth
+from sandbox.measure.forecast.forecasts import warnings
+from sandbox.measure.forecast.passages import largest_safe_dt
+from sandbox.measure.forecast.warning import ROUNDING, Warning
 from sandbox.measure.recorder import require_memory
 from sandbox.measure.seeds import is_random, seeded
 from sandbox.measure.told import Told, nobody
@@ -36,10 +43,11 @@ from sandbox.measure.tradeoff.search import SLOW, Search
 from sandbox.measure.tradeoff.split import Split, split
 from sandbox.measure.tradeoff.trial import Trial, tried
 from sandbox.measure.tradeoff.variant import Space, Variant
-from sandbox.measure.tradeoff.weighed import Tradeoff, front_of
+from sandbox.measure.tradeoff.weighed import Pick, Tradeoff, front_of
 from sandbox.measure.versions import machine, versions
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import as_scene
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 EFFORT = 10.0
@@ -57,7 +65,7 @@ SEEDS = 2**63
 
 
 def tradeoff(
-    scene: Scene,
+    scene: Scene | str | Path,
     engines: Sequence[str] | None = None,
     *,
     metric: str | None = None,
@@ -75,36 +83,44 @@ def tradeoff(
     told: Told | None = None,
     **settings: Any,
 ) -> Tradeoff:
-    """Weigh a scene's settings: error against the best known truth, and cost, over engines and choices.
+    """Measure the error and the cost of engines and settings for a scene, and find the Pareto front.
+
+    The error is measured against the best known truth, the cost in computing time per simulated second. The settings
+    that are tried depend on the scene and on `effort`, not on the speed of the machine, unless `time_limit` is given.
 
     Args:
-        scene: what to run.
-        engines: their names; by default all there are. One that cannot run the scene is a point that says why.
-        metric: what the error is counted in (`metrics.METRICS`); by default the largest distance from the truth
-            where that is trusted to the end, else an invariant of the scene.
-        tolerance: in the metric's unit; by default 1 % of the smallest radius, 1 px, 1 %, or none missed.
-        budget: ms a frame, for the best that it buys.
-        fps: frames a second of the budget; what is recommended steps as often, or as often as the scene does.
-        seeds: how many, from the scene's own on; errors are the worst of them.
-        zoom: px/m, for errors in pixels; by default all that happens fills a window of 1280 × 720.
-        effort: counted work that the search may do, in about seconds of computing: the same settings are tried
-            on every machine. Every engine's own settings are tried, however small the effort.
-        time_limit: s after which nothing more is tried; what is tried then depends on the machine.
-        repeats: how often what is near the front is timed.
-        most: how many settings are tried.
-        truth: of this scene and its frames, as close as the tolerance asks for, or why there is none, where it was
-            sought already.
-        runs: by engine, runs of this scene with its own settings, where they were made already.
-        told: called with what is being done.
+        scene: the scene, or its name or path, as `load` takes it.
+        engines: names of the engines, or one name; default: all. An engine that cannot run the scene gets a
+            point with the reason.
+        metric: metric of the error (`metrics.METRICS`); default: the largest distance from the truth if the truth is
+            trusted to the end, otherwise an invariant of the scene.
+        tolerance: largest accepted error, in the unit of the metric; default: 1 % of the smallest radius, 1 px, 1 %, or
+            no missed contact.
+        budget: computing time per frame, ms, for which the most accurate setting is sought.
+        fps: frames per second of the budget. A recommended setting has at least this step rate, or the step rate of the
+            scene if that is lower.
+        seeds: number of seeds, from the scene's own upwards; each error is the largest over the seeds.
+        zoom: px/m, for errors in pixels; default: the motion fills a window of 1280 × 720.
+        effort: counted work of the search, about seconds of computing. The same settings are tried on every machine.
+            The default settings of each engine are tried even with a small effort.
+        time_limit: time after which no more settings are tried, s; the tried settings then depend on the machine.
+        repeats: number of timings of settings near the front.
+        most: largest number of settings that are tried.
+        truth: truth of this scene and its frames, as accurate as the tolerance requires, or the reason why there is
+            none, if already known.
+        runs: runs of this scene with its own settings by engine, if already made.
+        told: progress callback, called with a description of each stage.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
     Raises:
         UnknownEngineError: no engine has one of the names.
         UnknownMetricError: no metric has that name.
         TooLargeError: the frames would not fit into memory.
-        ValueError: a figure is out of range.
-        pydantic.ValidationError: a setting is wrong.
+        ValueError: an argument is out of range.
+        pydantic.ValidationError: a setting is invalid.
     """
+    scene = as_scene(scene)
+    engines = [engines] if isinstance(engines, str) else engines
     names = tuple(dict.fromkeys(ENGINES if engines is None else engines))
     for name in names:
         engine_named(name)
@@ -136,12 +152,12 @@ def tradeoff(
         points = [*_timed(trials, space, aim, repeats, effort), *_refused(scene, names, base)]
         trial_of = {id(point): trial for point, trial in zip(points, trials, strict=False)}  # the refused have none
         again = _again(space, trial_of, aim, lambda: _judges(scene, base, close, fresh, judges[0].zoom), effort)
-        say("trying the answer on fresh seeds")
+        say("checking the recommended setting with other seeds")
         within, best = cheapest(points, aim, fresh, again), closest(points, aim, fresh, again)
         splits: list[Split] = []
         cheaper: list[Proposal] = []
         if repeats and working() < deadline:
-            say("where the error comes from, and what a cheaper model would do")
+            say("splitting the error into its sources, and trying simpler models")
             splits = _splits(judges[0], space, effort, deadline)
             cheaper = _proposals(judges, aim, within.point if within else None, space, effort, deadline)
         return Tradeoff(
@@ -158,13 +174,14 @@ def tradeoff(
             tolerance=aim.tolerance,
             budget=budget,
             fps=fps,
-            within_tolerance=within,
-            within_budget=best,
+            within_tolerance=_checked(scene, within),
+            within_budget=_checked(scene, best),
             cheapest_by_engine={
-                name: cheapest([p for p in points if p.engine == name], aim, fresh, again) for name in space.engines
+                name: _checked(scene, cheapest([p for p in points if p.engine == name], aim, fresh, again))
+                for name in space.engines
             },
-            nearest_to_tolerance=None if within else nearest_to_tolerance(points, aim),
-            nearest_to_budget=None if best or budget is None else nearest_to_budget(points, aim),
+            nearest_to_tolerance=None if within else _checked(scene, nearest_to_tolerance(points, aim)),
+            nearest_to_budget=None if best or budget is None else _checked(scene, nearest_to_budget(points, aim)),
             seeds=known,
             untried=len(search.untried - set(search.trials)),
             effort=effort,
@@ -172,6 +189,7 @@ def tradeoff(
             out_of_time=working() >= deadline,
             machine=machine(),
             versions=versions(),
+            max_dt=aim.step,
             interrupted=not repeats,
         )
 
@@ -188,10 +206,10 @@ def _require_sense(
 ) -> None:
     for what, value in (("seeds", seeds), ("repeats", repeats), ("most", most)):
         if value < 1:
-            raise ValueError(f"{what} of {value}; at least 1")
+            raise ValueError(f"{what} is {value}; it must be at least 1")
     for what, figure in (("zoom", zoom), ("effort", effort), ("time limit", time_limit)):
         if figure is not None and not 0.0 < figure < math.inf:
-            raise ValueError(f"a {what} of {figure:g}; it is positive and finite")
+            raise ValueError(f"{what} is {figure:g}; it must be positive and finite")
 
 
 def _seeds(scene: Scene, count: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -323,6 +341,40 @@ def _again(
         return known[variant]
 
     return again
+
+
+def _checked(scene: Scene, pick: Pick | None) -> Pick | None:
+    """Return a pick with the warnings of the forecasts for its setting."""
+    if pick is None:
+        return None
+    return replace(pick, warnings=tuple(setting_warnings(scene, pick.point.engine, pick.point.asked)))
+
+
+def setting_warnings(scene: Scene, engine: str, settings: Settings) -> list[Warning]:
+    """Return what the forecasts predict for a setting, without a trial run.
+
+    Warnings of tunnelling also state the number of substeps from which on no body can tunnel at the dt of the setting.
+    """
+    found = warnings(scene, settings, engine)
+    limits = [float(each.figures["safe_dt"]) for each in found if each.kind == "tunnelling"]
+    if not limits:
+        return found
+    safe = largest_safe_dt(scene, settings)
+    # Unknown where something may add any speed; then the speeds that the warnings state decide.
+    what = "prevents tunnelling at these speeds" if safe is None else "prevents tunnelling"
+    safe = min(limits) if safe is None else safe
+    ratio = settings.substeps * settings.dt / safe if safe > 0.0 else math.inf
+    try:
+        needed = settings.replace(substeps=math.ceil(ratio * (1.0 - ROUNDING))).substeps
+    except (OverflowError, ValidationError):  # more than a setting may have
+        return found
+    remedy = f"; at dt = {settings.dt:.4g} s, substeps >= {needed} {what}"
+    return [
+        replace(each, message=each.message + remedy, figures={**each.figures, "safe_substeps": needed})
+        if each.kind == "tunnelling"
+        else each
+        for each in found
+    ]
 
 
 def _splits(judge: Judge, space: Space, effort: float, deadline: float) -> list[Split]:

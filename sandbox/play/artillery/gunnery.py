@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from sandbox.scene.part import Point
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
+from sandbox.scene.description.base import Point
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.games.artillery.flight import Flight, landing
 from sandbox.games.artillery.rules import ArtilleryRules
 from sandbox.games.artillery.tanks import WHOLE
 from sandbox.games.rules import Rules
 from sandbox.play.artillery.gunnery import Burst, Clod, Gun, Gunnery
 from sandbox.play.sight import Sight
-from sandbox.trajectory import FloatArray
 
 BURST = 0.7
 """s that a blast is seen"""

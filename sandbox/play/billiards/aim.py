@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from sandbox.play.billiards.forecast import Forecast
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from sandbox.scene.cue import MISCUE, Shot, Stroke
+from sandbox.scene.description.surface import MISCUE, Shot, Stroke
 
 SLOWEST, FASTEST = 0.05, 10.0
 """m/s, of the cue: the least that is a stroke, and a hard break"""

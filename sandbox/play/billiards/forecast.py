@@ -2,12 +2,12 @@
 
 from typing import NamedTuple
 
+from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Exhaustion, Refusal
-from sandbox.engines.exact.rolling.table import Table
-from sandbox.scene.cue import Stroke
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Point
-from sandbox.trajectory import FloatArray
+from sandbox.engines.exact.tabletop.shots import Table
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.surface import Stroke
+from sandbox.scene.scene import Scene
 
 SPACING = 0.05
 """m between the points of a way"""

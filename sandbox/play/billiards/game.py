@@ -8,16 +8,16 @@ from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Call
 from sandbox.games.billiards.rules.happening import GameError
 from sandbox.games.billiards.rules.verdict import player
+from sandbox.games.names import TableGame
 from sandbox.play.billiards.cue import Cue
 from sandbox.play.billiards.hearing import Hearing
 from sandbox.play.billiards.opponent import Opponent
 from sandbox.play.billiards.turns import Turns
 from sandbox.play.running.live import Live
 from sandbox.play.running.rest import at_rest
-from sandbox.scene.cue import Shot
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Point
-from sandbox.scene.spots import TableGame
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.surface import Shot
+from sandbox.scene.scene import Scene
 
 Players = Literal["one player", "two players", "you vs bot"]
 PLAYERS: tuple[Players, ...] = get_args(Players)

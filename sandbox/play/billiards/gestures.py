@@ -8,7 +8,7 @@ from typing import Literal
 from sandbox.play.billiards.cue import FASTEST, SLOWEST
 from sandbox.play.billiards.person import Person
 from sandbox.play.billiards.seen import Seen
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 Mode = Literal["aim", "stroke", "draw", "english", "power"]
 

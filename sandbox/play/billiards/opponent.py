@@ -10,7 +10,7 @@ from sandbox.games.billiards.frame import Plan
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Decision
 from sandbox.play.billiards.cue import Cue
-from sandbox.scene.cue import Stroke
+from sandbox.scene.description.surface import Stroke
 
 TURNING, DRAWING = 0.9, 0.45
 """s that it takes to aim, and to draw the cue back"""

@@ -7,7 +7,7 @@ from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Call, Decision
 from sandbox.games.billiards.rules.happening import GameError
 from sandbox.play.billiards.game import Game
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 
 class Person:

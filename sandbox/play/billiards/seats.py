@@ -5,12 +5,12 @@ from typing import get_args
 
 from sandbox.games.billiards.layout import Layout
 from sandbox.games.billiards.rules.happening import GameError
+from sandbox.games.names import TableGame
 from sandbox.play.billiards.game import Game, Players, plays
 from sandbox.play.billiards.gestures import Gestures
 from sandbox.play.billiards.person import Person
 from sandbox.play.running.live import Live
-from sandbox.scene.model import Scene
-from sandbox.scene.spots import TableGame
+from sandbox.scene.scene import Scene
 
 
 def laid(scene: Scene) -> Scene:

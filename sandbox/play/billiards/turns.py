@@ -6,10 +6,11 @@ strikes there goes another way.
 
 from dataclasses import replace
 
+from sandbox.arrays import FloatArray
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Call
-from sandbox.scene.part import Point
-from sandbox.trajectory import Contacts, FloatArray
+from sandbox.scene.description.base import Point
+from sandbox.trajectory import Contacts
 
 
 class Turns:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from sandbox.arrays import IntArray
 from sandbox.play.drawing.palette import ColourArray, hex_colour
 from sandbox.play.drawing.points import MANY, Packed
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.discs import Emitter
-from sandbox.scene.near import IntArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.discs import Emitter
 
 SHADES = 64
 """Steps of a life that are told apart: one and the next look alike, and a crowd has few colours at once."""
@@ -52,7 +52,7 @@ class Ageing:
 
     def _compiled(self, tones: Packed, shades: Packed, time: float) -> bool:
         """Fade in one compiled pass; return whether that could be done."""
-        from sandbox.engines.kernel import COMPILED
+        from sandbox.engines.common.kernel import COMPILED
 
         if COMPILED:
             from sandbox.play.drawing.scatter import fade

@@ -6,11 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.play.drawing.outlines import outline_distance, outlines_of
 from sandbox.play.hulls import Distance, Hull, hull_distance
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.near import IntArray
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.bodies import Bodies
 
 SEAM = 1e-3
 """px: what is no farther from a piece lies in it, so that no seam shows where two abut"""

@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.play.drawing.discs import Discs, Style
 from sandbox.play.drawing.palette import BACKGROUND, INK, ORANGE, SKY, YELLOW, Colour, mixed
 from sandbox.play.drawing.strokes import arrow, stroke
 from sandbox.play.drawing.text import write
 from sandbox.play.drawing.touches import touches
 from sandbox.play.drawing.view import View
-from sandbox.scene.near import IntArray
-from sandbox.trajectory import FloatArray
 
 MOST = 1000
 """Arrows of one kind; of more bodies or contacts, so many of them spread over all, or of forces the strongest"""

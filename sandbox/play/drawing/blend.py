@@ -1,6 +1,6 @@
 """Blend: colours between two, as surfaces of four bytes a pixel hold them, compiled where it can be."""
 
-from sandbox.engines.kernel import bare_kernel
+from sandbox.engines.common.kernel import bare_kernel
 
 FULL = 256
 """A share of all."""

@@ -5,11 +5,12 @@ from typing import NamedTuple
 import numpy as np
 import pygame
 
+from sandbox.arrays import IntArray
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.fixtures import draw_fixtures
-from sandbox.scene.model import Scene
-from sandbox.scene.zone import mask_of
-from sandbox.trajectory import Frame, IntArray
+from sandbox.scene.description.fixed import mask_of
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Frame
 
 OPACITY = 165
 """of 255, of what is above the ground"""

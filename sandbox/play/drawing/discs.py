@@ -6,12 +6,11 @@ from typing import NamedTuple
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.play.drawing.palette import BACKGROUND, Colour, ColourArray
 from sandbox.play.drawing.points import packed
 from sandbox.play.drawing.shade import Look, disc_distance, paint, shaded, surface_of
 from sandbox.play.drawing.strokes import stroke
-from sandbox.scene.near import IntArray
-from sandbox.trajectory import FloatArray
 
 LARGEST = 96.0
 """px, the radius up to which discs are sprites; larger ones are painted, only where they are in the picture"""

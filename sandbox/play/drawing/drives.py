@@ -10,8 +10,8 @@ from sandbox.play.drawing.fittings import arc, path, spot
 from sandbox.play.drawing.palette import BACKGROUND, INK, ORANGE, SKY, Colour, mixed
 from sandbox.play.drawing.strokes import Pixel
 from sandbox.play.drawing.view import View
-from sandbox.scene.driven import Mount, mounts
-from sandbox.scene.drives import PlungerDrive
+from sandbox.scene.compile.drives import Mount, mounts
+from sandbox.scene.description.forces import PlungerDrive
 
 PIN = 4.0
 """px, radius of a hinge"""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.play.drawing.anatomy import clipped_box
 from sandbox.play.drawing.discs import Discs, Style
 from sandbox.play.drawing.joints import SHADES, Held, strain
@@ -17,8 +18,7 @@ from sandbox.play.drawing.shade import Look, paint
 from sandbox.play.drawing.strokes import Pixel, arrow, dashes, stroke
 from sandbox.play.drawing.threads import draw_threads
 from sandbox.play.drawing.view import View
-from sandbox.scene.links import LinkKind
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.joint_arrays import LinkKind
 
 MOST = 600
 """Joints of one kind that are drawn each in its way; of more, only lines from body to body."""

@@ -1,4 +1,4 @@
-"""Fixtures: planes, walls, posts and the world's bounds, which change with the camera alone."""
+"""StaticColliders: planes, walls, posts and the world's bounds, which change with the camera alone."""
 
 import math
 from itertools import pairwise
@@ -19,7 +19,8 @@ from sandbox.play.drawing.palette import (
 )
 from sandbox.play.drawing.shade import Look, capsule_distance, disc_distance, line_distance, paint
 from sandbox.play.drawing.strokes import Pixel, clipped, dashes, stroke
-from sandbox.scene.model import Plane, Post, Scene, Wall
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.scene import Scene
 
 HATCH, HATCHES = 9.0, 600
 """px between two hatches of a plane, and the most of them"""

@@ -10,15 +10,14 @@ from itertools import pairwise
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.play.drawing.discs import Discs, Style
 from sandbox.play.drawing.palette import BACKGROUND, ORANGE, SKY, SURFACE, ColourArray, mixed
 from sandbox.play.drawing.points import packed
 from sandbox.play.drawing.strokes import Pixel, stroke
 from sandbox.play.drawing.threads import draw_threads
 from sandbox.play.drawing.view import View
-from sandbox.scene.links import LinkKind, Links
-from sandbox.scene.near import IntArray
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.joint_arrays import LinkKind, Links
 
 COILED = 500
 """Springs up to which each is a zigzag."""

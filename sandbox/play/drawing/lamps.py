@@ -12,9 +12,9 @@ from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import BACKGROUND, Colour, hex_colour, mixed
 from sandbox.play.drawing.shade import Look, disc_distance, paint
 from sandbox.play.drawing.strokes import clipped
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Point
-from sandbox.scene.parts import PlayPart
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.play import PlayPart
+from sandbox.scene.scene import Scene
 
 AMBER: Colour = (255, 196, 84)
 WHITE: Colour = (255, 255, 255)

@@ -10,9 +10,9 @@ from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import Colour, hex_colour
 from sandbox.play.drawing.shade import Look, disc_distance, paint
 from sandbox.play.drawing.strokes import Pixel, cut, fill, stroke
-from sandbox.scene.marking import Marking
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.play import Marking
+from sandbox.scene.scene import Scene
 
 BEYOND = 16_000.0
 """px to which widths of lines are cut: SDL counts in 32 bits, and draws all of it"""

@@ -11,11 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.play.hulls import Distance, segment_distance
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.near import IntArray
-from sandbox.scene.shapes import form_of
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.geometry.shapes import form_of
 
 Convex = tuple[tuple[tuple[float, float], ...], float]
 """Corners, counter-clockwise, and radius, m."""

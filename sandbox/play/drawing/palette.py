@@ -6,9 +6,9 @@ Source: M. Okabe, K. Ito, "Color Universal Design", 2008; its black is left out,
 import numpy as np
 import numpy.typing as npt
 
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.discs import Emitter
-from sandbox.scene.surfaced import Single, Surfaced
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.base import BodySpec, HasMaterial
+from sandbox.scene.description.discs import Emitter
 
 Colour = tuple[int, int, int]
 """sRGB, 0 to 255 each."""
@@ -77,7 +77,7 @@ def accent(number: int) -> Colour:
     return ACCENTS[number % len(ACCENTS)]
 
 
-def colour_of_fixed(thing: Surfaced, otherwise: Colour = NEUTRAL) -> Colour:
+def colour_of_fixed(thing: HasMaterial, otherwise: Colour = NEUTRAL) -> Colour:
     """Return the colour of a plane, wall or post: its own, or a neutral one."""
     return otherwise if thing.colour is None else hex_colour(thing.colour)
 
@@ -95,7 +95,7 @@ def colour_of(bodies: Bodies) -> ColourArray:
             colours[start:end] = hex_colour(element.colour)
         elif isinstance(element, Emitter) and element.colours is not None:
             colours[start:end] = hex_colour(element.colours[0])
-        elif isinstance(element, Single):
+        elif isinstance(element, BodySpec):
             colours[start:end] = NEUTRAL if element.fixed else accent(k)
         elif end - start <= FEW:
             colours[start:end] = [accent(k + n) for n in range(end - start)]

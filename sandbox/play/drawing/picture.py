@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import pygame
 
+from sandbox.arrays import BoolArray, IntArray
+from sandbox.games.artillery.terrain import Artillery
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.ageing import Ageing
 from sandbox.play.drawing.artillery.fire import draw_above, draw_below
@@ -28,11 +30,10 @@ from sandbox.play.drawing.table.cloth import draw_table
 from sandbox.play.drawing.view import View
 from sandbox.play.drawing.zones import draw_zones
 from sandbox.play.sight import Sight
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.meetings import meetings
-from sandbox.scene.model import Scene
-from sandbox.scene.near import IntArray
-from sandbox.trajectory import BoolArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.description.game_tables import table_of
+from sandbox.scene.scene import Scene
 
 POINT = 1.2
 """px, the radius below which a ball is a point"""
@@ -238,7 +239,7 @@ class Picture:
         ageing = Ageing(bodies)
         self._ageing = ageing if len(ageing) else None
         turned = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
-        self._turning = turned | meetings(scene, bodies).turnable
+        self._turning = turned | contact_matrix(sight.setup or scene, bodies).turnable
 
     def _blit_background(
         self, surface: pygame.Surface, camera: Camera, sight: Sight, antialias: bool, unit: float
@@ -252,7 +253,7 @@ class Picture:
             area = sight.scene.play.area
             if sight.scene.play.ground == "playfield":
                 draw_playfield(drawn, camera, sight.scene, unit, antialias)
-            elif sight.scene.artillery is not None:
+            elif table_of(sight.scene, Artillery) is not None:
                 draw_land(drawn, camera, sight.scene, unit, antialias)
             elif area is None:
                 draw_grid(drawn, camera, unit)

@@ -14,8 +14,9 @@ from sandbox.play.drawing.palette import INK, Colour, colour_of_fixed, mixed
 from sandbox.play.drawing.shade import Look
 from sandbox.play.drawing.strokes import Pixel, clipped, stroke
 from sandbox.play.drawing.zones import draw_zones
-from sandbox.scene.model import Post, Scene
-from sandbox.scene.surfaced import GROUND
+from sandbox.scene.description.base import GROUND
+from sandbox.scene.description.fixed import Post
+from sandbox.scene.scene import Scene
 
 DARK: Colour = (5, 8, 14)
 SHADOW = (0.003, -0.005)

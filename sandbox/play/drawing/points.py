@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 import pygame
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import ColourArray
-from sandbox.trajectory import BoolArray, FloatArray
 
 PIECE = 16384
 """Particles at a time: what is worked on, some 500 kB, stays in cache."""
@@ -87,7 +87,7 @@ class Points:
         side: int,
     ) -> bool:
         """Draw all in one compiled pass; return whether that could be done."""
-        from sandbox.engines.kernel import COMPILED
+        from sandbox.engines.common.kernel import COMPILED
 
         if not COMPILED or not is_flat(surface):
             return False

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.play.drawing.anatomy import Anatomy, Place, clipped_box
 from sandbox.play.drawing.discs import DARK, Style, dark
 from sandbox.play.drawing.palette import BACKGROUND, Colour, ColourArray
@@ -17,9 +18,7 @@ from sandbox.play.drawing.shade import Look, paint
 from sandbox.play.drawing.strokes import fill
 from sandbox.play.drawing.view import View
 from sandbox.play.hulls import rounded
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.near import IntArray
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.bodies import Bodies
 
 FEW = 8
 """Bodies up to which numba is not imported for them alone"""
@@ -126,7 +125,7 @@ def _in_one_pass(
     style: Style,
 ) -> bool:
     """Draw all in one compiled pass; return whether that could be done."""
-    from sandbox.engines.kernel import COMPILED
+    from sandbox.engines.common.kernel import COMPILED
 
     if not COMPILED or not is_flat(surface):
         return False

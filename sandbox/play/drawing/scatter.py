@@ -3,8 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
-from sandbox.engines.kernel import kernel
-from sandbox.trajectory import BoolArray, FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.kernel import kernel
 
 
 @kernel

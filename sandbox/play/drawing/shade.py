@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pygame
 
+from sandbox.arrays import FloatArray
 from sandbox.play.drawing.palette import Colour
-from sandbox.trajectory import FloatArray
 
 Distance = Callable[[FloatArray, FloatArray], FloatArray]
 """Takes x and y, px, that broadcast, and returns the signed distance there; it changes by no more than 1 a pixel."""

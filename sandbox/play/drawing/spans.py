@@ -5,8 +5,8 @@ A piece's `room` is (V, 5 or more): x and y of each corner, px, then normal and 
 
 import math
 
-from sandbox.engines.kernel import bare_kernel
-from sandbox.trajectory import FloatArray
+from sandbox.arrays import FloatArray
+from sandbox.engines.common.kernel import bare_kernel
 
 
 @bare_kernel

@@ -6,12 +6,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sandbox.engines.kernel import bare_kernel
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.kernel import bare_kernel
 from sandbox.play.drawing.anatomy import SEAM, Pieces
 from sandbox.play.drawing.blend import FULL, blended
 from sandbox.play.drawing.spans import inner_span, outer_span, span
-from sandbox.scene.near import IntArray
-from sandbox.trajectory import FloatArray
 
 
 class Pose(NamedTuple):

@@ -45,7 +45,7 @@ def write(
     x, y = at
     if not (abs(x) < FARTHEST and abs(y) < FARTHEST):  # nor where it is nan
         return pygame.Rect(0, 0, 0, 0)
-    words = _rendered(_sound(text), _whole(size), colour, bold, mono)
+    words = _rendered(renderable(text), _whole(size), colour, bold, mono)
     rect = words.get_rect(**{anchor: (round(x), round(y))})
     surface.blit(words, rect)
     return rect
@@ -53,15 +53,15 @@ def write(
 
 def measure(text: str, size: float, bold: bool = False, mono: bool = False) -> tuple[int, int]:
     """Return the width and height of a line of text, px."""
-    return _font(_whole(size), bold, mono).size(_sound(text))
+    return _font(_whole(size), bold, mono).size(renderable(text))
 
 
 def _whole(size: float) -> int:
     return round(min(max(size, SMALLEST), LARGEST)) if math.isfinite(size) else SMALLEST
 
 
-def _sound(text: str) -> str:
-    """Return a text that can be rendered: a zero letter or half a surrogate pair would raise."""
+def renderable(text: str) -> str:
+    """Return a text that can be rendered, or be a caption: a zero letter or half a surrogate pair would raise."""
     text = text[:LONGEST]
     if text.isprintable():
         return text

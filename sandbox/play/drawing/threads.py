@@ -3,8 +3,8 @@
 import numpy as np
 import pygame
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.play.drawing.points import Packed, flat_pixels, is_flat
-from sandbox.trajectory import BoolArray, FloatArray
 
 MANY = 300
 """Lines from which on a compiled pass is worth its import."""
@@ -24,7 +24,7 @@ def draw_threads(surface: pygame.Surface, ends: FloatArray, tones: Packed, antia
     kept, ends = _cut(surface, ends)
     tones = tones[kept]
     if antialias and len(ends) >= MANY and is_flat(surface):
-        from sandbox.engines.kernel import COMPILED
+        from sandbox.engines.common.kernel import COMPILED
 
         if COMPILED:
             from sandbox.play.drawing.wires import wires

@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.play.drawing.view import View
 from sandbox.play.hulls import Hull, hulls_of, meeting
-from sandbox.scene.model import Plane, Post, Wall
-from sandbox.trajectory import FloatArray
+from sandbox.scene.description.fixed import Plane, Post, Wall
 
 MOST_CURVED = 400
 """Contacts with walls and posts whose normals are worked out anew."""

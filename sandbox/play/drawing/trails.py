@@ -5,11 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.play.drawing.palette import BACKGROUND, ColourArray
 from sandbox.play.drawing.points import Points, packed
 from sandbox.play.drawing.view import View
-from sandbox.scene.near import IntArray
-from sandbox.trajectory import FloatArray
 
 LINES = 300
 """Bodies whose trails are lines."""

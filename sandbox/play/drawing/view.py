@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.discs import Style
 from sandbox.play.drawing.palette import ColourArray
 from sandbox.play.sight import Sight
-from sandbox.scene.near import IntArray
-from sandbox.trajectory import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sandbox.engines.kernel import bare_kernel
+from sandbox.arrays import FloatArray
+from sandbox.engines.common.kernel import bare_kernel
 from sandbox.play.drawing.blend import FULL, blended
-from sandbox.trajectory import FloatArray
 
 
 @bare_kernel

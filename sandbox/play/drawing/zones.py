@@ -5,12 +5,13 @@ from itertools import pairwise
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import FAINT, GREEN, ORANGE, SKY, Colour, hex_colour
 from sandbox.play.drawing.shade import Distance, Look, capsule_distance, disc_distance, paint
-from sandbox.scene.model import Scene, Zone
-from sandbox.scene.part import Point
-from sandbox.trajectory import FloatArray
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.fixed import Zone
+from sandbox.scene.scene import Scene
 
 FILLED, LINED = 0.13, 0.55
 """opacity of the area, and of its outline"""

@@ -98,7 +98,7 @@ def size_within(size: Size, width: int) -> Size:
 
 def _recorder(outfile: Outfile, suffix: str, size: Size, fps: float) -> Recorder:
     if min(size) < 2 or not (math.isfinite(fps) and fps > 0):
-        raise CaptureError(f"a film of {size[0]} x {size[1]} pixels at {fps:g} pictures a second cannot be made")
+        raise CaptureError(f"cannot record {size[0]} x {size[1]} pixels at {fps:g} frames per second")
     if suffix == ".gif":
         from sandbox.play.footage.gif import GifRecorder  # the window itself needs no Pillow
 
@@ -109,4 +109,4 @@ def _recorder(outfile: Outfile, suffix: str, size: Size, fps: float) -> Recorder
         from sandbox.play.footage.mp4 import Mp4Recorder
 
         return Mp4Recorder(outfile, size, fps)
-    raise CaptureError(f"a film ends in {' or '.join(FILMS)}, not {suffix!r}")
+    raise CaptureError(f"a recording is written as {' or '.join(FILMS)}, not {suffix!r}")

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.play.camera import Box
 from sandbox.play.framing import ANCHORED
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray
+from sandbox.scene.scene import Scene
 
 STRAY = 3.0
 """Sizes of the middle of a crowd that a body may go beyond it and still be shown."""

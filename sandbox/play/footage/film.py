@@ -9,6 +9,7 @@ import numpy as np
 import pygame
 
 from sandbox.action import Action, ActionError, Spawn, actions_from_json, in_order
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.games.lighting import Lightings
 from sandbox.play.breaks import broken_by
 from sandbox.play.camera import Box, Camera
@@ -22,12 +23,12 @@ from sandbox.play.footage.scenery import Scenery
 from sandbox.play.framing import framing
 from sandbox.play.picking import overlapping
 from sandbox.play.sight import Flash, Sight
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.faults import Fault, SceneError
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
-from sandbox.scene.zone import notes
-from sandbox.trajectory import BoolArray, Contacts, FloatArray, Frame, Trajectory
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.scene import zone_visits
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.load import from_session
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Contacts, Frame, Trajectory
 
 LINGER = 0.12
 """s of the film that a contact stays in sight after its first touch; one picture would be too short to see"""
@@ -144,7 +145,7 @@ class Film:
         """Return the contacts that are in sight at a time, s: those that began a moment of the film ago."""
         run = self.trajectory
         recent = (run.contact_time > time - LINGER * speed) & (run.contact_time <= time)
-        rows = np.flatnonzero(recent & ~notes(run.contact_pair, self.scene))
+        rows = np.flatnonzero(recent & ~zone_visits(run.contact_pair, self.scene))
         columns = (run.contact_point, run.contact_normal, run.contact_impulse)
         return Contacts(run.contact_time[rows], run.contact_pair[rows], *(column[rows] for column in columns))
 
@@ -242,8 +243,8 @@ def scene_of(trajectory: Trajectory, name: str = "<run>") -> Scene:
     """
     document = trajectory.info.get("scene")
     if not isinstance(document, dict):
-        raise SceneError([Fault(name, None, "info.scene", "the run does not say which scene it is of")])
-    return from_document(document, name)
+        raise SceneError([Fault(name, None, "info.scene", "the stored run does not contain its scene")])
+    return from_session(document, name)
 
 
 def actions_of(trajectory: Trajectory, name: str = "<run>") -> tuple[Action, ...]:
@@ -270,5 +271,5 @@ def bodies_of(trajectory: Trajectory, scene: Scene, name: str = "<run>") -> Bodi
     for single, called in zip(spawned, names[len(bodies) :], strict=False):  # a run that ended early lacks the last
         bodies = bodies.joined_by(single, called)
     if list(bodies.names) != names:
-        raise SceneError([Fault(name, None, "names", "the bodies are not those of the run's scene and actions")])
+        raise SceneError([Fault(name, None, "names", "the run's bodies do not match its scene and actions")])
     return bodies

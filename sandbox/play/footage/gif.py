@@ -75,7 +75,7 @@ class GifRecorder:
             return
         if self._count >= self._most:
             raise CaptureError(
-                f"a gif holds at most {self._most:,} pictures; record shorter, or an mp4, which may be longer"
+                f"a gif holds at most {self._most:,} frames; record a shorter one, or an mp4, which may be longer"
             )
         self._flush()
         self._pending, self._pending_seconds = self._encoded(pixels(surface, self._size)), seconds
@@ -89,7 +89,7 @@ class GifRecorder:
         """
         try:
             if not self._count:
-                raise CaptureError("a film needs at least one picture")
+                raise CaptureError("a recording needs at least one frame")
             self._flush()
             try:
                 self._stream.write(END)

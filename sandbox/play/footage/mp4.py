@@ -40,7 +40,7 @@ class Mp4Recorder:
         try:
             program = imageio_ffmpeg.get_ffmpeg_exe()
         except RuntimeError as error:
-            raise CaptureError(f"no ffmpeg was found: {error}") from None
+            raise CaptureError(f"ffmpeg not found: {error}") from None
         command = [
             *(program, "-v", "error", "-y", "-nostdin"),
             *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{even[0]}x{even[1]}", "-r", f"{fps:.9g}", "-i", "-"),
@@ -95,7 +95,7 @@ class Mp4Recorder:
                 self._pipe.close()
             status = self._process.wait()
             if not self._written:
-                raise CaptureError("a film needs at least one picture")
+                raise CaptureError("a recording needs at least one frame")
             if status != 0:
                 raise self._failure(f"status {status}")
             return self._outfile.place()

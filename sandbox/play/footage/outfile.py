@@ -3,12 +3,14 @@
 import os
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Self
-from uuid import uuid4
+
+from sandbox.whole import temporary_path
 
 LONGEST_STEM = 60
 """Letters of a scene's name that its files bear."""
@@ -28,12 +30,12 @@ class Outfile:
     @classmethod
     def at(cls, path: Path) -> Self:
         """Return an outfile that replaces what a path holds."""
-        return cls(_temporary(path.parent), lambda temporary: temporary.replace(path))
+        return cls(temporary_path(path.parent), lambda temporary: temporary.replace(path))
 
     @classmethod
     def numbered(cls, folder: Path, stem: str, suffix: str) -> Self:
         """Return an outfile that takes the first free of `sandbox-<stem>-1<suffix>`, `…-2<suffix>` and so on."""
-        return cls(_temporary(folder), partial(_place_numbered, folder=folder, stem=safe(stem), suffix=suffix))
+        return cls(temporary_path(folder), partial(_place_numbered, folder=folder, stem=safe(stem), suffix=suffix))
 
     def place(self) -> Path:
         """Give the finished file its name, and return it.
@@ -49,7 +51,8 @@ class Outfile:
 
     def discard(self) -> None:
         """Remove the temporary file, where there is one."""
-        self.temporary.unlink(missing_ok=True)
+        with suppress(NotADirectoryError):  # its folder has become a file
+            self.temporary.unlink(missing_ok=True)
 
 
 def safe(name: str) -> str:
@@ -60,10 +63,6 @@ def safe(name: str) -> str:
 def unwritable(place: Path, error: OSError) -> CaptureError:
     """Return what to say of a file that cannot be written."""
     return CaptureError(f"{place}: cannot be written: {error.strerror or error}")
-
-
-def _temporary(folder: Path) -> Path:
-    return folder / f".sandbox-{uuid4().hex}.tmp"
 
 
 def _place_numbered(temporary: Path, folder: Path, stem: str, suffix: str) -> Path:

@@ -7,8 +7,8 @@ import pygame
 
 from sandbox.measure.energy import Energies, energies
 from sandbox.play.instruments.graph import SPAN, EnergyGraph
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 SAMPLES = 500

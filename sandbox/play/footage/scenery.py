@@ -4,7 +4,7 @@ from bisect import bisect_right
 from collections.abc import Iterable
 
 from sandbox.action import Action, Reshape, Toggle
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 
 class Scenery:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pygame
 
 from sandbox.play.footage.capture import Recorder, recorder_in, screenshot, size_within
-from sandbox.play.footage.outfile import CaptureError, Outfile
+from sandbox.play.footage.outfile import CaptureError, Outfile, unwritable
 from sandbox.play.running.live import Live
 from sandbox.play.running.stored import Stored
 
@@ -92,11 +92,11 @@ class Taking:
     def session(self, show: Live | Stored | None, name: str) -> None:
         """Keep the session, to be replayed."""
         if not isinstance(show, Live):
-            self._tell("a stored run is already saved" if show is not None else "there is no session yet", "warning")
+            self._tell("a stored run is already saved" if show is not None else "no session to save", "warning")
             return
         if show.busy is not None:  # where it is going is what is to be kept, not somewhere on the way
             self._waiting = show, name
-            self._tell("saved as soon as it is there", "info")
+            self._tell("the session is saved once the jump in time is complete", "info")
             return
         outfile = Outfile.numbered(self._folder, name, ".json")
         try:
@@ -105,4 +105,5 @@ class Taking:
             show.session.note_saved()
         except (CaptureError, OSError) as error:
             outfile.discard()
-            self._tell(f"the session cannot be saved: {error}", "error")
+            why = str(error) if isinstance(error, CaptureError) else str(unwritable(self._folder, error))
+            self._tell(f"cannot save the session: {why}", "error")

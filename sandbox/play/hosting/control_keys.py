@@ -42,7 +42,7 @@ def codes_of(name: str) -> tuple[int, ...]:
     """
     codes = NAMED.get(name) or ((ord(name),) if len(name) == 1 and name.isprintable() and name == name.lower() else ())
     if not codes or GLOBAL & set(codes):
-        raise KeyNameError(f"no key {name!r} can be claimed: {', '.join(NAMED)}, or a letter, digit or sign")
+        raise KeyNameError(f"key {name!r} cannot be assigned; use {', '.join(NAMED)}, or a letter, digit or sign")
     return codes
 
 

@@ -112,13 +112,13 @@ class Gamepads:
             return
         if number not in self._devices:
             self._devices[number] = device, layout_of(name)
-            self._tell(f"gamepad: {name}")
+            self._tell(f"gamepad connected: {name}")
 
     def _go(self, number: int, host: Host | None) -> list[ActionError]:
         gone = self._devices.pop(number, None)
         if gone is None:
             return []
-        self._tell(f"gamepad gone: {gone[0].get_name()}")
+        self._tell(f"gamepad disconnected: {gone[0].get_name()}")
         if host is None:
             return []
         words = {word for control in host.controls for word in (control.pad or "").split()}

@@ -9,7 +9,7 @@ from sandbox.games.rules import Control, Lit, Logged, Rules, UnfitError
 from sandbox.play.hosting.past import Board, Past, Shown
 from sandbox.play.messages import Messages
 from sandbox.play.running.live import Live
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 
 def refereed(scene: Scene, messages: Messages) -> Referee | None:
@@ -93,7 +93,7 @@ class Host:
         if self._told or game is None or game.otherwise is None:
             return []
         self._told = True
-        return [f"from {game.otherwise:g} s on the rules would have done something else than was recorded"]
+        return [f"from {game.otherwise:g} s on, the rules no longer reproduce the recording"]
 
     def _news(self) -> list[str]:
         """Return what a game with a log has told since the last call; of what is taken back it may tell again."""

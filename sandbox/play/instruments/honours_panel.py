@@ -68,7 +68,7 @@ class HonoursPanel:
             return
         size = LETTERS * min(unit, free.width / 420.0, free.height / 420.0)
         title = "High scores" if entering.kept else f"Place {entering.place}: type your initials"
-        foot = "Enter or Esc closes" if entering.kept else "Enter keeps them, Esc does not"
+        foot = "Enter or Esc: close" if entering.kept else "Enter: save · Esc: discard"
         texts = [
             f"{k:>2}  {each.initials.ljust(3)}  {each.score:>15,}".replace(",", " ") for k, each in enumerate(rows, 1)
         ]

@@ -30,6 +30,9 @@ LEAST_MESSAGE = 14.0
 ESSENTIAL = 2
 """The rank of what is shown even beside the faults of a file."""
 
+PAUSED = "PAUSED  (P or Space)"
+"""The longest line that says that time stands still."""
+
 Mark = Literal["", "disc", "triangle", "ring", "bars"]
 
 
@@ -56,13 +59,12 @@ def rows(status: Status) -> tuple[Row, ...]:
         Row(f"step {status.step:,}   {clock(status.time, step)}".replace(",", " "), mono=True, rank=0),
     ]
     if status.ended is not None:
-        found.append(Row(f"ENDED: {status.ended} (R restarts)", WARNING, "triangle", bold=True, rank=2))
+        found.append(Row(f"ENDED: {status.ended} (R: restart)", WARNING, "triangle", bold=True, rank=2))
     elif status.unfocused:
-        found.append(Row("PAUSED  (another window is active)", WARNING, "bars", bold=True, rank=2))
+        found.append(Row("PAUSED  (no focus)", WARNING, "bars", bold=True, rank=2))
     elif status.paused:
         space_claimed = any("space" in key.lower() for key, _ in status.claimed)
-        keys = "P" if space_claimed else "P or Space"
-        found.append(Row(f"PAUSED  ({keys})", WARNING, "bars", bold=True, rank=2))
+        found.append(Row("PAUSED  (P)" if space_claimed else PAUSED, WARNING, "bars", bold=True, rank=2))
     found += _speed(status) + _doubts(status)
     if status.recording is not None:
         found.append(Row(f"recording {status.recording}", WARNING, "disc", rank=3))
@@ -197,9 +199,14 @@ def draw_hud(
 
 
 def hud_width(longest: str, unit: float) -> int:
-    """Return how far to the right the state of things reaches at full size, px, by the longest of its lines."""
+    """Return how far to the right the state of things reaches at full size, px, by the longest of its lines.
+
+    There is always room for the line that says that it is paused.
+    """
     size = 13.5 * unit
-    return round(10 * unit) + measure(longest, size)[0] + 2 * _pad(size) + round(2 * size)
+    paused = measure(PAUSED, size, bold=True)[0] + round(1.3 * size)
+    wide = max(measure(longest, size)[0] + round(2 * size), paused + round(0.5 * size))
+    return round(10 * unit) + wide + 2 * _pad(size)
 
 
 def _pad(size: float) -> int:
@@ -338,8 +345,8 @@ def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], free: pygame.
     """Draw the faults of the scene file in a box in the middle, and return it; what finds no room is counted."""
     pad, line = round(min(1.1 * size, 0.04 * free.width)), round(1.45 * size)
     room = min(free.width, round(62 * size)) - 2 * pad
-    head = "The scene file has a fault" if len(faults) == 1 else f"The scene file has {len(faults)} faults"
-    heads = wrapped(f"{head}; the scene before it goes on (Esc closes this)", size, room - 1.6 * size, 2, bold=True)
+    head = "1 fault in the scene file" if len(faults) == 1 else f"{len(faults)} faults in the scene file"
+    heads = wrapped(f"{head}; the previous scene keeps running (Esc: close)", size, room - 1.6 * size, 2, bold=True)
     most = (free.height - 2 * pad) // line - len(heads)
     if most < 5:
         most += len(heads) - 1

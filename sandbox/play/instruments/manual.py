@@ -92,7 +92,7 @@ class Manual:
         size, columns = _fitted(everything, free, unit)
         tall = max(sum(_height(group, size) for group in column) for column in columns) + HEAD * size
         self._scroll = min(max(self._scroll, 0.0), max(tall - free.height, 0.0) / size)
-        hint = "any key closes this" if tall <= free.height else "wheel: more · any key closes this"
+        hint = "press any key to close" if tall <= free.height else "scroll for more · press any key to close"
         _draw_columns(surface, columns, free.move(0, -round(self._scroll * size)), size, hint)
 
 

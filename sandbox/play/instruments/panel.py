@@ -23,18 +23,20 @@ SCROLL = 48
 """px at unit 1, a notch of the wheel"""
 
 _BUTTONS = {
-    "play": ("Go on", Command.PAUSE),
+    "play": ("Resume", Command.PAUSE),
     "pause": ("Pause", Command.PAUSE),
-    "step": ("One step", Command.STEP),
-    "back": ("One step back", Command.BACK),
+    "step": ("Step forward", Command.STEP),
+    "back": ("Step back", Command.BACK),
     "restart": ("Restart", Command.RESTART),
     "camera": ("Screenshot", Command.SCREENSHOT),
     "record": ("Record", Command.RECORD),
     "stop": ("Stop recording", Command.RECORD),
     "save": ("Save the session", Command.SAVE),
     "help": ("Help", Command.HELP),
-    "picker": ("Pick a scene", Command.PICKER),
+    "picker": ("Open a scene", Command.PICKER),
 }
+_LABELS = {"trust": "horizon", "antialias": "antialiasing"}
+"""of switches that are not labelled by their names"""
 _MOUSE = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP)
 
 
@@ -122,7 +124,7 @@ class Panel:
         switch = self._switches.get(name)
         if switch is None:
             key = next((binding.label for binding in BINDINGS if binding.command == name), "")
-            switch = Switch(self._sheet, name, on, key=key)
+            switch = Switch(self._sheet, name, on, _LABELS.get(name, ""), key)
         switch.on = on
         return switch
 

@@ -157,16 +157,16 @@ class Picker:
             self._draw_card(surface, card, place, size, shown.index(card) == self.chosen)
         surface.set_clip(clip)
         if not shown:
-            text = f"no scene has “{self.typed}”" if self.cards else "no scenes were found"
+            text = f"no scene matches “{self.typed}”" if self.cards else "no scenes found"
             write(surface, shortened(text, size, free.width), free.center, size, FAINT, "center")
         self._work(in_sight)
 
     def _draw_head(self, surface: pygame.Surface, size: float, margin: int) -> int:
         """Draw the title and what was typed, and return where they end."""
         width = surface.get_width() - 2 * margin
-        title = shortened("Pick a scene", 1.5 * size, width, bold=True)
+        title = shortened("Open a scene", 1.5 * size, width, bold=True)
         rect = write(surface, title, (margin, margin), 1.5 * size, INK, bold=True)
-        hint = "type to filter · arrows and Enter · Esc"
+        hint = "type to filter · Enter: open · Esc: close"
         box = pygame.Rect(rect.right + 2 * size, rect.top - 0.2 * size, 0, 2.2 * size)
         box.width = min(round(26 * size), surface.get_width() - margin - box.left)
         if box.width > 8 * size:

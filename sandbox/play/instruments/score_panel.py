@@ -140,7 +140,7 @@ def _draw_cells(
 
 
 def _told(board: Board) -> str:
-    return f"{board.over}  ·  R starts again"
+    return f"{board.over}  ·  R: new game"
 
 
 def _wide(line: str, size: float) -> int:

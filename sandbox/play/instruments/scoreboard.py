@@ -138,7 +138,7 @@ def status_line(person: Person) -> str:
 
 
 def _asked(game: Game) -> str:
-    return "aim, and shoot" if game.strokes == 0 else f"{game.strokes} {'stroke' if game.strokes == 1 else 'strokes'}"
+    return "aim and shoot" if game.strokes == 0 else f"{game.strokes} {'stroke' if game.strokes == 1 else 'strokes'}"
 
 
 def _on(match: Match) -> str:

@@ -12,10 +12,10 @@ from sandbox.play.camera import Box, Camera
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.framing import framing, lies_down
 from sandbox.play.sight import Sight
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import load
-from sandbox.scene.generators import GeneratorError
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.generators import GeneratorError
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import load
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 FEW = 40

@@ -10,7 +10,7 @@ from sandbox.play.drawing.shade import Look, disc_distance, paint
 from sandbox.play.drawing.table.coats import IVORY
 from sandbox.play.drawing.text import write
 from sandbox.play.instruments.plates import plate
-from sandbox.scene.cue import MISCUE
+from sandbox.scene.description.surface import MISCUE
 
 TIP = 0.22
 """of the ball's radius, the tip's"""

@@ -10,8 +10,8 @@ from sandbox.play.messages import Messages
 from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
 from sandbox.recording import Recording
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 
 def played_again(recording: Recording) -> Live:
@@ -45,5 +45,5 @@ def begun(scene: Scene, engine: str, settings: Settings | None, messages: Messag
         if not others:
             messages.tell(str(refusal), "error")
             return None
-        messages.tell(f"{refusal}; {others[0]} plays it", "warning")
+        messages.tell(f"{refusal}; opened with {others[0]}", "warning")
         return Live(Session(scene, others[0], game=game))

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sandbox.trajectory import FloatArray, Frame
+from sandbox.arrays import FloatArray
+from sandbox.trajectory import Frame
 
 LEAP = 4.0
 """Who is farther on than so many times what its speed explains was put there."""

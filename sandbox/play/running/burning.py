@@ -6,12 +6,12 @@ from functools import lru_cache
 
 from sandbox.action import Throttle
 from sandbox.play.sight import Flame
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.forces import Thrust
-from sandbox.scene.model import Scene, default_name
-from sandbox.scene.part import Point
-from sandbox.scene.shapes import form_of
-from sandbox.scene.surfaced import Mover
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.base import BodySource, Point
+from sandbox.scene.description.forces import Thrust
+from sandbox.scene.description.scene import default_name
+from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.scene import Scene
 
 LONG = 1.1
 """of a body's reach, the flame of its strongest thrust, fully open"""
@@ -30,9 +30,9 @@ def burning(scene: Scene, bodies: Bodies, throttles: Mapping[str, Throttle], tim
     for k, thrust in enumerate(scene.thrusts):
         level = _level(thrust, throttles.get(thrust.name or default_name("thrust", k)), time)
         force = math.hypot(*thrust.force)
-        if level * force == 0.0 or thrust.body not in bodies.names:
+        if level * force == 0.0 or thrust.body not in bodies.number_of:
             continue
-        number = bodies.names.index(thrust.body)
+        number = bodies.number_of[thrust.body]
         strongest = max(math.hypot(*each.force) for each in scene.thrusts if each.body == thrust.body)
         x, y = _centre(bodies.elements[int(bodies.element[number])])
         place = thrust.point[0] - x, thrust.point[1] - y
@@ -51,6 +51,6 @@ def _level(thrust: Thrust, throttle: Throttle | None, time: float) -> float:
 
 
 @lru_cache(maxsize=64)
-def _centre(element: Mover) -> Point:
+def _centre(element: BodySource) -> Point:
     """Return the centre of mass in the frame that an element was drawn in, m."""
     return form_of(element).centre

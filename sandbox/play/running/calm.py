@@ -1,8 +1,8 @@
 """Calm: how long nothing has touched in a session, and whether that is long enough for a checkpoint."""
 
-from sandbox.engines.relay import Relay
+from sandbox.engines.switching import SwitchableSimulation
 from sandbox.play.running.rest import at_rest
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 
 LEAST = 8
@@ -19,7 +19,7 @@ class Calm:
         """Take in the contacts of what was last seen."""
         self._substeps = 0 if len(contacts) else self._substeps + settings.substeps
 
-    def lasts(self, relay: Relay, frame: Frame) -> bool:
+    def lasts(self, relay: SwitchableSimulation, frame: Frame) -> bool:
         """Tell whether from the present state of a relay one can go on as if it had never been left."""
         if self._substeps < max(LEAST, 2 * (relay.settings.persistence or 1)):
             return False

@@ -11,14 +11,14 @@ from time import perf_counter
 import numpy as np
 
 from sandbox.action import Action, ActionError, Switch
-from sandbox.engines.checkpoint import Checkpoint, cast
-from sandbox.engines.compiling import COMPILING
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
-from sandbox.engines.relay import Relay
+from sandbox.engines.segment import Checkpoint
+from sandbox.engines.switching import SwitchableSimulation
 from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.compare.horizon import perturb
-from sandbox.scene.settings import COMMON
+from sandbox.scene.description.world import COMMON
 from sandbox.trajectory import Frame
 
 PATIENCE = 0.3
@@ -41,7 +41,7 @@ class Companion:
         """
         self.step = step
         """of the session, up to which it has come"""
-        self.relay = Relay.resumed(point)
+        self.relay = SwitchableSimulation.resumed(point)
         self.relay.patience = PATIENCE
         self.frame: Frame | None = self.relay.frame()
         self.begun = point.frame.time
@@ -65,14 +65,14 @@ class Companion:
     def follow(self, step: int) -> None:
         """Make steps up to one of the session; where it has been there, it waits."""
         steps, self.step = step - self.step, max(step, self.step)
-        until, compiled = perf_counter() + PATIENCE, COMPILING.seconds
+        until, compiled = perf_counter() + PATIENCE, COMPILE_CLOCK.seconds
         if self.ended is not None or steps <= 0:
             return
         try:
             for _ in range(steps):
                 self.relay.step()
-                if perf_counter() > until + COMPILING.seconds - compiled:
-                    raise Exhaustion(f"{self.engine} takes longer to compute than there is time")
+                if perf_counter() > until + COMPILE_CLOCK.seconds - compiled:
+                    raise Exhaustion(f"{self.engine} is too slow to keep up")
             self.frame = self.relay.frame()
         except (Divergence, Exhaustion) as error:
             self._end(str(error))
@@ -104,7 +104,7 @@ def ghost_of(point: Checkpoint, step: int = 0, without: Collection[str] = ()) ->
             return Companion(replace(point, engine=name, wanted=point.wanted.common()), step), "; ".join(why)
         except (Refusal, ActionError) as refusal:
             why.append(str(refusal))
-    raise ActionError("; ".join(why) or "there is no other engine")
+    raise ActionError("; ".join(why) or "no other engine is available")
 
 
 class Trust:
@@ -189,7 +189,7 @@ def apart(a: Frame, b: Frame) -> float | None:
 def _perturbed(point: Checkpoint) -> Checkpoint | None:
     """Return the moment with every body that can meet something moved a little (`perturb`); None without any."""
     frame, there = point.frame, point.frame.present
-    moved = perturb(point.scene.placed(cast(point.bodies, frame), frame.time, point.broken))
+    moved = perturb(point.present_setup())
     if moved is None:
         return None
     state = {key: getattr(frame, key).copy() for key in ("position", "velocity", "angle")}

@@ -9,7 +9,7 @@ from sandbox.play.running.session import Session
 from sandbox.play.running.trails import Trails
 from sandbox.play.running.watch import Watch
 from sandbox.play.sight import Flash
-from sandbox.scene.meetings import meetings
+from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.trajectory import Frame
 
 
@@ -49,7 +49,7 @@ class Company:
         session = self._session
         self._missed = [time for time in self._missed if time <= session.time]
         # What can meet nothing misses nothing.
-        meets = not bool(meetings(session.scene, session.bodies).free.all())
+        meets = not bool(contact_matrix(session.relay.setup, session.bodies).free.all())
         self._watch = Watch(session.relay) if meets else None
         self.trails.keep(session.frame)
         if self.trust is not None:
@@ -144,12 +144,12 @@ class Company:
         if self._ghost.frame is not None:
             self._seen.keep(self._ghost.step, self._ghost.frame)
         if note:
-            self.notes.append(("info", f"the ghost is {self._ghost.engine}: {note}"))
+            self.notes.append(("info", f"ghost computed by {self._ghost.engine}: {note}"))
 
     def _replace_ghost(self, ended: Companion) -> None:
         """Let another engine go on as the ghost, from here."""
         self._given_up += (ended.engine,)
-        self.notes.append(("warning", f"the ghost of {ended.engine} is gone: {ended.ended}"))
+        self.notes.append(("warning", f"ghost of {ended.engine} stopped: {ended.ended}"))
         self._begin_ghost()
 
     def _drop_ghost(self) -> None:
@@ -166,7 +166,7 @@ class Company:
             try:
                 self.trust = Trust(self._session.relay.checkpoint(), self._session.step_number)
             except (Refusal, ActionError) as error:
-                self.notes.append(("warning", f"no trust light: {error}"))
+                self.notes.append(("warning", f"no predictability horizon: {error}"))
 
     @property
     def ghost_frame(self) -> Frame | None:

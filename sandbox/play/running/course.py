@@ -5,15 +5,15 @@ It knows nothing of what was seen before: that is the session's.
 
 from sandbox.action import Action, ActionError, Pull
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
-from sandbox.engines.relay import Relay
+from sandbox.engines.switching import SwitchableSimulation
 from sandbox.games.referee import Referee
 from sandbox.play.footage.scenery import Scenery
 from sandbox.play.running.history import Mark
 from sandbox.play.running.script import ROUNDING, Script
 from sandbox.recording import Recording
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts
 
 PATIENCE = 2.0
@@ -57,7 +57,7 @@ class Course:
         self.game: Referee | None = None
         """the game that is played, as it stands"""
         self._heard: list[Contacts] = []  # what the game has been told of, since somebody else asked
-        self._begin(Relay(*self._start))
+        self._begin(SwitchableSimulation(*self._start))
 
     @property
     def scene(self) -> Scene:
@@ -170,14 +170,14 @@ class Course:
         relay = None
         if mark is not None:
             try:
-                relay = Relay.resumed(mark.point)
+                relay = SwitchableSimulation.resumed(mark.point)
             except (Refusal, ActionError):
                 mark = None
         self.relay.close()
         self.ended, self._exhausted = None, False
         self._step, self._script.done = (mark.step, mark.actions) if mark is not None else (0, 0)
         if relay is None or mark is None:
-            self._begin(Relay(*self._start))
+            self._begin(SwitchableSimulation(*self._start))
         else:
             self._take_over(relay, mark.game)
             if self.game is not None:
@@ -185,13 +185,13 @@ class Course:
             self._redo()
         return mark is not None
 
-    def _begin(self, relay: Relay) -> None:
+    def _begin(self, relay: SwitchableSimulation) -> None:
         """Begin at the start."""
         self._take_over(relay, self._first_game)
         self._judge()
         self._redo()
 
-    def _take_over(self, relay: Relay, game: Referee | None) -> None:
+    def _take_over(self, relay: SwitchableSimulation, game: Referee | None) -> None:
         """Go on with a relay, and with a copy of a game; what was pressed later than now stays known."""
         self.relay = relay
         """what runs"""

@@ -3,7 +3,7 @@
 from bisect import bisect_left, bisect_right, insort
 from typing import NamedTuple
 
-from sandbox.engines.checkpoint import Checkpoint
+from sandbox.engines.segment import Checkpoint
 from sandbox.games.referee import Referee
 from sandbox.trajectory import Frame
 

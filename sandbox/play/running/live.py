@@ -4,7 +4,7 @@ from collections.abc import Callable
 from time import perf_counter
 
 from sandbox.action import Action, ActionError, Launch
-from sandbox.engines.compiling import COMPILING
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.play.breaks import BreakNotes, broken_by
 from sandbox.play.footage.film import Film
 from sandbox.play.picking import overlapping
@@ -17,7 +17,7 @@ from sandbox.play.running.session import Replaced, Session, WrongWayError
 from sandbox.play.running.showing import Showing
 from sandbox.play.running.switching import switch
 from sandbox.play.sight import Sight
-from sandbox.scene.zone import notes
+from sandbox.scene.description.scene import zone_visits
 from sandbox.trajectory import Contacts, Frame
 
 LEAST, MOST = 0.012, 0.03
@@ -84,12 +84,12 @@ class Live(Showing):
             if left <= asked:
                 asked = max(left, 0)
                 self._until, self.wants_pause = None, True
-                self.company.notes.append(("info", "what was recorded ends here; go on, and it is played further"))
-        compiled, began = COMPILING.seconds, perf_counter()
+                self.company.notes.append(("info", "end of the recording; resume to play on from here"))
+        compiled, began = COMPILE_CLOCK.seconds, perf_counter()
         budget = min(max(elapsed - self._worked, LEAST), MOST)
         made = self._advance(asked, began + budget) if asked else 0
         self._worked = perf_counter() - began
-        if COMPILING.seconds > compiled:  # that time was not the scene's
+        if COMPILE_CLOCK.seconds > compiled:  # that time was not the scene's
             self.pace.rest()
         else:
             self.pace.spent(elapsed, made, asked, dt)
@@ -151,7 +151,7 @@ class Live(Showing):
         """Say that what came later is replaced, where it has just been."""
         now = self.session.replaced
         if now is not None and now is not before:
-            text = f"what came after {now.time:.4g} s is replaced (Ctrl+Z brings it back)"
+            text = f"everything after {now.time:.4g} s is replaced (Ctrl+Z: restore it)"
             self.company.notes.append(("warning", text))
 
     def _hear(self) -> None:
@@ -191,7 +191,7 @@ class Live(Showing):
 
     def _check_there(self) -> None:
         if self._journey.under_way:
-            raise ActionError("wait until the way back is done")
+            raise ActionError("wait until the jump in time is complete")
 
     def seek(self, step: int) -> None:
         """Set out for another step. It is reached in parts, one a picture; meanwhile what is known nearest is seen."""
@@ -261,7 +261,7 @@ class Live(Showing):
             pull: where a body is held, and the hand, m.
         """
         session, present, scene, frame = self.session, self._peek is None, self.shown, self.drawn
-        touches = self._contacts.some(~notes(self._contacts.pair, session.scene))
+        touches = self._contacts.some(~zone_visits(self._contacts.pair, session.scene))
         return Sight(
             scene=scene,
             bodies=self.bodies,
@@ -279,6 +279,7 @@ class Live(Showing):
             flames=burning(session.scene, self.bodies, session.relay.throttles, session.time)
             if present and session.scene.thrusts
             else (),
+            setup=session.relay.setup if scene is session.scene else None,
         )
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
 """Script: all that is done in a session, in order, and how far it has been done."""
 
 from sandbox.action import Action, Pull, Switch
-from sandbox.engines.relay import Relay
+from sandbox.engines.switching import SwitchableSimulation
 
 ROUNDING = 1e-9
 """Shares of a step by which an action may be late."""
@@ -35,7 +35,7 @@ class Script:
         del self._actions[place:]
         self.done = min(self.done, place)
 
-    def due(self, relay: Relay) -> list[Action]:
+    def due(self, relay: SwitchableSimulation) -> list[Action]:
         """Return what was done at this time, and has not yet been done again."""
         due = relay.time + ROUNDING * relay.settings.dt
         end = self.done
@@ -43,7 +43,7 @@ class Script:
             end += 1
         return self._actions[self.done : end]
 
-    def redo(self, relay: Relay) -> list[Action]:
+    def redo(self, relay: SwitchableSimulation) -> list[Action]:
         """Do what was done at this time, and return it.
 
         Raises:
@@ -55,7 +55,7 @@ class Script:
             self.done += 1
         return due
 
-    def add(self, action: Action | None, relay: Relay) -> None:
+    def add(self, action: Action | None, relay: SwitchableSimulation) -> None:
         """Take note of what has just been done, if anything; what lay ahead is forgotten.
 
         Who was to be let go of later is let go of now, unless the action says more of it.
@@ -86,5 +86,5 @@ class Script:
 
 def handed_over(actions: tuple[Action, ...], place: int, time: float) -> tuple[Action, ...]:
     """Return actions with the taking up of a checkpoint at a place and a time, s, where it is not there yet."""
-    switch = Switch(time=time)
+    switch = Switch(time=time, resumes=True)
     return actions if actions[:place][-1:] == (switch,) else (*actions[:place], switch, *actions[place:])

@@ -15,6 +15,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 from sandbox.action import Action, ActionError, Switch
+from sandbox.arrays import FloatArray
 from sandbox.games.referee import Referee
 from sandbox.play.breaks import BreakTimes
 from sandbox.play.running.calm import Calm
@@ -22,10 +23,10 @@ from sandbox.play.running.course import Course
 from sandbox.play.running.history import History, Mark
 from sandbox.play.running.script import handed_over
 from sandbox.recording import Recording
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import Contacts, FloatArray, Frame
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Contacts, Frame
 
 PACE = 16
 """Steps made at a time on the way to another one."""
@@ -172,7 +173,7 @@ class Session(Course):
             self._astray = True
             self.history.forget(self._unsure)
             self._unsure.clear()
-            raise WrongWayError(f"step {self._step} led elsewhere than before")
+            raise WrongWayError(f"step {self._step} led to another state than before")
         if known is not None:
             self._unsure.clear()
 
@@ -224,7 +225,7 @@ class Session(Course):
             ActionError: it cannot be done. Nothing has changed then.
         """
         if self.ended is not None:
-            raise ActionError("the scene has ended here; go back, or restart")
+            raise ActionError("the run has ended; step back or restart")
         timed = action.model_copy(update={"time": self.relay.time})
         self.relay.apply(timed)
         self._go_another_way(timed)
@@ -245,7 +246,7 @@ class Session(Course):
         if self.game is None or self.game.rules.over is not None:
             return ()
         if self.ended is not None:
-            raise ActionError("the scene has ended here; go back, or restart")
+            raise ActionError("the run has ended; step back or restart")
         before, done = self.game.copy(), 0
         actions = self.game.press(self.relay.time, control, value)
         try:

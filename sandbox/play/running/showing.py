@@ -1,11 +1,11 @@
 """Showing: a session as it is looked at: its present state, or another one that was seen."""
 
-from sandbox.engines.energy import energy_of
+from sandbox.engines.common.energy_balance import energy_of
 from sandbox.play.footage.scenery import Scenery
 from sandbox.play.running.session import Session
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 
@@ -83,4 +83,6 @@ class Showing:
 
     def energy(self) -> tuple[float, float, float]:
         """Return the kinetic, potential and total energy, J."""
-        return energy_of(self.frame, self.bodies, self.scene.world.gravity, self.scene, self.session.breaks)
+        return energy_of(
+            self.frame, self.bodies, self.scene.world.gravity, self.session.relay.setup, self.session.breaks
+        )

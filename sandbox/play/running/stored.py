@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from sandbox.engines.energy import energy_of
+from sandbox.engines.common.energy_balance import energy_of
 from sandbox.play.footage.film import Film
 from sandbox.play.picking import overlapping
 from sandbox.play.running.pace import Pace
 from sandbox.play.sight import Sight
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 

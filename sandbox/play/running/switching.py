@@ -2,7 +2,7 @@
 
 from sandbox.action import ActionError, Switch, Value
 from sandbox.play.running.session import Session
-from sandbox.scene.settings import COMMON
+from sandbox.scene.description.world import COMMON
 
 
 def switch(session: Session, engine: str) -> str | None:
@@ -27,5 +27,5 @@ def switch(session: Session, engine: str) -> str | None:
             session.act(Switch(time=0.0, engine=engine, settings=free))
         except ActionError:
             raise error from None
-        return f"left to {engine}: {', '.join(own)}"
+        return f"chosen by {engine}: {', '.join(own)}"
     return None

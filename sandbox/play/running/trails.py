@@ -4,7 +4,8 @@ from collections import deque
 
 import numpy as np
 
-from sandbox.trajectory import FloatArray, Frame
+from sandbox.arrays import FloatArray
+from sandbox.trajectory import Frame
 
 LENGTH = 120
 """States that a trail goes back."""

@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from sandbox.engines.relay import Relay
+from sandbox.engines.switching import SwitchableSimulation
 from sandbox.measure.run import Auditor
 from sandbox.play.sight import Flash
 from sandbox.trajectory import Frame
@@ -19,8 +19,8 @@ MOST = 50
 class Watch:
     """Audits a relay, and remembers where a miss was noticed."""
 
-    def __init__(self, relay: Relay) -> None:
-        self._auditor = Auditor(relay.scene, relay)
+    def __init__(self, relay: SwitchableSimulation) -> None:
+        self._auditor = Auditor(relay.setup, relay)
         self._told = 0
         self._flashes: deque[tuple[tuple[float, float], float]] = deque(maxlen=MOST)
 

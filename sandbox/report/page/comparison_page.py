@@ -14,9 +14,9 @@ from sandbox.report.page.document import Page, Section, write_page
 from sandbox.report.page.markup import Child, Markup, joined, named, tag
 from sandbox.report.page.replay import Track, replay
 from sandbox.report.page.settings_text import settings_text
-from sandbox.report.page.tables import Column, table
+from sandbox.report.page.tables import Column, column_key, table
 from sandbox.report.page.time_chart import TRUTH, Curve, energy_chart, error_chart
-from sandbox.report.page.verdicts import badge_of, engine_name, look_of
+from sandbox.report.page.verdicts import badge_of, engine_name, key, looks_of
 from sandbox.report.page.wording import NONE, count, number, plural, share
 
 MOST_EVENTS = 50
@@ -24,17 +24,16 @@ MOST_EVENTS = 50
 ENGINES = (
     Column("engine"),
     Column("verdict"),
-    Column("max error, m", True, "the largest distance of any body from the truth while that is trusted"),
-    Column("rms error, m", True, "root of the mean square over bodies and frames"),
-    Column("max error, m/s", True, "the largest velocity error"),
-    Column("energy", True, "how far the energy is off, as a share: from the truth's, else from the start's"),
-    Column("momentum", True, "how far the momentum is off, as a share"),
-    Column("contacts", True, "that the truth has too"),
-    Column("missed", True, "contacts of the truth that never happened"),
-    Column("phantom", True, "contacts that the truth does not have"),
-    Column("after", True, "contacts in one of the two alone after a body had diverged: not judged"),
-    Column("seconds", True, "of the steps alone"),
-    Column("ms per s", True, "milliseconds per simulated second"),
+    Column("max error, m", True, "largest position error of any body while the truth is trusted"),
+    Column("rms error, m", True, "root mean square of the position error, over bodies and frames"),
+    Column("max error, m/s", True, "largest velocity error of any body"),
+    Column("energy", True, "energy error at the end, relative to the largest kinetic energy of the run"),
+    Column("momentum", True, "unexplained momentum at the end, relative to the largest sum of |m v|"),
+    Column("contacts", True, "contacts that the truth has too"),
+    Column("missed", True, "contacts of the truth that the engine does not have"),
+    Column("phantom", True, "contacts of the engine that the truth does not have"),
+    Column("after", True, "unmatched contacts after a body diverged, which are not judged"),
+    Column("ms per s", True, "computing time in milliseconds per simulated second"),
 )
 
 
@@ -47,24 +46,30 @@ def write_comparison(comparison: Comparison, path: str | Path) -> Path:
     return write_page(comparison_page(comparison), path)
 
 
-def comparison_page(comparison: Comparison) -> Page:
-    """Return the page of a comparison."""
+def comparison_page(comparison: Comparison, replayed: bool = True) -> Page:
+    """Return the page of a comparison.
+
+    Args:
+        comparison: which.
+        replayed: with the replay and the plots that go with it.
+    """
     scene = comparison.scene
     lead = joined(
         tag("p", tag("bdi", scene.about)) if scene.about else None,
         tag("p", sentence(comparison), class_="soft"),
     )
-    sections = [Section("Engines", joined(engines_table(comparison), remarks(comparison)))]
-    if comparison.trajectories:
+    meanings = tag("details", tag("summary", "What the columns and verdicts mean"), column_key(ENGINES), key())
+    sections = [Section("Engines", joined(engines_table(comparison), remarks(comparison), meanings))]
+    if replayed and comparison.trajectories and comparison.same_scene:
         sections.append(Section("Replay", linked_plots(comparison, "plot"), lead=HOW))
     sections += explanations(comparison)
-    sections.append(Section("Settings", settings_of(comparison.rows)))
+    sections.append(Section("Settings", settings_of(comparison)))
     return Page(scene.title or "Untitled scene", "Comparison", sections, lead, versions(), machine())
 
 
 HOW = (
-    "Press play, or drag in a plot: the replay goes there. Click the picture, then wheel or + and − zoom; "
-    "drag moves it. Uncheck an engine to hide it."
+    "Press play, or drag in a plot to move the replay to that time. Click the picture, then zoom with the wheel or "
+    "+ and −; drag to pan. Uncheck an engine to hide it."
 )
 
 
@@ -83,15 +88,15 @@ def linked_plots(comparison: Comparison, name: str) -> Markup:
     """
     scene, truth, duration = comparison.scene, comparison.best, comparison.scene.world.duration
     until, moving = comparison.trusted_until, ~scene.bodies.fixed
-    tracks, off, total = [], [], []
-    for engine, run in comparison.trajectories.items():
-        error = None
-        if truth is not None:
-            found = errors(run, truth.trajectory, moving)
+    tracks, off, total, looks = [], [], [], looks_of(comparison)
+    for name_of_row, run in comparison.trajectories.items():
+        error, look, own = None, looks[name_of_row], comparison.truth_of(name_of_row)
+        if own is not None:
+            found = errors(run, own.trajectory, moving)
             error = found.time, found.position
-            off.append(Curve(engine, look_of(engine), *error))
-        total.append(Curve(engine, look_of(engine), run.time, energies(run, scene).total))
-        tracks.append(Track(engine, look_of(engine), run, error))
+            off.append(Curve(name_of_row, look, *error))
+        total.append(Curve(name_of_row, look, run.time, energies(run, scene).total))
+        tracks.append(Track(name_of_row, look, run, error))
     if truth is not None:
         tracks.append(Track(TRUTH, TRUTH, truth.trajectory))
         right = energies(truth.trajectory, scene).total
@@ -106,12 +111,12 @@ def linked_plots(comparison: Comparison, name: str) -> Markup:
 
 def engines_table(comparison: Comparison) -> Markup:
     """Return the figures of every engine."""
-    rows = []
+    rows, looks = [], looks_of(comparison)
     for row in comparison.rows:
         cost = milliseconds(comparison, row)
         rows.append(
             [
-                engine_name(row.engine),
+                engine_name(row.name, looks[row.name]),
                 badge_of(row, comparison.tolerance),
                 number(row.score.max_position),
                 number(row.score.rms_position),
@@ -119,7 +124,6 @@ def engines_table(comparison: Comparison) -> Markup:
                 share(row.energy_drift),
                 share(row.momentum_drift),
                 *(count(row.count(kind)) for kind in ("matched", "missed", "phantom", "after_divergence")),
-                number(row.seconds),
                 number(cost),
             ]
         )
@@ -128,7 +132,7 @@ def engines_table(comparison: Comparison) -> Markup:
 
 def milliseconds(comparison: Comparison, row: Row) -> float | None:
     """Return an engine's cost, ms per simulated second, of this one run with all its frames kept."""
-    run = comparison.trajectories.get(row.engine)
+    run = comparison.trajectories.get(row.name)
     if row.seconds is None or run is None or not len(run.time) or not run.time[-1] > 0.0:
         return None
     return 1e3 * row.seconds / float(run.time[-1])
@@ -136,28 +140,31 @@ def milliseconds(comparison: Comparison, row: Row) -> float | None:
 
 def remarks(comparison: Comparison) -> Markup | None:
     """Return why engines refused or failed, and what the energy is held against."""
+    looks = looks_of(comparison)
     found: list[Child] = [
-        row.reason if row.status == "refused" else joined(engine_name(row.engine), f": {row.reason}")
+        row.reason if row.status == "refused" else joined(engine_name(row.name, looks[row.name]), f": {row.reason}")
         for row in comparison.rows
         if row.reason
     ]
     if any(row.energy_against == "start" and row.energy_drift for row in comparison.rows):
         found.append(
-            "Energy is the change from the start, losses that are right included: the truth ends before the run."
+            "Energy is the change from the start, correct losses included, because the truth ends before the run."
         )
     return tag("ul", *(tag("li", each) for each in found), class_="plain soft") if found else None
 
 
 def explanations(comparison: Comparison) -> list[Section]:
     """Return why engines are off, where that was asked, and which contacts they missed or made up."""
-    found = []
-    told = [tag("li", engine_name(row.engine), ": ", row.verdict) for row in comparison.rows if row.verdict]
+    found, looks = [], looks_of(comparison)
+    told = [
+        tag("li", engine_name(row.name, looks[row.name]), ": ", row.verdict) for row in comparison.rows if row.verdict
+    ]
     if told:
         turned = joined(*(_knobs(row) for row in comparison.rows if row.why))
         found.append(Section("Why", joined(tag("ul", *told, class_="plain"), turned)))
     events = [(row, event) for row in comparison.rows for event in _odd(row)]
     if events:
-        found.append(Section("Missed and phantom contacts", _events(comparison.rows, events)))
+        found.append(Section("Missed and phantom contacts", _events(comparison, events)))
     return found
 
 
@@ -165,14 +172,16 @@ def _odd(row: Row) -> list[Event]:
     return [event for event in row.events or () if event.kind in ("missed", "phantom")]
 
 
-def _events(rows: Sequence[Row], events: Sequence[tuple[Row, Event]]) -> Markup:
+def _events(comparison: Comparison, events: Sequence[tuple[Row, Event]]) -> Markup:
     columns = Column("engine"), Column("contact"), Column("between"), Column("at, s", True)
     cells: list[list[Child]] = []
-    for row in rows:
+    looks = looks_of(comparison)
+    for row in comparison.rows:
+        label = engine_name(row.name, looks[row.name])
         mine = [event for other, event in events if other is row]
         cells += [
             [
-                engine_name(row.engine),
+                label,
                 event.kind,
                 joined(named(event.between[0]), " and ", named(event.between[1])),
                 number(event.when, 4),
@@ -180,14 +189,12 @@ def _events(rows: Sequence[Row], events: Sequence[tuple[Row, Event]]) -> Markup:
             for event in mine[:MOST_EVENTS]
         ]
         if len(mine) > MOST_EVENTS:
-            cells.append(
-                [engine_name(row.engine), f"and {plural(len(mine) - MOST_EVENTS, 'more').removesuffix('s')}", "", ""]
-            )
+            cells.append([label, f"and {plural(len(mine) - MOST_EVENTS, 'more').removesuffix('s')}", "", ""])
     return table(columns, cells, "Missed and phantom contacts")
 
 
 def _knobs(row: Row) -> Markup:
-    columns = Column("change"), Column("of the error is left", True), Column("max error, m", True)
+    columns = Column("change"), Column("remaining error", True), Column("max error, m", True)
     cells = [
         [
             knob.label,
@@ -196,20 +203,25 @@ def _knobs(row: Row) -> Markup:
         ]
         for knob in row.why
     ]
-    caption = f"{row.engine}: what changes of settings leave of the error"
-    return tag("details", tag("summary", caption), table(columns, cells, "Changes of settings"))
+    caption = f"{row.name}: remaining error after one changed setting"
+    return tag("details", tag("summary", caption), table(columns, cells, "Changed settings"))
 
 
-def settings_of(rows: Sequence[Row]) -> Markup:
+def settings_of(comparison: Comparison) -> Markup:
     """Return the settings of engines, as they filled them in; engines that share all are told together."""
     told: dict[str, list[str]] = {}
-    for row in rows:
+    looks = looks_of(comparison)
+    for row in comparison.rows:
         if row.status != "refused":
-            told.setdefault(settings_text(row.settings), []).append(row.engine)
+            told.setdefault(settings_text(row.settings), []).append(row.name)
     return tag(
         "div",
         *(
-            tag("div", tag("h3", *(joined(engine_name(name), " ") for name in names)), tag("pre", tag("code", text)))
+            tag(
+                "div",
+                tag("h3", *(joined(engine_name(name, looks[name]), " ") for name in names)),
+                tag("pre", tag("code", text)),
+            )
             for text, names in told.items()
         ),
         class_="colophon",

@@ -54,9 +54,16 @@ class Page:
     versions: Mapping[str, str] = field(default_factory=dict)
     machine: Mapping[str, str | int] = field(default_factory=dict)
 
-    def html(self) -> str:
-        """Return the page as one HTML document."""
+    def html(self, compact: bool = False) -> str:
+        """Return the page as one HTML document.
+
+        Args:
+            compact: with small margins and headings, for a frame within another page, to which it reports its height.
+        """
         style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS))
+        if compact:
+            style = f"{style}\n{_resource('compact.css')}"
+            script = f"{script}\n{_resource('height.js')}"
         head = tag(
             "header",
             tag("p", self.kind, class_="kind"),
@@ -98,7 +105,7 @@ def _colophon(versions: Mapping[str, str], machine: Mapping[str, str | int]) -> 
         "footer",
         tag("h2", "Measured with"),
         tag("div", pairs([*told, ("date", f"{datetime.now(UTC):%Y-%m-%d}")]), pairs(made), class_="colophon"),
-        tag("p", "Times are of one machine and vary from run to run; errors do not."),
+        tag("p", "Times hold for this machine and vary between runs; errors do not."),
     )
 
 

@@ -18,6 +18,10 @@ class Painter {
     context.fillRect(0, 0, camera.width, camera.height);
     const step = this.gridStep();
     this.drawGrid(step);
+    context.fillStyle = colours.pocket;
+    context.beginPath();
+    for (const [x, y, radius] of scenery.pockets) this.addDisc(x, y, radius);
+    context.fill();
     context.fillStyle = colours.solid;
     context.strokeStyle = colours.edge;
     context.lineWidth = 1.5;

@@ -40,9 +40,9 @@ def extremes_page(document: Document) -> Page:
     lead = joined(tag("p", f"{plural(len(cells), 'cell')}: {', '.join(counts)}."), tag("ul", *keys, class_="keys"))
     axes = dict.fromkeys(str(cell["axis"]) for cell in cells)
     heats = [joined(tag("h3", axis.replace("_", " ")), _heat(axis, cells)) for axis in axes]
-    sections = [Section("Axis by axis", joined(*heats), lead="Point at a cell for its reason.")]
+    sections = [Section("Axis by axis", joined(*heats), lead="Hover over a cell for its reason.")]
     if document["limits"]:
-        lead_ = "The last level that passed, and the first that failed; found by halving the interval between them."
+        lead_ = "The last level that passed and the first that failed, found by bisection."
         sections.append(Section("Limits", _limits(document["limits"]), lead=lead_))
     if document["predictions"]:
         sections.append(Section("Forecasts", _forecasts(document["predictions"]), lead=FORECASTS))
@@ -57,8 +57,8 @@ def extremes_page(document: Document) -> Page:
 
 
 FORECASTS = (
-    "Before each run it was forecast what would go wrong. Precision is the share of warnings that came true, "
-    "recall the share of what went wrong that was warned of."
+    "sandbox check warned before each run. Precision is the fraction of warnings that came true; "
+    "recall is the fraction of failures that had a warning."
 )
 
 
@@ -108,14 +108,14 @@ def _limits(rows: Sequence[Document]) -> Markup:
         Column("axis"),
         Column("engine"),
         Column("settings"),
-        Column("good up to", True),
+        Column("passes up to", True),
         Column("first failure", True),
     )
     cells: list[list[Child]] = [
         [
             str(row["axis"]).replace("_", " "),
             engine_name(row["engine"]),
-            _setup(row) or "as they are",
+            _setup(row) or "default",
             number(row["limit"], 4),
             number(row["first_failure"], 4),
         ]
@@ -130,9 +130,9 @@ def _forecasts(predictions: Sequence[Document]) -> Markup:
         Column("warning"),
         Column("precision", True),
         Column("recall", True),
-        Column("right", True),
+        Column("true alarms", True),
         Column("false alarms", True),
-        Column("not forecast", True),
+        Column("missed failures", True),
     )
     cells: list[list[Child]] = [
         [

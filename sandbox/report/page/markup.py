@@ -5,7 +5,9 @@ import json
 import re
 from typing import Any
 
-VOID = frozenset({"br", "circle", "col", "hr", "input", "line", "link", "meta", "path", "polyline", "rect", "use"})
+VOID = frozenset(
+    {"br", "circle", "col", "hr", "img", "input", "line", "link", "meta", "path", "polyline", "rect", "use"}
+)
 """Elements without a content: those of HTML that have none, and shapes of SVG where there is nothing to put in."""
 _UNPRINTED = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ufffe\uffff]")
 
@@ -51,7 +53,11 @@ def tag(name: str, *children: Child, **attributes: Attribute) -> Markup:
             parts.append(f'{written}="{escaped(text)}"')
     opening = " ".join(parts)
     if not children and name in VOID:
-        return Markup(f"<{opening}/>") if name not in {"br", "hr", "input", "link", "meta"} else Markup(f"<{opening}>")
+        return (
+            Markup(f"<{opening}/>")
+            if name not in {"br", "hr", "img", "input", "link", "meta"}
+            else Markup(f"<{opening}>")
+        )
     return Markup(f"<{opening}>{joined(*children)}</{name}>")
 
 

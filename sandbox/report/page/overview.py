@@ -6,6 +6,7 @@ from sandbox.measure.compare import Comparison
 from sandbox.measure.compare.errors import errors
 from sandbox.measure.versions import machine, versions
 from sandbox.report.page.comparison_page import (
+    ENGINES,
     engines_table,
     explanations,
     linked_plots,
@@ -16,7 +17,7 @@ from sandbox.report.page.comparison_page import (
 )
 from sandbox.report.page.document import Page, Section
 from sandbox.report.page.markup import Child, Markup, joined, named, tag
-from sandbox.report.page.tables import Column, table
+from sandbox.report.page.tables import Column, column_key, table
 from sandbox.report.page.time_chart import Curve, sparkline
 from sandbox.report.page.tradeoff_page import answers, weighed
 from sandbox.report.page.verdicts import badge, badge_of, engine_name, key, look_of
@@ -27,9 +28,9 @@ COLUMNS = (
     Column("scene"),
     Column("truth"),
     Column("engine"),
-    Column("max error, m", True, "the largest distance of any body from the truth while that is trusted"),
-    Column("of tolerance", True, "the error as a multiple of the tolerance, 1 % of the smallest radius"),
-    Column("ms per s", True, "milliseconds per simulated second, of this one run with all its frames kept"),
+    Column("max error, m", True, "largest position error of any body while the truth is trusted"),
+    Column("of tolerance", True, "error divided by the tolerance, which is 1 % of the smallest radius"),
+    Column("ms per s", True, "computing time in milliseconds per simulated second, of one run that keeps all frames"),
     Column("verdict"),
     Column("error over time"),
 )
@@ -52,7 +53,7 @@ class SceneReport:
 class Overview:
     """A page that grows scene by scene. Of each scene only its markup is kept, not its runs."""
 
-    title: str = "What each engine costs, and what it gets right"
+    title: str = "Accuracy and cost of each engine"
     rows: list[list[Child]] = field(default_factory=list)
     sections: list[Section] = field(default_factory=list)
     asked: int = 0
@@ -75,14 +76,14 @@ class Overview:
     def page(self) -> Page:
         """Return the page of what there is so far."""
         done = len(self.sections)
-        about = "each run by every engine that can model it and held against the best known truth"
+        about = "each run on every engine that supports it and compared with the best known truth"
         told = f"{plural(done, 'scene')}, {about}."
         missing = None
         if done < self.asked:
-            missing = tag("p", f"Interrupted: {done} of {self.asked} scenes are here.", class_="soft")
+            missing = tag("p", f"Interrupted: the page has {done} of {self.asked} scenes.", class_="soft")
         summary = joined(
             table(COLUMNS, self.rows, "Every scene and engine", wide=True),
-            tag("details", tag("summary", "What the verdicts mean"), key()),
+            tag("details", tag("summary", "What the columns and verdicts mean"), column_key(COLUMNS, ENGINES), key()),
         )
         first = Section("All scenes", summary, "all")
         return Page(
@@ -141,7 +142,7 @@ def _section(report: SceneReport, comparison: Comparison, anchor: str) -> Sectio
         parts.insert(1, lead)
     more = joined(
         *(Section(each.title, each.body, level=3).markup() for each in explanations(comparison)),
-        settings_of(comparison.rows),
+        settings_of(comparison),
     )
-    parts.append(tag("details", tag("summary", "Settings, and contacts missed or made up"), more))
+    parts.append(tag("details", tag("summary", "Settings, missed and phantom contacts"), more))
     return Section(scene.title or report.name, joined(*parts), anchor, tag("bdi", scene.about) if scene.about else None)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sandbox.trajectory import BoolArray, FloatArray
+from sandbox.arrays import BoolArray, FloatArray
 
 ABSENT = 65535
 """As x: the body is not there, or outside the box."""

@@ -63,7 +63,7 @@ class Points {
       range.selectNodeContents(code);
       getSelection().removeAllRanges();
       getSelection().addRange(range);
-      this.copy.textContent = "Selected: copy it";
+      this.copy.textContent = "Selected: press Ctrl+C";
     }
   }
 }

@@ -298,7 +298,7 @@ class Replay {
     const { context, scene, camera, clock, figure } = this;
     const style = getComputedStyle(figure);
     const colours = { font: style.fontFamily };
-    const own = ["sheet", "soft", "rule", "solid", "e0", "e1", "e2", "e3", "e4", "e5", "truth"];
+    const own = ["sheet", "soft", "rule", "solid", "pocket", "e0", "e1", "e2", "e3", "e4", "e5", "truth"];
     for (const name of own) colours[name] = style.getPropertyValue(`--${name}`).trim();
     colours.edge = style.getPropertyValue("--solid-edge").trim();
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
@@ -317,7 +317,7 @@ class Replay {
     }
     this.name(painter, shown);
     const late = scene.trusted_until !== null && clock.time > scene.trusted_until;
-    figure.querySelector(".told").textContent = late ? "beyond the time for which the truth is trusted" : "";
+    figure.querySelector(".told").textContent = late ? "the truth is not trusted at this time" : "";
     figure.dataset.shown = shown.map((track) => track.name).join(",");
     figure.dataset.painted = String(Number(figure.dataset.painted || 0) + 1);
   }
@@ -374,7 +374,7 @@ for (const figure of document.querySelectorAll(".replay")) {
   const place = figure.closest(".linked");
   const clock = new Clock(JSON.parse(figure.querySelector("script.data").textContent).duration);
   const made = new Replay(figure, clock);
-  for (const chart of place.querySelectorAll("svg.time")) {
+  for (const chart of place ? place.querySelectorAll("svg.time") : []) {
     link(chart, clock, () => {
       made.play(false);
       made.load();

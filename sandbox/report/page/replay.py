@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.report.page.markup import Markup, data, joined, named, tag
 from sandbox.report.page.packing import Crate, packed, rounded, turned
 from sandbox.report.page.scenery import scenery_of
 from sandbox.report.page.sight import box_of, crate_of
 from sandbox.report.page.wording import plural
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray, IntArray, Trajectory
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 MOST_FRAMES = 600
 FEWEST_FRAMES = 75
@@ -52,7 +53,7 @@ def replay(scene: Scene, tracks: Sequence[Track], trusted_until: float | None, u
     """
     document = replay_document(scene, tracks, trusted_until)
     title = scene.title or "this scene"
-    canvas = tag("canvas", role="img", aria_label=f"{title}, as {', '.join(each.name for each in tracks)} move it")
+    canvas = tag("canvas", role="img", aria_label=f"{title}, computed by {', '.join(each.name for each in tracks)}")
     note = tag("p", document["note"], class_="left-out") if document["note"] else None
     stage = tag("div", canvas, tag("p", "", class_="told", aria_live="off"), class_="stage")
     legend = [_entry(each, unit) for each in tracks]
@@ -62,7 +63,7 @@ def replay(scene: Scene, tracks: Sequence[Track], trusted_until: float | None, u
         _controls(document["speed"]),
         tag("ul", *legend, class_="legend"),
         note,
-        tag("noscript", tag("p", "The replay needs scripts; all figures are in the plots and tables.")),
+        tag("noscript", tag("p", "The replay needs JavaScript; the plots and tables hold all figures.")),
         data(document, class_="data"),
         class_="replay",
         tabindex="0",
@@ -93,7 +94,7 @@ def replay_document(scene: Scene, tracks: Sequence[Track], trusted_until: float 
     if len(drawn) < len(moving):
         note.append(f"{len(drawn):,} of {plural(len(moving), 'body').replace('bodys', 'bodies')} are drawn")
     if len(time) < len(longest):
-        note.append(f"{len(time):,} of {len(longest):,} frames are kept, and drawn over between them")
+        note.append(f"{len(time):,} of {len(longest):,} frames are kept; the replay interpolates between them")
     return {
         "scenery": scenery_of(scene, drawn, origin),
         "tracks": [
@@ -198,16 +199,16 @@ def _controls(speed: float) -> Markup:
     return tag(
         "div",
         button("play", "▶", "Play or pause (Space)"),
-        button("back", "◂", "One frame back (←)"),
-        button("on", "▸", "One frame on (→)"),
+        button("back", "◂", "Previous frame (←)"),
+        button("on", "▸", "Next frame (→)"),
         tag("input", type="range", class_="scrub", min="0", max="1000", value="0", step="any", aria_label="Time"),
         tag("output", "0 s", class_="time"),
         tag("label", tag("span", "Speed", class_="unseen"), tag("select", joined(*speeds), class_="speed")),
         tag(
             "span",
-            button("nearer", "+", "Nearer (+)"),
-            button("farther", "−", "Farther (−)"),
-            button("fit", "⤢", "Show all (0)"),
+            button("nearer", "+", "Zoom in (+)"),
+            button("farther", "−", "Zoom out (−)"),
+            button("fit", "⤢", "Fit all (0)"),
             class_="zoom",
         ),
         class_="controls",

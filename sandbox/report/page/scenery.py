@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.links import LinkKind
-from sandbox.scene.model import Scene
-from sandbox.scene.shapes import form_of
-from sandbox.trajectory import IntArray
+from sandbox.arrays import IntArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.scene import Scene
 
 MOST_LINKS = 5000
 """Joints drawn."""
@@ -53,6 +53,7 @@ def scenery_of(scene: Scene, drawn: IntArray, origin: tuple[float, float]) -> di
             if wall.solid
         ],
         "posts": [[*_moved(post.position, origin), post.radius] for post in scene.posts if post.solid],
+        "pockets": [[*_moved(pocket.position, origin), pocket.radius] for pocket in scene.pockets],
         "solids": _solids(bodies, origin),
         "attractions": [_moved(a.toward, origin) for a in scene.attractions if not isinstance(a.toward, str)],
         "links": _links(scene, drawn, origin),

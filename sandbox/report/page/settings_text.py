@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
 
 PLAIN = Settings()
 

@@ -4,11 +4,12 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.report.page.packing import Crate
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.links import LinkKind
-from sandbox.scene.model import Plane, Post, Scene, Wall
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.scene import Scene
 
 MANY = 1000
 """From so many places on the outermost are left out, `OUTLIERS` per cent at each side."""

@@ -1,4 +1,4 @@
-"""Bars of what an error consists of: model, time step, solver, and what is left at the finest step that was tried."""
+"""Bars of what an error consists of: model, time step, solver, and what is error at the finest step that was tried."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from sandbox.report.page.verdicts import engine_name
 from sandbox.report.page.wording import number
 from sandbox.report.work_points import Document
 
-PARTS = (("model", "model"), ("time_step", "time step"), ("solver", "solver"), ("left", "left at the finest step"))
+PARTS = (("model", "model"), ("time_step", "time step"), ("solver", "solver"), ("left", "error at the finest step"))
 WIDTH, HEIGHT = 320.0, 14.0
 
 
@@ -17,7 +17,7 @@ def split_bars(rows: Sequence[Document]) -> Markup:
 
     Args:
         rows: each with `engine`, `total`, `model`, `time_step`, `solver` and `left`, in m; unknown parts are None.
-            What is left at the finest step is the model's where that is known.
+            What is error at the finest step is the model's where that is known.
     """
     columns = [Column("engine"), Column("shares"), Column("error, m", True)]
     columns += [Column(f"{words}, m", True) for _, words in PARTS]
@@ -26,7 +26,7 @@ def split_bars(rows: Sequence[Document]) -> Markup:
         for row in rows
     ]
     keys = [tag("li", tag("span", class_=f"swatch square {key}", aria_hidden="true"), words) for key, words in PARTS]
-    return joined(table(columns, cells, "What the error consists of"), tag("ul", *keys, class_="keys"))
+    return joined(table(columns, cells, "Sources of error"), tag("ul", *keys, class_="keys"))
 
 
 def _bar(row: Document) -> Markup:

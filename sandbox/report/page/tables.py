@@ -51,6 +51,12 @@ def table(columns: Sequence[Column], rows: Sequence[Sequence[Child]], caption: s
     return tag("div", whole, class_="table", tabindex="0", role="region", aria_label=caption)
 
 
+def column_key(*tables: Sequence[Column]) -> Markup:
+    """Return what the columns of some tables hold, each once, those that say so."""
+    found = {column.head: column.about for columns in tables for column in columns if column.about}
+    return tag("dl", *(joined(tag("dt", head), tag("dd", about)) for head, about in found.items()))
+
+
 def pairs(rows: Sequence[tuple[str, Child]]) -> Markup:
     """Return names and what they stand for, as a list in two columns."""
     return tag("dl", *(joined(tag("dt", name), tag("dd", value)) for name, value in rows))

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.report.page.axes import Axes
 from sandbox.report.page.markup import Markup, tag
 from sandbox.report.page.scales import Linear, Log
 from sandbox.report.page.wording import number, power_of
-from sandbox.trajectory import FloatArray
 
 FLOOR = 1e-16
 """The lowest that a logarithmic axis reaches; what is smaller, such as 0, lies on its low end."""
@@ -59,7 +59,12 @@ def error_chart(
 
 
 def energy_chart(
-    curves: Sequence[Curve], label: str, duration: float, trusted_until: float | None, name: str
+    curves: Sequence[Curve],
+    label: str,
+    duration: float,
+    trusted_until: float | None,
+    name: str,
+    whole: bool = False,
 ) -> Markup:
     """Return energies, J, on a linear axis that holds what is right, and engines that are not far from it.
 
@@ -69,8 +74,9 @@ def energy_chart(
         duration: of the scene, s.
         trusted_until: s; None without a truth.
         name: of the chart, the only one of that name on the page.
+        whole: hold all values, as of a single run, even far from what is right.
     """
-    low, high = _range(curves)
+    low, high = _range(curves, math.inf if whole else ROOM)
     size = max(abs(low), abs(high))
     power = 0 if size == 0.0 or 1e-3 <= size < 1e5 else 3 * math.floor(math.log10(size) / 3.0)
     scaled = [Curve(each.name, each.look, each.time, each.values / 10.0**power) for each in curves]
@@ -170,7 +176,7 @@ def _thinned(time: FloatArray, values: FloatArray, stretches: int) -> tuple[Floa
     return time[places], values[places]
 
 
-def _range(curves: Sequence[Curve]) -> tuple[float, float]:
+def _range(curves: Sequence[Curve], room: float = ROOM) -> tuple[float, float]:
     """Return the lowest and highest energy to show: the truth's, and others' where they are not out of all reach."""
     finite = {each.name: each.values[np.abs(each.values) < BEYOND] for each in curves}
     known = {name: values for name, values in finite.items() if len(values)}
@@ -180,7 +186,7 @@ def _range(curves: Sequence[Curve]) -> tuple[float, float]:
     if right is None:
         right = np.asarray([values[0] for values in known.values()])
     low, high = float(right.min()), float(right.max())
-    reach = ROOM * max(high - low, 0.1 * max(abs(low), abs(high)), 1e-300)
+    reach = room * max(high - low, 0.1 * max(abs(low), abs(high)), 1e-300)
     if low == high == 0.0:
         reach = math.inf
     lows = [max(float(values.min()), low - reach) for values in known.values()]

@@ -72,7 +72,7 @@ def tradeoff_chart(document: Document, name: str) -> Markup:
         viewBox=f"0 0 {axes.width:g} {axes.height:g}",
         class_="chart broad",
         role="group",
-        aria_label=f"{metric} against cost, {len(points)} points; arrow keys go along the Pareto front",
+        aria_label=f"{metric} against cost, {len(points)} points; arrow keys move along the Pareto front",
     )
 
 
@@ -100,14 +100,14 @@ def chart_keys(document: Document) -> Markup:
         return tag("li", tag("svg", stroke, viewBox="-7 -7 14 14"), text)
 
     if document["pareto"]:
-        entries.append(line("front", "Pareto front: no other setting is both cheaper and closer"))
+        entries.append(line("front", "Pareto front: no setting tried is both cheaper and more accurate"))
     entries += [
-        line(f"floor {look_of(engine)}", f"{engine}: no step is small enough for less")
+        line(f"floor {look_of(engine)}", f"{engine}: error limit at any step (its model's error)")
         for engine in floors_of(document)
     ]
     if any(not point.whole for point in points):
         cross = tag("svg", _shape("cross", 0.0, 0.0), viewBox="-7 -7 14 14", class_="truth points")
-        entries.append(tag("li", cross, "failed: at the top what ran into nonsense, at the right what has no cost"))
+        entries.append(tag("li", cross, "failed: no valid error at the top, no cost at the right"))
     return tag("ul", *entries, class_="keys")
 
 

@@ -3,8 +3,8 @@
 import math
 from typing import Literal
 
-from sandbox.measure.compare import Row
-from sandbox.report.colours import number_of
+from sandbox.measure.compare import Comparison, Row
+from sandbox.report.colours import COLOURS, number_of
 from sandbox.report.page.markup import Markup, joined, named, tag
 from sandbox.report.page.wording import number
 
@@ -19,11 +19,24 @@ def look_of(engine: str) -> str:
     return f"e{number_of(engine)}"
 
 
-def engine_name(engine: str) -> Markup:
-    """Return an engine's name beside its colour."""
-    return tag(
-        "span", tag("span", class_=f"swatch {look_of(engine)}", aria_hidden="true"), named(engine), class_="look"
-    )
+def looks_of(comparison: Comparison) -> dict[str, str]:
+    """Return the class that bears the colour of each row, by the row's `name`: its engine's, or of a sweep its own."""
+    rows = comparison.rows
+    return {
+        row.name: f"e{k % len(COLOURS)}" if any(each.set for each in rows) else look_of(row.engine)
+        for k, row in enumerate(rows)
+    }
+
+
+def engine_name(engine: str, look: str | None = None) -> Markup:
+    """Return an engine's name, or a row's, beside its colour.
+
+    Args:
+        engine: the name.
+        look: the class that bears the colour; by default the engine's.
+    """
+    shown = look_of(engine) if look is None else look
+    return tag("span", tag("span", class_=f"swatch {shown}", aria_hidden="true"), named(engine), class_="look")
 
 
 def badge(word: str, shade: Shade, about: str | None = None) -> Markup:
@@ -36,19 +49,19 @@ def verdict_of(row: Row, tolerance: float) -> tuple[str, Shade]:
     error = row.score.max_position
     missed, phantom = row.count("missed"), row.count("phantom")
     if row.status == "refused":
-        return "refuses", "none"
+        return "unsupported", "none"
     if row.status != "ok":
         return row.status, "bad"
     if error is None:
         return "not judged", "none"
     first = min((event.when for event in row.events or () if event.kind == "missed"), default=math.inf)
     if missed and (row.first_divergence is None or first <= row.first_divergence):
-        return f"misses {missed:,}", "bad"
+        return f"{missed:,} missed", "bad"
     if row.first_divergence is not None:
-        return f"off from {number(row.first_divergence)} s", "bad" if error > 10.0 * tolerance else "fair"
+        return f"diverges at {number(row.first_divergence)} s", "bad" if error > 10.0 * tolerance else "fair"
     if phantom:
         return f"{phantom:,} phantom", "fair"
-    return ("right", "good") if error <= NEGLIGIBLE * tolerance else ("within", "good")
+    return ("matches", "good") if error <= NEGLIGIBLE * tolerance else ("within tolerance", "good")
 
 
 def badge_of(row: Row, tolerance: float) -> Markup:
@@ -57,11 +70,15 @@ def badge_of(row: Row, tolerance: float) -> Markup:
 
 
 KEY: tuple[tuple[str, Shade, str], ...] = (
-    ("right", "good", "off by no more than a millionth of the tolerance"),
-    ("within", "good", "within the tolerance for as long as the truth is trusted"),
-    ("off from", "fair", "further off than the tolerance from that time on; red beyond ten times"),
-    ("misses", "bad", "so many contacts of the truth never happened, the first before all else went wrong"),
-    ("refuses", "none", "cannot model the scene, and says so"),
+    ("matches", "good", "error at most a millionth of the tolerance"),
+    ("within tolerance", "good", "error within the tolerance while the truth is trusted"),
+    (
+        "diverges at",
+        "fair",
+        "error exceeds the tolerance from that time on; red where it exceeds ten times the tolerance",
+    ),
+    ("missed", "bad", "number of contacts that the engine missed, the first before any body diverged"),
+    ("unsupported", "none", "the engine does not support the scene"),
 )
 """What the words mean."""
 

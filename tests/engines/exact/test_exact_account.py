@@ -10,10 +10,10 @@ import pytest
 
 import sandbox
 from sandbox.action import Impulse, Move, Remove, SetParameter, Spawn
-from sandbox.engines.account import Cause
+from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 SCENES = Path(__file__).parents[3] / "scenes"
 G = 10.0

@@ -1,6 +1,7 @@
 """The exact engine under any scene: it ends, stays finite, and does so again."""
 
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from strategies import Document, documents
@@ -8,8 +9,8 @@ from strategies import Document, documents
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.exact.engine import ExactEngine
 from sandbox.engines.exact.simulation import ExactSimulation
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 
 @st.composite
@@ -38,6 +39,7 @@ def outcome(simulation: ExactSimulation) -> tuple[str | None, str]:
     return ended, simulation.state_hash()
 
 
+@pytest.mark.slow
 @given(runnable())
 @settings(max_examples=80)
 def test_any_scene_runs_finite_or_ends_with_a_reason_and_does_so_again(scene: Scene) -> None:

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.engines.reference.joints.solver import JointSolver, kick_pose
-from sandbox.engines.reference.motion import Inputs, transition
-from sandbox.scene.links import LinkKind, Links
+from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, transition
+from sandbox.engines.reference.joints import JointSolver, kick_pose
+from sandbox.scene.compile.joint_arrays import LinkKind, Links
 
 G = 9.81
 BIAS = 0.9**60
@@ -74,8 +73,8 @@ class Rig:
 
     def step(self, h: float) -> None:
         moved = self.integrator.step(transition, self.time, self.x, self.u, h)
-        if self.solver.how == "impulses":
-            share = self.integrator.share
+        if self.solver.method == "impulses":
+            share = self.integrator.fraction
             self.solver.prepare(kick_pose(moved, share, h), h)
             kicked = moved[1].copy()
             self.solver.solve(moved[1])

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from scipy.spatial import ConvexHull
 
-from sandbox.engines.reference.convex import meet_half_plane, meet_pieces
+from sandbox.engines.reference.polygon import meet_half_plane, meet_pieces
 
 Outline = tuple[np.ndarray, float]
 """corners (n, 2), counter-clockwise, and radius"""

@@ -4,11 +4,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.contract import Simulation
 from sandbox.engines.registry import start
-from sandbox.engines.roster import Roster
-from sandbox.scene.file import from_document, load
-from sandbox.scene.model import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -52,8 +53,8 @@ def side_by_side(scene: Scene, steps: int, **settings: Any) -> Iterator[tuple[Si
         yield theirs, ours
 
 
-def roster_of(scene: Scene) -> Roster:
-    return Roster(scene, scene.solver.h)
+def roster_of(scene: Scene) -> BodyStore:
+    return BodyStore(Setup.of(scene), scene.solver.h)
 
 
 def small_pile(count: int = 60) -> Scene:

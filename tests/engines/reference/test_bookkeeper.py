@@ -12,13 +12,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sandbox.action import Action, Force, Impulse, Launch, Move, Pull, Remove, SetParameter, Spawn, Switch
-from sandbox.engines.account import Cause
-from sandbox.engines.relay import start
+from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.switching import start
 from sandbox.measure.ledger import Ledger, ledger
 from sandbox.measure.run import run
-from sandbox.scene.file import from_document, load
-from sandbox.scene.model import Ball, Scene
-from sandbox.scene.shipped import find
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 CLOSED = 1e-9  # the promise; what is found is the rounding of sums, some 1e-11 at most
 G = 9.81
@@ -287,8 +288,8 @@ def test_an_account_opens_empty_and_late() -> None:
 SAME = """
 import json, sys
 from sandbox.measure.ledger import ledger
-from sandbox.scene.file import load
-from sandbox.scene.shipped import find
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import find
 scene = load(find("joints/ragdoll_stairs"))
 scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.1})})
 print(json.dumps(ledger(scene, "reference").document()))

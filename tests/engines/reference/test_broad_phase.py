@@ -9,10 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pieces import ball, roster_of, running, scene_of, shipped, small_pile, stepped
 
-from sandbox.engines.reference.ball_finder import BallFinder
-from sandbox.engines.reference.broad_phase import BROAD_PHASES
-from sandbox.engines.reference.broad_phase.grid import cell_of
-from sandbox.engines.reference.meeting import FIRST, SECOND, may_meet, pair_key
+from sandbox.engines.reference.broad_phase import BROAD_PHASES, FIRST, SECOND, cell_of, may_meet, pair_key
+from sandbox.engines.reference.collision import CirclePipeline
 
 WORDS = st.sampled_from(["all", "fixed", "none"])
 
@@ -52,7 +50,7 @@ def found(finder, position, margin=0.0):
 @given(crowds())
 def test_all_find_the_same_manifolds(balls):
     roster = roster_of(scene_of(*balls))
-    results = [found(BallFinder(roster, name), roster.position) for name in BROAD_PHASES]
+    results = [found(CirclePipeline(roster, name), roster.position) for name in BROAD_PHASES]
     assert all(result == results[0] for result in results)
     overlapping = [
         pair_key(i, j)
@@ -71,7 +69,7 @@ def test_none_loses_a_pair_nearer_than_the_margin(balls, margin):
         if meets(a, b) and math.dist(a["position"], b["position"]) < a["radius"] + b["radius"] + margin * (1 - 1e-12)
     }
     for name in BROAD_PHASES:
-        keys = BallFinder(roster, name).candidates(roster.position, margin).balls.tolist()
+        keys = CirclePipeline(roster, name).candidates(roster.position, margin).balls.tolist()
         assert keys == sorted(set(keys))
         assert near <= set(keys)
 
@@ -79,10 +77,10 @@ def test_none_loses_a_pair_nearer_than_the_margin(balls, margin):
 @given(crowds(), st.randoms(use_true_random=False))
 def test_the_order_kept_from_step_to_step_changes_nothing(balls, random):
     roster = roster_of(scene_of(*balls))
-    used = BallFinder(roster, "sweep")
+    used = CirclePipeline(roster, "sweep")
     for _ in range(3):
         moved = roster.position + np.array([[random.uniform(-3, 3), random.uniform(-3, 3)] for _ in balls])
-        assert found(used, moved) == found(BallFinder(roster, "all_pairs"), moved)
+        assert found(used, moved) == found(CirclePipeline(roster, "all_pairs"), moved)
 
 
 def touching_within_rounding(count):
@@ -101,7 +99,7 @@ def test_touches_within_the_rounding_of_a_far_place_are_not_lost(name):
     for x, a, other, b in touching_within_rounding(300):
         balls = [ball(x, 0.0, radius=a), ball(other, 0.0, radius=b)]
         roster = roster_of(scene_of(*balls))
-        assert found(BallFinder(roster, name), roster.position)[0] == [pair_key(0, 1)]
+        assert found(CirclePipeline(roster, name), roster.position)[0] == [pair_key(0, 1)]
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
@@ -112,7 +110,7 @@ def test_balls_near_the_end_of_doubles_are_neighbours_if_they_touch(name):
     for k in range(-40, 40):
         x = start + 2.0 * k
         roster = roster_of(scene_of(ball(x, 0.0, radius=wide / 2), ball(x + 2.0, 0.0, radius=wide / 2)))
-        assert found(BallFinder(roster, name), roster.position)[0] == [pair_key(0, 1)]
+        assert found(CirclePipeline(roster, name), roster.position)[0] == [pair_key(0, 1)]
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
@@ -121,18 +119,18 @@ def test_empty_and_smallest_scenes(name, balls):
     balls = [{**each, "name": f"b{k}"} for k, each in enumerate(balls)]
     if not balls:  # a scene of nothing else is a fault
         document = {"plane": [{"point": [0, 0], "normal": [0, 1]}]}
-        finder = BallFinder(roster_of(scene_of(**document)), name)
+        finder = CirclePipeline(roster_of(scene_of(**document)), name)
         assert found(finder, np.empty((0, 2)))[0] == []
         return
     roster = roster_of(scene_of(*balls))
     expected = [pair_key(0, 1)] if len(balls) == 2 else []
-    assert found(BallFinder(roster, name), roster.position)[0] == expected
+    assert found(CirclePipeline(roster, name), roster.position)[0] == expected
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
 def test_coincident_centres_have_the_normal_of_munk(name):
     roster = roster_of(scene_of(ball(3, 4), ball(3, 4)))
-    contacts = BallFinder(roster, name).overlaps(roster.position)
+    contacts = CirclePipeline(roster, name).overlaps(roster.position)
     assert (contacts.separation.tolist(), contacts.normal.tolist()) == ([-1.0], [[1.0, 0.0]])
 
 
@@ -140,7 +138,7 @@ def test_coincident_centres_have_the_normal_of_munk(name):
 def test_more_pairs_than_there_is_room_for_are_all_kept(name):
     balls = [ball(0.001 * k, 0.0, name=f"b{k}") for k in range(40)]
     roster = roster_of(scene_of(*balls))
-    assert len(BallFinder(roster, name).overlaps(roster.position).key) == 40 * 39 // 2
+    assert len(CirclePipeline(roster, name).overlaps(roster.position).key) == 40 * 39 // 2
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
@@ -148,7 +146,7 @@ def test_a_position_that_is_no_number_meets_nobody_and_hides_nobody(name):
     roster = roster_of(scene_of(ball(0, 0), ball(0.5, 0), ball(0.2, 0.2)))
     position = roster.position.copy()
     position[2] = np.nan
-    keys = found(BallFinder(roster, name), position)[0]
+    keys = found(CirclePipeline(roster, name), position)[0]
     assert set(keys) <= {pair_key(0, 1)}
     assert name == "sweep" or keys == [pair_key(0, 1)]
 
@@ -158,7 +156,7 @@ def test_circles_tests_every_pair_that_may_meet_and_the_others_far_fewer():
     roster = roster_of(scene_of(*wide, ball(0, 50, fixed=True), ball(9, 50, fixed=True), ball(4, 50, collides="fixed")))
     tests = {}
     for name in BROAD_PHASES:
-        finder = BallFinder(roster, name)
+        finder = CirclePipeline(roster, name)
         finder.overlaps(roster.position)
         tests[name] = finder.work["broad_tests"]
     assert tests["all_pairs"] == 0
@@ -172,7 +170,7 @@ def test_one_huge_ball_spoils_the_grid_and_not_the_sweep():
     roster = roster_of(scene_of(*small, ball(300, -1e4 - 1, radius=1e4)))
     tests = {}
     for name in ("grid", "sweep"):
-        finder = BallFinder(roster, name)
+        finder = CirclePipeline(roster, name)
         finder.overlaps(roster.position)
         tests[name] = finder.work["broad_tests"]
     assert tests["grid"] == 201 * 200 // 2  # all are in one cell, or in the next

@@ -7,8 +7,7 @@ import pytest
 from outlines import box, capsule, disc, met, met_plane, moved, pairs
 from shapely import LineString, Point
 
-from sandbox.engines.reference.clipping import clip, closest_points
-from sandbox.engines.reference.convex import FAVOUR
+from sandbox.engines.reference.polygon import FAVOUR, clip, closest_points
 
 ROUNDING = 1e-15
 """some ulps of numbers about 1"""

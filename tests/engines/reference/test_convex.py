@@ -26,9 +26,9 @@ from outlines import (
 from pieces import ROOT
 from scipy.spatial import ConvexHull
 
-from sandbox.engines.reference import convex
-from sandbox.engines.reference.convex import FAVOUR, LEVEL
-from sandbox.engines.reference.narrow_phase import NARROW_PHASE
+from sandbox.engines.reference import polygon as convex
+from sandbox.engines.reference.manifold import circle_circle, circle_segment
+from sandbox.engines.reference.polygon import FAVOUR, LEVEL
 
 PAIRS = 1000
 
@@ -155,9 +155,9 @@ def test_discs_are_met_as_the_table_of_discs_says():
     for _ in range(300):
         x, y, a, b = *random.normal(0, 1, 2), *random.uniform(0.1, 1.0, 2)
         ends = random.normal(0, 1, 4)
-        separation, *normal = NARROW_PHASE["circle", "circle"](0.0, 0.0, a, x, y, b)
+        separation, *normal = circle_circle(0.0, 0.0, a, x, y, b)
         assert met(disc(0, 0, a), disc(x, y, b))[0, :3].tolist() == [*normal, separation]
-        separation, *normal = NARROW_PHASE["circle", "segment"](x, y, a, *ends, b)
+        separation, *normal = circle_segment(x, y, a, *ends, b)
         assert met(disc(x, y, a), capsule(*ends, b))[0, :3].tolist() == [*normal, separation]
 
 

@@ -10,10 +10,9 @@ from pieces import EARTH, FLOOR, ball, running, scene_of, shipped, stepped
 
 from sandbox.action import ActionError, Spawn
 from sandbox.engines.contract import Exhaustion
-from sandbox.engines.reference.detection import DETECTIONS
-from sandbox.engines.reference.detection.resting import MOST_IMPACTS
+from sandbox.engines.reference.continuous import DETECTIONS, MAX_IMPACTS
 from sandbox.measure.run import run
-from sandbox.scene.model import Box
+from sandbox.scene.description.bodies import Box
 
 UNSEEING, SEEING = ["discrete", "bisect"], ["swept", "shrink"]
 
@@ -232,7 +231,7 @@ def test_shrink_cuts_no_step_in_which_little_moves():
 def test_an_exhausted_simulation_can_be_read_and_does_not_go_on():
     scene = scene_of(ball(0, 3, velocity=[1e9, 0]), plane=[FLOOR], solver={"dt": 0.1})
     simulation = running(scene, detection="shrink")
-    with pytest.raises(Exhaustion, match="a substep would be cut into 4e\\+08 pieces; at most 100,000"):
+    with pytest.raises(Exhaustion, match="a substep would be divided into 4e\\+08 parts; the limit is 40,000"):
         simulation.step()
     assert simulation.frame().position[0].tolist() == [0, 3]
     with pytest.raises(RuntimeError, match="ended"):
@@ -274,7 +273,7 @@ def test_past_the_most_impacts_a_step_ends_by_one_discrete_look():
     simulation, impacts = running(scene, detection="swept"), []
     simulation.watch(lambda *args: impacts.append(args[0]))
     simulation.step()
-    assert len(impacts) == MOST_IMPACTS + 1
+    assert len(impacts) == MAX_IMPACTS + 1
     assert abs(simulation.frame().velocity[0, 0]) == 300.0
 
 
@@ -336,7 +335,7 @@ def test_a_resting_ball_carries_its_weight_through_anothers_impacts(detection):
 def test_swept_takes_in_no_polygon_while_it_runs_but_what_meets_nothing():
     simulation = running(scene_of(ball(0, 0, velocity=[1.0, 0.0])), detection="swept")
     box = {"position": (1.0, 0.0), "size": (0.5, 0.5)}
-    with pytest.raises(ActionError, match="'swept' knows times of impact of balls alone"):
+    with pytest.raises(ActionError, match="'swept' supports balls only"):
         simulation.apply(Spawn(time=0.0, box=Box(**box)))
     simulation.apply(Spawn(time=0.0, box=Box(**box, collides="none")))
     assert stepped(simulation, 100).frame().velocity[0].tolist() == [1.0, 0.0]

@@ -6,12 +6,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import sandbox
-from sandbox.engines.account import Cause
-from sandbox.engines.reference.dissipation import largest_shares
+from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.reference.dissipation import largest_fractions
 from sandbox.measure.forecast import forecast
 from sandbox.measure.ledger import ledger
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 ROOM = [
     {"point": [0, -2], "normal": [0, 1]},
@@ -133,7 +133,7 @@ def test_largest_share_is_where_the_work_ends_to_take() -> None:
         np.array([0.0, 3.0, 0.5, 1.0, 0.0]),
         np.array([4.0, 0, 0.5, 0, 0]),
     )
-    assert largest_shares(work, slope, curve) == pytest.approx([0.5, 1 / 3, 1.0, 0.0, 1.0])
+    assert largest_fractions(work, slope, curve) == pytest.approx([0.5, 1 / 3, 1.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "exact"])

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sandbox.engines.reference.integrators import INTEGRATORS, amplification
-from sandbox.engines.reference.motion import Inputs, transition
+from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, amplification, transition
 
 SYMPLECTIC = ["semi_implicit_euler", "velocity_verlet", "leapfrog"]
 
@@ -181,7 +180,7 @@ def test_share_is_what_positions_have_of_a_kick_within_the_step(name):
     scheme = INTEGRATORS[name]
     with_kick, without = (scheme.step(f(kick), 0.0, x, CONSERVATIVE, h) for kick in (1.0, 0.0))
     moved, gained = (with_kick - without)[:, 0, 0]
-    assert moved == pytest.approx(scheme.share * h * gained, rel=1e-15)  # rk4's sixths are rounded
+    assert moved == pytest.approx(scheme.fraction * h * gained, rel=1e-15)  # rk4's sixths are rounded
 
 
 @given(st.floats(0.01, 2), st.floats(0.01, 2), st.floats(-20, 20))

@@ -7,8 +7,8 @@ import pytest
 from joint_rig import G, Rig, link, links_of
 from scipy.optimize import brentq
 
-from sandbox.engines.reference.joints.solver import CAP
-from sandbox.scene.links import LinkKind
+from sandbox.engines.reference.joints import CAP
+from sandbox.scene.compile.joint_arrays import LinkKind
 
 
 def discrete_sag(links=20, span=1.0, length=1.4):

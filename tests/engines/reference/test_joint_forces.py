@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from joint_rig import Rig, links_of
 
-from sandbox.engines.reference.joints.attraction import attract
-from sandbox.engines.reference.joints.thrust import thrust
+from sandbox.engines.reference.forces import attract, thrust
 
 
 def pull(inverse_mass, *, target=-1, place=(0.0, 0.0), strength=1.0, softening=0.0):

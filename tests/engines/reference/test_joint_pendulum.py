@@ -8,7 +8,7 @@ import pytest
 from joint_rig import BIAS, G, Rig, link, links_of, pendulum
 from scipy.special import ellipk
 
-from sandbox.scene.links import LinkKind
+from sandbox.scene.compile.joint_arrays import LinkKind
 
 PERIODS = {5: 2.0070219, 90: 2.3678419, 170: 4.8935243}
 """By amplitude in degrees: 4 √(L/g) K(sin²(θ₀/2)), s, for L = 1 m"""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from joint_rig import G, Rig, link, links_of
 
-from sandbox.scene.links import LinkKind
+from sandbox.scene.compile.joint_arrays import LinkKind
 
 OMEGA = 2 * math.pi
 

@@ -14,7 +14,7 @@ from pieces import ROOT
 
 HERE = Path(__file__).resolve().parent
 
-ANNOUNCEMENT = "compiling: up to half a minute, this once"
+ANNOUNCEMENT = "compiling some functions for the first time; later runs start at once"
 
 HASHES = """
 import json
@@ -44,7 +44,7 @@ print(json.dumps({name: run.state_hash() for name, run in runs.items()}))
 """
 
 TINY = """
-from sandbox.engines.reference.narrow_phase import circle_circle
+from sandbox.engines.reference.manifold import circle_circle
 print(circle_circle(0.0, 0.0, 1.0, 3.0, 4.0, 1.0))
 """
 
@@ -98,7 +98,7 @@ def test_changed_sources_are_compiled_anew_and_what_is_old_is_removed(tmp_path, 
     then = before.stat().st_mtime - age
     os.utime(before, (then, then))
     # A callee in another file: what numba's own cache would not notice.
-    source = root / "sandbox" / "engines" / "reference" / "meeting.py"
+    source = root / "sandbox" / "engines" / "reference" / "broad_phase.py"
     source.write_text(source.read_text() + "\n# changed\n")
     assert python(TINY, root, NUMBA_DISABLE_JIT="0")[1] == ANNOUNCEMENT + "\n"
     assert len(list(cache_home.glob("kernels-*"))) == left
@@ -118,6 +118,19 @@ def test_where_the_install_cannot_be_written_the_users_cache_serves(tmp_path):
     assert len(list((home / "sandbox2d").glob("kernels-*"))) == 1
 
 
+def test_full_disk_is_one_line_and_kernels_are_compiled_again(tmp_path):
+    root = installed(tmp_path)
+    limit = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))\n"
+    two = "from sandbox.engines.reference.broad_phase import cell_of\nprint(cell_of(0.5, 2.0))\n"
+    for _ in range(2):
+        said, complaints = python(limit + textwrap.dedent(TINY) + two, root, NUMBA_DISABLE_JIT="0")
+        assert said.startswith("(3.0, 0.6000000000000001, 0.8)\n")
+        announced, warning = complaints.splitlines()
+        assert (announced, "File too large" in warning) == (ANNOUNCEMENT, True)
+    left = (file for file in tmp_path.rglob("kernels-*/**/*") if file.is_file())
+    assert [file.name for file in left] == []
+
+
 def test_where_nothing_can_be_written_it_works_all_the_same(tmp_path):
     root = installed(tmp_path / "site")
     (root / "sandbox" / "engines" / "__pycache__").write_text("")
@@ -135,10 +148,10 @@ for _ in range(2):
 """
 
 
-@pytest.mark.parametrize(("count", "said"), [(99, ""), (100, "100 bodies without compiled kernels will be slow")])
+@pytest.mark.parametrize(("count", "said"), [(99, ""), (100, "100 bodies are slow without compiled kernels")])
 def test_large_scenes_uncompiled_are_said_to_be_slow_once(count, said):
     _, errors = python(SLOW.replace("COUNT", str(count)), NUMBA_DISABLE_JIT="1")
-    assert errors == (f"{said}: pip install -e '.[fast]'\n" if said else "")
+    assert errors == (f"{said}; install them with: pip install -e '.[fast]'\n" if said else "")
 
 
 def test_large_scenes_compiled_are_not():
@@ -150,7 +163,7 @@ def test_without_numba_kernels_are_the_functions_themselves():
     code = """
         import sys
         sys.modules["numba"] = None
-        from sandbox.engines.kernel import COMPILED, kernel
+        from sandbox.engines.common.kernel import COMPILED, kernel
         def twice(x):
             return 2 * x
         assert kernel(twice) is twice

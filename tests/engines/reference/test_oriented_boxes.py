@@ -7,7 +7,7 @@ import pytest
 import shapely
 from outlines import any_outline, box, capsule, disc, laid_out, moved, ring, separation_of, size_of
 
-from sandbox.engines.reference.oriented_boxes import box_of, boxes_apart
+from sandbox.engines.reference.polygon_contacts import box_of, boxes_apart
 
 
 def boxed(outline):

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sandbox
-from sandbox.engines.reference.piece_finder import PieceFinder
-from sandbox.engines.roster import Roster
-from sandbox.scene.file import from_document
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.reference.collision import ConvexPipeline
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.files.load import from_document
 
 BROAD = ("all_pairs", "circles", "sweep", "grid", "oriented")
 
@@ -51,8 +52,8 @@ def crowds(draw):
 
 
 def found(scene, broad_phase):
-    roster = Roster(scene, 0.01)
-    finder = PieceFinder(roster, broad_phase)
+    roster = BodyStore(Setup.of(scene), 0.01)
+    finder = ConvexPipeline(roster, broad_phase)
     contacts = finder.overlaps(np.column_stack((roster.position, roster.angle)))
     return [column.copy() for column in contacts], finder.work
 
@@ -82,7 +83,7 @@ def test_contacts_are_in_the_order_of_keys_and_never_of_a_body_with_itself(scene
 @given(crowds())
 def test_levers_end_on_both_surfaces(scene):
     """A contact as two bodies see it: their points lie apart by the separation, along the normal."""
-    (_, first, second, normal, separation, point, arm, offset, _), _ = found(scene, "all_pairs")
+    (_, first, second, normal, separation, point, arm, offset, *_), _ = found(scene, "all_pairs")
     two = second >= 0
     centre, left = scene.bodies.position, np.column_stack((-normal[:, 1], normal[:, 0]))
     ours = centre[first] + arm[:, :1] * normal + offset[:, :1] * left
@@ -103,8 +104,8 @@ def test_the_test_that_fits_looks_at_least():
     """The tutorial's claim, by counts: discs around planks hold 26 neighbours each, boxes along them none."""
     looked = {}
     for broad_phase in ("circles", "oriented"):
-        roster = Roster(planks(), 0.01)
-        finder = PieceFinder(roster, broad_phase)
+        roster = BodyStore(Setup.of(planks()), 0.01)
+        finder = ConvexPipeline(roster, broad_phase)
         finder.overlaps(np.column_stack((roster.position, roster.angle)))
         looked[broad_phase] = finder.work["pair_tests"]
     assert looked["oriented"] == 0

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from pieces import EARTH, FLOOR, PYMUNK_WAY, ball, running, scene_of, shipped, side_by_side, stepped
 
 from sandbox.action import Force, Impulse, Move, Remove, SetParameter, Spawn
-from sandbox.scene.model import Ball
+from sandbox.scene.description.discs import Ball
 
 
 def difference(theirs, ours):

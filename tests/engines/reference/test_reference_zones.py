@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.action import Impulse, Reshape, Spawn, Toggle
-from sandbox.engines.reference.precincts import precincts_of, within
-from sandbox.engines.relay import Relay, start
-from sandbox.scene.discs import Ball
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene, Zone
-from sandbox.scene.precinct import contains
-from sandbox.scene.solids import Box
-from sandbox.scene.zone import HELD
+from sandbox.engines.reference.zones import precincts_of, within
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.description.bodies import Box
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.fixed import HELD, Zone
+from sandbox.scene.files.load import from_document
+from sandbox.scene.geometry.shapes import contains
+from sandbox.scene.scene import Scene
 
 H = 0.001
 """s, the substep"""
@@ -61,11 +61,11 @@ def course(body: dict[str, Any] | None = None, **world: Any) -> Scene:
     )
 
 
-def begun(scene: Scene, how: str) -> Relay:
+def begun(scene: Scene, how: str) -> SwitchableSimulation:
     return start(scene, "reference", scene.solver.replace(**HOWS[how]))
 
 
-def advance(relay: Relay, seconds: float) -> None:
+def advance(relay: SwitchableSimulation, seconds: float) -> None:
     while relay.time < seconds - 1e-9:
         relay.step()
 
@@ -105,7 +105,7 @@ def test_every_choice_holds_and_lets_go(how: str) -> None:
     scene = from_document({"solver": {"dt": 5 * H, "substeps": 5}, "ball": balls, "zone": zones})
     relay = begun(scene, how)
     relay.account()
-    began = sandbox.engines.energy.total_energy(relay)
+    began = sandbox.engines.common.energy_balance.total_energy(relay)
     advance(relay, 2.0)
     frame = relay.frame()
     assert frame.visits is not None and frame.visits[0].tolist() == [HELD, 0]
@@ -118,7 +118,9 @@ def test_every_choice_holds_and_lets_go(how: str) -> None:
     assert relay.frame().velocity[0, 0] < -1.0 + 2.0 * 0.2 + 0.01
     assert relay.frame().position[0, 0] < 0.42
     brought = sum(relay.account().values())
-    assert sandbox.engines.energy.total_energy(relay) - began == pytest.approx(brought, abs=1e-12)  # rounding of 1 J
+    assert sandbox.engines.common.energy_balance.total_energy(relay) - began == pytest.approx(
+        brought, abs=1e-12
+    )  # rounding of 1 J
 
 
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "leapfrog", "rk4"])

@@ -7,10 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pieces import ball, roster_of, scene_of
 
-from sandbox.engines.reference.ball_finder import BallFinder
-from sandbox.engines.reference.meeting import pair_key
-from sandbox.engines.reference.narrow_phase import circle_segment
-from sandbox.engines.reference.segments import SegmentBoxes
+from sandbox.engines.reference.broad_phase import SegmentBoxes, pair_key
+from sandbox.engines.reference.collision import CirclePipeline
+from sandbox.engines.reference.manifold import circle_segment
 
 corner = st.tuples(st.integers(-40, 40), st.integers(-40, 40)).map(lambda c: [c[0] / 4, c[1] / 4])
 
@@ -48,7 +47,7 @@ def test_none_nearer_than_the_margin_is_lost(scene, margin):
         for s, (ax, ay, bx, by, half) in enumerate(roster.fixtures.segments)
         if roster.meets[i] and circle_segment(x, y, roster.radius[i], ax, ay, bx, by, half)[0] < margin * (1 - 1e-12)
     }
-    keys = BallFinder(roster, "grid").candidates(roster.position, margin).segments.tolist()
+    keys = CirclePipeline(roster, "grid").candidates(roster.position, margin).segments.tolist()
     assert keys == sorted(set(keys))
     assert near <= set(keys)
 
@@ -56,7 +55,7 @@ def test_none_nearer_than_the_margin_is_lost(scene, margin):
 @given(courts())
 def test_contacts_are_those_that_overlap(scene):
     roster = roster_of(scene)
-    contacts = BallFinder(roster, "grid").overlaps(roster.position)
+    contacts = CirclePipeline(roster, "grid").overlaps(roster.position)
     walls = contacts.second < 0
     expected = {
         (i, -1 - int(roster.fixtures.segment_thing[s]))
@@ -80,13 +79,13 @@ def test_walls_far_out_are_not_lost_to_rounding():
         seen += 1
         wall = {"points": [[place, -1.0], [place, 1.0]], "thickness": 2 * half}
         roster = roster_of(scene_of(ball(x, 0, radius=r), wall=[wall]))
-        assert BallFinder(roster, "grid").overlaps(roster.position).size == 1
+        assert CirclePipeline(roster, "grid").overlaps(roster.position).size == 1
 
 
 def test_a_long_street_is_not_looked_at_as_a_whole():
     posts = [{"position": [3.0 * k, 0.0], "radius": 0.5} for k in range(1000)]
     roster = roster_of(scene_of(ball(1500, 0.2), post=posts))
-    finder = BallFinder(roster, "grid")
+    finder = CirclePipeline(roster, "grid")
     assert finder.overlaps(roster.position).size == 1
     assert finder.work["broad_tests"] <= 3
 

@@ -10,7 +10,7 @@ from pieces import EARTH, FLOOR, ball, running, scene_of, stepped
 from scipy.integrate import solve_ivp
 
 from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.engines.reference.springs import LEAST_RESTITUTION, damping_of, restitution_of
+from sandbox.engines.reference.penalty import LEAST_RESTITUTION, damping_of, restitution_of
 
 
 @given(st.floats(LEAST_RESTITUTION, 1.0))

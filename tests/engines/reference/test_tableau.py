@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from sandbox.engines.reference.motion import Inputs
-from sandbox.engines.reference.tableau import CLASSIC_4, EULER, Tableau, runge_kutta
+from sandbox.engines.reference.integrators import CLASSIC_4, EULER, Inputs, Tableau, runge_kutta
 
 TABLES = {"euler": (EULER, 1), "classic": (CLASSIC_4, 4)}
 

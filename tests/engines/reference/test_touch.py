@@ -9,10 +9,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pieces import FLOOR, ball, roster_of, scene_of
 
-from sandbox.engines.reference.ball_finder import BallFinder
-from sandbox.engines.reference.manifolds import KIND
-from sandbox.engines.reference.narrow_phase import circle_segment
-from sandbox.engines.reference.touch import NEVER, touch_circle, touch_line, touch_segment
+from sandbox.engines.reference.collision import CirclePipeline
+from sandbox.engines.reference.manifold import KIND, circle_segment
+from sandbox.engines.reference.time_of_impact import NEVER, touch_circle, touch_line, touch_segment
 
 
 def figures(most):
@@ -198,7 +197,7 @@ def test_a_segment_of_no_length_is_touched_as_a_circle(x, y, mx, my, ax, ay, dis
 
 def finder(*balls, **document):
     roster = roster_of(scene_of(*balls, **document))
-    return BallFinder(roster, "grid"), roster.position
+    return CirclePipeline(roster, "grid"), roster.position
 
 
 def test_the_first_of_several_is_found_and_told_by_its_key():

@@ -5,12 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.games.artillery.ground import Ground
-from sandbox.scene.artillery.columns import settled
-from sandbox.scene.artillery.described import Terrain
-from sandbox.scene.artillery.landscape import heights_of, levelled
-from sandbox.scene.model import World
-from sandbox.trajectory import FloatArray
+from sandbox.games.artillery.landscape import heights_of, levelled, settled
+from sandbox.games.artillery.terrain import Terrain
+from sandbox.scene.description.world import World
 
 G = 9.81
 

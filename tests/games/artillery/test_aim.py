@@ -15,9 +15,9 @@ from sandbox.games.artillery.bot import ANGLE_ERROR, Thought, chances, choose
 from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.flight import landing
 from sandbox.games.artillery.tanks import Muzzle
+from sandbox.games.artillery.terrain import Edges
 from sandbox.games.artillery.weapons import WEAPONS
-from sandbox.scene.artillery.described import Edges
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 AIRS = [(0.0, 0.0), (0.06, 0.0), (0.0, 0.002)]
 RADIUS = WEAPONS[0].radius

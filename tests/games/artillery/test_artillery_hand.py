@@ -13,8 +13,8 @@ from sandbox.games.policies import POLICIES, Script
 from sandbox.games.registry import rules_of
 from sandbox.games.rules import Policy, UnfitError
 from sandbox.measure.run import run
-from sandbox.scene.file import load, loads
-from sandbox.scene.shipped import find
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find
 
 FIELD = two_tanks("duration = 12.0", "money = 0", blue="bot = 0.0")
 

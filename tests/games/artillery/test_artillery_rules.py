@@ -10,7 +10,7 @@ import pytest
 from dueling import two_tanks
 
 from sandbox.action import Action, SetParameter, actions_from_json
-from sandbox.engines.relay import start
+from sandbox.engines.switching import start
 from sandbox.games.artillery.bot import chances
 from sandbox.games.artillery.field import Field
 from sandbox.games.artillery.rules import ArtilleryRules
@@ -26,8 +26,8 @@ from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
 from sandbox.measure.seeds import seeded
 from sandbox.recording import Recording
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Trajectory
 
 WORLD, GAME = "linear_drag = 0.03\nduration = 14.0\nseed = 2", "speed = 60.0\nwind = 6.0"
@@ -184,7 +184,7 @@ def test_air_that_a_hand_changes_is_the_exact_flights_too(time: float, disturbed
     assert shot.disturbed == disturbed
     if disturbed:
         assert (shot.exact, shot.off) == (None, None)
-        assert shot.told.endswith("; the air changed on its way")
+        assert shot.told.endswith("; wind or gravity changed during the flight")
     else:
         assert shot.off == pytest.approx(0.0, abs=1e-5)  # rk4's own error at 20 ms, and rounding
 

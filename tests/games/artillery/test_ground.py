@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.games.artillery.ground import Crater, Ground
-from sandbox.scene.artillery.columns import QUANTUM
+from sandbox.games.artillery.landscape import QUANTUM
 
 CENTRES = st.tuples(st.floats(-20, 320), st.floats(-20, 80))
 RADII = st.floats(0.01, 40)

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 from grounds import G, world
 
+from sandbox.arrays import FloatArray
+from sandbox.engines.contract import Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
+from sandbox.games.artillery import miss
+from sandbox.games.artillery.flight import Landing
 from sandbox.games.artillery.miss import miss_table
+from sandbox.scene.description.world import Settings, World
 
 DTS = 0.1, 0.05, 0.025
 
@@ -44,3 +49,15 @@ def test_what_never_comes_down_is_told() -> None:
     rising = world().model_copy(update={"gravity": (0.0, 0.0)})
     with pytest.raises(ValueError, match="does not come down within"):
         miss_table(rising, 50.0, 1.0, (0.1,))
+
+
+def test_refusal_of_one_integrator_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fly(world: World, velocity: FloatArray, engine: str, settings: Settings) -> Landing:
+        if settings.integrator == "rk4" or engine == "exact":
+            raise Refusal(engine, ("not this one",), ())
+        return Landing(1.0, (1.0, 0.0))
+
+    monkeypatch.setattr(miss, "flown", fly)
+    found = miss_table(world(), 50.0, math.radians(45.0), DTS)
+    assert {row.integrator for row in found.rows} == {*INTEGRATORS, None} - {"rk4"}
+    assert [engine for engine, _ in found.refused].count("exact") == 1

@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.engines.reference.motion import transition
+from sandbox.engines.reference.integrators import INTEGRATORS, transition
 from sandbox.games.artillery.flight import Flight, crossing, inputs_of, landing, rk4, strike
 from sandbox.games.artillery.ground import Ground
 from sandbox.games.artillery.miss import _exact
-from sandbox.scene.model import World
+from sandbox.scene.description.world import World
 
 
 def down(air: World, velocity: np.ndarray) -> tuple[float, float]:

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from sandbox.games.billiards.match import Match
-from sandbox.scene.file import load
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
+from sandbox.scene.files.load import load
+from sandbox.scene.scene import Scene
 
 SCENES = Path(__file__).parents[3] / "scenes" / "billiards"
 

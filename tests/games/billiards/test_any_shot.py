@@ -75,7 +75,7 @@ def follows(rules: Rules[Any], before: Any, verdict: Verdict[Any]) -> None:
     assert {each.ball for each in verdict.respot} <= set(after.table)
     assert verdict.goes_on <= (after.turn == before.turn and not after.over)
     if isinstance(after, SnookerState) and not before.free:  # a free ball brings a colour with it, as a red does
-        level = "level: the black is spotted" in verdict.messages
+        level = "scores level: the black is respotted" in verdict.messages
         assert level or remaining(after) <= remaining(before)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tables_by_hand import lying, match, table
 
-from sandbox.engines.exact.rolling.table import Table
+from sandbox.engines.exact.tabletop.shots import Table
 from sandbox.games.billiards.bot.bot import BEST, WORST, Bot
 from sandbox.games.billiards.bot.ease import pots
 from sandbox.games.billiards.bot.named import bots_in
@@ -13,7 +13,7 @@ from sandbox.games.billiards.frame import play
 from sandbox.games.billiards.layout import Layout
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.happening import GameError
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 FAR = {str(k): (0.06 + 0.075 * k, 0.12) for k in range(2, 10)}
 

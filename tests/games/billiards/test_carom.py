@@ -61,7 +61,7 @@ def test_straight_rail_needs_no_cushion() -> None:
 def test_opening_shot_must_touch_the_red_first() -> None:
     assert THREE.legal_targets(START) == {"red"}
     verdict = played(THREE, START, "white hits yellow", RAIL, RAIL, RAIL, "white hits red")
-    assert verdict.fouls == ("the opening shot must touch the red first",)
+    assert verdict.fouls == ("the opening shot must hit the red first",)
     assert (verdict.state.turn, verdict.state.scores) == (1, (0, 0))
     made = played(THREE, START, *MADE)
     assert made.goes_on

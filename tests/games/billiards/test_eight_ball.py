@@ -64,7 +64,7 @@ def test_scratch_on_the_break_is_in_hand_behind_the_head_string() -> None:
 
 def test_break_that_misses_all_may_be_taken_in_hand() -> None:
     verdict = played(RULES, START, "cue at rail")
-    assert verdict.fouls == ("the cue ball touched no ball",)
+    assert verdict.fouls == ("the cue ball hit no ball",)
     assert verdict.state.decisions == ("play", "rerack", "rerack and pass", "in hand")
     assert RULES.decide(verdict.state, "in hand").state.in_hand == "behind the head string"
     assert RULES.decide(verdict.state, "play").state.in_hand is None
@@ -120,9 +120,9 @@ def test_foul_on_an_open_table_leaves_it_open() -> None:
 
 FOULS = {
     "scratch": ("cue hits 1", "1 at rail", "cue in left"),
-    "the cue ball touched no ball": ("cue at rail",),
-    "the 9 was touched first; one of 1, 2, 3, 4, 5, 6, 7 was on": ("cue hits 9", "cue hits 1", "1 in left"),
-    "the 8 was touched first; one of 1, 2, 3, 4, 5, 6, 7 was on": ("cue hits 8", "cue at rail"),
+    "the cue ball hit no ball": ("cue at rail",),
+    "the 9 was hit first instead of one of 1, 2, 3, 4, 5, 6, 7": ("cue hits 9", "cue hits 1", "1 in left"),
+    "the 8 was hit first instead of one of 1, 2, 3, 4, 5, 6, 7": ("cue hits 8", "cue at rail"),
     "no rail after contact": ("cue at rail", "cue hits 1", "1 hits 2"),
 }
 
@@ -173,13 +173,13 @@ def test_eight_in_the_pocket_that_was_called_wins() -> None:
 
 
 LOSSES = {
-    "the eight fell in a pocket that was not called": (LAST, ("cue hits 8", "8 in left"), {"pocket": "right"}),
-    "the eight fell on a foul: scratch": (
+    "the 8 was pocketed in a pocket that was not called": (LAST, ("cue hits 8", "8 in left"), {"pocket": "right"}),
+    "the 8 was pocketed on a foul: scratch": (
         LAST,
         ("cue hits 8", "8 in left", "cue in right"),
         {"pocket": "left"},
     ),
-    "the eight fell before its turn": (MINE, ("cue hits 1", "8 in left"), {"pocket": "left"}),
+    "the 8 was pocketed early": (MINE, ("cue hits 1", "8 in left"), {"pocket": "left"}),
 }
 
 
@@ -218,7 +218,7 @@ def test_one_who_plays_alone_keeps_the_turn_and_may_win_or_lose() -> None:
 
 
 def test_what_is_not_offered_cannot_be_decided() -> None:
-    with pytest.raises(GameError, match="'pass' is not to be had now; what is: nothing"):
+    with pytest.raises(GameError, match="'pass' is not offered now; options: none"):
         RULES.decide(START, "pass")
 
 

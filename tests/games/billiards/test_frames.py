@@ -12,7 +12,7 @@ from sandbox.games.billiards.rules.call import Decision
 from sandbox.games.billiards.rules.happening import GameError
 from sandbox.measure.replay import rerun
 from sandbox.recording import Recording
-from sandbox.scene.cue import Stroke
+from sandbox.scene.description.surface import Stroke
 
 TERMS = {"three-cushion": {"distance": 2}, "straight-rail": {"distance": 3}, "snooker": {"misses": True}}
 GAMES = ["8-ball", "9-ball", "snooker", "three-cushion", "straight-rail"]
@@ -77,14 +77,14 @@ def test_what_may_not_be_done_is_refused() -> None:
 
     with pytest.raises(GameError, match="behind the head string"):
         play(match("9-ball"), [Cheat(), Cheat()])
-    with pytest.raises(GameError, match="2 play, not 1"):
+    with pytest.raises(GameError, match="has 2 players, not 1"):
         play(match("9-ball"), [Bot()])
 
 
 def test_replay_of_turns_that_do_not_fit_is_refused() -> None:
     played = frame("straight-rail", (0.9, 0.9))
     other = replace(played, turns=played.turns[1:])
-    with pytest.raises(GameError, match="did not come to this"):
+    with pytest.raises(GameError, match="does not reach this"):
         replace(other, turns=(replace(other.turns[0], player=1 - played.turns[0].player), *other.turns)).replayed()
 
 

@@ -7,14 +7,14 @@ import pytest
 from tables_by_hand import lying, match, table
 
 import sandbox
-from sandbox.engines.exact.rolling.table import Table
+from sandbox.arrays import FloatArray
+from sandbox.engines.exact.tabletop.shots import Table
 from sandbox.games.billiards.frame import roll_out
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.placing import refusal
 from sandbox.games.billiards.rules.call import Call
 from sandbox.games.billiards.rules.happening import GameError
-from sandbox.scene.cue import Stroke
-from sandbox.trajectory import FloatArray
+from sandbox.scene.description.surface import Stroke
 
 UP = 0.5 * np.pi
 
@@ -51,7 +51,7 @@ def after_break(places: dict[str, tuple[float, float]], name: str = "9-ball", **
 def test_game_that_the_table_has_not_got_is_refused_with_all_that_lacks() -> None:
     with pytest.raises(GameError) as told:
         match("9-ball", game="snooker")
-    for part in ("no ball black", "no use for 1", "no spot yellow", "[[play.spot]]"):
+    for part in ("no ball black", "does not use 1", "no spot yellow", "[[play.spot]]"):
         assert part in str(told.value)
     with pytest.raises(GameError, match="carom has no pockets"):
         match("9-ball", game="three-cushion")
@@ -131,7 +131,7 @@ def test_nine_that_falls_on_a_foul_is_spotted_behind_what_lies_there() -> None:
     after = shot(now, Stroke(aim=0.0, speed=1.5))
     assert after.state.scores == (0, 0)
     assert after.verdict is not None
-    assert after.verdict.fouls == ("the 9 was touched first; the 1 was on",)
+    assert after.verdict.fouls == ("the 9 was hit first instead of the 1",)
     radius = after.layout.radius[0]
     assert position_of(after, "9") == pytest.approx((foot[0], foot[1] + 2.0 * radius + 1e-5), abs=1e-12)  # and a hair
 

@@ -36,9 +36,9 @@ def test_fair_break_without_a_ball_passes_and_the_other_may_push_out() -> None:
 
 
 BREAK_FOULS = {
-    "the break was too weak": DRY[:-1],
-    "the 2 was touched first; the 1 was on": ("cue hits 2", "5 in left"),
-    "the cue ball touched no ball": ("cue at rail",),
+    "illegal break": DRY[:-1],
+    "the 2 was hit first instead of the 1": ("cue hits 2", "5 in left"),
+    "the cue ball hit no ball": ("cue at rail",),
     "scratch": (*DRY, "cue in left"),
 }
 
@@ -77,8 +77,8 @@ def test_other_balls_stay_down_on_a_foul_and_count_for_nobody() -> None:
 
 FOULS = {
     "scratch": ("cue hits 1", "1 in left", "cue in left"),
-    "the cue ball touched no ball": ("cue at rail",),
-    "the 3 was touched first; the 1 was on": ("cue hits 3", "cue hits 1", "1 in left"),
+    "the cue ball hit no ball": ("cue at rail",),
+    "the 3 was hit first instead of the 1": ("cue hits 3", "cue hits 1", "1 in left"),
     "no rail after contact": ("cue hits 1",),
 }
 

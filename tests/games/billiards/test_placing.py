@@ -24,7 +24,9 @@ def test_what_is_refused_is_told() -> None:
     assert refusal(POOL, "anywhere", (-3.0, 1.0), R, []) == "the ball would be outside the cushions"
     assert refusal(POOL, "anywhere", (math.nan, 1.0), R, []) == "the ball would be outside the cushions"
     assert refusal(POOL, "anywhere", (0.01, 0.01), R, []) == "the ball would be outside the cushions"  # in the pocket
-    assert refusal(POOL, "behind the head string", (0.3, 0.7), R, []) == "the ball is to be put behind the head string"
+    assert (
+        refusal(POOL, "behind the head string", (0.3, 0.7), R, []) == "the ball must be placed behind the head string"
+    )
     assert refusal(POOL, "behind the head string", (0.3, 0.635), R, []) is None  # on the string, where racks have it
 
 
@@ -32,7 +34,7 @@ def test_d_is_a_half_disc_towards_baulk() -> None:
     radius, (x, y) = SNOOKER.radius[0], SNOOKER.spots["brown"]
     for far, way, good in ((0.28, -1.0, True), (0.30, -1.0, False), (0.1, 1.0, False), (0.0, 1.0, True)):
         told = refusal(SNOOKER, "in the D", (x, y + way * far), radius, [])
-        assert told == (None if good else "the ball is to be put in the D")
+        assert told == (None if good else "the ball must be placed in the D")
 
 
 def test_legal_place_is_the_nearest_itself() -> None:

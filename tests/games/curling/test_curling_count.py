@@ -20,7 +20,7 @@ from sandbox.games.curling.sheet import (
     stone,
     waiting,
 )
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
 
 RED, YELLOW = 0, 1
 FOOT = 0.3048

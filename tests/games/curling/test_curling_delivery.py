@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.engines.floor.curl import curled
 from sandbox.engines.registry import start
+from sandbox.engines.tabletop.motion import curled
 from sandbox.games.curling.delivery import Delivery, Ice
 from sandbox.games.curling.sheet import RELEASE, STONE, WEIGHT
-from sandbox.scene.file import load
-from sandbox.scene.model import Ball, Scene
-from sandbox.scene.shipped import find
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 SCENE = load(find("games/curling"))
 assert SCENE.surface is not None

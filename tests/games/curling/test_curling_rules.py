@@ -16,8 +16,8 @@ from sandbox.games.curling.sheet import RELEASE, gone, waiting
 from sandbox.games.policies import Nobody, Script
 from sandbox.games.registry import rules_of
 from sandbox.games.rules import Press, UnfitError
-from sandbox.scene.file import from_document, load
-from sandbox.scene.shipped import find
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def test_the_other_turn_is_the_mirror_of_the_first(rink: Rink) -> None:
 def test_a_stone_short_of_the_hog_line_is_taken_away(rink: Rink) -> None:
     rink.throw(weight=-8.0)
     assert rink.place("red-1") == gone(0, 0)
-    assert ("", "short of the hog line") in rink.rules.lines()
+    assert ("", "stone removed: short of the hog line") in rink.rules.lines()
 
 
 def test_a_stone_past_the_back_line_is_taken_away_as_it_passes(rink: Rink) -> None:
@@ -73,7 +73,7 @@ def test_a_guard_that_is_taken_out_too_soon_is_put_back(rink: Rink) -> None:
     rink.throw(weight=14.0)
     assert rink.place("yellow-1") == (-4.0, -0.55)
     assert rink.place("red-2") == gone(0, 1)
-    assert ("", "a guard was taken out too soon") in rink.rules.lines()
+    assert ("", "free guard zone: stones replaced") in rink.rules.lines()
 
 
 def test_a_stone_short_of_the_hog_line_that_touched_a_guard_is_a_guard(rink: Rink) -> None:
@@ -92,7 +92,7 @@ def test_a_stone_short_of_the_hog_line_that_touched_a_guard_is_a_guard(rink: Rin
     rink.rules._broom = rink.rules._ice.through((x, y), 1, 3.2).heading * -RELEASE
     rink.throw(weight=14.0)
     assert rink.place("yellow-1") == (x, y)
-    assert ("", "a guard was taken out too soon") in rink.rules.lines()
+    assert ("", "free guard zone: stones replaced") in rink.rules.lines()
 
 
 def test_the_sixth_stone_may_take_out_a_guard(rink: Rink) -> None:

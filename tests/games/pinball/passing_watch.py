@@ -5,10 +5,10 @@ The audit of missed contacts knows of a bat only the largest disc within it, and
 
 import math
 
-from sandbox.scene.bodies import Bodies
-from sandbox.scene.drives import PlungerDrive
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray, IntArray
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.forces import PlungerDrive
+from sandbox.scene.scene import Scene
 
 LENGTH, BASE, TIP = 0.0702, 0.0116, 0.007
 """m, of the bats of all tables: between the middles of their ends, and the radii of these"""

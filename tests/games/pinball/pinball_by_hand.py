@@ -8,8 +8,8 @@ import numpy as np
 from sandbox.action import Action, Drive, Move, Toggle
 from sandbox.games.pinball.pinball import Pinball
 from sandbox.games.rules import Seen
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 DT = 0.01

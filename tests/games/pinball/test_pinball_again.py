@@ -7,8 +7,8 @@ from sandbox.action import actions_from_json
 from sandbox.games.player import Player
 from sandbox.measure.run import run
 from sandbox.recording import Press, Recording
-from sandbox.scene.file import load
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import load
 
 FULL = Path(__file__).parents[3] / "scenes" / "pinball" / "full.toml"
 

@@ -7,8 +7,8 @@ import pytest
 from passing_watch import TIP, Watch
 
 from sandbox.action import Drive, Move
-from sandbox.engines.relay import start
-from sandbox.scene.file import loads
+from sandbox.engines.switching import start
+from sandbox.scene.files.load import loads
 
 TEXT = """
 [solver]

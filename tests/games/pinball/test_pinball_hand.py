@@ -6,7 +6,7 @@ from pinball_by_hand import OPEN, Table, table
 from sandbox.games.pinball.hand import HELD, PULL, PinballHand
 from sandbox.games.policies import POLICIES
 from sandbox.games.rules import Seen, UnfitError
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
 
 BAT = "left bat"

@@ -8,7 +8,7 @@ import pytest
 from sandbox.games.policies import Script
 from sandbox.games.rules import Press
 from sandbox.measure.play_out import play_out
-from sandbox.scene.file import load
+from sandbox.scene.files.load import load
 
 TABLES = sorted((Path(__file__).parents[3] / "scenes" / "pinball").glob("*.toml"))
 

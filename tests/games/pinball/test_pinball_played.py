@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from sandbox.action import actions_from_json
-from sandbox.engines.relay import start
+from sandbox.engines.switching import start
 from sandbox.games.pinball.hand import PinballHand
 from sandbox.games.player import Player
 from sandbox.games.registry import required_rules, rules_of
 from sandbox.games.rules import Seen, UnfitError
 from sandbox.measure.run import run
 from sandbox.recording import Press, Recording
-from sandbox.scene.file import load, loads
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.scene.shipped import find
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Trajectory
 
 TABLE = """
@@ -171,7 +171,7 @@ def test_table_without_a_ball_is_refused() -> None:
 
 def test_hand_plays_pinball_alone() -> None:
     other, frame = required_rules(load(find("landing"))), start(plain(), "pymunk").frame()
-    with pytest.raises(UnfitError, match="pinball alone"):
+    with pytest.raises(UnfitError, match="only plays pinball"):
         PinballHand(1).decide(Seen(0.0, frame, Contacts.none(), ()), other)
     with pytest.raises(ValueError, match="0 to 1"):
         PinballHand(1, 1.5)

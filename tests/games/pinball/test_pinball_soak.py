@@ -9,8 +9,9 @@ import pytest
 from passing_watch import TIP, Watch
 
 from sandbox.action import Move
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.contract import Observer
-from sandbox.engines.relay import start
+from sandbox.engines.switching import start
 from sandbox.games.pinball.board import MARGIN
 from sandbox.games.pinball.hand import PinballHand
 from sandbox.games.pinball.pinball import Pinball
@@ -20,9 +21,9 @@ from sandbox.games.referee import Referee
 from sandbox.games.rules import Policy
 from sandbox.measure.play_out import play_out
 from sandbox.measure.run import Auditor
-from sandbox.scene.file import load
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray, Frame, IntArray
+from sandbox.scene.files.load import load
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Frame
 
 TABLES = sorted((Path(__file__).parents[3] / "scenes" / "pinball").glob("*.toml"))
 
@@ -50,7 +51,7 @@ class Game(NamedTuple):
     """and when, s"""
     seconds: float
     missed: list[tuple[float, str, str]]
-    """contacts that the engine never saw: when, s, and between whom"""
+    """contacts that the engine missed: when, s, and between whom"""
     through: list[tuple[float, str]]
     """balls that went through a bat, or a gate from its wrong side: when, s, and which of the two"""
     deepest: float

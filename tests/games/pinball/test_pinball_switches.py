@@ -39,7 +39,7 @@ def test_kick_and_falloff_of_the_thing_decide() -> None:
 
 
 def _kicking(post):
-    from sandbox.scene.kick import Kick
+    from sandbox.scene.description.world import Kick
 
     return post.model_copy(update={"kick": Kick(speed=0.8, threshold=0.2), "restitution_falloff": 3.0})
 

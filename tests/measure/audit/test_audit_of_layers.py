@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 import sandbox
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 
 both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
 

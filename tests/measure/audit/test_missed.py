@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 
 from sandbox.measure.audit import Audit
 from sandbox.measure.audit.sweep import CLEAR, DEEP, JUMP, TOLERANCE
-from sandbox.scene.model import Ball, Emitter, Plane, Post, Scene, Wall
-from sandbox.scene.part import BACKING
+from sandbox.scene.description.base import BACKING
+from sandbox.scene.description.discs import Ball, Emitter
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.scene import Scene
 
 NOTHING = np.empty((0, 2), np.int64)
 WALL = Wall(points=((0.0, -1.0), (0.0, 1.0)), thickness=0.02)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sandbox.measure.run import run
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 
 WALL = "[[wall]]\nname = 'w'\npoints = [[0, -5], [0, 5]]\n"

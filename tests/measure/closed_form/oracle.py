@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from sandbox.measure.closed_form.form import Motion
 from sandbox.measure.closed_form.forms import Solution, solution
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 
 FloatArray = npt.NDArray[np.float64]
 

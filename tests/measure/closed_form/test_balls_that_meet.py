@@ -12,7 +12,7 @@ from oracle import form_of, motion_of, scene_of
 from sandbox.measure.closed_form import solution
 from sandbox.measure.compare.closed import solved
 from sandbox.measure.run import run
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 
 def balls(

@@ -10,7 +10,7 @@ from oracle import form_of, integrated, motion_of, scene_of
 
 from sandbox.measure.closed_form import solution
 from sandbox.measure.closed_form.kepler import Kepler
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 TIME = np.linspace(0.0, 15.0, 61)
 SUN = "[[attraction]]\ntoward = [0.2, -0.1]\nstrength = 1.0\n"

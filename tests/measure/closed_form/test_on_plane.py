@@ -12,7 +12,7 @@ from sandbox.measure.closed_form import solution
 from sandbox.measure.closed_form.on_plane import phases_of
 from sandbox.measure.compare.closed import solved
 from sandbox.measure.run import run
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 G = 9.81
 TIME = np.linspace(0.0, 2.0, 81)

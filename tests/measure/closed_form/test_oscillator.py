@@ -8,7 +8,7 @@ from oracle import integrated, motion_of, scene_of
 
 from sandbox.measure.closed_form import solution
 from sandbox.measure.closed_form.oscillator import damped
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 TIME = np.linspace(0.0, 10.0, 101)
 

@@ -11,7 +11,7 @@ from scipy.special import ellipk
 
 from sandbox.measure.closed_form import solution
 from sandbox.measure.closed_form.pendulum import Pendulum, Swing
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 G = 9.81
 WORLD = "gravity = [0.0, -9.81]\nduration = 10.0"

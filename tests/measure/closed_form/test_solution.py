@@ -8,7 +8,7 @@ from sandbox.measure.closed_form import solution
 from sandbox.measure.closed_form.forms import ALONE, TOGETHER
 from sandbox.measure.closed_form.given import Given
 from sandbox.measure.compare.closed import solved
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 MIXED = (
     "[[plane]]\npoint = [0.0, 0.0]\nnormal = [0.0, 1.0]\nfriction = 0.5\n",

@@ -8,7 +8,7 @@ from oracle import form_of, scene_of
 
 from sandbox.measure.closed_form import solution
 from sandbox.measure.compare.closed import solved
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 FLOOR = "[[plane]]\npoint = [0.0, 0.0]\nnormal = [0.0, 1.0]\n"
 WORLD = "gravity = [0.0, -10.0]\nduration = 2.0"

@@ -5,9 +5,9 @@ import pytest
 
 from sandbox.measure.compare.closed import frame_times, solved
 from sandbox.measure.run import run
-from sandbox.scene.file import load, loads
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 GROUND = "[[plane]]\nname = 'ground'\npoint = [0, 0]\nnormal = [0, 1]\n"
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from sandbox.measure.closed_form import solution
 from sandbox.measure.compare import compare
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 
 R = 0.028575
 BALL: dict[str, Any] = {"name": "a", "position": [0.0, 0.0], "velocity": [0.4, 1.0], "radius": R, "mass": 0.17}

@@ -8,9 +8,9 @@ import pytest
 from sandbox.measure.compare.closed import solved
 from sandbox.measure.compare.drift import energy_drift, momentum_drift
 from sandbox.measure.run import run
-from sandbox.scene.file import load, loads
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 
 def falling(world: str = "") -> Scene:

@@ -8,7 +8,7 @@ from sandbox.measure.collisions import are_collisions, collisions, together
 from sandbox.measure.compare.drift import momentum_drift
 from sandbox.measure.compare.gaps import gap
 from sandbox.measure.compare.spelled import spelled
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 
 
 def test_gap_is_the_distance_of_the_centre_from_the_zone() -> None:

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from runs_by_hand import run_of, scene_of
 
+from sandbox.arrays import FloatArray
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.gaps import gap
 from sandbox.measure.compare.horizon import NUDGE, agree_until, perturb, touching_pairs
 from sandbox.measure.compare.truth import truth_of
-from sandbox.scene.file import load, loads
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import find, shipped
-from sandbox.scene.surfaces import surfaces_of
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.contacts import pair_table
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find, shipped
+from sandbox.scene.scene import Scene
 
 
 def moved(scene: Scene, **options: Any) -> FloatArray:
@@ -96,7 +96,7 @@ def test_no_perturbation_brings_an_overlap_or_takes_a_contact(name: str) -> None
         gaps = gap(scene, old, np.stack((old.position, new.position)), np.stack((old.angle, new.angle)), pair)
         assert abs(gaps[1] - gaps[0]) <= 1e-14 * max(1.0, np.abs(old.position[pair[0]]).max())  # some 50 last digits
     if not ENGINES["exact"].missing(scene, scene.solver):
-        assert ENGINES["exact"].missing(other, other.solver) == ()
+        assert ENGINES["exact"].missing(other, scene.solver) == ()
 
 
 CROWD = """
@@ -150,7 +150,7 @@ def test_perturbation_changes_places_and_nothing_else() -> None:
     assert new.names == old.names
     for key in ("velocity", "angle", "angular_velocity", "radius", "mass", "fixed"):
         assert np.array_equal(getattr(new, key), getattr(old, key))
-    mine, its = surfaces_of(scene, old), surfaces_of(other, new)
+    mine, its = pair_table(scene, old), pair_table(other.scene, new)
     assert np.array_equal(mine.restitution, its.restitution)
 
 

@@ -10,10 +10,10 @@ from sandbox.measure.compare.disagreement import Disagreement, Parting
 from sandbox.measure.compare.horizon import TOUCH
 from sandbox.measure.compare.minimise import Minimised, minimise, overlaps
 from sandbox.measure.compare.spelled import spelled
-from sandbox.scene.bodies import COLUMNS
-from sandbox.scene.file import dumps, from_document, load, loads
-from sandbox.scene.model import Scene
-from sandbox.scene.shipped import shipped
+from sandbox.scene.compile.bodies import COLUMNS
+from sandbox.scene.files.load import dumps, from_document, load, loads
+from sandbox.scene.files.shipped_scenes import shipped
+from sandbox.scene.scene import Scene
 
 TUNNEL = """
 title = "Tunnel"
@@ -278,7 +278,7 @@ def test_an_answer_that_is_not_found_again_leaves_the_scene_as_it_was(monkeypatc
     monkeypatch.setattr(asked, "of", fickle)
     found = minimise(loads(TUNNEL), asked, most_runs=5)
     assert (found.scene, found.bodies) == (loads(TUNNEL), (13, 13))
-    assert found.ended == "an engine's answer hangs on chance, so nothing was left out"
+    assert found.ended == "the result of an engine is not reproducible, so nothing was removed"
 
 
 def test_a_scene_that_parts_sooner_parts_for_another_reason() -> None:
@@ -293,7 +293,7 @@ def test_a_scene_that_parts_sooner_parts_for_another_reason() -> None:
 
 
 def test_three_engines_are_no_disagreement() -> None:
-    with pytest.raises(ValueError, match="of two; not of 3"):
+    with pytest.raises(ValueError, match="two engines, not 3"):
         Disagreement(["pymunk", "exact", "reference"], 1e-3)
 
 

@@ -16,8 +16,8 @@ from sandbox.measure.compare.horizon import NUDGE, perturb
 from sandbox.measure.compare.refined import refined
 from sandbox.measure.compare.why import knobs
 from sandbox.measure.run import run
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 
 PENDULUM = (
     "[world]\ngravity = [0.0, -9.81]\nduration = 1.0\n[solver]\ndt = 0.01\n"

@@ -7,12 +7,13 @@ import pytest
 
 from sandbox.engines import registry
 from sandbox.engines.contract import Simulation
-from sandbox.engines.native.engine import PymunkEngine
+from sandbox.engines.pymunk_adapter.engine import PymunkEngine
 from sandbox.measure.compare import compare, refined, witness
 from sandbox.measure.compare.truth import seek_truth, truth_of
-from sandbox.scene.file import from_document, loads
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import from_document, loads
+from sandbox.scene.scene import Scene
 
 DROP = """
 [world]
@@ -46,13 +47,15 @@ class Another:
     def __getattr__(self, name: str) -> Any:
         return getattr(PymunkEngine(), name)
 
-    def start(self, scene: Scene, settings: Settings | None = None) -> Simulation:
+    def start(self, start: Scene | Setup, settings: Settings | None = None) -> Simulation:
+        setup = Setup.of(start)
+        scene = setup.scene
         world = scene.world.model_copy(update={"gravity": tuple(self.gravity * g for g in scene.world.gravity)})
         balls = tuple(
             b.model_copy(update={"restitution": self.restitution * (b.restitution or 0.0)}) for b in scene.balls
         )
-        bodies = replace(scene.bodies, elements=balls)
-        return PymunkEngine().start(scene.model_copy(update={"world": world}).placed(bodies), settings)
+        changed = replace(setup, scene=scene.model_copy(update={"world": world}))
+        return PymunkEngine().start(replace(changed, bodies=replace(setup.bodies, elements=balls)), settings)
 
 
 def install(monkeypatch: pytest.MonkeyPatch, **engines: Any) -> None:
@@ -78,12 +81,13 @@ def test_a_truth_ends_where_two_engines_part(monkeypatch: pytest.MonkeyPatch) ->
     # After the impact at 3.6 m/s they differ by 0.9 m/s, so by the tolerance within 1.2 ms: 0.36 s is the first frame.
     assert comparison.trusted_until is not None
     assert MEETS - 0.01 <= comparison.trusted_until <= MEETS + 0.01  # frames are 0.01 s apart
-    until = f"there is no truth beyond {comparison.trusted_until:.4g} s"
-    assert f"{until}: pymunk and another converge to different answers" in comparison.sentence()
+    until = f"no truth is known after {comparison.trusted_until:.4g} s"
+    assert f"{until}: pymunk and another converge to different results" in comparison.sentence()
     (row,) = comparison.rows
     assert row.count("missed") == row.count("phantom") == 0
 
 
+@pytest.mark.slow
 def test_where_two_engines_never_agree_there_is_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch, pymunk=PymunkEngine(), another=Another(gravity=10.0))
     scene = loads(DROP)
@@ -91,7 +95,7 @@ def test_where_two_engines_never_agree_there_is_no_truth(monkeypatch: pytest.Mon
     assert isinstance(found, str)
     document = compare(scene, ["pymunk"], tolerance=1e-4).document()
     assert (document["truth"], document["trusted_until"]) == (None, None)
-    assert "pymunk and another converge to different answers" in document["truth_about"]
+    assert "pymunk and another converge to different results" in document["truth_about"]
     (row,) = document["engines"]
     assert row["status"] == "ok"
     assert row["energy_drift"] is not None  # what is conserved needs no truth
@@ -106,6 +110,7 @@ def test_energy_that_grows_without_a_source_ends_the_truth(monkeypatch: pytest.M
     assert "the energy in one grows" in comparison.sentence()
 
 
+@pytest.mark.slow
 def test_one_method_alone_confirms_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     dragged = loads(DROP.replace("duration", "linear_drag = 0.1\nduration"))  # with which half_kick is no choice
     install(monkeypatch, pymunk=PymunkEngine())
@@ -114,6 +119,7 @@ def test_one_method_alone_confirms_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     assert "no second engine or method" in found
 
 
+@pytest.mark.slow
 def test_another_method_of_the_same_engine_is_a_witness(monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch, pymunk=PymunkEngine())
     scene = loads(DROP)
@@ -130,11 +136,11 @@ def test_a_witness_takes_half_the_work_of_the_answer_or_three_runs(monkeypatch: 
         honest = module.bounded_run
 
         def counted(
-            scene: Scene, engine: str, settings: Settings, limit: float,
+            start: Scene | Setup, engine: str, settings: Settings, limit: float,
             *, name: str = module.__name__, honest: Any = honest, **options: Any,
         ) -> Any:  # fmt: skip
-            steps[name] = steps.get(name, 0) + round(scene.world.duration / settings.h)
-            return honest(scene, engine, settings, limit, **options)
+            steps[name] = steps.get(name, 0) + round(Setup.of(start).scene.world.duration / settings.h)
+            return honest(start, engine, settings, limit, **options)
 
         monkeypatch.setattr(module, "bounded_run", counted)
     install(monkeypatch, pymunk=PymunkEngine(), another=Another(restitution=0.9))

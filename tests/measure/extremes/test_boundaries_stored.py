@@ -51,16 +51,25 @@ def test_what_has_moved_is_told(old: list[dict[str, Any]], now: Limit, worse: bo
 
 def test_change_is_a_line() -> None:
     (change,) = changes(before(2.0), [NOW])
-    assert str(change) == "speed on pymunk: worse: passed up to 2, now up to 1: passed the wall"
+    assert str(change) == "speed on pymunk: worse: passed up to 2 before, up to 1 now: passed the wall"
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("", "cannot be read"),
-        ("[1, 2]", "holds no boundaries"),
-        ('{"limits": [{"axis": "speed"}]}', "holds no boundaries"),
-        ('{"limits": [{"axis": "a", "setup": "b", "limit": "x", "first_failure": null}]}', "no number"),
+        ("[1, 2]", "contains no boundaries"),
+        ('{"limits": [{"axis": "speed"}]}', "contains no boundaries"),
+        ('{"limits": [{"axis": "a", "setup": "b", "limit": "x", "first_failure": null}]}', "is not a number"),
+        ('{"limits": [{"axis": [], "setup": "b", "limit": 1, "first_failure": null}]}', "contains no boundaries"),
+        ('{"limits": [{"axis": "a", "setup": {}, "limit": 1, "first_failure": null}]}', "contains no boundaries"),
+        ('{"limits": [{"axis": "a", "setup": "b", "limit": true, "first_failure": null}]}', "is not a number"),
+        ('{"limits": [{"axis": "a", "setup": "b", "limit": NaN, "first_failure": null}]}', "is not a number"),
+        ('{"limits": [{"axis": "a", "setup": "b", "limit": 1e999, "first_failure": null}]}', "is not a number"),
+        (
+            f'{{"limits": [{{"axis": "a", "setup": "b", "limit": 1{"0" * 400}, "first_failure": 0}}]}}',
+            "is not a number",
+        ),
         ("[" * 100_000, "cannot be read"),
     ],
 )

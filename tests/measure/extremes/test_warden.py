@@ -7,10 +7,10 @@ import pytest
 
 from sandbox.measure.extremes.cell import Task
 from sandbox.measure.extremes.confine import cause_of_death
-from sandbox.measure.extremes.warden import Warden, WorkerError
+from sandbox.measure.extremes.warden import ATTEMPTS, Warden, WorkerError
 
 MISBEHAVING = """
-import ctypes, os, sys, time
+import ctypes, os, signal, sys, time
 from sandbox.measure.extremes.worker import serve
 
 def answer(task):
@@ -29,6 +29,15 @@ def answer(task):
         case "chatter":
             print("this is no answer", flush=True)
             os.write(1, b"nor is this\\n")
+        case "stop":
+            os.kill(os.getpid(), signal.SIGSTOP)
+        case "killed" | "killed once" as case:
+            marks = open(sys.argv[1], "a+")
+            first = not marks.tell()
+            marks.write("!")
+            marks.close()
+            if first or case == "killed":
+                os.kill(os.getpid(), 9)
         case "raise":
             raise ValueError("made up")
     return {"verdict": "exact", "reason": "well"}
@@ -40,7 +49,7 @@ serve(answer, 1024)
 def warden(folder: Path, seconds: float = 20.0) -> Warden:
     script = folder / "worker.py"
     script.write_text(MISBEHAVING, encoding="utf-8")
-    return Warden(seconds, 1024, [sys.executable, str(script)])
+    return Warden(seconds, 1024, [sys.executable, str(script), str(folder / "marks")])
 
 
 def task(case: str) -> Task:
@@ -56,11 +65,29 @@ def test_whatever_happens_is_told_and_the_run_goes_on(tmp_path: Path) -> None:
             assert keeper.ask(task("well")).verdict == "exact"
         assert keeper.started == 5  # the first, and one after each death
     assert told["well"] == told["chatter"] == ("exact", None, "well")
-    assert told["memory"] == ("failed", "process", "ran out of memory")
+    assert told["memory"] == ("failed", "process", "out of memory")
     assert told["abort"] == ("failed", "process", "the process was killed by SIGABRT: Aborting: it was too much")
     assert told["crash"] == ("failed", "process", "the process was killed by SIGSEGV")
     assert told["quit"] == ("failed", "process", "the process ended with status 3")
     assert told["raise"][2].endswith("ValueError: made up")
+
+
+def test_task_whose_worker_is_killed_from_outside_is_asked_again(tmp_path: Path) -> None:
+    with warden(tmp_path) as keeper:
+        assert keeper.ask(task("killed once")).verdict == "exact"
+        assert keeper.started == 2
+        (tmp_path / "marks").unlink()
+        outcome = keeper.ask(task("killed"))
+        assert (outcome.verdict, outcome.reason) == ("failed", "the process was killed by SIGKILL")
+        assert (tmp_path / "marks").read_text() == "!" * ATTEMPTS
+        assert keeper.ask(task("well")).verdict == "exact"
+
+
+def test_worker_that_is_stopped_is_ended_in_time(tmp_path: Path) -> None:
+    with warden(tmp_path, seconds=0.5) as keeper:
+        assert keeper.ask(task("well")).verdict == "exact"
+        assert keeper.ask(task("stop")).slow
+        assert keeper.ask(task("well")).verdict == "exact"
 
 
 def test_task_that_hangs_is_stopped_in_time(tmp_path: Path) -> None:

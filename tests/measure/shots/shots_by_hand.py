@@ -1,7 +1,7 @@
 """Floors with a shot whose outcome is known on paper: balls without rubbing, pockets without jaws."""
 
 import sandbox
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 R = 0.028575
 

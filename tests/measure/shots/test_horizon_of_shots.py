@@ -98,7 +98,7 @@ def test_a_ball_that_falls_in_one_shot_alone_is_apart() -> None:
 
 @pytest.mark.parametrize(("nudge", "tolerance"), [(0.0, 1e-3), (1e-9, 0.0), (math.nan, 1e-3)])
 def test_what_is_not_positive_is_refused(nudge: float, tolerance: float) -> None:
-    with pytest.raises(ValueError, match="both are more than 0"):
+    with pytest.raises(ValueError, match="both must be greater than 0"):
         horizon(floor(shot()), nudge=nudge, tolerance=tolerance)
 
 

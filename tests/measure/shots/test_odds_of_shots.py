@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from shots_by_hand import R, ball, floor, pocket, shot, straight_pot
 
-from sandbox.engines.exact.rolling.table import Table
+from sandbox.engines.exact.tabletop.shots import Table
 from sandbox.measure.shots.attempt import NoSuchShotError
 from sandbox.measure.shots.odds import odds
 from sandbox.measure.shots.spread import Spread
 from sandbox.measure.shots.wilson import wilson
 from sandbox.measure.shots.windows import windows
-from sandbox.scene.cue import Stroke, struck
+from sandbox.scene.description.surface import Stroke, struck
 
 SURE = 4.0
 """Deviations that one in 16,000 draws exceeds; the seed is fixed besides."""
@@ -98,7 +98,7 @@ def test_document_has_all_of_it() -> None:
 
 @pytest.mark.parametrize("wrong", [-0.1, math.nan, math.inf])
 def test_what_is_no_spread_is_refused(wrong: float) -> None:
-    with pytest.raises(ValueError, match="is no spread"):
+    with pytest.raises(ValueError, match="is not a standard deviation"):
         Spread(aim=wrong)
 
 

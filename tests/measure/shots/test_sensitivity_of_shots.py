@@ -7,7 +7,7 @@ from shots_by_hand import R, ball, floor, pocket, shot, straight_pot
 
 from sandbox.measure.shots.attempt import Variable, attempt_of
 from sandbox.measure.shots.sensitivity import Slope, sensitivity
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 
 def slopes(scene: Scene, variable: Variable) -> dict[str, Slope]:
@@ -81,7 +81,9 @@ def test_a_graze_is_not_smooth_and_says_so() -> None:
     scene = floor(ball("object", d), shot(math.asin(2.0 * R / d), 2.0))  # it just touches, or does not
     found = slopes(scene, "aim")
     assert found["cue"].value is None and found["object"].value is None
-    assert found["object"].reason is not None and found["object"].reason.startswith("not smooth: another course within")
+    assert found["object"].reason is not None and found["object"].reason.startswith(
+        "not smooth: the sequence of contacts changes within"
+    )
 
 
 def test_who_is_not_concerned_stays_smooth() -> None:

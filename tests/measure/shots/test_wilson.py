@@ -35,5 +35,5 @@ def test_ends_are_ends_and_of_nothing_nothing_is_known() -> None:
 
 
 def test_what_is_no_count_is_refused() -> None:
-    with pytest.raises(ValueError, match="8 of 7 is no count"):
+    with pytest.raises(ValueError, match="8 of 7 is not a count"):
         wilson(8, 7)

@@ -68,9 +68,9 @@ def test_windows_are_the_same_on_any_number_of_threads() -> None:
 
 def test_unknown_names_are_refused_with_those_known() -> None:
     scene = straight_pot(0.5, 1.0)
-    with pytest.raises(NoSuchShotError, match="no ball is named 'x'; there are: cue, object"):
+    with pytest.raises(NoSuchShotError, match="no ball is named 'x'; known names: cue, object"):
         windows(scene, "x", "hole")
-    with pytest.raises(NoSuchShotError, match="no pocket is named 'x'; there are: hole"):
+    with pytest.raises(NoSuchShotError, match="no pocket is named 'x'; known names: hole"):
         windows(scene, "object", "x")
-    with pytest.raises(NoSuchShotError, match="no shot is named 'x'; there are: it"):
+    with pytest.raises(NoSuchShotError, match="no shot is named 'x'; known names: it"):
         windows(scene, "object", "hole", "x")

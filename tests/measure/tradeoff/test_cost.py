@@ -8,8 +8,8 @@ from runs_by_hand import DROP, scene_of
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.measure.tradeoff import cost as module
 from sandbox.measure.tradeoff.cost import Cost, costs, seconds_of, warm_up
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 
 def test_cost_is_scaled_to_a_simulated_second() -> None:

@@ -11,8 +11,8 @@ from sandbox.measure.run import run as run_scene
 from sandbox.measure.tradeoff.aim import choose_metric
 from sandbox.measure.tradeoff.judge import strayed, zoom_of
 from sandbox.measure.tradeoff.metrics import METRICS, measured
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 OF_TRUTH = ("max_position", "final_position", "rms_position", "pixels", "bounce_height", "settle_time", "drift")
@@ -121,6 +121,16 @@ def test_penetration_is_the_deepest_of_any_that_touched(scene: Scene) -> None:
     assert measured(clear, judge_of(scene))["penetration"] == 0.0
 
 
+def test_overlap_at_the_start_counts_only_where_it_gets_deeper_again(scene: Scene) -> None:
+    height = 5.0 + np.asarray([-4.8, -4.7, -4.9, -4.6, -4.4, *[0.0] * 16])  # centre 0.2 m above the ground at first
+    place = run_of(scene).position.copy()
+    place[:, 0, 1] = height
+    run = run_of(scene, place, contacts=[(0.4, (0, -1))])
+    assert measured(run, judge_of(scene))["penetration"] == pytest.approx(0.2, rel=1e-12)  # from 0.2 to 0.4 m deep
+    place[:, 0, 1] = np.maximum.accumulate(height)
+    assert measured(run_of(scene, place, contacts=[(0.4, (0, -1))]), judge_of(scene))["penetration"] == 0.0
+
+
 def test_drift_is_of_what_lies_still_in_truth_and_of_the_second_half(scene: Scene) -> None:
     moving = run_of(scene).position.copy()
     moving[:, 1, 0] += np.linspace(0.0, 1.0, 21)  # b wanders in truth: it does not count
@@ -142,7 +152,7 @@ def test_drift_of_what_stands_in_truth_from_the_start_counts_from_there(scene: S
 def test_stack_whose_truth_is_trusted_for_a_short_time_is_scored_by_drift_and_not_by_overlaps(scene: Scene) -> None:
     metric, reason = choose_metric(judge_of(scene, run_of(scene), until=0.5))
     assert metric.name == "drift"
-    assert reason == "positions are predictable for 0.5 s of 2 s only, and 2 bodies should lie still"
+    assert reason == "positions are predictable for 0.5 s of 2 s only, and 2 bodies should stay at rest"
     tumbling = run_of(scene).position + np.linspace(0.0, 1.0, 21)[:, None, None]
     metric, _ = choose_metric(judge_of(scene, run_of(scene, tumbling), until=0.5))
     assert metric.name == "penetration"

@@ -8,7 +8,7 @@ import pytest
 from runs_by_hand import DROP, scene_of
 from trials_by_hand import point_of
 
-from sandbox.engines.native.space import new_space
+from sandbox.engines.pymunk_adapter.colliders import new_space
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.tradeoff.aim import Aim
 from sandbox.measure.tradeoff.metrics import METRICS
@@ -47,7 +47,7 @@ def test_pick_that_fails_on_fresh_seeds_gives_way_to_the_next() -> None:
     assert found is not None
     assert (found.point, found.fresh_seeds, found.fresh_error) == (POINTS[2], (4, 5, 6), 0.009)
     assert asked == POINTS[1:3]
-    assert "9 mm on fresh seeds" in found.sentence
+    assert "9 mm with other seeds" in found.sentence
 
 
 @pytest.mark.parametrize("fresh", [math.inf, math.nan, 0.02])
@@ -102,7 +102,7 @@ def test_nearest_is_the_most_accurate_and_of_the_budget_the_cheapest() -> None:
     assert near is not None
     assert cheap is not None
     assert (near.point, cheap.point) == (POINTS[3], POINTS[0])
-    assert "ms a frame" in cheap.sentence
+    assert "ms per frame" in cheap.sentence
     assert nearest_to_tolerance([point_of(1.0, None)], aim) is None
     assert nearest_to_budget([], aim) is None
 
@@ -135,7 +135,7 @@ def test_what_has_no_figures_is_not_picked() -> None:
 
 
 def test_best_within_the_budget_is_the_most_right() -> None:
-    found = closest(POINTS, AIM, (), never)  # 0.5 ms a frame, 60 a second: 30 ms per simulated second
+    found = closest(POINTS, AIM, (), never)  # 0.5 ms per frame, 60 a second: 30 ms per simulated second
     assert found is not None
     assert found.point == POINTS[2]
     assert closest(POINTS, AIM._replace(budget=0.01), (), never) is None
@@ -169,7 +169,8 @@ def test_sentence_says_what_it_is_and_what_it_takes() -> None:
     found = cheapest([point_of(12.0, 0.00031, dt=0.01, substeps=4)], AIM, (), never)
     assert found is not None
     assert found.sentence == (
-        "pymunk with dt = 0.01, substeps = 4: max_position 310 µm, 12 ms a simulated second (1.2 % of real time)"
+        "pymunk with dt = 0.01, substeps = 4: max_position 310 µm, 12 ms per simulated second (1.2 % of real time), "
+        "0.2 ms per frame of the budget of 0.5 ms"
     )
     coarse = cheapest([point_of(12.0, 0.0, dt=0.1)], AIM, (), never)
     assert coarse is not None
@@ -180,13 +181,13 @@ def test_bullets_are_counted() -> None:
     aim = Aim(METRICS["passes"], 0.5, None, 60.0)
     found = cheapest([point_of(1.0, 0.125)], aim, (), never)
     assert found is not None
-    assert "1 in 8 passes unseen" in found.sentence
+    assert "1 in 8 contacts missed" in found.sentence
     whole = cheapest([point_of(1.0, 0.0)], aim, (), never)
     assert whole is not None
     assert "1 in" not in whole.sentence
 
 
 def test_name_tells_what_is_set_and_what_is_left_open() -> None:
-    assert called(point_of(1.0, 0.0)) == "pymunk as the scene has it"
+    assert called(point_of(1.0, 0.0)) == "pymunk with the settings of the scene"
     assert called(point_of(1.0, 0.0, dt=0.001, half_kick=True)) == "pymunk with dt = 0.001, half_kick = true"
     assert called(point_of(1.0, 0.0, substeps=2, integrator=None)) == "pymunk with substeps = 2 without integrator"

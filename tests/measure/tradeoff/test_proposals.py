@@ -10,9 +10,9 @@ from sandbox.measure.compare.truth import Truth, truth_of
 from sandbox.measure.tradeoff import proposals as module
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.proposals import Proposal, proposals
-from sandbox.scene.demands import Demand, demands
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.compile.demands import Demand, demands
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 LOW = DROP.replace("position = [0.0, 1.0]", "position = [0.0, 0.6]")
 APART = f"""{LOW}
@@ -71,12 +71,14 @@ def test_drag_that_does_nothing_may_go_and_drag_that_does_may_not(monkeypatch: p
     weak, strong = (proposed(monkeypatch, DRAGGED.format(drag), tolerance=2e-3) for drag in ("1e-4", "5.0"))
     assert "no drag" in [each.what for each in weak]
     assert "no drag" not in [each.what for each in strong]
+    (sentence,) = [each.sentence for each in weak if each.what == "no drag"]
+    assert sentence.startswith("the scene can also be simulated without drag: max_position ")
 
 
 def test_closed_form_is_proposed_first(monkeypatch: pytest.MonkeyPatch) -> None:
     found = proposed(monkeypatch, DROP)
     assert found[0].engine is None
-    assert "closed form" in found[0].what
+    assert "closed-form" in found[0].what
     assert found[0].error == 0.0
     assert [each.ratio for each in found] == sorted(each.ratio for each in found)
 

@@ -16,7 +16,7 @@ from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.search import Search
 from sandbox.measure.tradeoff.trial import Trial
 from sandbox.measure.tradeoff.variant import Space, Variant
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 Law = Callable[[Variant], float | None]
 """The error of a variant; infinite where it diverges, None where the metric says nothing of it."""

@@ -9,7 +9,7 @@ from trials_by_hand import judge_of
 from sandbox.measure.compare.truth import Truth, truth_of
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.split import split
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 FLIGHT = """
 [world]

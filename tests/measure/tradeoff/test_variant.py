@@ -12,8 +12,8 @@ from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.runs import common_frames
 from sandbox.measure.run import run
 from sandbox.measure.tradeoff.variant import COARSEST, FEWEST_STEPS, FINEST, Space, Variant
-from sandbox.scene.file import loads
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import loads
 
 FINER = st.sampled_from([Fraction(2) ** k for k in range(-4, 9)])
 ENGINE = ("pymunk", "exact", "reference")

@@ -12,6 +12,7 @@ from runs_by_hand import DROP, SWING, scene_of
 import sandbox
 from sandbox.engines.registry import ENGINES, UnknownEngineError
 from sandbox.measure.compare.truth import truth_of
+from sandbox.measure.forecast import Warning, warnings
 from sandbox.measure.seeds import seeded
 from sandbox.measure.tradeoff import Tradeoff, tradeoff
 from sandbox.measure.tradeoff import cost as cost_module
@@ -19,9 +20,11 @@ from sandbox.measure.tradeoff import weighing as module
 from sandbox.measure.tradeoff.aim import UnknownMetricError
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.measure.tradeoff.picking import ALIKE, FAR, Point, called
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.measure.tradeoff.picking import ALIKE, FAR, LONGER, Point, called
+from sandbox.measure.tradeoff.weighed import Pick
+from sandbox.measure.tradeoff.weighing import setting_warnings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 
 PROMISED = {"scene", "truth", "metric", "points", "pareto", "within_tolerance", "within_budget"}
 OF_A_POINT = {"engine", "settings", "error", "cost_ms_per_second", "status"}
@@ -46,6 +49,23 @@ radius = 0.5
 velocity_jitter = 1.0
 restitution = 0.5
 """
+BULLET = """
+[world]
+duration = 0.2
+[solver]
+dt = 0.01
+[[wall]]
+name = "wall"
+points = [[1.0, -1.0], [1.0, 1.0]]
+thickness = 0.01
+[[ball]]
+name = "bullet"
+position = [0.0, 0.0]
+velocity = [20.0, 0.0]
+radius = 0.02
+restitution = 1.0
+"""
+"""A ball that the search stops with 5 substeps, and that can pass the wall with fewer than 8 at another phase."""
 
 
 def weighed(scene: Scene, *engines: str, **more: Any) -> Tradeoff:
@@ -226,14 +246,14 @@ def test_metric_and_its_reason_are_stated() -> None:
         "the truth (closed form) is trusted to the end, 0.4 s",
     )
     assert found.document()["metric_reason"] == found.metric_reason
-    assert weighed(scene_of(DROP), most=1, metric="energy").metric_reason == "it was asked for"
+    assert weighed(scene_of(DROP), most=1, metric="energy").metric_reason == "it was requested"
 
 
 def test_where_two_methods_contradict_each_other_an_invariant_is_the_metric_and_the_reason_is_stated() -> None:
     why = "reference, dt halved 8 times; pymunk contradicts it from 0 s on"
     found = weighed(scene_of(DROP), most=2, truth=why)
     assert (found.best, found.truth, found.metric.name) == (None, None, "penetration")
-    assert found.metric_reason == f"no truth is known ({why}), and bodies can touch"
+    assert found.metric_reason == f"no truth is known ({why}), and bodies can collide"
     assert found.document()["truth_about"] == why
     assert f"because no truth is known ({why})" in found.error_about
 
@@ -299,7 +319,7 @@ def test_nothing_that_moves_is_no_trap() -> None:
 def test_metric_that_says_nothing_is_told() -> None:
     found = weighed(scene_of(DROP), metric="joint_error", most=3)
     assert found.within_tolerance is None
-    assert found.answers() == ["joint_error says nothing of this scene; choose another --metric"]
+    assert found.answers() == ["joint_error cannot be measured in this scene; choose another --metric"]
 
 
 def test_who_watches_is_told_what_is_being_done() -> None:
@@ -308,3 +328,58 @@ def test_who_watches_is_told_what_is_being_done() -> None:
     assert told[0] == "the truth"
     assert "1 tried: pymunk, dt, 1 × 10" in told
     assert "timing" in told
+
+
+def tunnelling(pick: Pick) -> list[Warning]:
+    return [each for each in pick.warnings if each.kind == "tunnelling"]
+
+
+def test_recommended_setting_that_can_tunnel_says_so_and_how_many_substeps_prevent_it() -> None:
+    scene = scene_of(BULLET)
+    found = weighed(scene, metric="missed_contacts", budget=100.0, most=30)
+    pick = found.within_tolerance
+    assert pick is not None
+    assert pick.point.error == 0.0
+    (warning,) = tunnelling(pick)
+    safe = warning.figures["safe_substeps"]
+    assert isinstance(safe, int)
+    dt, reach, speed = pick.point.settings.dt, 0.02 + 0.01 / 2, 20.0
+    assert safe == math.ceil(dt * speed / reach * (1.0 - 1e-9))  # rounding: 8 is 8.000000000000002
+    assert pick.point.settings.substeps < safe
+    assert f"substeps >= {safe}" in warning.message
+    document = json.loads(json.dumps(found.document(), allow_nan=False))
+    assert document["within_tolerance"]["warnings"][0]["safe_substeps"] == safe
+    assert tunnelling(found.cheapest_by_engine["pymunk"] or pick) == [warning]
+    assert not any(each.kind == "tunnelling" for each in setting_warnings(scene, "pymunk", with_substeps(pick, safe)))
+    assert any(each.kind == "tunnelling" for each in setting_warnings(scene, "pymunk", with_substeps(pick, safe - 1)))
+
+
+def with_substeps(pick: Pick, substeps: int) -> Settings:
+    return pick.point.asked.replace(substeps=substeps)
+
+
+def test_warnings_are_those_of_check_for_the_same_settings() -> None:
+    scene = scene_of(BULLET)
+    settings = scene.solver.replace(substeps=5, iterations=1)
+    known = warnings(scene, settings, "pymunk")
+    found = setting_warnings(scene, "pymunk", settings)
+    assert [each.kind for each in found] == [each.kind for each in known]
+    assert all(mine.message.startswith(its.message) for mine, its in zip(found, known, strict=True))
+    assert setting_warnings(scene, "reference", settings.replace(detection="swept")) == []
+
+
+def test_more_substeps_than_allowed_are_not_advised() -> None:
+    scene = scene_of(BULLET.replace("[20.0, 0.0]", "[20000.0, 0.0]"))
+    (warning,) = [each for each in setting_warnings(scene, "pymunk", scene.solver) if each.kind == "tunnelling"]
+    assert "safe_substeps" not in warning.figures
+
+
+def test_longest_step_of_a_recommendation_is_a_frame_or_the_step_of_the_scene() -> None:
+    scene = scene_of(BULLET)
+    found = weighed(scene, most=12)
+    assert found.max_dt == LONGER / 60.0
+    assert found.document()["max_dt"] == found.max_dt
+    assert any(point.settings.dt > found.max_dt for point in found.points)
+    picks = [found.within_tolerance, found.nearest_to_tolerance, *found.cheapest_by_engine.values()]
+    assert all(pick.point.settings.dt <= found.max_dt for pick in picks if pick is not None)
+    assert weighed(scene, most=1, dt=0.1).max_dt == 0.1

@@ -5,13 +5,14 @@ from typing import Any
 
 from runs_by_hand import run_of
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.compare.truth import Truth
 from sandbox.measure.tradeoff.judge import Judge
 from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.point import Point
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 
 def judge_of(scene: Scene, truth: Trajectory | None = None, until: float | None = None, zoom: float = 100.0) -> Judge:

@@ -4,7 +4,7 @@ from sandbox.games.billiards.layout import Layout
 from sandbox.play.billiards.game import Game, Players
 from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 RADIUS = 0.028575
 """m, of pool balls"""

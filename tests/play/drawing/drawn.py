@@ -9,8 +9,8 @@ from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import Colour
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.sight import Sight
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 SIZE = (200, 120)

@@ -9,7 +9,7 @@ from drawn import at, drawn, frame, scene, sight
 from sandbox.play.drawing import ageing
 from sandbox.play.drawing.ageing import SHADES, Ageing, faded
 from sandbox.play.drawing.picture import Picture
-from sandbox.scene.bodies import Bodies
+from sandbox.scene.compile.bodies import Bodies
 
 FADING = {
     "velocity_min": [0.0, 0.0],

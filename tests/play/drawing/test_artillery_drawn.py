@@ -10,6 +10,7 @@ from pressing import key, key_up
 from windowed import turned, window_on
 
 from sandbox.action import Reshape
+from sandbox.games.artillery.landscape import course_of
 from sandbox.games.artillery.rules import ArtilleryRules
 from sandbox.games.bout import Bout
 from sandbox.games.policies import Nobody
@@ -25,9 +26,8 @@ from sandbox.play.running.live import Live
 from sandbox.play.sight import Sight
 from sandbox.play.window import Window
 from sandbox.recording import Recording
-from sandbox.scene.artillery.columns import course_of
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 SIZE = (400, 240)

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
+from sandbox.games.billiards.equipment import TABLES
 from sandbox.play.drawing.table.cushions import DEPTH, cushions, others, outside, width_of
-from sandbox.scene.billiards.tables import TABLES
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 
 
 def table(name: str) -> Scene:

@@ -9,8 +9,8 @@ from sandbox.play.drawing.inset import HIGH, WIDE, Inset
 from sandbox.play.drawing.palette import hex_colour
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.sight import Sight
-from sandbox.scene.file import from_document
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
 
 SIZE = (800, 600)
 FREE = pygame.Rect(0, 0, 700, 560)

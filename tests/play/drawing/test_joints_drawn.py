@@ -7,13 +7,13 @@ import pygame
 import pytest
 from drawn import CAMERA, ball, changed, drawn, frame, scene, sight
 
-from sandbox.engines import kernel
+from sandbox.engines.common import kernel
 from sandbox.play.drawing import threads as module
 from sandbox.play.drawing import wires
 from sandbox.play.drawing.joints import COILED, SHADES, Held, strain
 from sandbox.play.drawing.palette import ORANGE, SKY
 from sandbox.play.drawing.threads import draw_threads
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 TWO = [ball(-3, 0, 0.3, name="a", angle=0.1), ball(3, 0, 0.3, name="b", angle=0.1)]
 PAIR = {"between": ["a", "b"]}

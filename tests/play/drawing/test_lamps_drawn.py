@@ -11,7 +11,7 @@ from sandbox.play.drawing import picture as drawing
 from sandbox.play.drawing.lamps import GLOW, LARGEST, RADIUS
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.footage.still import offscreen
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 SCALE = 1000.0
 CLOSE = Camera((0.0, 0.0), SCALE, SIZE)

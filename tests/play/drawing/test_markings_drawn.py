@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.palette import Colour, hex_colour
 from sandbox.play.drawing.pucks import STONE
-from sandbox.scene.faults import SceneError
+from sandbox.scene.errors import SceneError
 
 ICE, LINE = "#dce7ec", "#b5433c"
 SHEET = {"colour": ICE, "points": [[-4, -2], [4, -2], [4, 2], [-4, 2]]}
@@ -90,11 +90,11 @@ def test_what_meets_nothing_is_a_ring() -> None:
 @pytest.mark.parametrize(
     ("marking", "words"),
     [
-        ({}, "state one of them"),
-        ({"points": [[0, 0], [1, 1]], "radius": 1.0, "position": [0, 0]}, "state one of them"),
+        ({}, "must have either"),
+        ({"points": [[0, 0], [1, 1]], "radius": 1.0, "position": [0, 0]}, "must have either"),
         ({"radius": 1.0}, "`position` and `radius`"),
-        ({"points": [[0, 0], [1, 1]]}, "3 or more"),
-        ({"points": [[0, 0]], "filled": False}, "2 or more"),
+        ({"points": [[0, 0], [1, 1]]}, "at least 3 points"),
+        ({"points": [[0, 0]], "filled": False}, "at least 2 points"),
     ],
 )
 def test_a_marking_that_is_no_shape_is_told(marking: dict, words: str) -> None:

@@ -3,7 +3,7 @@ import pytest
 from drawn import ball, scene
 
 from sandbox.play.drawing.palette import ACCENTS, NEUTRAL, colour_of, colour_of_fixed, hex_colour, mixed
-from sandbox.scene.model import Ball
+from sandbox.scene.description.discs import Ball
 
 SPARKS = {"position": [0.0, 0.0], "velocity_min": [-1.0, 0.0], "velocity_max": [1.0, 1.0]}
 

@@ -7,13 +7,13 @@ import pygame
 import pytest
 from drawn import CAMERA, at, ball, changed, drawn, frame, scene, sight
 
-from sandbox.engines import kernel
+from sandbox.engines.common import kernel
 from sandbox.play.drawing import polygons as module
 from sandbox.play.drawing import stencil
 from sandbox.play.drawing.discs import Style, dark
 from sandbox.play.drawing.palette import ACCENTS, NEUTRAL, YELLOW
 from sandbox.play.drawing.polygons import Polygons
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 STAR = [
     [math.cos(k * math.pi / 5) * (1.0 if k % 2 else 2.5), math.sin(k * math.pi / 5) * (1.0 if k % 2 else 2.5)]

@@ -11,8 +11,8 @@ from sandbox.play.drawing.table.cloth import CAROM, HOLE, POOL, SNOOKER
 from sandbox.play.drawing.table.coats import IVORY, coat_of, painted
 from sandbox.play.framing import framing
 from sandbox.play.sight import Sight
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 SIZE = (700, 400)

@@ -13,9 +13,9 @@ from sandbox.play.footage.crowd import crowd
 from sandbox.play.footage.film import LINGER, Film, bodies_of, moments, scene_of
 from sandbox.play.footage.still import offscreen, pixels
 from sandbox.play.sight import OVERLAYS
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import loads
-from sandbox.scene.model import Ball
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 
 FALL = """

@@ -12,8 +12,8 @@ from sandbox.play.camera import Camera
 from sandbox.play.drawing.lamps import RADIUS
 from sandbox.play.footage.film import Film
 from sandbox.play.footage.still import offscreen, pixels
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import load
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import load
 from sandbox.trajectory import Trajectory
 
 CLASSIC = Path(__file__).parents[3] / "scenes" / "pinball" / "classic.toml"
@@ -47,5 +47,5 @@ def test_picture_of_a_run_shows_the_lamps_that_were_lit(played: Trajectory, tmp_
 
 def test_lamps_that_are_none_are_told(played: Trajectory) -> None:
     info = played.info | {"game": played.info["game"] | {"lamps": [["never", 3]]}}
-    with pytest.raises(SceneError, match=r"info\.game: these are no lamps"):
+    with pytest.raises(SceneError, match=r"info\.game: invalid lamp record"):
         Film(replace(played, info=info))

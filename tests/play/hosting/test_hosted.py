@@ -28,8 +28,8 @@ from sandbox.play.sound import Sounds
 from sandbox.play.stage import Stage
 from sandbox.play.window import Window
 from sandbox.recording import Recording
-from sandbox.scene.file import load
-from sandbox.scene.shipped import find, shipped
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import find, shipped
 
 UP, LEFT, R, P = pygame.K_UP, pygame.K_LEFT, pygame.K_r, pygame.K_p
 
@@ -312,7 +312,7 @@ def plugged(window: Window) -> Callable[[str], None]:
 
 def test_gamepad_plays(window: Window, plugged: Callable[[str], None]) -> None:
     plugged("Xbox 360 Controller")
-    assert ("info", "gamepad: Xbox 360 Controller") in window.stage.messages.shown()
+    assert ("info", "gamepad connected: Xbox 360 Controller") in window.stage.messages.shown()
     live = turned(window, joy(pygame.JOYBUTTONDOWN, button=0))
     live = turned(window, joy(pygame.JOYBUTTONUP, button=0))
     assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
@@ -447,5 +447,5 @@ def test_a_game_of_many_keys_says_where_they_are_told() -> None:
     opened.stage.open(find("duel"))
     opened.turn(0.02)
     said = [text for _, text in opened.stage.messages.shown()]
-    assert said == ["Left, Right, Up, Down, W, Space, Gamepad Start (F1: help)"]
+    assert said == ["keys: Left, Right, Up, Down, W, Space, Gamepad Start (F1: help)"]
     opened.close()

@@ -49,11 +49,22 @@ def test_pause_is_told_in_red_with_its_keys() -> None:
     assert row.colour == WARNING
 
 
+@pytest.mark.parametrize("unit", [0.7, 1.0, 2.0])
+def test_pause_of_a_window_without_focus_fits_beside_a_score_panel(unit: float) -> None:
+    free = pygame.Rect(0, 0, round(1920 * unit), round(1080 * unit))
+    panel = pygame.Rect(hud.hud_width("exact  ·  dt 10 ms", unit), 0, 600, 60)
+    for status in (
+        replace(QUIET, engine="exact", settings="dt 10 ms", **{how: True}) for how in ("paused", "unfocused")
+    ):
+        (line,) = [text for row, text in hud.lay_rows(status, free, unit, [panel]).lines if row.mark == "bars"]
+        assert line in texts(status)
+
+
 @pytest.mark.parametrize("stopped", [True, False])
 def test_end_is_told_with_its_reason_in_place_of_the_pause(stopped: bool) -> None:
     status = replace(QUIET, paused=stopped, ended="at 3 s: it broke", real_speed=0.0)
     (row,) = rows(status)[3:]
-    assert (row.text, row.colour) == ("ENDED: at 3 s: it broke (R restarts)", WARNING)
+    assert (row.text, row.colour) == ("ENDED: at 3 s: it broke (R: restart)", WARNING)
     (pause,) = [row for row in rows(replace(QUIET, paused=True)) if "PAUSED" in row.text]
     assert row.mark != pause.mark
 

@@ -39,8 +39,8 @@ def test_claimed_keys_come_first_and_are_taken_from_ours() -> None:
     assert found[0].lines == CLAIMS
     ours = {about: label for group in found[1:] for label, about in group.lines}
     assert ours["pause / resume"] == "P"
-    assert ours["(ghost of the reference)"] == "G"
-    assert "ghost of the reference" not in ours
+    assert ours["(ghost: another engine's run)"] == "G"
+    assert "ghost: another engine's run" not in ours
 
 
 def test_claim_on_a_global_key_takes_nothing() -> None:

@@ -219,7 +219,7 @@ def test_callback_may_show_something_else() -> None:
 
 def test_buttons_name_their_keys() -> None:
     noted = Noted()
-    assert noted.find("play").hint == "Go on (P or Space)"
+    assert noted.find("play").hint == "Resume (P or Space)"
     assert noted.find("camera").hint == "Screenshot (Ctrl+P)"
 
 

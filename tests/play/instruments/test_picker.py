@@ -11,8 +11,8 @@ from sandbox.play.drawing.palette import BACKGROUND
 from sandbox.play.drawing.picture import Picture
 from sandbox.play.instruments.picker import Picker
 from sandbox.play.instruments.thumbnail import read, thumbnail
-from sandbox.scene.file import loads
-from sandbox.scene.shipped import shipped
+from sandbox.scene.files.load import loads
+from sandbox.scene.files.shipped_scenes import shipped
 
 BALL = 'title = "{title}"\nabout = "{about}"\n[world]\ngravity = [0, -9.81]\n[[ball]]\nposition = [0, 0]\nradius = 1\n'
 

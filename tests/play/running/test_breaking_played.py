@@ -13,9 +13,9 @@ from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
 from sandbox.play.running.stored import Stored
 from sandbox.play.sight import Sight
-from sandbox.scene.faults import SceneError
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 ALL = frozenset({"shapes", "joints"})

@@ -14,7 +14,7 @@ from sandbox.play.running.burning import LONG, burning
 from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
 from sandbox.play.sight import Sight
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 SHIP = """
 title = "Ship"

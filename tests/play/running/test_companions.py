@@ -13,10 +13,11 @@ from sandbox.play.running import companions
 from sandbox.play.running.companions import Companion, Trust, apart, follows, ghost_of
 from sandbox.play.running.company import Company
 from sandbox.play.running.session import Session
-from sandbox.scene.file import from_document, load
-from sandbox.scene.model import Ball, Scene
-from sandbox.scene.settings import Settings
-from sandbox.scene.shipped import find
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 
 BOUNCE = load(find("bounce"))
 
@@ -128,7 +129,7 @@ def test_ghost_that_cannot_follow_says_why_and_another_engine_goes_on() -> None:
     together(session, company, 1)
     assert company.ghost_engine == "reference"
     assert company.distance == 0.0
-    assert [level for level, text in company.notes if "the ghost of exact is gone" in text] == ["warning"]
+    assert [level for level, text in company.notes if "ghost of exact stopped" in text] == ["warning"]
     together(session, company, 5)
     assert company.distance is not None
 
@@ -145,7 +146,7 @@ def test_exact_ghost_of_a_heap_gives_up_and_says_so(monkeypatch: pytest.MonkeyPa
         if company.ghost_engine != "exact":
             break
     assert company.ghost_engine == "reference" or company.ghost_engine is None  # which has no more patience either
-    assert any("the ghost of exact is gone" in text for _, text in company.notes)
+    assert any("ghost of exact stopped" in text for _, text in company.notes)
     together(session, company, 3)
 
 
@@ -354,7 +355,7 @@ def test_ghost_takes_over_a_steady_force_or_leaves_it_to_who_can() -> None:
     ghost = company.ghost_frame
     assert ghost is not None
     assert company.ghost_engine == "reference"
-    assert "exact cannot go on with the steady force on 'a'" in company.notes[0][1]
+    assert "exact cannot continue with the constant force on 'a'" in company.notes[0][1]
     assert ghost.velocity[0] == pytest.approx([1.0, 0.0], rel=1e-12)  # a hundred sums
 
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.engines.checkpoint import Checkpoint
-from sandbox.engines.relay import Relay
+from sandbox.engines.segment import Checkpoint
+from sandbox.engines.switching import SwitchableSimulation
 from sandbox.play.running import history as module
 from sandbox.play.running.history import APART, BYTES_PER_BODY, BYTES_PER_FRAME, MOST, History, Mark
-from sandbox.scene.file import from_document
+from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Frame
 
 
@@ -21,7 +21,7 @@ def frame(time: float, bodies: int = 1) -> Frame:
 
 
 def point() -> Checkpoint:
-    return Relay(from_document({"ball": [{"position": [0, 0], "radius": 1}]})).checkpoint()
+    return SwitchableSimulation(from_document({"ball": [{"position": [0, 0], "radius": 1}]})).checkpoint()
 
 
 def filled(steps: int, dt: float = 0.01) -> History:

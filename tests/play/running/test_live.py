@@ -16,9 +16,10 @@ from sandbox.play.running import live as module
 from sandbox.play.running.live import Live
 from sandbox.play.running.session import Session
 from sandbox.play.running.stored import Stored
-from sandbox.scene.file import from_document, load
-from sandbox.scene.model import Ball, Scene
-from sandbox.scene.shipped import find
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 ALL = frozenset({"shapes", "trails", "contacts"})

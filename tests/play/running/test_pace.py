@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sandbox.arrays import FloatArray
 from sandbox.play.running.between import between
 from sandbox.play.running.pace import LONGEST, Pace
-from sandbox.trajectory import FloatArray, Frame
+from sandbox.trajectory import Frame
 
 
 def frame(time: float, position: FloatArray, velocity: FloatArray, present: list[bool] | None = None) -> Frame:

@@ -18,7 +18,7 @@ from sandbox.report.page.document import write_page
 from sandbox.report.page.extremes_page import write_extremes
 from sandbox.report.page.overview import Overview, SceneReport
 from sandbox.report.page.tradeoff_page import write_tradeoff
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 FLAGS = (
     *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),

@@ -8,14 +8,15 @@ from sandbox.measure.extremes import Extremes, Plan
 from sandbox.measure.extremes.axes import AXES
 from sandbox.measure.extremes.boundary import Limit
 from sandbox.measure.extremes.cell import Cell, Outcome
+from sandbox.measure.forecast.warning import Warning
 from sandbox.measure.run import run
 from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.point import Point
 from sandbox.measure.tradeoff.proposals import Proposal
 from sandbox.measure.tradeoff.split import Split
 from sandbox.measure.tradeoff.weighed import Pick, Tradeoff
-from sandbox.scene.file import loads
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import loads
 
 HOSTILE = """</script><img src="x" onerror="window.harm=1">'"&amp;"""
 """Ends a script, and starts one of its own."""
@@ -101,6 +102,8 @@ def tradeoff_document() -> dict[str, Any]:
         point("reference", 0.01, 0.001, 8.0, integrator="velocity_verlet"),
         point("exact", 0.01, 0.0, 30.0),
     )
+    risk = Warning("tunnelling", f"substeps >= 20 prevents tunnelling of {HOSTILE}", {"safe_substeps": 20})
+    cheapest = {"pymunk": Pick(points[1], "cheapest of pymunk", (), None, (risk,)), "exact": None}
     scene = loads(SCENE, "hostile.toml")
     found = weighed(
         points,
@@ -109,6 +112,8 @@ def tradeoff_document() -> dict[str, Any]:
         splits=(Split("pymunk", Settings(), 0.1, 0.01, 0.085, 0.005, 0.005, 16),),
         proposals=(Proposal("closed form", None, 0.0, 0.1, 0.05, HOSTILE),),
         within_tolerance=Pick(points[4], HOSTILE, (), None),
+        cheapest_by_engine=cheapest,
+        max_dt=0.005,
     )
     return found.document("scene.toml")
 

@@ -23,7 +23,7 @@ from sandbox.report.page.time_chart import Curve, energy_chart, error_chart
 from sandbox.report.page.tradeoff_page import tradeoff_page
 from sandbox.report.page.wording import number, share
 from sandbox.report.work_points import budget_of, pareto_of, work_points
-from sandbox.scene.file import loads
+from sandbox.scene.files.load import loads
 
 
 class Read(HTMLParser):
@@ -168,6 +168,35 @@ def test_every_point_of_a_trade_off_is_drawn_failures_as_crosses() -> None:
     assert len(re.findall(r'data-point="\d"', html)) == 6
     assert len(re.findall(r'class="cross"', html)) == 2  # one in the key
     assert len(re.findall(r'class="floor e0"', html)) == 2
+
+
+def test_warnings_for_recommended_settings_are_below_their_answers() -> None:
+    document = tradeoff_document()
+    html = tradeoff_page(document).html()
+    answers = html[html.index('class="answers"') : html.index("</ul>")]
+    (warned,) = [item for item in answers.split("<li>")[1:] if "substeps &gt;= 20 prevents" in item]
+    assert warned.startswith("Cheapest setting of pymunk within the tolerance")
+    assert 'src="x"' not in answers
+
+
+def test_chosen_point_has_its_warnings_and_its_time_per_frame() -> None:
+    html = tradeoff_page(tradeoff_document()).html()
+    facts = json.loads(re.findall(r'class="facts">(.*?)</script>', html, re.DOTALL)[0])
+    own, safe = dict(facts[0]["figures"]), dict(facts[1]["figures"])
+    assert own["time per frame"] == "0.0333 ms of the budget of 0.5 ms"  # 2 ms/s, 60 frames a second
+    assert own[">frame"].startswith("not recommended: dt is longer than a frame")
+    assert "substeps >= 20" in safe["note"]
+    assert ">frame" not in safe
+
+
+def test_settings_with_a_step_longer_than_a_frame_and_dear_frames_are_marked() -> None:
+    html = tradeoff_page({**tradeoff_document(), "budget": 0.05}).html()
+    front = html[html.index("The Pareto front</bdi>") : html.index("Sources of error")]
+    assert front.count("&gt;frame</span>") == 4  # dt is 0.01 s on the whole front
+    assert front.count("&gt;budget</span>") == 3  # 2, 5, 8 and 30 ms/s at 60 frames a second
+    unmarked = tradeoff_page({**tradeoff_document(), "max_dt": None, "budget": None}).html()
+    assert "&gt;frame" not in unmarked
+    assert "&gt;budget" not in unmarked
 
 
 def test_extremes_have_a_cell_a_level() -> None:

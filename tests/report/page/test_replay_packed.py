@@ -10,8 +10,8 @@ from sandbox.measure.run import run
 from sandbox.report.page import replay as module
 from sandbox.report.page.packing import ABSENT, unpacked
 from sandbox.report.page.replay import Track, replay_document
-from sandbox.scene.file import loads
-from sandbox.scene.model import Scene
+from sandbox.scene.files.load import loads
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 FALL = """

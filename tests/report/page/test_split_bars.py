@@ -6,7 +6,7 @@ import pytest
 
 from sandbox.measure.tradeoff.split import Split
 from sandbox.report.page.split_bars import split_bars
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
 
 
 def shares(split: Split) -> dict[str, float]:

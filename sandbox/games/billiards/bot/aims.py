@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from sandbox.games.billiards.bot.trial import Trial, standing, straight
-from sandbox.scene.cue import Stroke
+from sandbox.scene.description.surface import Stroke
 
 SPEEDS = (1.2, 2.0, 3.2)
 """m/s, of the cue, for a pot"""

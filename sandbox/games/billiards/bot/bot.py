@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field, replace
 
-from sandbox.engines.exact.rolling.table import Table
+from sandbox.engines.exact.tabletop.shots import Table
 from sandbox.games.billiards.bot.aims import all_around, breaks, pots_of
 from sandbox.games.billiards.bot.trial import Trial, ease, straight
 from sandbox.games.billiards.frame import Plan
@@ -11,9 +11,9 @@ from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.placing import spread
 from sandbox.games.billiards.rules.call import Call, Decision
 from sandbox.games.billiards.rules.happening import GameError
-from sandbox.scene.cue import Stroke
-from sandbox.scene.part import Point
-from sandbox.scene.streams import Stream, draws
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.surface import Stroke
+from sandbox.scene.random_streams import Stream, draws
 
 WORST, BEST = 0.03, 0.0003
 """rad: the error of the aim, one standard deviation, at skill 0 and 1; in between by its logarithm"""
@@ -45,7 +45,7 @@ class Bot:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.skill <= 1.0:
-            raise GameError(f"a skill of {self.skill:g} is none; 0 to 1")
+            raise GameError(f"skill {self.skill:g} is out of range; it should be 0 to 1")
 
     @property
     def sigma(self) -> float:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.games.billiards.layout import Layout
-from sandbox.trajectory import BoolArray, FloatArray
 
 THINNEST = 0.2
 """cos of the thinnest cut that is tried: 78°"""

@@ -1,5 +1,6 @@
 """Players by name, as a command line tells them: `bot:0.5`."""
 
+from sandbox.echo import short_repr
 from sandbox.games.billiards.bot.bot import Bot
 from sandbox.games.billiards.rules.happening import GameError
 
@@ -21,8 +22,8 @@ def bots_in(text: str, seed: int = 0) -> tuple[Bot, ...]:
         except ValueError:
             value = -1.0
         if kind != "bot" or not 0.0 <= value <= 1.0:
-            raise GameError(f"{each.strip()!r} is no player; one is bot or bot:SKILL, a skill being 0 to 1")
+            raise GameError(f"unknown player {short_repr(each.strip())}; use bot or bot:SKILL, skill 0 to 1")
         found.append(Bot(value, 2 * seed + number))
     if len(found) > 2:
-        raise GameError(f"{len(found)} cannot play; one or two can")
+        raise GameError(f"{len(found)} players cannot play; 1 or 2 can")
     return tuple(found)

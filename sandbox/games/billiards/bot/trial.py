@@ -6,14 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Exhaustion
-from sandbox.engines.exact.rolling.table import Table
+from sandbox.engines.exact.tabletop.shots import Table
 from sandbox.games.billiards.bot.ease import Pots, pots
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.call import Call
 from sandbox.games.billiards.rules.happening import Happening, touched_by
-from sandbox.scene.cue import Stroke
-from sandbox.trajectory import FloatArray
+from sandbox.scene.description.surface import Stroke
 
 IN_HAND = 0.9
 """the chance of a pot that a player with the ball in hand is taken to have"""

@@ -65,4 +65,4 @@ class Choices:
 
 def _those(balls: Iterable[str]) -> str:
     named = ", ".join(balls)
-    return f"; those that can: {named}" if named else ""
+    return f"; possible: {named}" if named else ""

@@ -58,7 +58,7 @@ class Carom(Rules[CaromState]):
         """
         points = self.distance if distance is None else distance
         if points < 1:
-            raise GameError(f"a distance of {points} is none; at least 1")
+            raise GameError(f"distance {points} is out of range; it should be 1 or more")
         none = (0,) * counted(players)
         return CaromState(players=players, scores=none, innings=none, table=BALLS, distance=points)
 
@@ -73,7 +73,7 @@ class Carom(Rules[CaromState]):
         if state.over:
             return Verdict(state)
         decisions: tuple[Decision, ...] = ("play", "spot") if lie.touching else ()
-        told = (f"the cue ball touches the {' and the '.join(lie.touching)}",) if lie.touching else ()
+        told = (f"the cue ball is frozen to the {' and the '.join(lie.touching)}",) if lie.touching else ()
         return Verdict(replace(state, touching=lie.touching, decisions=decisions), messages=told)
 
     def _decide(self, state: CaromState, decision: Decision) -> Verdict[CaromState]:
@@ -95,14 +95,14 @@ class Carom(Rules[CaromState]):
             raise GameError("a carom table has no pockets")
         after = replace(state, opening=False, touching=())
         if state.opening and shot.first and RED not in shot.first:
-            fouls = ("the opening shot must touch the red first",)
+            fouls = ("the opening shot must hit the red first",)
             return self._ended(after, fouls)
         if not self._made(shot):
             return self._ended(after, ())
         after = replace(after, scores=state.scored(state.turn, 1), run=state.run + 1)
         points = tuple(int(each == state.turn) for each in range(state.players))
         if after.scores[state.turn] >= state.distance:
-            told = f"{player(state.turn)} has made {state.distance}"
+            told = f"{player(state.turn)} has reached {state.distance}"
             verdict = self._ended(replace(after, last=after.last or state.turn == state.players - 1), (), full=True)
             return replace(verdict, points=points, messages=(told, *verdict.messages))
         return Verdict(after, points=points, goes_on=True)

@@ -112,19 +112,19 @@ class EightBall(Rules[EightBallState]):
         if fouls and not scratch(shot):  # (h)
             offered = (*(offered or ("play",)), "in hand")
         after = replace(after, turn=state.turn if goes_on else state.other, decisions=offered)
-        why = [f"foul: {each}" for each in fouls] + (["the break was too weak"] if weak else [])
-        told = why + (["the eight fell on the break and is spotted"] if respot else [])
+        why = [f"foul: {each}" for each in fouls] + (["illegal break"] if weak else [])
+        told = why + (["the 8 was pocketed on the break and is spotted"] if respot else [])
         return Verdict(after, fouls=fouls, respot=respot, goes_on=goes_on, messages=tuple(told))
 
     def _eight(self, state: EightBallState, call: Call, shot: Shot, fouls: tuple[str, ...]) -> Verdict[EightBallState]:
         """Judge a shot on which the eight fell: it wins, or it loses (WPA 3.8)."""
         lost = None
         if fouls:
-            lost = f"the eight fell on a foul: {fouls[0]}"
+            lost = f"the 8 was pocketed on a foul: {fouls[0]}"
         elif EIGHT not in self.legal_targets(state):
-            lost = "the eight fell before its turn"
+            lost = "the 8 was pocketed early"
         elif call.safety or call.pocket is None or call.pocket != shot.pocket_of(EIGHT):
-            lost = "the eight fell in a pocket that was not called"
+            lost = "the 8 was pocketed in a pocket that was not called"
         winner = state.turn if lost is None else state.opponent
         after = replace(state, table=state.without(shot.down), in_hand=None, over=True, winner=winner)
         ends = f"{player(winner)} wins" if winner is not None else "the rack is lost"

@@ -43,7 +43,7 @@ class FreePlay(Rules[FreeState]):
         """
         scores = (0,) * counted(players)
         if cue in balls:
-            raise GameError(f"{cue!r} cannot be both struck and made")
+            raise GameError(f"{cue!r} cannot be both the cue ball and an object ball")
         return FreeState(
             players=players, scores=scores, table=balls, rack=balls, cue=cue, in_hand="anywhere", decisions=ALWAYS
         )
@@ -74,7 +74,7 @@ class FreePlay(Rules[FreeState]):
             return Verdict(after, points=points, goes_on=goes_on, messages=told)
         top = max(after.scores)
         winner = after.scores.index(top) if after.scores.count(top) == 1 else None
-        ends = f"the table is clear: {player(winner)} wins" if winner is not None else "the table is clear: a draw"
+        ends = f"table cleared: {player(winner)} wins" if winner is not None else "table cleared: a draw"
         over = replace(after, over=True, winner=winner, in_hand=None, decisions=())
         return Verdict(over, points=points, messages=(*told, ends))
 

@@ -69,7 +69,7 @@ class NineBall(Rules[NineBallState]):
         if call.push_out:
             decisions: tuple[Decision, ...] = ("play", "pass") if state.players == 2 else ()
             after = replace(after, turn=state.other, decisions=decisions)
-            return Verdict(after, respot=respot, points=points, messages=(f"{player(state.turn)} pushed out",))
+            return Verdict(after, respot=respot, points=points, messages=(f"{player(state.turn)} played a push-out",))
         if NINE in shot.down:
             after = replace(after, over=True, winner=state.turn)
             return Verdict(after, points=points, messages=(f"{player(state.turn)} wins",))
@@ -83,7 +83,7 @@ class NineBall(Rules[NineBallState]):
         wrong = [*scratch(shot), *wrong_ball(shot, self.legal_targets(state))]
         if not state.opening:
             return (*wrong, *no_rail(shot))
-        return (*wrong, *(["the break was too weak"] if shot.first and not broke(shot) else []))
+        return (*wrong, *(["illegal break"] if shot.first and not broke(shot) else []))
 
 
 def _foul(after: NineBallState, fouls: tuple[str, ...]) -> Verdict[NineBallState]:

@@ -15,9 +15,9 @@ def scratch(shot: Shot) -> list[str]:
 def wrong_ball(shot: Shot, targets: frozenset[str]) -> list[str]:
     """Return the foul of what was touched first (WPA 6.2); of two at one time, one that is right will do."""
     if not shot.first:
-        return ["the cue ball touched no ball"]
+        return ["the cue ball hit no ball"]
     if targets.isdisjoint(shot.first):
-        return [f"{named_first(shot)} touched first; {_of(targets)} was on"]
+        return [f"{named_first(shot)} hit first instead of {_of(targets)}"]
     return []
 
 
@@ -30,7 +30,7 @@ def from_behind(shot: Shot) -> list[str]:
     """Return the foul of a cue ball in hand that was played at a ball behind the head string (WPA 6.11)."""
     if not shot.stayed_behind:
         return []
-    return [f"{named_first(shot)} behind the head string, which the cue ball had not crossed"]
+    return [f"{named_first(shot)} behind the head string, and the cue ball had not crossed it"]
 
 
 def standard(shot: Shot, targets: frozenset[str]) -> tuple[str, ...]:

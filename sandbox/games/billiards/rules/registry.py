@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from sandbox.echo import short_repr
 from sandbox.games.billiards.rules.carom import Carom
 from sandbox.games.billiards.rules.eight_ball import EightBall
 from sandbox.games.billiards.rules.free_play import FreePlay
@@ -29,4 +30,4 @@ def rules_named(name: str) -> Rules[Any]:
     try:
         return RULES[name]
     except KeyError:
-        raise GameError(f"no game {name!r}; games: {', '.join(RULES)}") from None
+        raise GameError(f"unknown game {short_repr(name)}; games: {', '.join(RULES)}") from None

@@ -72,7 +72,7 @@ class Rules(ABC, Generic[S]):
         """
         offered = self.choices(state).decisions
         if decision not in offered:
-            raise GameError(f"{decision!r} is not to be had now; what is: {', '.join(offered) or 'nothing'}")
+            raise GameError(f"{decision!r} is not offered now; options: {', '.join(offered) or 'none'}")
         return self._decide(replace(state, decisions=()), decision)
 
     def settle(self, state: S, lie: Lie) -> Verdict[S]:  # noqa: ARG002

@@ -91,7 +91,7 @@ class Snooker(Rules[SnookerState]):
             return Verdict(after)
         if state.freed is not None and state.freed in lie.by and set(state.table) != {"pink", "black"}:
             penalty = max(LEAST, VALUES.get(state.on, 1))
-            why = f"the free ball, {state.freed}, snookers"
+            why = f"the free ball, {state.freed}, snookers the opponent"
             points = tuple(penalty * (each == state.turn) for each in range(state.players))
             scores = state.scored(state.turn if state.players == 2 else None, penalty)
             after = replace(after, scores=scores, fouled=True, free=True, decisions=_answers(state, False))
@@ -151,7 +151,7 @@ class Snooker(Rules[SnookerState]):
         after = replace(
             after, decisions=_answers(after, missed), before=replace(state, before=None) if missed else None
         )
-        messages = (told, "a miss: it may be played again from where it was") if missed else (told,)
+        messages = (told, "foul and a miss: the shot may be replayed from the same position") if missed else (told,)
         colours_down = tuple(ball for ball in down if ball in VALUES)
         return Verdict(after, why, gained, respot=respots(colours_down), messages=messages)
 
@@ -207,6 +207,6 @@ def _ended(state: SnookerState) -> Verdict[SnookerState]:
             state, table=("black",), on="black", turn=state.other, in_hand="in the D", run=0, decisions=("play", "pass")
         )
         after = replace(after, fouled=False)
-        return Verdict(after, respot=respots(("black",)), messages=("level: the black is spotted",))
+        return Verdict(after, respot=respots(("black",)), messages=("scores level: the black is respotted",))
     winner = state.scores.index(max(state.scores))
     return Verdict(replace(state, over=True, winner=winner), messages=(f"{player(winner)} wins",))

@@ -50,12 +50,12 @@ class Stroke:
             found.append((least, "in-off"))
         if not self.hit:
             if not shot.first:
-                found.append((least, "the cue ball touched no ball"))
+                found.append((least, "the cue ball hit no ball"))
             else:
                 most = max(least, *(self.value(ball) for ball in shot.first))
-                found.append((most, f"{named_first(shot)} touched first"))
+                found.append((most, f"{named_first(shot)} hit first"))
         found += [
-            (max(least, self.value(ball)), f"the {ball} fell and was not on")
+            (max(least, self.value(ball)), f"the {ball} was potted but not on")
             for ball in shot.down
             if ball not in self.fair
         ]
@@ -81,7 +81,7 @@ def stroke(
         shot: what happened.
         on: `red`, `colour`, or the name of the colour on.
         table: the balls that were on the table.
-        named: the colour that was nominated, or the free ball. A colour that is touched first, or from which the cue
+        named: the colour that was nominated, or the free ball. A colour that is hit first, or from which the cue
             ball is played away, is nominated by that.
         free: whether a free ball might be nominated.
         touching: what lay against the cue ball before.

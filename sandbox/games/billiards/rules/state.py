@@ -41,7 +41,7 @@ class State:
     def __post_init__(self) -> None:
         counted(self.players)
         if not 0 <= self.turn < self.players == len(self.scores):
-            raise GameError(f"turn {self.turn}, with {len(self.scores)} scores, is not that of {self.players} players")
+            raise GameError(f"turn {self.turn} and {len(self.scores)} scores do not fit {self.players} players")
 
     @property
     def other(self) -> int:
@@ -69,7 +69,7 @@ def counted(players: int) -> int:
         GameError: neither one nor two.
     """
     if players not in (1, 2):
-        raise GameError(f"{players} cannot play; one or two can")
+        raise GameError(f"{players} players cannot play; 1 or 2 can")
     return players
 
 

@@ -5,7 +5,7 @@ import math
 from sandbox.measure.energy import energies
 from sandbox.measure.extremes.axis import Axis, Pair, Side
 from sandbox.measure.extremes.case import Case, Document, Parameters
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 G = 9.81
@@ -63,7 +63,7 @@ def _rack(p: Parameters) -> Document:
 
 GAS = Case(
     "gas",
-    "elastic balls fly about in a box, half of it filled",
+    "elastic balls in a half-filled box",
     {"count": 100, "dt": 1 / 240},
     _gas,
     frozenset({"energy", "overlap"}),
@@ -72,7 +72,7 @@ GAS = Case(
 )
 PILE = Case(
     "pile",
-    "balls fall into a box, and come to rest",
+    "balls fall into a box and come to rest",
     {"count": 100, "dt": 1 / 120},
     _pile,
     frozenset({"energy", "overlap", "settles"}),
@@ -104,7 +104,7 @@ AXES = (
     ),
     Axis(
         "iterations",
-        "with which a rack is broken, 480 Hz",
+        "speed of the ball that breaks a rack, 480 Hz",
         "",
         RACK,
         "iterations",

@@ -6,7 +6,7 @@ from sandbox.measure.closed_form import bounces
 from sandbox.measure.extremes.axis import Axis, Pair, Side
 from sandbox.measure.extremes.case import Case, Document, Parameters
 from sandbox.measure.extremes.setup import PIERCING
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 RADIUS, HEIGHT, G = 0.1, 1.0, 9.81  # m, m, m/s²
@@ -95,7 +95,7 @@ GRAVITIES = (0.0, 1.0, G, 100.0, 1e3, 1e4)
 AXES = (
     Axis(
         "dt",
-        "the frame step of balls that fall onto a thin floor",
+        "time step of a frame, balls falling onto a thin floor",
         "s",
         DROP,
         "dt",

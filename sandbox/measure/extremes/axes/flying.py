@@ -5,7 +5,7 @@ import numpy as np
 from sandbox.measure.extremes.axis import Axis, Pair, Side
 from sandbox.measure.extremes.case import Case, Document, Parameters
 from sandbox.measure.extremes.setup import PIERCING
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 RADIUS, THICKNESS, DT = 0.05, 0.1, 0.01  # m, m, s
@@ -50,12 +50,12 @@ def _behind(scene: Scene, run: Trajectory) -> str | None:
 
 BULLET = Case(
     "bullet",
-    "a bullet flies at a wall, as near to it after a step as can be without touching",
+    "a bullet hits a wall; a step ends as close to the wall as possible without contact",
     {"speed": 0.5, "offset": 0.0, "substeps": 1},
     _bullet,
     frozenset({"through", "energy", "overlap"}),
     _off,
-    "the way flown",
+    "the distance flown",
     through=_behind,
 )
 
@@ -64,7 +64,7 @@ SPEEDS = (0.5, 0.99, 1.01, 2.0, 10.0, 100.0)
 AXES = (
     Axis(
         "speed",
-        "v·dt/(r + w/2): the way of a bullet in a step, against where it touches the wall",
+        "v·dt/(r + w/2): travel of a bullet per step, relative to the contact distance",
         "",
         BULLET,
         "speed",

@@ -8,8 +8,8 @@ from sandbox.measure.extremes.axis import Axis, Pair, Side
 from sandbox.measure.extremes.case import Case, Document, Parameters
 from sandbox.measure.extremes.cell import Cell
 from sandbox.measure.extremes.setup import JOINTED, SWINGING
-from sandbox.scene.model import Scene
-from sandbox.scene.settings import Settings
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 G, LINK = 9.81, 0.1
@@ -66,7 +66,7 @@ def _band(scene: Scene, settings: Settings, engine: str) -> float:
 
 CHAIN = Case(
     "chain",
-    "a chain hangs straight down from one end, at rest",
+    "a chain hangs at rest from one end",
     {"links": 20, "dt": 1 / 240, "iterations": 10},
     _chain,
     frozenset({"joints", "energy"}),
@@ -75,7 +75,7 @@ CHAIN = Case(
 )
 SWING = Case(
     "swing",
-    "a mass swings on a spring",
+    "a mass oscillates on a spring",
     {"omega_h": 0.1},
     _swing,
     frozenset({"energy"}),
@@ -111,7 +111,7 @@ AXES = (
     ),
     Axis(
         "chain",
-        "links that hang from each other, 240 Hz, 10 iterations",
+        "links of a hanging chain, 240 Hz, 10 iterations",
         "links",
         CHAIN,
         "links",

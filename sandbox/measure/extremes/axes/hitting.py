@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.extremes.axis import Axis, Pair, Side
 from sandbox.measure.extremes.case import Case, Document, Parameters
-from sandbox.scene.model import Scene
-from sandbox.trajectory import FloatArray, Trajectory
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Trajectory
 
 SPEED, GAP, DT = 1.0, 0.3, 0.01  # m/s, m, s
 
@@ -45,7 +46,7 @@ def _places_off(scene: Scene, run: Trajectory) -> float:
 
 HEAD_ON = Case(
     "head on",
-    "a ball hits one at rest, head on, e = 1",
+    "a ball hits another at rest, head on, e = 1",
     {"mass_ratio": 1.0, "size_ratio": 1.0, "offset": 0.0},
     _head_on,
     frozenset({"energy", "momentum", "overlap"}),
@@ -55,7 +56,7 @@ HEAD_ON = Case(
 )
 FAR = Case(
     "far out",
-    "a ball hits one at rest, far from the origin",
+    "a ball hits another at rest, far from the origin",
     {"mass_ratio": 1.0, "size_ratio": 1.0, "offset": 0.0},
     _head_on,
     frozenset({"energy", "momentum", "overlap"}),
@@ -72,7 +73,7 @@ AXES = (
     Axis("heavy_hits_light", "mass ratio of two balls", "", HEAD_ON, "mass_ratio", RATIOS, (1.0, 1e3, 1e6)),
     Axis(
         "light_hits_heavy",
-        "mass of the ball that hits, of that which it hits",
+        "mass of the moving ball relative to that of the ball at rest",
         "",
         HEAD_ON,
         "mass_ratio",
@@ -81,7 +82,7 @@ AXES = (
     ),
     Axis(
         "offset",
-        "distance from the origin of two balls, r = 1 m, that meet",
+        "distance from the origin of two colliding balls, r = 1 m",
         "m",
         FAR,
         "offset",

@@ -3,7 +3,7 @@
 from sandbox.measure.extremes.axis import Axis, Pair, Side
 from sandbox.measure.extremes.case import Case, Document, Parameters
 from sandbox.measure.extremes.cell import Cell
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 
 RADIUS = 0.5
 NUDGED = 1e-9
@@ -34,7 +34,7 @@ def _moved(cell: Cell) -> bool:
 
 OVERLAP = Case(
     "overlap",
-    "two balls start in each other, at rest",
+    "two overlapping balls start at rest",
     {"depth": 0.1, "mass_ratio": 1.0},
     _pair,
     frozenset({"energy", "momentum", "parted"}),
@@ -44,7 +44,7 @@ OVERLAP = Case(
 AXES = (
     Axis(
         "overlap",
-        "the depth to which two balls start in each other, of their width; 1 is coincident centres",
+        "initial overlap of two balls as a fraction of their diameter; 1 is coincident centres",
         "",
         OVERLAP,
         "depth",

@@ -2,7 +2,7 @@
 
 from sandbox.measure.extremes.axis import Axis, Pair, Side
 from sandbox.measure.extremes.case import Case, Document, Parameters
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 SPEED, RADIUS, G = 5.0, 0.1, 9.81
@@ -37,7 +37,7 @@ SLIDE = Case(
     _slide,
     frozenset({"energy", "overlap"}),
     _off,
-    "the way",
+    "the distance",
     useless=0.1,
 )
 

@@ -2,7 +2,7 @@
 
 from sandbox.measure.extremes.axis import Axis, Pair, Side
 from sandbox.measure.extremes.case import Case, Document, Parameters
-from sandbox.scene.model import Scene
+from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 FRICTION, G = 0.5, 9.81
@@ -80,7 +80,7 @@ AXES = (
     ),
     Axis(
         "light_on_heavy",
-        "mass of the upper box, of the lower's",
+        "mass of the upper box relative to that of the lower",
         "",
         TWO,
         "mass_ratio",
@@ -103,7 +103,7 @@ AXES = (
     ),
     Axis(
         "tower_iterations",
-        "iterations that hold a tower of 10 boxes, 120 Hz",
+        "iterations for a stable tower of 10 boxes, 120 Hz",
         "",
         TOWER,
         "iterations",

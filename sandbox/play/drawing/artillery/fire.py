@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray
 from sandbox.play.artillery.gunnery import Burst, Clod, Gunnery
 from sandbox.play.artillery.seen import BURST
 from sandbox.play.drawing.artillery.dots import dot, glow
@@ -14,7 +15,6 @@ from sandbox.play.drawing.palette import BACKGROUND, INK, SKY, YELLOW, Colour, m
 from sandbox.play.drawing.strokes import arrow, stroke
 from sandbox.play.drawing.text import write
 from sandbox.play.drawing.view import View
-from sandbox.trajectory import FloatArray
 
 SMOKE: Colour = (214, 206, 200)
 FLAME: tuple[Colour, ...] = ((255, 250, 222), (255, 204, 92), (238, 116, 48), (96, 62, 58))

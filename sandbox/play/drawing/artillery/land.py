@@ -3,13 +3,16 @@
 import numpy as np
 import pygame
 
+from sandbox.games.artillery.preset import GROUND
+from sandbox.games.artillery.terrain import Artillery
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.artillery.sky import sky
 from sandbox.play.drawing.fixtures import draw_fixtures
 from sandbox.play.drawing.palette import FAINT, Colour, hex_colour, mixed
 from sandbox.play.drawing.strokes import dashes, stroke
-from sandbox.scene.artillery.expanding import GROUND
-from sandbox.scene.model import Scene, Wall
+from sandbox.scene.description.fixed import Wall
+from sandbox.scene.description.game_tables import table_of
+from sandbox.scene.scene import Scene
 
 SOIL: Colour = (122, 92, 62)
 GRASS: Colour = (150, 190, 96)
@@ -76,9 +79,10 @@ def strip_of(soil: Colour, scale: float, height: int, like: pygame.Surface) -> p
 
 def _sides(surface: pygame.Surface, camera: Camera, scene: Scene, wall: Wall, unit: float, antialias: bool) -> None:
     """Draw what stands at the sides: walls of rubber, or where one side is the other."""
-    if scene.artillery is None or scene.artillery.edges == "open":
+    artillery = table_of(scene, Artillery)
+    if artillery is None or artillery.edges == "open":
         return
-    rubber = scene.artillery.edges == "rubber"
+    rubber = artillery.edges == "rubber"
     for x in (wall.points[0][0], wall.points[-1][0]):
         px, foot = float(camera.to_screen(np.array((x, 0.0)))[0]), surface.get_height() + 1.0  # as far as dirt is seen
         if rubber:

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray
+from sandbox.games.artillery.landscape import displaced
 from sandbox.play.drawing.palette import Colour, mixed
-from sandbox.scene.artillery.landscape import displaced
-from sandbox.trajectory import FloatArray
 
 TONES: tuple[tuple[float, Colour], ...] = (
     (0.0, (13, 17, 34)),

@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray
 from sandbox.play.billiards.aim import Aim
 from sandbox.play.drawing.palette import BACKGROUND, INK, ORANGE, SKY, WARNING, YELLOW, Colour, ColourArray, mixed
 from sandbox.play.drawing.shade import Look, disc_distance, paint
 from sandbox.play.drawing.strokes import Pixel, stroke
 from sandbox.play.drawing.table.cloth import felt_of
 from sandbox.play.drawing.view import View
-from sandbox.trajectory import FloatArray
 
 FADE = 3.0
 """m along a way after which it is half as bright"""

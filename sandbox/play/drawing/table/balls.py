@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 import pygame
 
+from sandbox.arrays import FloatArray
 from sandbox.play.camera import Camera
 from sandbox.play.drawing.shade import surface_of
 from sandbox.play.drawing.table.coats import STRUCK, Coat, coat_of, painted
 from sandbox.play.drawing.table.rolling import Rolling
 from sandbox.play.drawing.view import View
-from sandbox.scene.bodies import Bodies
-from sandbox.trajectory import FloatArray
+from sandbox.scene.compile.bodies import Bodies
 
 FINEST, LARGEST = 48.0, 160.0
 """px: what moves is drawn no finer than the first, what rests than the second, and larger by scaling"""

@@ -13,8 +13,8 @@ from sandbox.play.drawing.palette import BACKGROUND, Colour, mixed
 from sandbox.play.drawing.shade import Look, disc_distance, paint
 from sandbox.play.drawing.strokes import Pixel, clipped, fill, stroke
 from sandbox.play.drawing.table.cushions import DEPTH, RIM, Cushion, cushions, others, width_of
-from sandbox.scene.model import Scene
-from sandbox.scene.part import Point
+from sandbox.scene.description.base import Point
+from sandbox.scene.scene import Scene
 
 WOOD: Colour = (66, 45, 36)
 WOOD_LIGHT: Colour = (104, 74, 56)

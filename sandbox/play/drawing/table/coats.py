@@ -6,10 +6,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 import pygame
 
+from sandbox.arrays import FloatArray
+from sandbox.games.billiards.equipment import POOL, SOLIDS, WHITE
 from sandbox.play.drawing.palette import Colour, hex_colour
 from sandbox.play.drawing.text import write
-from sandbox.scene.billiards.balls import POOL, SOLIDS, WHITE
-from sandbox.trajectory import FloatArray
 
 Kind = Literal["plain", "solid", "stripe", "spots"]
 

@@ -8,8 +8,9 @@ import math
 from typing import NamedTuple
 
 from sandbox.play.camera import Box
-from sandbox.scene.model import Post, Scene, Wall
-from sandbox.scene.part import Point, Vector
+from sandbox.scene.description.base import Point, Vector
+from sandbox.scene.description.fixed import Post, Wall
+from sandbox.scene.scene import Scene
 
 DEPTH = 0.036
 """of a table's width, from the nose of a cushion to the wood"""

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from sandbox.trajectory import FloatArray, Frame, IntArray
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.trajectory import Frame
 
 LONGEST = 0.5
 """s between two pictures over which balls are seen to roll; over more they were put where they are"""

@@ -1,0 +1,102 @@
+"""Standard streams: closed ones are replaced, and what cannot be written is one error, or for standard error none."""
+
+import codecs
+import errno
+import io
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+
+class OutputError(Exception):
+    """Standard output cannot be written: the disk is full, or it is closed. `str()` says which."""
+
+
+def prepare_streams() -> None:
+    """Replace the standard streams, so that the process neither fails by them nor writes into another file.
+
+    A descriptor of 0 to 2 that is closed would be that of the next file opened, a database say, and text meant for a
+    terminal would be written there. Closed ones are opened on the null device: standard output for reading alone, so
+    that writing to it is the error that it is. Characters that an encoding lacks are written as escapes.
+
+    A write to standard output that fails raises `OutputError`, once: what follows is dropped, also at the exit of the
+    interpreter. Standard error drops what cannot be written, as there is nowhere left to say so.
+    """
+    for descriptor, flags in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            null = os.open(os.devnull, flags)  # the lowest that is free: this one
+            os.set_inheritable(null, True)
+    if sys.stdin is None:
+        sys.stdin = Path(os.devnull).open(encoding="utf-8")  # noqa: SIM115, open as long as the process
+    sys.stdout = _guarded(sys.stdout, _Output, os.O_RDONLY)
+    sys.stderr = _guarded(sys.stderr, _Errors, os.O_WRONLY)
+
+
+def can_write_unicode() -> bool:
+    """Tell whether standard output can encode every character."""
+    encoding = getattr(sys.stdout, "encoding", None)
+    return encoding is None or codecs.lookup(encoding).name.startswith("utf")
+
+
+class _Output(io.FileIO):
+    """Standard output, unbuffered."""
+
+    _has_failed = False
+
+    def write(self, data: "ReadableBuffer", /) -> int:
+        """Write bytes; after a failure, drop them.
+
+        Raises:
+            BrokenPipeError: the reader has gone, as `| head` does.
+            OutputError: they cannot be written.
+        """
+        if self._has_failed:
+            return memoryview(data).nbytes
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            self._has_failed = True
+            raise
+        except OSError as error:
+            self._has_failed = True
+            reason = "it is closed" if error.errno == errno.EBADF else error.strerror or str(error)
+            raise OutputError(reason) from None
+
+
+class _Errors(io.FileIO):
+    """Standard error, unbuffered."""
+
+    def write(self, data: "ReadableBuffer", /) -> int:
+        """Write bytes, or drop what cannot be written."""
+        with suppress(OSError):
+            return super().write(data)
+        return memoryview(data).nbytes
+
+
+def _guarded(stream: TextIO | None, kind: type[io.FileIO], flags: int) -> TextIO:
+    """Return a stream like another, on the same descriptor, that writes by a kind of file."""
+    if stream is None:  # closed; on a descriptor of its own, as its own may be another file's by now
+        return io.TextIOWrapper(io.BufferedWriter(_null(kind, flags)), "utf-8", "backslashreplace")
+    assert isinstance(stream, io.TextIOWrapper)
+    raw = getattr(stream.buffer, "raw", stream.buffer)  # unbuffered streams have no buffer in between
+    if type(raw) is not io.FileIO:  # a console of Windows, which takes Unicode and is never full
+        stream.reconfigure(errors="backslashreplace")
+        return stream
+    return io.TextIOWrapper(
+        io.BufferedWriter(kind(raw.fileno(), "wb", closefd=False)),
+        stream.encoding,
+        "backslashreplace",
+        line_buffering=stream.line_buffering,
+        write_through=stream.write_through,
+    )
+
+
+def _null(kind: type[io.FileIO], flags: int) -> io.FileIO:
+    return kind(os.open(os.devnull, flags), "wb")

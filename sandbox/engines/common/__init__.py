@@ -1,0 +1,1 @@
+"""Parts that engines share: kernels, body state, contacts, actions, zones, motors and energy."""

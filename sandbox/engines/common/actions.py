@@ -1,0 +1,465 @@
+"""Actions: apply impulses, forces, changed parameters and new bodies to a running simulation.
+
+An action is checked completely before anything changes: an invalid action raises `ActionError` and leaves the
+simulation as it was.
+"""
+
+import math
+from typing import Protocol
+
+import numpy as np
+from pydantic import ValidationError
+
+from sandbox.action import (
+    SETTABLE,
+    Action,
+    ActionError,
+    Drive,
+    Force,
+    Impulse,
+    Launch,
+    Move,
+    Pull,
+    Remove,
+    Reshape,
+    SetParameter,
+    Spawn,
+    Strike,
+    Switch,
+    Throttle,
+    Toggle,
+    heading_of,
+    is_settable,
+    number_among,
+    speed_limit,
+)
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.demands import on_floor
+from sandbox.scene.compile.drives import names_of
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import BACKING, MAX_BODIES, BodySource, BodySpec, Collides
+from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.fixed import Post, Wall
+from sandbox.scene.description.game_tables import PRESETS
+from sandbox.scene.description.scene import default_name
+from sandbox.scene.description.surface import MISCUE, miscues, struck
+from sandbox.scene.errors import SceneError, quoted
+from sandbox.scene.files.document import change_value, to_document
+from sandbox.scene.files.load import from_session
+from sandbox.scene.files.overrides import AddressError, assign, elements_hint, parse_path
+from sandbox.scene.scene import Scene
+from sandbox.scene.validate.references import check_surface
+from sandbox.scene.validate.scene import MAX_SURFACES, check_wall_points, crosscheck
+
+
+class ActionTarget(Protocol):
+    """Bodies of a running scene, as actions read and change them. Bodies are addressed by their index."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, with all changes that actions have made."""
+
+    @property
+    def setup(self) -> Setup:
+        """The state from which the simulation started, with that scene."""
+
+    @property
+    def bodies(self) -> Bodies:
+        """Bodies by index; spawned bodies are at the end."""
+
+    @property
+    def h(self) -> float:
+        """Substep, s."""
+
+    @property
+    def present(self) -> BoolArray:
+        """(N,) whether each body is in the scene."""
+
+    def motion(self, index: int) -> tuple[FloatArray, float]:
+        """Return the velocity (2,), m/s, and the angular velocity, rad/s, of a body."""
+
+    def set_velocity(self, index: int, velocity: FloatArray) -> None:
+        """Set the velocity of a body, m/s."""
+
+    def set_spin(self, index: int, spin: float) -> None:
+        """Set the angular velocity of a body, rad/s."""
+
+    def set_roll(self, index: int, roll: tuple[float, float]) -> None:
+        """Set the angular velocity of a sphere on a surface about x and y, rad/s."""
+
+    def push(self, index: int, force: FloatArray, torque: float) -> None:
+        """Apply a constant force, N, and torque, N·m, to a body from now on. They replace the previous ones.
+
+        Raises:
+            ActionError: the engine models no such force.
+        """
+
+    def put(self, index: int, position: FloatArray) -> None:
+        """Set the position of a body, m."""
+
+    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
+        """Check that the engine can place a body at a position.
+
+        Raises:
+            ActionError: this engine cannot, though other engines may.
+        """
+
+    def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
+        """Continue with a changed scene. Only air, gravity, coefficients, points of walls and solid flags may differ.
+
+        Args:
+            setup: with the changed scene (`Setup.with_scene`).
+            spawned: the elements of bodies spawned since the start, with other coefficients; default: unchanged.
+
+        Raises:
+            ActionError: the settings or the engine do not support the change.
+        """
+
+    def throttle(self, index: int, level: float) -> None:
+        """Set the level of a thrust, by its index in the scene: the fraction of its force that acts.
+
+        Raises:
+            ActionError: the engine models no thrust.
+        """
+
+    def drive(self, index: int, level: float) -> None:
+        """Set the level of a drive, by its index in the scene.
+
+        Raises:
+            ActionError: the engine models no drives.
+        """
+
+    def add(self, single: BodySpec, name: str) -> int:
+        """Add a body that has been checked, and return its index.
+
+        Raises:
+            ActionError: the engine cannot add it.
+        """
+
+
+def set_parameter(action: SetParameter, target: ActionTarget) -> None:
+    """Change a value of the scene.
+
+    Raises:
+        ActionError: the value cannot be changed during a run, or the new value is invalid.
+    """
+    if not is_settable(action.path):
+        raise ActionError(f"{action.path!r} cannot be changed during a run; these can: {SETTABLE}")
+    try:
+        parts = parse_path(action.path)
+    except AddressError as error:
+        raise ActionError(str(error)) from None
+    if parts[0] in PRESETS:  # its elements exist already: changing the preset would have no effect
+        hint = elements_hint(to_document(target.scene), parts)
+        raise ActionError(
+            f"{action.path}: a running scene has no [{parts[0]}]; presets are expanded to primitives{hint}"
+        )
+    spawned = _with_coefficient(action, parts, target)
+    if spawned is not None:
+        target.change(target.setup, spawned)
+        return
+    try:
+        scene = change_value(target.scene, action.path, action.value)
+        wrong = action.path.startswith("surface.") and any(check_surface(scene, target.setup.bodies))
+    except ValueError:
+        wrong = True
+    if wrong:  # validate the whole scene again, to report every fault as for a file
+        try:
+            scene = _validated_again(action, target.scene)
+        except AddressError as error:
+            raise ActionError(f"{error}{_spawned_hint(parts, target)}") from None
+    setup = target.setup.with_scene(scene)
+    if on_floor(setup) != on_floor(target.setup):
+        raise ActionError(f"{action.path}: floor friction cannot be switched on or off during a run")
+    target.change(setup)
+
+
+def _validated_again(action: SetParameter, scene: Scene) -> Scene:
+    """Return a scene with a value changed, validated as if it were read from a file.
+
+    Raises:
+        ActionError: the scene is then invalid; the message lists all faults.
+        AddressError: the path does not exist.
+    """
+    try:
+        document, _ = assign(to_document(scene), action.path, action.value)
+        return from_session(document)
+    except SceneError as error:
+        raise ActionError("; ".join(f"{f.path}: {f.message}" for f in error.faults)) from None
+
+
+def _with_coefficient(
+    action: SetParameter, parts: tuple[str, ...], target: ActionTarget
+) -> tuple[BodySource, ...] | None:
+    """Return the spawned elements, one of them with another restitution or friction; None if none of them is meant.
+
+    Spawned elements are addressed by name, `ball.spawned-1.restitution`. `*` and indices mean the elements of the file,
+    so that the meaning of an action does not depend on which bodies were spawned before.
+
+    Raises:
+        ActionError: the value is out of range.
+    """
+    first = len(target.scene.elements)
+    if len(parts) != 3 or parts[1] not in target.bodies.names:
+        return None
+    place = int(target.bodies.element[target.bodies.names.index(parts[1])]) - first
+    if place < 0:
+        return None
+    spawned = list(target.bodies.elements[first:])
+    element = spawned[place]
+    heading = heading_of(element)
+    if parts[0] != heading:
+        meant = ".".join((heading, quoted(parts[1]), parts[2]))
+        raise ActionError(f"{action.path}: {parts[1]!r} is a {heading}; did you mean {meant}?")
+    try:
+        stated = element.model_dump(by_alias=True, exclude_unset=True)
+        spawned[place] = type(element).model_validate({**stated, parts[2]: action.value})
+    except ValidationError as error:
+        from sandbox.scene.files.diagnosis import explained  # only faults need it
+
+        messages = (message for _, message in explained(error, (heading, place)))
+        raise ActionError(f"{action.path}: {'; '.join(messages)}") from None
+    return tuple(spawned)
+
+
+def _spawned_hint(parts: tuple[str, ...], target: ActionTarget) -> str:
+    """Return a hint how spawned bodies are addressed, for a path into the list of their kind."""
+    first = len(target.scene.elements)
+    of_element = dict(zip(target.bodies.element.tolist(), target.bodies.names, strict=True))
+    joined = [
+        f"{parts[0]}.{quoted(of_element[first + k])}"
+        for k, element in enumerate(target.bodies.elements[first:])
+        if heading_of(element) == parts[0] and first + k in of_element
+    ]
+    some = ", ".join(joined[:5])
+    return f"; bodies added during the run are addressed by name: {some}" if joined else ""
+
+
+def toggle(action: Toggle, target: ActionTarget) -> None:
+    """Make a wall or post solid or not solid.
+
+    Raises:
+        ActionError: there is no such wall or post, or the scene has a surface.
+    """
+    scene = target.scene
+    begin = len(scene.planes)
+    names = scene.fixed_names[begin : len(scene.fixed)]
+    index = number_among(names, action.thing, "wall or post")
+    if scene.surface is not None or scene.pockets:
+        raise ActionError("the cushions of a billiard table cannot be switched off")
+    things: list[Wall | Post] = [*scene.walls, *scene.posts]
+    if things[index].solid == action.solid:
+        return
+    things[index] = things[index].model_copy(update={"solid": action.solid})
+    walls, posts = tuple(things[: len(scene.walls)]), tuple(things[len(scene.walls) :])
+    target.change(target.setup.with_scene(scene.model_copy(update={"walls": walls, "posts": posts})))
+
+
+def reshape(action: Reshape, target: ActionTarget) -> None:
+    """Change the points of a wall.
+
+    Raises:
+        ActionError: there is no such wall, it is a cushion, or the points are invalid.
+    """
+    scene = target.scene
+    names = scene.fixed_names[len(scene.planes) : len(scene.planes) + len(scene.walls)]
+    if action.thing not in names:
+        raise ActionError(f"no wall is named {action.thing!r}; walls: {', '.join(map(repr, names)) or 'none'}")
+    if on_floor(target.setup):
+        raise ActionError(f"{action.thing!r} is a cushion; walls on a [surface] cannot be reshaped")
+    index = names.index(action.thing)
+    wall = scene.walls[index].model_copy(update={"points": action.points})
+    faults = [f"{'.'.join(map(str, where))} {message}" for where, message in check_wall_points(wall)]
+    if faults:
+        raise ActionError(f"the wall {action.thing!r}: {'; '.join(faults)}")
+    walls = (*scene.walls[:index], wall, *scene.walls[index + 1 :])
+    target.change(target.setup.with_scene(scene.model_copy(update={"walls": walls})))
+
+
+ENVIRONMENT_FIELDS = {"world", "surface"}
+"""Fields of a scene that define neither bodies nor static colliders."""
+
+
+def apply_action(action: Action, target: ActionTarget) -> int | None:
+    """Apply an action. Return the index of the body that is to be removed, if any.
+
+    Raises:
+        ActionError: the action cannot be applied. Nothing has changed then.
+    """
+    match action:
+        case Impulse():
+            _apply_impulse(action, target)
+        case Force():
+            _apply_force(action, target)
+        case Move():
+            _move(action, target)
+        case Spawn():
+            _spawn(action, target)
+        case Remove():
+            return _body_index(action.body, target)
+        case SetParameter():
+            set_parameter(action, target)
+        case Throttle():
+            thrusts = [thrust.name or default_name("thrust", k) for k, thrust in enumerate(target.scene.thrusts)]
+            target.throttle(number_among(thrusts, action.thrust, "thrust"), action.level)
+        case Reshape():
+            reshape(action, target)
+        case Drive():
+            target.drive(number_among(names_of(target.scene), action.drive, "drive"), action.level)
+        case Toggle():
+            toggle(action, target)
+        case Strike():
+            _strike(action, target)
+        case Pull() | Launch() | Switch():
+            raise ActionError(
+                f"{action!r} is not an action of an engine; the simulation that sandbox.start returns accepts it"
+            )
+        case _:
+            raise ActionError(f"{action!r} is not an action")
+    return None
+
+
+def has_same_bodies(scene: Scene, running: Scene) -> bool:
+    """Return whether two scenes differ in their world and surface only, so that their contact matrices are equal.
+
+    Parts are compared by identity: parts that are equal but not the same objects count as different.
+    """
+    return all(
+        getattr(scene, key) is getattr(running, key) for key in Scene.model_fields if key not in ENVIRONMENT_FIELDS
+    )
+
+
+def derive_contacts(setup: Setup, bodies: Bodies) -> ContactMatrix:
+    """Derive the contact matrix after an action has changed the scene or its bodies.
+
+    Raises:
+        ActionError: the scene would have more different surfaces than allowed.
+    """
+    meet = contact_matrix(setup, bodies)
+    if len(meet.surfaces.surfaces) > MAX_SURFACES:
+        raise ActionError(f"more than {MAX_SURFACES} different surfaces; share materials between balls")
+    return meet
+
+
+def _body_index(name: str, target: ActionTarget) -> int:
+    """Return the index of a body that is in the scene."""
+    try:
+        index = target.bodies.names.index(name)
+    except ValueError:
+        raise ActionError(f"no body is named {name!r}") from None
+    if not target.present[index]:
+        raise ActionError(f"{name!r} has been removed")
+    return index
+
+
+def _check_place(position: tuple[float, float], radius: float, collides: Collides, target: ActionTarget) -> None:
+    """Check a position: not deep behind a plane, and accepted by the engine."""
+    if collides == "none":
+        return
+    scene = target.scene
+    for plane, name in zip(scene.planes, scene.fixed_names, strict=False):  # planes come first among the names
+        normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+        depth = float((np.asarray(plane.point) - np.asarray(position)) @ normal)
+        if depth > BACKING:
+            raise ActionError(f"{depth:g} m behind the plane {name!r}; the limit is {BACKING:g} m")
+    target.check_place(position, radius, collides)
+
+
+def _movable_body_index(name: str, target: ActionTarget) -> int:
+    index = _body_index(name, target)
+    if target.bodies.fixed[index]:
+        raise ActionError(f"{name!r} is fixed and cannot move")
+    _refuse_driven(name, target.scene)
+    return index
+
+
+def _refuse_driven(name: str, scene: Scene) -> None:
+    for drive, own in zip(scene.drives, names_of(scene), strict=True):
+        if drive.body == name:
+            raise ActionError(f"{name!r} is held by its drive; move it by a `drive` action on {own!r}")
+
+
+def _apply_impulse(action: Impulse, target: ActionTarget) -> None:
+    index = _movable_body_index(action.body, target)
+    velocity, spin = target.motion(index)
+    velocity = velocity + np.asarray(action.impulse) / target.bodies.mass[index]
+    spin += float(action.angular / target.bodies.moment[index])
+    speed_limit(float(np.hypot(*velocity)), f"the impulse on {action.body!r}")
+    speed_limit(abs(spin), f"the angular impulse on {action.body!r}")
+    target.set_velocity(index, velocity)
+    if action.angular:
+        target.set_spin(index, spin)
+
+
+def _apply_force(action: Force, target: ActionTarget) -> None:
+    index = _movable_body_index(action.body, target)
+    mass, moment = float(target.bodies.mass[index]), float(target.bodies.moment[index])
+    speed_limit(math.hypot(*action.force) / mass * target.h, f"one step under the force on {action.body!r}")
+    speed_limit(abs(action.torque) / moment * target.h, f"one step under the torque on {action.body!r}")
+    target.push(index, np.asarray(action.force), action.torque)
+
+
+def _move(action: Move, target: ActionTarget) -> None:
+    index = _body_index(action.body, target)
+    _refuse_driven(action.body, target.scene)
+    fixed = bool(target.bodies.fixed[index])
+    if fixed and action.velocity not in (None, (0.0, 0.0)):
+        raise ActionError(f"{action.body!r} is fixed; its position can be changed, but it cannot have a velocity")
+    collides = target.bodies.elements[target.bodies.element[index]].collides
+    _check_place(action.position, float(target.bodies.radius[index]), collides, target)
+    target.put(index, np.asarray(action.position))
+    if action.velocity is not None and not fixed:
+        target.set_velocity(index, np.asarray(action.velocity))
+
+
+def _strike(action: Strike, target: ActionTarget) -> None:
+    index = _movable_body_index(action.ball, target)
+    if target.scene.surface is None or not target.bodies.round[index]:
+        raise ActionError(f"{action.ball!r} cannot be struck; a cue strikes balls on a [surface] only")
+    if target.scene.surface.bodies == "pucks":
+        raise ActionError(f"{action.ball!r} cannot be struck; use an impulse for a puck")
+    if miscues(action):
+        raise ActionError(f"the tip slips; side and height together must be at most {MISCUE:g} of the radius off")
+    velocity, spin = struck(action, float(target.bodies.mass[index]), float(target.bodies.radius[index]))
+    target.set_velocity(index, np.asarray(velocity))
+    target.set_spin(index, spin[2])
+    target.set_roll(index, spin[:2])
+
+
+def _spawn(action: Spawn, target: ActionTarget) -> None:
+    scene, single = target.scene, action.single
+    name = single.name or default_name("spawned", len(target.bodies))
+    if name in target.bodies.names or name in scene.fixed_names:
+        raise ActionError(f"a body or fixed object is already named {name!r}")
+    if single.layer not in scene.layers:
+        raise ActionError(f"no layer is named {single.layer!r}; layers: {', '.join(scene.layers)}")
+    if len(target.bodies) >= MAX_BODIES:
+        raise ActionError(f"the scene already has {MAX_BODIES:,} bodies, which is the limit")
+    alone = scene_of_one_body(scene, single)
+    faults = crosscheck(alone)
+    if faults:
+        raise ActionError("; ".join(message for _, message in faults))
+    x, y = alone.bodies.position[0].tolist()  # of the centre of mass, which may be far from `position`
+    _check_place((x, y), float(alone.bodies.radius[0]), single.collides, target)
+    if isinstance(single, Ball) and not single.fixed and single.collides != "none":
+        _check_cushion_heights(single.radius, scene)
+    target.add(single, name)
+
+
+def _check_cushion_heights(radius: float, scene: Scene) -> None:
+    """Refuse a ball of a radius, m, that a cushion's nose would pass over. Balls of a file are checked alike."""
+    for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):  # pockets come last among the names
+        height = thing.height if isinstance(thing, Wall | Post) else None
+        if height is not None and height >= 2.0 * radius:
+            raise ActionError(f"the nose of {name!r}, {height:g} m high, passes over a ball of radius {radius:g} m")
+
+
+def scene_of_one_body(scene: Scene, single: BodySpec) -> Scene:
+    """Return a scene with one body and the world, surface and materials of another scene."""
+    kinds = {Ball: "balls", Box: "boxes", Capsule: "capsules", Polygon: "polygons", Compound: "compounds"}
+    keys = ("world", "surface", "contact_models", "materials", "pairs")
+    surroundings = {key: getattr(scene, key) for key in keys}
+    return Scene.model_validate(surroundings).model_copy(update={kinds[type(single)]: (single,)})

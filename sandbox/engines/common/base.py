@@ -1,0 +1,150 @@
+"""Base class of simulations: clock, lock, end of the run, and the bounds of a valid state."""
+
+import math
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import NoReturn
+
+import numpy as np
+
+from sandbox.engines.energy_ledger import Cause
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.fixed import PlaneReach
+from sandbox.scene.description.world import MAX_SLOP, Settings
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Frame
+
+
+class StepLock:
+    """Non-blocking lock that is held while a simulation is being changed.
+
+    Two threads in one pymunk space hang or crash the process. In other engines they would corrupt the step.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        """Acquire the lock.
+
+        Raises:
+            RuntimeError: the lock is held already.
+        """
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError("a step or action of the simulation is still in progress, perhaps in another thread")
+
+    def __exit__(self, *_: object) -> None:
+        """Release the lock."""
+        self._lock.release()
+
+
+class BaseSimulation(ABC):
+    """Simulation that advances by time steps dt until it ends. One thread at a time may use it."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._turn = StepLock()
+        self._steps, self._part = 0, 0.0
+        self._ended = False
+        self.patience: float | None = None
+        """s, largest computing time of a step; engines check it where they can. None: unlimited"""
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse copying and pickling: a copied pymunk space silently computes other contacts than the original."""
+        raise TypeError("a running simulation cannot be copied; start its scene again and repeat its actions")
+
+    @property
+    @abstractmethod
+    def setup(self) -> Setup:
+        """State from which the simulation started, with the changes that actions have made to its scene."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, with all changes that actions have made."""
+        return self.setup.scene
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return (self._steps + self._part) * self._settings.dt
+
+    @property
+    def substeps(self) -> int:
+        """Number of substeps so far, including a shortened last one."""
+        return self._steps * self._settings.substeps + math.ceil(self._part * self._settings.substeps)
+
+    @property
+    def settings(self) -> Settings:
+        """The settings, with every default chosen by the engine filled in."""
+        return self._settings
+
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """Time in s, by index in `setup.links`, at which joints broke."""
+        return {}
+
+    @property
+    def plane_reach(self) -> PlaneReach | None:
+        """Present extent of half-planes as (x, y, distance), m; None if they are infinite."""
+        return None
+
+    @abstractmethod
+    def frame(self) -> Frame:
+        """Return the present state."""
+
+    @abstractmethod
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy change, J, by each cause since the first call."""
+
+    def _after(self, substeps: int) -> float:
+        """Return the time after a number of substeps of the present step, s.
+
+        After all of them it is the next frame's time.
+        """
+        return (self._steps + substeps / self._settings.substeps) * self._settings.dt
+
+    def state_hash(self) -> str:
+        """Return the SHA-256 of the time and the state of every body."""
+        return self.frame().state_hash()
+
+    def close(self) -> None:
+        """End the simulation and release what it holds."""
+        self._ended = True
+
+    def _check_running(self) -> None:
+        if self._ended:
+            raise RuntimeError("the simulation has ended; its state can be read, but it cannot continue")
+
+    @staticmethod
+    def _check_part(part: float) -> None:
+        if not 0.0 < part < 1.0:
+            raise ValueError(f"a last part of {part} steps; it must be greater than 0 and less than 1")
+
+
+FARTHEST = 1e17
+"""m, largest distance from the origin; ten times the largest start position of a scene"""
+
+FASTEST = 1e13
+"""m/s, largest speed; ten times the largest start speed of a scene"""
+
+BEYOND = "is not finite, or is out of range"
+
+
+SLOP_PER_RADIUS = 0.01
+"""Default slop as a fraction of the smallest radius or half width. pymunk's default of 0.1 m would let a ball of 5 cm
+rest 10 cm deep."""
+
+BIAS = (1.0 - 0.1) ** 60
+"""pymunk's default: a tenth of an overlap is corrected in 1/60 s."""
+
+
+def slop_of(start: Scene | Setup) -> float:
+    """Return the default slop, m: the overlap that is not corrected.
+
+    It follows from the thinnest body that can collide.
+    """
+    bodies = Setup.of(start).bodies
+    touching = np.asarray([e.collides != "none" for e in bodies.elements], dtype=bool)[bodies.element]
+    thinnest = float(bodies.thin[touching].min()) if touching.any() else 1.0
+    return min(SLOP_PER_RADIUS * thinnest, MAX_SLOP)

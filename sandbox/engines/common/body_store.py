@@ -1,0 +1,258 @@
+"""State of all bodies of a running simulation as arrays, and their collision masks."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.actions import derive_contacts, has_same_bodies
+from sandbox.engines.common.base import FARTHEST, FASTEST
+from sandbox.engines.common.colliders import StaticColliders, static_colliders
+from sandbox.engines.common.kernel import kernel
+from sandbox.engines.common.lifetimes import Lifetimes
+from sandbox.engines.common.motors import rate_after_level_change
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.drives import Mount, about_hinge, mounts
+from sandbox.scene.compile.joint_arrays import Links
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import BodySource, BodySpec, Collides
+from sandbox.scene.description.forces import PlungerDrive, TorqueDrive
+from sandbox.scene.scene import Scene
+
+NOTHING, FIXED, ALL = 0, 1, 2
+"""Collision masks of `BodyStore.meets`: a body collides with nothing, with static and fixed bodies, or with everything.
+They follow from `collides`; a removed body collides with nothing."""
+
+MEETS: dict[Collides, int] = {"none": NOTHING, "fixed": FIXED, "all": ALL}
+
+
+class BodyStore:
+    """State and collision masks of all bodies of a running scene, as arrays. Engines advance the arrays in place."""
+
+    def __init__(self, setup: Setup, h: float) -> None:
+        self.setup, self.h = setup, h
+        scene, bodies = setup.scene, setup.bodies
+        self.fixtures: StaticColliders = static_colliders(scene)
+        self.position: FloatArray = bodies.position.copy()
+        self.velocity: FloatArray = bodies.velocity.copy()
+        self.angle: FloatArray = bodies.angle.copy()
+        self.angular_velocity: FloatArray = bodies.angular_velocity.copy()
+        self.roll: FloatArray = bodies.roll.copy()
+        """(N, 2) rad/s, angular velocity about x and y, of spheres on a surface"""
+        self.present: BoolArray = np.ones(len(bodies), dtype=np.bool_)
+        self.force: FloatArray = np.zeros((len(bodies), 2))
+        """(N, 2) N, constant forces by actions"""
+        self.torque: FloatArray = np.zeros(len(bodies))
+        """(N,) N·m, constant torques by actions"""
+        self.throttles: FloatArray = np.asarray([0.0 if t.key else 1.0 for t in scene.thrusts], dtype=np.float64)
+        """level of each thrust of the scene, 0 to 1"""
+        self.layer: IntArray = bodies.layer.copy()
+        """(N,) collision layer of each body, by its index in the scene's `layers`"""
+        self.visits: IntArray = bodies.visits.copy()
+        """(N, Z) state of each body with regard to each zone"""
+        self.caught: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
+        """(N,) whether a zone holds the body in place"""
+        self.drives: FloatArray = setup.drives.copy()
+        """(D, 3) state of each drive, as in `Frame.drives`"""
+        self._mounts: dict[str, Mount] = mounts(scene)
+        self._retired: dict[int, float] = {}
+        self._broken: dict[int, float] = {}
+        self._lifetimes = Lifetimes(bodies, setup.time, h)
+        self._has_torque: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
+        self._rebuild(setup, bodies, contact_matrix(setup))
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, with all changes that actions have made."""
+        return self.setup.scene
+
+    def _rebuild(self, setup: Setup, bodies: Bodies, meet: ContactMatrix) -> None:
+        """Derive the arrays that depend on the set of bodies and their materials."""
+        self.setup, self.bodies, self.meet = setup, bodies, meet
+        surfaces = meet.surfaces
+        self.radius: FloatArray = bodies.radius
+        self.surface: IntArray = surfaces.of_body
+        self.fixed_surface: IntArray = surfaces.of_fixed
+        self.restitution: FloatArray = surfaces.restitution
+        self.friction: FloatArray = surfaces.friction
+        self.falloff: FloatArray = surfaces.falloff
+        kinds = np.asarray([MEETS[element.collides] for element in bodies.elements], dtype=np.int64)
+        self.meets: IntArray = np.where(self.present, kinds[bodies.element], NOTHING)
+        """(N,) `NOTHING`, `FIXED` (planes, walls, posts, fixed bodies) or `ALL`"""
+        moves = self.moving
+        self.inverse_mass: FloatArray = np.where(moves, 1.0 / bodies.mass, 0.0)
+        # A body that nothing can turn gets no inverse moment: its spin stays the same, bit for bit.
+        turns = moves & (meet.turnable | self._has_torque)
+        self.inverse_moment: FloatArray = np.where(turns, 1.0 / bodies.moment, 0.0)
+        self.held: dict[int, Mount] = {}
+        """how drives hold the present bodies, by body index"""
+        if self._mounts:
+            self._rebuild_driven()
+
+    def _rebuild_driven(self) -> None:
+        """Set up driven bodies: their hinges, and their inverse masses as the solver sees them."""
+        names, bodies = self.bodies.names, self.bodies
+        indices = {names.index(name): mount for name, mount in self._mounts.items() if name in names}
+        self.held = {n: mount for n, mount in sorted(indices.items()) if self.present[n]}
+        self.hinge: FloatArray = np.zeros((len(bodies), 2))
+        """(N, 2) m, in the body's frame, the point about which it turns: its centre unless it is on a hinge"""
+        self.led: BoolArray = np.zeros(len(bodies), np.bool_)
+        """(N,) moves along its path whatever it collides with (kinematic)"""
+        for n, mount in self.held.items():
+            self.hinge[n], self.led[n] = mount.hinge, not isinstance(mount.drive, TorqueDrive)
+            about = about_hinge(mount, float(bodies.mass[n]), float(bodies.moment[n]))
+            self.inverse_mass[n], self.inverse_moment[n] = 0.0, 0.0 if self.led[n] else 1.0 / about
+
+    @property
+    def links(self) -> Links:
+        """The joints that are intact and whose bodies are present."""
+        return self.setup.links.some(self.linked())
+
+    def linked(self) -> IntArray:
+        """Return the indices of the scene's joints that are intact and whose bodies are present."""
+        links, there = self.setup.links, np.append(self.present, True)  # index −1, the world, is the last entry
+        holds = there[links.a] & there[links.b]
+        holds[list(self._broken)] = False
+        return np.flatnonzero(holds)
+
+    def throttle(self, index: int, level: float) -> None:
+        """Set the level of a thrust, by its index in the scene: the fraction of its force that acts."""
+        self.throttles[index] = level
+
+    def drive(self, index: int, level: float) -> None:
+        """Set the level of a drive, by its index in the scene."""
+        before, _, rate = self.drives[index].tolist()
+        if isinstance(self.scene.drives[index], PlungerDrive):
+            self.drives[index, 2] = rate_after_level_change(before, level, rate)
+        self.drives[index, 0] = level
+
+    @property
+    def mobile(self) -> BoolArray:
+        """(N,) whether each body is present and not fixed."""
+        return self.present & ~self.bodies.fixed
+
+    @property
+    def moving(self) -> BoolArray:
+        """(N,) whether each body is present, not fixed, and not held by a zone."""
+        return self.mobile & ~self.caught
+
+    @property
+    def gravity(self) -> FloatArray:
+        """Gravity, m/s²: (2,) for all bodies, or (N, 2) for each."""
+        return np.asarray(self.scene.world.gravity, dtype=np.float64)
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """Time in s, by body index, at which bodies left the scene."""
+        return MappingProxyType(self._retired)
+
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """Time in s, by index in `setup.links`, at which joints broke."""
+        return MappingProxyType(self._broken)
+
+    def part(self, links: IntArray, time: float) -> None:
+        """Mark joints, by their indices, as broken since a time, s."""
+        self._broken |= dict.fromkeys(links.tolist(), time)
+
+    def motion(self, index: int) -> tuple[FloatArray, float]:
+        """Return the velocity (2,), m/s, and the angular velocity, rad/s, of a body."""
+        return self.velocity[index].copy(), float(self.angular_velocity[index])
+
+    def set_velocity(self, index: int, velocity: FloatArray) -> None:
+        """Set the velocity of a body, m/s."""
+        self.velocity[index] = velocity
+
+    def set_spin(self, index: int, spin: float) -> None:
+        """Set the angular velocity of a body, rad/s."""
+        self.angular_velocity[index] = spin
+
+    def set_roll(self, index: int, roll: tuple[float, float]) -> None:
+        """Set the angular velocity of a sphere on a surface about x and y, rad/s."""
+        self.roll[index] = roll
+
+    def push(self, index: int, force: FloatArray, torque: float) -> None:
+        """Apply a constant force (N) and torque (N·m) to a body from now on."""
+        self.force[index], self.torque[index] = force, torque
+        if torque and not self._has_torque[index]:
+            self._has_torque[index] = True
+            self._rebuild(self.setup, self.bodies, self.meet)
+
+    def put(self, index: int, position: FloatArray) -> None:
+        """Set the position of a body, m."""
+        self.position[index] = position
+
+    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
+        """Accept every position: bodies may start anywhere."""
+
+    def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
+        """Continue with a changed scene. Only air, gravity, coefficients, points of walls and solid flags may differ.
+
+        Raises:
+            ActionError: the scene would have more different surfaces than allowed.
+        """
+        scene = setup.scene
+        if spawned is None and has_same_bodies(scene, self.scene):
+            self.setup = setup
+            return
+        spawned = self.bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
+        bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
+        meet = derive_contacts(setup, bodies)
+        if scene.fixed != self.scene.fixed:
+            self.fixtures = static_colliders(scene)
+        self._rebuild(setup, bodies, meet)
+
+    def add(self, single: BodySpec, name: str) -> int:
+        """Add a body that has been checked, and return its index.
+
+        Raises:
+            ActionError: the scene would have more different surfaces than allowed.
+        """
+        bodies = self.bodies.joined_by(single, name)
+        meet = derive_contacts(self.setup, bodies)
+        self.position = np.vstack((self.position, bodies.position[-1:]))
+        self.velocity = np.vstack((self.velocity, bodies.velocity[-1:]))
+        self.roll = np.vstack((self.roll, bodies.roll[-1:]))
+        self.angle = np.append(self.angle, bodies.angle[-1])
+        self.angular_velocity = np.append(self.angular_velocity, bodies.angular_velocity[-1])
+        self.present = np.append(self.present, True)
+        self.force, self.torque = np.vstack((self.force, np.zeros((1, 2)))), np.append(self.torque, 0.0)
+        self._has_torque, self.caught = np.append(self._has_torque, False), np.append(self.caught, False)
+        self.layer = np.append(self.layer, bodies.layer[-1])
+        self.visits = np.vstack((self.visits, bodies.visits[-1:]))
+        self._rebuild(self.setup, bodies, meet)
+        return len(bodies) - 1
+
+    def take_out(self, indices: IntArray, time: float) -> None:
+        """Remove bodies at a time, s. Their rows stay in the arrays, with zero velocity."""
+        self.present[indices] = False
+        self.velocity[indices], self.angular_velocity[indices], self.roll[indices] = 0.0, 0.0, 0.0
+        self.force[indices], self.torque[indices] = 0.0, 0.0
+        self.caught[indices] = False
+        self._retired |= dict.fromkeys(indices.tolist(), time)
+        self._rebuild(self.setup, self.bodies, self.meet)
+
+    def expired(self, time: float) -> IntArray:
+        """Return the indices of the bodies to be removed at a time, s: by their lifetime or by world.bounds, (K,)."""
+        return self._lifetimes.expired(time, self.position, self.present, self.bodies.fixed, self.scene.world.bounds)
+
+    def beyond(self) -> int | None:
+        """Return the index of a body that is not finite or out of bounds; None if there is none."""
+        worst = first_beyond(self.position, self.velocity, self.angle, self.angular_velocity)
+        return None if worst < 0 else worst
+
+
+@kernel
+def first_beyond(position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray) -> int:
+    """Return the index of the first of N bodies that is not finite or out of bounds; −1 if there is none."""
+    for i in range(len(position)):
+        # Comparisons with nan are false, so a nan anywhere makes `good` false.
+        good = position[i, 0] ** 2 + position[i, 1] ** 2 <= FARTHEST * FARTHEST
+        good = good and velocity[i, 0] ** 2 + velocity[i, 1] ** 2 <= FASTEST * FASTEST
+        if not (good and abs(spin[i]) < math.inf and abs(angle[i]) < math.inf):
+            return i
+    return -1

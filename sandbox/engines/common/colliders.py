@@ -1,0 +1,124 @@
+"""Static colliders: the planes, walls and posts of a scene as arrays, for the hand-written engines.
+
+Where two segments of a wall join, their ends are no edges of the wall: a body that slides or rolls from one to the
+other must not collide with a corner there. So points in line with their neighbours are removed, and each segment knows
+how the wall continues at its ends (ghost vertices, as in Box2D's chain shapes). The ends of an open wall, and corners,
+are solid.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.fixed import Plane, Wall
+from sandbox.scene.scene import Scene
+
+IN_LINE = 4 * 2.0**-52
+"""Distance of a point from the line through its neighbours, as a fraction of its coordinates, up to which it is in
+line: two roundings of each coordinate."""
+
+LEAN = 1e-9
+"""Sine of the angle up to which a contact normal does not lean over a joint of a wall; below it is rounding."""
+
+SIDEWAYS = 0.1
+"""A normal whose angle to a segment's direction has a smaller sine does not show on which side of the segment a body
+is."""
+
+
+class StaticColliders(NamedTuple):
+    """Static colliders. Collider k (planes, walls, posts in scene order) has index k here and −1 − k in contacts."""
+
+    planes: FloatArray
+    """(P, 4) a point of the surface, m, and the unit normal pointing out of the solid"""
+    plane_thing: IntArray
+    """(P,) index of the collider of each plane"""
+    segments: FloatArray
+    """(G, 5) both ends and half the thickness, m; a post is a segment of length 0"""
+    segment_thing: IntArray
+    """(G,) index of the collider that each segment belongs to"""
+    joints: FloatArray
+    """(G, 4) m, from the two ends of a segment to the far ends of its neighbours; 0 where the wall ends"""
+
+
+class WallSegment(NamedTuple):
+    """Straight part of a wall."""
+
+    a: Point
+    b: Point
+    before: Point | None
+    """m, the other end of the segment that ends at `a`; None where the wall begins"""
+    after: Point | None
+    """m, the other end of the segment that begins at `b`; None where the wall ends"""
+
+    @property
+    def joints(self) -> tuple[float, float, float, float]:
+        """Displacements from the two ends to the far ends of the neighbours, m; 0 where the wall ends."""
+        before, after = self.before or self.a, self.after or self.b
+        return before[0] - self.a[0], before[1] - self.a[1], after[0] - self.b[0], after[1] - self.b[1]
+
+
+def wall_segments(wall: Wall) -> list[WallSegment]:
+    """Return the straight parts of a wall in order. Points in line with their neighbours do not divide it."""
+    line = straightened(wall)
+    looped = line[0] == line[-1] and len(line) > 3
+    found = []
+    for k in range(len(line) - 1):
+        before = line[k - 1] if k > 0 else line[-2] if looped else None
+        after = line[k + 2] if k + 2 < len(line) else line[1] if looped else None
+        found.append(WallSegment(line[k], line[k + 1], before, after))
+    return found
+
+
+def straightened(wall: Wall) -> tuple[Point, ...]:
+    """Return the points of a wall without those in line with their neighbours.
+
+    A closed wall ends with its first point.
+    """
+    points = (*wall.points, wall.points[0]) if wall.closed else wall.points
+    kept = [points[0]]
+    for k in range(1, len(points) - 1):
+        if not _in_line(kept[-1], points[k], points[k + 1]):
+            kept.append(points[k])
+    return *kept, points[-1]
+
+
+def _in_line(a: Point, b: Point, c: Point) -> bool:
+    """Return whether b lies between a and c, on the line through them up to rounding."""
+    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]
+    if ux * vx + uy * vy <= 0.0:
+        return False
+    off = abs(ux * vy - uy * vx) / math.hypot(c[0] - a[0], c[1] - a[1])
+    return off <= IN_LINE * max(map(abs, (*a, *b, *c)))
+
+
+def static_colliders(scene: Scene, everything: bool = False) -> StaticColliders:
+    """Return a scene's static colliders as arrays: the solid ones, or all with `everything`."""
+    planes, segments, joints = [], [], []
+    for k, collider in enumerate(scene.fixed):
+        if not (isinstance(collider, Plane) or collider.solid or everything):
+            continue
+        if isinstance(collider, Plane):
+            # Scale first: the square of a very long or short normal would overflow or underflow.
+            largest = max(abs(collider.normal[0]), abs(collider.normal[1]))
+            x, y = collider.normal[0] / largest, collider.normal[1] / largest
+            length = math.hypot(x, y)
+            planes.append((k, *collider.point, x / length, y / length))
+        elif isinstance(collider, Wall):
+            parts = wall_segments(collider)
+            segments += [(k, *part.a, *part.b, collider.thickness / 2.0) for part in parts]
+            joints += [part.joints for part in parts]
+        else:
+            segments.append((k, *collider.position, *collider.position, collider.radius))
+            joints.append((0.0, 0.0, 0.0, 0.0))
+    flat = np.asarray(planes, dtype=np.float64).reshape(-1, 5)
+    thin = np.asarray(segments, dtype=np.float64).reshape(-1, 6)
+    return StaticColliders(
+        flat[:, 1:].copy(),
+        flat[:, 0].astype(np.int64),
+        thin[:, 1:].copy(),
+        thin[:, 0].astype(np.int64),
+        np.asarray(joints, dtype=np.float64).reshape(-1, 4),
+    )

@@ -1,0 +1,118 @@
+"""Energy of a state, energy changes attributed to a cause, and ledgers that continue on another engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sandbox.arrays import FloatArray
+from sandbox.engines.contract import Simulation
+from sandbox.engines.energy_ledger import Cause, EnergyLedger
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.potential import Potential
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Frame
+
+if TYPE_CHECKING:
+    from sandbox.engines.contract import Simulation
+
+
+def energy_of(
+    frame: Frame,
+    bodies: Bodies,
+    gravity: tuple[float, float],
+    start: Scene | Setup | None = None,
+    breaks: FloatArray | None = None,
+) -> tuple[float, float, float]:
+    """Return the kinetic, potential and total energy of a state, J, of present bodies that are not fixed.
+
+    Args:
+        frame: the state.
+        bodies: at least those of the frame, with the same indices.
+        gravity: m/s².
+        start: adds the energy of the springs and attractions of this scene or setup; None: none.
+        breaks: (J,) s, time at which each joint of the scene broke; inf if it did not. None: no joint broke.
+    """
+    count = len(frame.position)
+    counts = frame.present & ~bodies.fixed[:count]
+    mass, moment = bodies.mass[:count][counts], bodies.moment[:count][counts]
+    with np.errstate(over="ignore", invalid="ignore"):  # a diverged state squares to infinity
+        squared = np.einsum("nk,nk->n", frame.velocity[counts], frame.velocity[counts])
+        kinetic = 0.5 * float(mass @ squared + moment @ np.square(frame.angular_velocity[counts]))
+        if frame.roll is not None:
+            kinetic += 0.5 * float(moment @ np.square(frame.roll[counts]).sum(axis=1))
+        potential = -float(mass @ (frame.position[counts] @ np.asarray(gravity)))
+        if start is not None:
+            known = bodies if count == len(bodies) else bodies.some(np.arange(count))
+            stored = Potential(start, known, breaks=breaks)
+            if stored:
+                state = frame.position[None], frame.angle[None], frame.present[None]
+                potential += float(stored.at(np.asarray([frame.time]), *state)[0])
+        return kinetic, potential, kinetic + potential
+
+
+def total_energy(simulation: Simulation) -> float:
+    """Return the energy of the present state, J."""
+    setup, broken = simulation.setup, simulation.broken
+    breaks = np.full(len(setup.links), np.inf)
+    breaks[list(broken)] = list(broken.values())
+    return energy_of(simulation.frame(), simulation.bodies, setup.scene.world.gravity, setup, breaks)[2]
+
+
+@contextmanager
+def booked(account: EnergyLedger | None, cause: Cause, simulation: Simulation) -> Iterator[None]:
+    """Attribute the energy change of a simulation within the context to a cause. Without an account do nothing.
+
+    If the body of the context raises, nothing is entered: the simulation is unchanged then.
+    """
+    before = 0.0 if account is None else total_energy(simulation)
+    yield
+    if account is not None:
+        account.enter(cause, total_energy(simulation) - before)
+
+
+class LedgerHandover:
+    """Energy by cause, J, over consecutive simulations. Changes made between them are actions.
+
+    Nothing is recorded before the first call of `entries`.
+    """
+
+    def __init__(self) -> None:
+        self._past: EnergyLedger | None = None  # sum of earlier simulations and of handovers
+
+    def entries(self, present: Simulation) -> Mapping[Cause, float]:
+        """Return the energy change by each cause since the first call, J, including the present simulation's ledger."""
+        if self._past is None:
+            self._past = EnergyLedger()
+        own = present.account()
+        return {cause: energy + own[cause] for cause, energy in self._past.entries().items()}
+
+    @contextmanager
+    def passing(self, whole: Simulation, heir: Simulation) -> Iterator[None]:
+        """Attribute the energy change while `heir` replaces the simulation of `whole` to `ACTIONS`."""
+        if self._past is None:
+            yield
+            return
+        energy, entries = total_energy(whole), whole.account()
+        yield
+        self._past = EnergyLedger()
+        for cause, brought in entries.items():
+            self._past.add(cause, brought)
+        heir.account()
+        self._past.enter(Cause.ACTIONS, total_energy(whole) - energy)
+
+    @contextmanager
+    def hands(self, present: Simulation) -> Iterator[None]:
+        """Attribute the work of mouse joints in the context to `DRIVES`. To an engine their impulses are actions."""
+        if self._past is None:
+            yield
+            return
+        before = present.account()[Cause.ACTIONS]
+        yield
+        work = present.account()[Cause.ACTIONS] - before
+        self._past.enter(Cause.DRIVES, work)
+        self._past.enter(Cause.ACTIONS, -work)

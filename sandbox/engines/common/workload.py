@@ -1,0 +1,39 @@
+"""Workload: the cost of a step of a fixed-step engine, estimated from the scene before anything is allocated."""
+
+import numpy as np
+
+from sandbox.resource_limits import PAIRS, STEP_WORK
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
+from sandbox.scene.validate.bodies import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps
+
+CONTACTS_PER_BODY = 2
+"""Contacts per body in a heap. In a stack of boxes, each box has one contact of two points."""
+DETECTION_COST = 10
+"""Cost of finding one contact in a substep, in iterations of one contact."""
+
+
+def overload(start: Scene | Setup, settings: Settings) -> list[str]:
+    """Return why a step would take too long: because of its iterations, or of its attractions."""
+    setup = Setup.of(start)
+    scene, bodies = setup.scene, setup.bodies
+    touching = np.asarray([element.collides != "none" for element in bodies.elements], np.bool_)[bodies.element]
+    moving = touching & ~bodies.fixed
+    movers = int(moving.sum())
+    iterations = (settings.iterations + DETECTION_COST) * settings.substeps
+    max_overlaps = MAX_OVERLAPS + MAX_OVERLAPS_EACH * movers  # validation refuses a scene that starts with more
+    overlaps = 0
+    if max_overlaps * iterations > STEP_WORK.value:  # rare; other scenes need no search for overlaps
+        overlaps = count_overlaps(bodies.position[moving], bodies.core[moving], max_overlaps)
+    rows = max(CONTACTS_PER_BODY * movers, overlaps) + len(setup.links)
+    solved = STEP_WORK.refusal(
+        f"a step of up to {rows:,} contacts and joints × ({settings.iterations:,} iterations + {DETECTION_COST} for "
+        f"detection) × {settings.substeps:,} substeps takes work of",
+        rows * iterations,
+    )
+    pulls = PAIRS.refusal(
+        f"{len(scene.attractions):,} attractions of {len(bodies):,} bodies need this many pairs per step:",
+        len(scene.attractions) * len(bodies) * settings.substeps,
+    )
+    return [reason for reason in (solved, pulls) if reason is not None]

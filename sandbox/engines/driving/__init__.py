@@ -1,1 +1,0 @@
-"""Driving: how drives move their bodies while these meet nothing, whichever engine runs them."""

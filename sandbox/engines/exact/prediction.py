@@ -1,0 +1,258 @@
+"""Prediction: the next event of a ball, from closed-form motion.
+
+The earliest over all lines, vertices and balls is found by computing each time of impact; a ball costs O(F + K + N).
+Each later candidate is bounded by the best time so far.
+"""
+
+import math
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.body_store import ALL
+from sandbox.engines.common.kernel import bare_kernel as kernel
+from sandbox.engines.exact import state as c
+from sandbox.engines.exact.impact import position_at
+from sandbox.engines.exact.roots import NOISE, curved_entry, line_entry, pair_entry
+from sandbox.engines.exact.state import EventState
+
+
+@kernel
+def nearest_vertex(
+    vertices: FloatArray,
+    state: FloatArray,
+    i: int,
+    now: float,
+    residual: float,
+    best: float,
+    met: int,
+    skip: int,
+    other: int,
+) -> tuple[int, float]:
+    """Return the vertex that a ball hits first and the time until then, s, if less than `best`; else −1.
+
+    Args:
+        vertices: all vertices.
+        state: of all balls.
+        i: ball.
+        now: s.
+        residual: s, part of the time that rounding has cut off `now`.
+        best: s.
+        met: vertex of the collision that the ball has just had, or −1.
+        skip: vertex at an end of the supporting line, to which the path of the ball is tangent; or −1.
+        other: likewise.
+    """
+    x, y, vx, vy = position_at(state, i, now, residual)
+    ax, ay, radius = state[i, c.AX], state[i, c.AY], state[i, c.RADIUS]
+    straight, speed, partner = ax == 0.0 and ay == 0.0, abs(vx) + abs(vy), -1
+    for k in range(len(vertices)):
+        if k in (skip, other) or (straight and k == met) or vertices[k, c.SOLID] == 0.0:
+            continue
+        dx, dy, reach = vertices[k, c.CENTRE_X] - x, vertices[k, c.CENTRE_Y] - y, vertices[k, c.CIRCLE_RADIUS] + radius
+        if straight:
+            tau = pair_entry(dx, dy, -vx, -vy, reach, speed)
+        else:
+            tau = curved_entry(dx, dy, -vx, -vy, -ax, -ay, reach, k == met, best)
+        if tau < best:
+            best, partner = tau, k
+    return partner, best
+
+
+@kernel
+def nearest_ball(
+    state: FloatArray, tags: IntArray, targets: IntArray, i: int, now: float, residual: float, best: float
+) -> tuple[int, float]:
+    """Return the ball that a ball hits first and the time until then, s, if less than `best`; else −1."""
+    x, y, vx, vy = position_at(state, i, now, residual)
+    ax, ay, size = state[i, c.AX], state[i, c.AY], state[i, c.RADIUS]
+    hits_all = tags[i, c.COLLISION_MASK] == ALL
+    just_hit = state[i, c.LAST_TIME] == now and tags[i, c.LAST_KIND] == c.BALL
+    last, partner, speed = tags[i, c.LAST_PARTNER], -1, abs(vx) + abs(vy)
+    for k in range(len(targets)):
+        j = targets[k]
+        if j == i or not (hits_all or state[j, c.INVERSE_MASS] == 0.0):
+            continue
+        tau = (now - state[j, c.T]) + (residual - state[j, c.TIME_RESIDUAL])
+        bx, by, reach = state[j, c.AX] - ax, state[j, c.AY] - ay, size + state[j, c.RADIUS]
+        straight = bx == 0.0 and by == 0.0
+        wx, wy = state[j, c.VX] + state[j, c.AX] * tau, state[j, c.VY] + state[j, c.AY] * tau
+        ux, uy = wx - vx, wy - vy
+        dx = state[j, c.X] + 0.5 * (state[j, c.VX] + wx) * tau - x
+        dy = state[j, c.Y] + 0.5 * (state[j, c.VY] + wy) * tau - y
+        # Most balls recede, or cannot arrive before `best`. The tests are combined with |, because separate branches
+        # would be mispredicted. The slack exceeds rounding.
+        ahead = best * 1.000001
+        far = (dx * ux + dy * uy >= 0.0) | (abs(dx) > reach + abs(ux) * ahead) | (abs(dy) > reach + abs(uy) * ahead)
+        if straight & far:
+            continue
+        met = just_hit and last == j
+        if met and state[j, c.INVERSE_MASS] > 0.0:
+            met = state[j, c.LAST_TIME] == now and tags[j, c.LAST_KIND] == c.BALL and tags[j, c.LAST_PARTNER] == i
+        if not straight:
+            after = curved_entry(dx, dy, ux, uy, bx, by, reach, met, best)
+        elif met:
+            continue
+        else:
+            after = pair_entry(dx, dy, ux, uy, reach, speed + abs(wx) + abs(wy))
+        if after < best:
+            best, partner = after, j
+    return partner, best
+
+
+PARALLEL_ANGLE = 1e-5
+"""rad: lines whose normals differ by less are continuous: a ball rolls from one on to the other. A collision at so flat
+a joint would change its velocity by 1e-5 of it, and rounding would decide whether it is found."""
+
+
+@kernel
+def are_parallel(lines: FloatArray, f: int, g: int) -> bool:
+    """Return whether two lines have the same normal, within `PARALLEL_ANGLE`."""
+    cross = lines[f, c.NX] * lines[g, c.NY] - lines[f, c.NY] * lines[g, c.NX]
+    dot = lines[f, c.NX] * lines[g, c.NX] + lines[f, c.NY] * lines[g, c.NY]
+    return bool(dot > 0.0 and abs(cross) <= PARALLEL_ANGLE)
+
+
+@kernel
+def line_time(
+    lines: FloatArray,
+    f: int,
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    ax: float,
+    ay: float,
+    radius: float,
+    met: bool,
+) -> float:
+    """Return the time until a ball hits a line, s, or infinity.
+
+    Args:
+        lines: all lines.
+        f: index of the line.
+        x: position of the ball, m.
+        y: likewise.
+        vx: its velocity, m/s.
+        vy: likewise.
+        ax: its acceleration, m/s².
+        ay: likewise.
+        radius: m.
+        met: whether they have just collided; a speed of approach is rounding error then.
+    """
+    nx, ny, length = lines[f, c.NX], lines[f, c.NY], lines[f, c.LENGTH]
+    b, a = vx * nx + vy * ny, ax * nx + ay * ny
+    if abs(b) <= NOISE * (abs(vx) + abs(vy)) or (met and b < 0.0):
+        b = 0.0
+    if abs(a) <= NOISE * (abs(ax) + abs(ay)):
+        a = 0.0
+    if b >= 0.0 and a >= 0.0:
+        return math.inf
+    rx, ry = x - lines[f, c.PX], y - lines[f, c.PY]
+    gap = rx * nx + ry * ny - radius
+    if length == math.inf:
+        return line_entry(max(gap, 0.0), b, a)
+    foot = rx * lines[f, c.UX] + ry * lines[f, c.UY]
+    if 0.0 <= foot <= length and gap + radius + lines[f, c.HALF_THICKNESS] > 0.0:
+        gap = max(gap, 0.0)  # in contact: an overlap is rounding, or tolerated at the start
+    tau = line_entry(gap, b, a)
+    if tau < math.inf:
+        along = foot + ((vx + 0.5 * ax * tau) * lines[f, c.UX] + (vy + 0.5 * ay * tau) * lines[f, c.UY]) * tau
+        if along < 0.0 or along > length:
+            return math.inf
+    return tau
+
+
+@kernel
+def line_end_time(lines: FloatArray, f: int, x: float, y: float, vx: float, vy: float, ax: float, ay: float) -> float:
+    """Return the time until a supported ball reaches an end of its line, s, or infinity."""
+    length, ux, uy = lines[f, c.LENGTH], lines[f, c.UX], lines[f, c.UY]
+    if length == math.inf:
+        return math.inf
+    foot = min(max((x - lines[f, c.PX]) * ux + (y - lines[f, c.PY]) * uy, 0.0), length)
+    v, a = vx * ux + vy * uy, ax * ux + ay * uy
+    return min(line_entry(foot, v, a), line_entry(length - foot, -v, -a))
+
+
+@kernel
+def predict_next_event(data: EventState, i: int, now: float, residual: float) -> None:
+    """Predict and store the earliest event of a ball after `now`."""
+    data.counts[c.PREDICTIONS] += 1
+    data.counts[c.PAIR_TESTS] += len(data.lines) + len(data.vertices) + len(data.targets)
+    find_next_event(
+        data.state,
+        data.tags,
+        data.next_time,
+        data.lines,
+        data.line_tags,
+        data.vertices,
+        data.targets,
+        i,
+        now,
+        residual,
+    )
+
+
+@kernel
+def find_next_event(
+    state: FloatArray,
+    tags: IntArray,
+    next_time: FloatArray,
+    lines: FloatArray,
+    line_tags: IntArray,
+    vertices: FloatArray,
+    targets: IntArray,
+    i: int,
+    now: float,
+    residual: float,
+) -> None:
+    """Do so, with few arrays as arguments instead of `EventState`, which saves reference counting.
+
+    Of simultaneous events the first in this order counts: end of slip, end of the line, lines, vertices, balls, each by
+    ascending index.
+    """
+    x, y, vx, vy = position_at(state, i, now, residual)
+    ax, ay, radius = state[i, c.AX], state[i, c.AY], state[i, c.RADIUS]
+    best, kind, partner = math.inf, c.NONE, -1
+    just_hit = state[i, c.LAST_TIME] == now
+    last_kind, last_partner = tags[i, c.LAST_KIND], tags[i, c.LAST_PARTNER]
+    s1, s2 = tags[i, c.SUPPORT], tags[i, c.SUPPORT + 1]
+    if state[i, c.SLIP_END_TIME] < math.inf:
+        best, kind = max((state[i, c.SLIP_END_TIME] - now) - residual, 0.0), c.SLIP_END
+    if s1 >= 0 and s2 < 0:
+        tau = line_end_time(lines, s1, x, y, vx, vy, ax, ay)
+        if tau < best:
+            best, kind, partner = tau, c.LINE_END, s1
+
+    for f in range(len(lines)):
+        if s1 >= 0 and (f in (s1, s2) or are_parallel(lines, f, s1)):
+            continue
+        if vx * lines[f, c.NX] + vy * lines[f, c.NY] >= 0.0 and ax * lines[f, c.NX] + ay * lines[f, c.NY] >= 0.0:
+            continue
+        if just_hit and last_kind == c.LINE_END and last_partner == f:
+            continue  # it has just left this line over its end
+        met = just_hit and last_kind == c.LINE and last_partner == f
+        tau = line_time(lines, f, x, y, vx, vy, ax, ay, radius, met)
+        if tau < best:
+            best, kind, partner = tau, c.LINE, f
+
+    met_vertex, skip, other = -1, -1, -1
+    if just_hit and last_kind == c.VERTEX:
+        met_vertex = last_partner
+    if s1 >= 0:
+        skip, other = line_tags[s1, c.ENDS], line_tags[s1, c.ENDS + 1]
+    k, tau = -1, math.inf
+    if len(vertices) > 0:
+        k, tau = nearest_vertex(vertices, state, i, now, residual, best, met_vertex, skip, other)
+    if k >= 0:
+        best, kind, partner = tau, c.VERTEX, k
+    j, tau = nearest_ball(state, tags, targets, i, now, residual, best)
+    if j >= 0:
+        best, kind, partner = tau, c.BALL, j
+        tags[i, c.PARTNER_VERSION] = tags[j, c.VERSION]
+    # Two-sum (Knuth): times grow, and their rounding error would dominate the error of a long run.
+    after = best + residual
+    time = now + after
+    virtual = time - now
+    state[i, c.NEXT_RESIDUAL] = 0.0
+    if time < math.inf:
+        state[i, c.NEXT_RESIDUAL] = (now - (time - virtual)) + (after - virtual)
+    next_time[i] = time
+    tags[i, c.NEXT_KIND], tags[i, c.NEXT_PARTNER] = kind, partner

@@ -1,1 +1,0 @@
-"""rolling: event-driven spheres on a floor, which slide, roll and spin in closed form between events."""

@@ -1,0 +1,1 @@
+"""Event-driven simulation of balls and pucks on a horizontal surface."""

@@ -1,0 +1,1 @@
+"""Adapter onto pymunk: scenes as pymunk spaces. Only this package imports pymunk."""

@@ -1,0 +1,264 @@
+"""Collision callbacks: coefficients by pair, kicks and one-way walls.
+
+`PairCallbacks` sets the coefficients of individual contacts, for those pairs of surfaces that need it. Munk2D separates
+two bodies at e times their speed of approach before the substep's forces. For another speed of separation, the
+equivalent restitution is set in `pre_solve`, which is called after the forces. Resting bodies do not approach each
+other; they get no kick and no other restitution.
+
+`SpaceOneWayWalls` lets bodies that come from the right of a one-way wall pass, for as long as the two overlap. The
+pairs that are passing are part of a state: where a space continues from one, a body that lies on a wall begins a new
+contact at a speed of rounding, so that it could not be distinguished from one that leaves the wall.
+
+Munk2D keeps the decision of `begin` on a contact until the contact ends; `pre_solve` is called nevertheless.
+`separate`, which would report the end, cannot be used: it is called for present contacts when a space is freed, and
+pymunk has released its objects by then.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+import pymunk
+
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.engines.common.colliders import WallSegment
+from sandbox.engines.common.restitution import fraction_at, kick_gain, kicked, rebound
+from sandbox.engines.pymunk_adapter.internal_edges import smooth
+from sandbox.engines.pymunk_adapter.reader import address_of
+from sandbox.scene.compile.contacts import PairTable
+from sandbox.scene.description.world import Kick
+
+
+def closing_speed(arbiter: pymunk.Arbiter) -> float:
+    """Return the speed of approach along the normal, m/s; of two contact points, the larger."""
+    a, b = arbiter.shapes
+    first, second, n = a.body, b.body, arbiter.normal
+    assert first is not None and second is not None
+    along = (first.velocity - second.velocity).dot(n)
+    if not (_turns(a) or _turns(b)):
+        return float(along)
+    return float(
+        max(
+            along + _turning(first, point.point_a, n) - _turning(second, point.point_b, n)
+            for point in arbiter.contact_point_set.points
+        )
+    )
+
+
+def _turns(shape: pymunk.Shape) -> bool:
+    """Return whether a body's spin moves its surface along the normal: it does not for a disc about its centre."""
+    body = shape.body
+    assert body is not None
+    return body.angular_velocity != 0.0 and not (
+        isinstance(shape, pymunk.Circle) and shape.offset == body.center_of_gravity
+    )
+
+
+def _turning(body: pymunk.Body, point: pymunk.Vec2d, normal: pymunk.Vec2d) -> float:
+    """Return the velocity along a normal of a point of a body due to its spin, m/s."""
+    arm = point - body.local_to_world(body.center_of_gravity)  # the hinge, for a body on a hinge
+    return float(body.angular_velocity * (arm.x * normal.y - arm.y * normal.x))
+
+
+BodyWallPair: TypeAlias = tuple[int, int]
+"""The ids of a body and a wall."""
+
+
+class SpaceOneWayWalls:
+    """One-way walls of a space, and the bodies that are passing them."""
+
+    def __init__(self, space: pymunk.Space, h: float) -> None:
+        self._space, self._h = space, h
+        self.walls: set[pymunk.Shape] = set()
+        """segments of one-way walls"""
+        self.joints: dict[pymunk.Shape, WallSegment] = {}
+        """segments of all walls that continue at one of their ends"""
+        self.tick = 0
+        """number of substeps"""
+        self._handled: set[tuple[int, int]] = set()
+        self._passing: dict[BodyWallPair, dict[tuple[pymunk.Shape, pymunk.Shape] | None, int]] = {}
+        self._last = -1  # the last substep in which a body was passing
+        self._stopped: dict[BodyWallPair, int] = {}  # the substep in which a wall last stopped a body
+        self._is_resumed = False
+
+    def rebuild(self, surfaces: PairTable, touching: BoolArray) -> None:
+        """Add callbacks for the pairs (S, S) of surfaces of which one may be a one-way wall's."""
+        for a, b in np.argwhere(np.triu(touching & (surfaces.one_way | surfaces.one_way[:, None]))).tolist():
+            if (a, b) not in self._handled:
+                self._handled.add((a, b))
+                self._space.on_collision(a + 1, b + 1, begin=self._begin)
+
+    def resume(self, passing: Iterable[BodyWallPair]) -> None:
+        """Continue from a state in which some bodies were passing walls, given by ids."""
+        self._is_resumed = True
+        for pair in passing:
+            self._passing[pair], self._last = {None: self.tick}, self.tick
+
+    def passing(self) -> list[BodyWallPair]:
+        """Return the pairs that are passing now, by ids."""
+        if self._last != self.tick:
+            return []
+        return [pair for pair, pairs in self._passing.items() if self.tick in pairs.values()]
+
+    def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
+        if self.joints:
+            smooth(arbiter, self.joints)
+        wall, shape = self._wall_and_other(arbiter)
+        if wall is None:  # indices of surfaces change when bodies join
+            return
+        # At a joint of two segments of a wall both are in contact: the second follows the decision of the first.
+        passing = self._passing.setdefault(_body_wall_pair(shape, wall), {})
+        through = any(last >= self.tick - 1 and pair != (shape, wall) for pair, last in passing.items())
+        held = self._stopped.get(_body_wall_pair(shape, wall), -2) >= self.tick - 1
+        arbiter.process_collision = held or (not through and self._blocks(arbiter, wall, shape))
+
+    def note(self, arbiter: pymunk.Arbiter) -> None:
+        """Record whether a contact is ignored, as decided when it began."""
+        wall, shape = self._wall_and_other(arbiter)
+        if wall is None:
+            return
+        if arbiter.process_collision:
+            self._stopped[_body_wall_pair(shape, wall)] = self.tick
+        else:
+            self._passing.setdefault(_body_wall_pair(shape, wall), {})[shape, wall] = self._last = self.tick
+
+    def _wall_and_other(self, arbiter: pymunk.Arbiter) -> tuple[pymunk.Shape | None, pymunk.Shape]:
+        """Return the shape of a one-way wall, if one of the two is such, and the other shape."""
+        a, b = arbiter.shapes
+        if a in self.walls:
+            return a, b
+        return (b if b in self.walls else None), a
+
+    def _blocks(self, arbiter: pymunk.Arbiter, wall: pymunk.Shape, shape: pymunk.Shape) -> bool:
+        """Return whether a wall blocks a body that has just touched it: it came from the left and is not leaving.
+
+        Positions have moved by the velocity that the body still has, so its position a substep ago is known.
+        """
+        assert isinstance(wall, pymunk.Segment) and shape.body is not None
+        side = shape.bb.center() - shape.body.velocity * self._h - wall.a
+        if (wall.b - wall.a).cross(side) < 0.0:
+            return False
+        touched = self._is_resumed and self.tick == 1  # in contact before the space was created, and not passing
+        return touched or closing_speed(arbiter) >= 0.0
+
+
+def _body_wall_pair(shape: pymunk.Shape, wall: pymunk.Shape) -> BodyWallPair:
+    """Return the ids of a body and a wall."""
+    assert shape.body is not None and wall.body is not None
+    return shape.body.id, wall.body.id
+
+
+SegmentFractions = dict[pymunk.Shape, tuple[float, float]]
+"""Fractions of the wall's length at which each segment of a kicking wall begins and ends."""
+
+
+@dataclass
+class PairCoefficients:
+    """Coefficients of a pair of surfaces that factors cannot represent."""
+
+    restitution: float
+    friction: float
+    falloff: float = 0.0
+    kick: Kick | None = None
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether restitution is a constant."""
+        return self.falloff == 0.0 and self.kick is None
+
+
+class KickedContact(NamedTuple):
+    """Speeds of a contact with a kick."""
+
+    closing: float
+    """m/s, speed of approach"""
+    without_kick: float
+    """m/s, speed of separation without the kick"""
+    kick: float
+    """m/s, increase by the kick"""
+
+    @property
+    def work_per_impulse(self) -> float:
+        """Work of the kick, J, for each N·s of the contact's normal impulse."""
+        whole = self.without_kick + self.kick
+        return self.kick / (self.closing + whole) * 0.5 * (self.without_kick + whole)
+
+
+@dataclass
+class PairCallbacks:
+    """Coefficients by pairs of surfaces of a space, and the kicks of the last substep."""
+
+    space: pymunk.Space
+    one_way_walls: SpaceOneWayWalls
+    segment_fractions: SegmentFractions = field(default_factory=dict)
+    recorded_kicks: dict[int, KickedContact] | None = None
+    """contacts that were kicked in the last substep, by the address of the arbiter; filled if it is a dict"""
+    _known: dict[tuple[int, int], list[PairCoefficients]] = field(default_factory=dict)
+
+    def rebuild(self, surfaces: PairTable, wrong: set[tuple[int, int]], jointed: set[tuple[int, int]]) -> None:
+        """Set the pairs (a ≤ b) whose coefficients are set at each contact; all others no longer are.
+
+        Args:
+            surfaces: all.
+            wrong: pairs that factors cannot represent.
+            jointed: pairs of polygons and walls of several segments, whose normals are corrected.
+        """
+        for known in self._known.values():
+            known.clear()
+        for a, b in sorted(wrong | jointed):
+            kick = surfaces.surfaces[a].kick or surfaces.surfaces[b].kick
+            restitution, friction = float(surfaces.restitution[a, b]), float(surfaces.friction[a, b])
+            known = self._known.setdefault((a, b), [])
+            known.append(PairCoefficients(restitution, friction, float(surfaces.falloff[a, b]), kick))
+            self.space.on_collision(a + 1, b + 1, pre_solve=self._set_coefficients, data=known)
+            if (a, b) in jointed and not (surfaces.one_way[a] or surfaces.one_way[b]):  # these have a `begin`
+                self.space.on_collision(a + 1, b + 1, begin=self._smooth)
+
+    def _smooth(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
+        smooth(arbiter, self.one_way_walls.joints)  # before the warm-start impulse is read, along its normal
+
+    def _set_coefficients(self, arbiter: pymunk.Arbiter, _: pymunk.Space, known: list[PairCoefficients]) -> None:
+        if not known:
+            return
+        if self.one_way_walls.walls:
+            self.one_way_walls.note(arbiter)
+            if not arbiter.process_collision:
+                return
+        if self.one_way_walls.joints:
+            smooth(arbiter, self.one_way_walls.joints)
+        coefficients = known[0]
+        arbiter.restitution, arbiter.friction = coefficients.restitution, coefficients.friction
+        if coefficients.is_constant:
+            return
+        closing = closing_speed(arbiter)
+        if closing <= 0.0:
+            return
+        without_kick = rebound(coefficients.restitution, coefficients.falloff, closing)
+        increase = 0.0
+        if coefficients.kick is not None:
+            kick, to_approach = self._kick(coefficients.kick, arbiter, closing), coefficients.kick.adds_to == "approach"
+            increase = kick_gain(coefficients.restitution, coefficients.falloff, kick, to_approach, closing)
+        arbiter.restitution = (without_kick + increase) / closing
+        if increase and self.recorded_kicks is not None:
+            self.recorded_kicks[address_of(arbiter._arbiter)] = KickedContact(closing, without_kick, increase)
+
+    def _kick(self, kick: Kick, arbiter: pymunk.Arbiter, closing: float) -> float:
+        """Return the speed of the kick on a contact, m/s."""
+        if closing <= kick.threshold:
+            return 0.0
+        fraction, middle = 0.5, kick.profile == "middle"
+        if middle:
+            segment = next(shape for shape in arbiter.shapes if shape in self.segment_fractions)
+            assert isinstance(segment, pymunk.Segment)
+            points = arbiter.contact_point_set.points
+            x = sum(point.point_a.x + point.point_b.x for point in points) / (2 * len(points))
+            y = sum(point.point_a.y + point.point_b.y for point in points) / (2 * len(points))
+            fraction = fraction_at(segment.a, segment.b, self.segment_fractions[segment], (x, y))
+        return kicked(kick.speed, kick.threshold, middle, fraction, closing)
+
+
+def kick_works(kicks: dict[int, KickedContact], where: list[int], counts: list[int]) -> FloatArray:
+    """Return the work of a kick, J, for each N·s along the normal of each contact point; 0 without a kick."""
+    each = [kicks[place].work_per_impulse if place in kicks else 0.0 for place in where]
+    return np.repeat(np.asarray(each, dtype=np.float64), counts)

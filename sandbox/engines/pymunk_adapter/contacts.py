@@ -1,0 +1,306 @@
+"""Contacts of a step with their impulses, corrected for warm-start impulses that pymunk reports twice.
+
+Munk2D caches the contact of two shapes that separate for `persistence` substeps. If they touch again by then, it starts
+each point that it recognises by its hash at the impulse accumulated there (`cpArbiterUpdate`), without applying it
+(`cpArbiterApplyCachedImpulse` skips first contacts). The total impulse that it then reports contains the old impulse a
+second time. Without it, the impulses of a run add up to its change of momentum, to rounding.
+
+`WarmStartCorrection` reads the impulse with which a contact begins, in a callback. That works for every shape: for
+polygons, of whose two points one may be recognised and the other new, and for bodies of several shapes, of which one
+separates while another stays.
+
+`RevivedContacts` computes the same correction from the lists of contacts, without callbacks. It needs pairs with at
+most one contact point. The impulse with which such a pair begins again is its last one, in the frame of the normal:
+with complex numbers c = J/n, and then c·n' about the new normal. A callback at each beginning takes as long as a sixth
+of the step of a pile.
+"""
+
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+import pymunk
+
+from sandbox.arrays import ComplexArray, FloatArray, IntArray
+from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, PairIndex
+from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks, kick_works
+from sandbox.engines.pymunk_adapter.joint_impulses import JointImpulses
+from sandbox.engines.pymunk_adapter.reader import ARMS, IMPULSES, WIDTH, SpaceReader, address_of, impulses_of, points_of
+
+
+class WarmStartCorrection:
+    """Impulses with which contacts of the last substep began, and which had been applied before they separated."""
+
+    def __init__(self, space: pymunk.Space) -> None:
+        self._ids: list[tuple[int, int]] = []
+        self._impulses: list[tuple[float, float]] = []
+        self.pairs = False
+        """whether to collect them by pair"""
+        self.points: dict[int, FloatArray] | None = None
+        """the same point by point, (C, 2) by the address of the arbiter; filled if it is a dict"""
+        space.on_collision(begin=self._begin)
+
+    def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
+        x, y = arbiter.total_impulse
+        if not (x or y):
+            return
+        if self.points is not None:
+            where, impulses = impulses_of(arbiter)
+            self.points[where] = impulses
+        if self.pairs:
+            a, b = arbiter.shapes
+            if a.body is not None and b.body is not None:
+                self._ids.append((a.body.id, b.body.id))
+                self._impulses.append((x, y))
+
+    @property
+    def found(self) -> bool:
+        """Whether there are some."""
+        return bool(self._ids)
+
+    def take(self) -> tuple[IntArray, FloatArray]:
+        """Return and clear the ids (K, 2) of the bodies, and the impulses (K, 2) on the first of each, N·s."""
+        ids, impulses = np.asarray(self._ids, np.int64).reshape(-1, 2), np.asarray(self._impulses).reshape(-1, 2)
+        self._ids, self._impulses = [], []
+        return ids, impulses
+
+
+def subtract_impulses(touching: ContactBatch, pair: IntArray, impulse: FloatArray) -> ContactBatch:
+    """Return contacts without impulses that are counted twice.
+
+    Args:
+        touching: contacts as pymunk reports them.
+        pair: (K, 2) body indices; if the two have several contacts, it does not matter which is corrected.
+        impulse: (K, 2) on the first of each, N·s.
+    """
+    if not len(pair) or not len(touching.a):
+        return touching
+    low = int(min(touching.a.min(), touching.b.min(), pair.min()))
+    span = int(max(touching.a.max(), touching.b.max(), pair.max())) - low + 1
+    key = (touching.a - low) * span + touching.b - low
+    order = np.argsort(key, kind="stable")
+    corrected = touching.impulse.copy()
+    given = impulse[:, 0] + 1j * impulse[:, 1]
+    for first, second, sign in ((0, 1, 1.0), (1, 0, -1.0)):
+        wanted = (pair[:, first] - low) * span + pair[:, second] - low
+        row = order[np.minimum(np.searchsorted(key, wanted, sorter=order), len(key) - 1)]
+        found = key[row] == wanted
+        np.subtract.at(corrected, row[found], sign * given[found])
+        pair, given = pair[~found], given[~found]  # some may be listed in the other order
+    return touching._replace(impulse=corrected)
+
+
+NOT_TOUCHING = 2
+"""cpArbiterState from which on shapes are not in contact: ignored, cached, invalidated."""
+
+
+class ContactPoints(NamedTuple):
+    """P contact points of a substep."""
+
+    a: IntArray
+    """(P,) index of one body; −1 for a static body"""
+    b: IntArray
+    """(P,) index of the other"""
+    arm_a: FloatArray
+    """(P, 2) m, from the centre of a to the point"""
+    arm_b: FloatArray
+    """(P, 2) likewise of b"""
+    normal: FloatArray
+    """(P, 2) from a to b"""
+    along: FloatArray
+    """(P,) normal impulse on b, N·s"""
+    across: FloatArray
+    """(P,) impulse on b to the left of the normal, N·s"""
+    kick: FloatArray
+    """(P,) work of a kick for each N·s of normal impulse, J; 0 without a kick"""
+
+    def scaled(self, fraction: float) -> Self:
+        """Return a fraction of the impulses."""
+        return self._replace(along=self.along * fraction, across=self.across * fraction)
+
+    @property
+    def joint_impulses(self) -> JointImpulses:
+        """The impulses in the form of joint impulses."""
+        nx, ny = self.normal.T
+        impulse = np.column_stack((nx * self.along - ny * self.across, ny * self.along + nx * self.across))
+        return JointImpulses(self.a, self.b, self.arm_a, self.arm_b, impulse, np.zeros(len(self.a)))
+
+    def work(self, velocity: FloatArray, spin: FloatArray) -> tuple[float, float, float]:
+        """Return the work, J, of impulses along normals, along surfaces and by kicks, at mean velocities."""
+        x, y = self.joint_impulses.separating_velocity(velocity, spin).T
+        nx, ny = self.normal.T
+        out, left = nx * x + ny * y, nx * y - ny * x
+        kicks = float(self.along @ self.kick)
+        return float(self.along @ out) - kicks, float(self.across @ left), kicks
+
+
+class ContactPointReader:
+    """Reads the contact points of a space after each substep."""
+
+    def __init__(self, space: pymunk.Space, warm_start: WarmStartCorrection, pair_callbacks: PairCallbacks) -> None:
+        self._space, self._warm_start, self._pair_callbacks = space, warm_start, pair_callbacks
+        warm_start.points, pair_callbacks.recorded_kicks = {}, {}
+
+    def read(self, index: dict[Any, int]) -> ContactPoints:
+        """Return the points of the last substep, with the impulses applied in it.
+
+        Args:
+            index: body index of each `cpBody` that moves; all others are static.
+        """
+        begun = self._warm_start.points
+        first: list[int] = []
+        second: list[int] = []
+        normal: list[tuple[float, float]] = []
+        records: list[FloatArray] = []
+        places: list[int] = []
+        kicks = self._pair_callbacks.recorded_kicks
+        for arbiter in self._space._get_arbiters():
+            if arbiter.state >= NOT_TOUCHING:
+                continue
+            record = points_of(arbiter)
+            if begun:
+                old = begun.get(address_of(arbiter))
+                if old is not None:
+                    record[:, IMPULSES] -= old  # applied before they separated
+            records.append(record)
+            if kicks:
+                places.append(address_of(arbiter))
+            a, b = index.get(arbiter.body_a, -1), index.get(arbiter.body_b, -1)
+            n = arbiter.n.x, arbiter.n.y
+            for _ in range(len(record)):
+                first.append(a)
+                second.append(b)
+                normal.append(n)
+        if begun:
+            begun.clear()
+        kick = np.zeros(len(first))
+        if kicks:
+            kick = kick_works(kicks, places, [len(record) for record in records])
+            kicks.clear()
+        table = np.concatenate(records) if records else np.empty((0, WIDTH))
+        arms, impulses = table[:, ARMS], table[:, IMPULSES]
+        indices = np.asarray(first, np.int64), np.asarray(second, np.int64)
+        normals = np.asarray(normal, np.float64).reshape(-1, 2)
+        return ContactPoints(*indices, arms[:, :2], arms[:, 2:], normals, impulses[:, 0], impulses[:, 1], kick)
+
+
+Pair = tuple[int, int]
+"""Indices of two bodies or static colliders, the lower first."""
+
+
+class RevivedContacts:
+    """Pairs that have separated and that pymunk still caches."""
+
+    def __init__(self, reader: SpaceReader, collider_count: int) -> None:
+        """Start after a first look at which no pair is cached.
+
+        Args:
+            reader: of the space; from now on it keeps each listing for one more look.
+            collider_count: number of static colliders.
+        """
+        self._reader, self._collider_count = reader, collider_count
+        self._rows = PairIndex()
+        self._last = NO_CONTACTS
+        self._parted: dict[Pair, complex] = {}
+        """pair → last impulse, N·s, in the frame of its normal"""
+        reader.keep_last = True
+
+    def correct(self, found: ContactBatch) -> ContactBatch:
+        """Return the contacts of a look, which differ from the last, without impulses that are counted twice."""
+        last = self._last
+        lower, higher = np.minimum(found.a, found.b), np.maximum(found.a, found.b)  # pymunk lists either first
+        row, new = self._rows.find(lower + self._collider_count, higher + self._collider_count)
+        self._rows.keep(np.arange(len(found.a)))
+        self._last = found
+        ended = np.ones(len(last.a), np.bool_)
+        goes_on = np.ones(len(found.a), np.bool_)
+        goes_on[new] = False
+        ended[row[goes_on]] = False
+        gone = np.flatnonzero(ended)
+        if len(gone):
+            impulse, normal = self._reader.last_vectors(gone)
+            for pair, had in zip(_pairs(last, gone), (impulse / normal).tolist(), strict=True):
+                self._parted[pair] = had
+        if not self._parted:
+            return found
+        again = [
+            (k, self._parted.pop(pair))
+            for k, pair in zip(new.tolist(), _pairs(found, new), strict=True)
+            if pair in self._parted
+        ]
+        if self._parted:  # a pair that pymunk no longer caches begins at 0
+            cached = set(map(_pair, *self._reader.cached().T.tolist()))
+            self._parted = {pair: had for pair, had in self._parted.items() if pair in cached}
+        if not again:
+            return found
+        impulse = found.impulse.copy()
+        for k, had in again:
+            impulse[k] -= had * found.normal[k]
+        return found._replace(impulse=impulse)
+
+
+def _pairs(touching: ContactBatch, rows: IntArray) -> list[Pair]:
+    return list(map(_pair, touching.a[rows].tolist(), touching.b[rows].tolist()))
+
+
+def _pair(a: int, b: int) -> Pair:
+    return (a, b) if a < b else (b, a)
+
+
+class ContactReader:
+    """Contacts of a space. Nothing is read before the first call."""
+
+    def __init__(
+        self, space: pymunk.Space, reader: SpaceReader, pair_callbacks: PairCallbacks, collider_count: int
+    ) -> None:
+        self._space, self._reader, self._pair_callbacks, self._collider_count = (
+            space,
+            reader,
+            pair_callbacks,
+            collider_count,
+        )
+        self._warm_start: WarmStartCorrection | None = None
+        self._revived: RevivedContacts | None = None
+        self._points: ContactPointReader | None = None
+
+    def touching(self, polygons: bool, single: bool, steady: bool) -> ContactBatch | ComplexArray:
+        """Return the present contacts; from the first call on, their impulses are corrected.
+
+        Args:
+            polygons: whether there are polygons, which may touch in two points.
+            single: whether two bodies have at most one contact.
+            steady: whether impulses alone suffice if the contacts are the same as at the last call, in the same order.
+        """
+        same = self._reader.look(polygons)
+        if single and self._are_listings_enough():
+            if same and steady and self._revived is not None:
+                return self._reader.impulses()
+            found = self._reader.touching()
+            if self._revived is None:
+                self._revived = RevivedContacts(self._reader, self._collider_count)
+            elif same:
+                return found
+            return self._revived.correct(found)
+        warm_start = self._warm_start or self._start_warm_start_correction()
+        if same and steady and warm_start.pairs and not warm_start.found:
+            return self._reader.impulses()
+        warm_start.pairs = True
+        found = self._reader.touching()
+        ids, impulses = warm_start.take()
+        return subtract_impulses(found, self._reader.indices(ids), impulses) if len(ids) else found
+
+    def _are_listings_enough(self) -> bool:
+        """Return whether listings suffice: no pair was cached before the first, and no callback is in use."""
+        if self._warm_start is not None and self._warm_start.pairs:
+            return False
+        return self._revived is not None or not len(self._reader.cached())
+
+    def _start_warm_start_correction(self) -> WarmStartCorrection:
+        if self._warm_start is None:
+            self._warm_start = WarmStartCorrection(self._space)
+        return self._warm_start
+
+    def points(self) -> ContactPoints:
+        """Return the contact points of the last substep; from the first call on, their impulses are corrected."""
+        if self._points is None:
+            self._points = ContactPointReader(self._space, self._start_warm_start_correction(), self._pair_callbacks)
+        return self._points.read(self._reader.records)

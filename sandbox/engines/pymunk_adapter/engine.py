@@ -1,0 +1,110 @@
+"""PymunkEngine: what pymunk can model, and its defaults of the settings. pymunk is imported by `start` only."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sandbox.engines.common.base import BIAS, slop_of
+from sandbox.engines.common.workload import overload
+from sandbox.engines.tabletop.requirements import of_floors, on_floor
+from sandbox.resource_limits import SPACE_SIZE
+from sandbox.scene.compile.demands import BALLS, FLOOR, JOINTS, SURFACES, Demand, unmodelled
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from sandbox.engines.pymunk_adapter.simulation import PymunkSimulation
+
+
+PYMUNK_WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse", "impact": "newton"}
+"""The one value of each of these settings that describes pymunk."""
+
+OWN = frozenset({Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.LAYERS, Demand.ZONES, Demand.DRIVES})
+
+PERSISTENCE = 3
+"""pymunk's default."""
+
+
+@dataclass(frozen=True)
+class PymunkEngine:
+    """pymunk (Munk2D): fixed step, discrete detection, sequential impulses with warm starting.
+
+    A substep of length h, in pymunk's order: positions move by the *old* velocity, overlaps are found, forces and
+    gravity change velocities, contacts are solved. For free motion that is explicit Euler, drift–kick.
+
+    A substep of length h, in pymunk's order: positions move by the *old* velocity, overlaps are found,
+    velocities get their kick, contacts are solved. For free motion that is explicit Euler, drift–kick.
+    Discrete: a body tunnels through a thin wall when v·h > r + half its thickness.
+    """
+
+    name: str = "pymunk"
+    about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
+    capabilities: frozenset[Demand] = BALLS | JOINTS | FLOOR | SURFACES | OWN | {Demand.CURL}
+
+    def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
+        """Return each demand and setting that pymunk does not support."""
+        setup = Setup.of(start)
+        scene = setup.scene
+        lacks = unmodelled(setup, self.capabilities)
+        for key, word in PYMUNK_WORDS.items():
+            stated = getattr(settings, key)
+            if stated not in (None, word):
+                lacks.append(f"{key} {stated!r} is not supported (only {word!r})")
+        lacks += [
+            f"{key} applies to penalty springs, which it does not have"
+            for key in ("stiffness", "damping")
+            if getattr(settings, key) is not None
+        ]
+        if settings.broad_phase is not None:
+            lacks.append(f"broad_phase {settings.broad_phase!r} is not supported (it always uses its own tree)")
+        if settings.joints not in (None, "impulses"):
+            lacks.append(f"joints {settings.joints!r} is not supported (only 'impulses')")
+        if settings.stretch is not None:
+            lacks.append("stretch applies to joints = 'relaxation', which it does not have")
+        if settings.half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
+            lacks.append("half_kick does not support drag")
+        if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
+            lacks.append("half_kick supports gravity only, and the scene has other forces")
+        if settings.half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
+            lacks.append("half_kick does not support zones with their own gravity")
+        if scene.drives and scene.attractions:
+            lacks.append("it does not model attraction and drives together")
+        if on_floor(setup):
+            lacks += of_floors(setup)
+        return (*lacks, *overload(setup, settings), *_too_large(setup))
+
+    def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:
+        """Return the settings with defaults for slop, bias, persistence and the values that describe pymunk."""
+        setup = Setup.of(start)
+        own: dict[str, object] = {"slop": slop_of(setup), "bias": BIAS, "persistence": PERSISTENCE, **PYMUNK_WORDS}
+        if len(setup.links):
+            own["joints"] = "impulses"
+        return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
+
+    def start(self, start: Scene | Setup, settings: Settings | None = None) -> "PymunkSimulation":
+        """Create a pymunk space with the bodies of a scene.
+
+        Raises:
+            Refusal: pymunk does not support something that the scene or a setting needs.
+        """
+        from sandbox.engines.contract import Refusal
+        from sandbox.engines.pymunk_adapter.simulation import PymunkSimulation
+
+        setup = Setup.of(start)
+        settings = setup.scene.solver if settings is None else settings
+        missing = self.missing(setup, settings)
+        if missing:
+            raise Refusal(self.name, missing, ())
+        return PymunkSimulation(setup, self.resolve(setup, settings))
+
+
+def _too_large(setup: Setup) -> list[str]:
+    """Return why it would take too long to create a scene's space."""
+    size = len(setup.bodies) + len(setup.links)
+    if size <= SPACE_SIZE.value:  # most scenes: no need to count the bodies in free flight
+        return []
+    from sandbox.scene.compile.contacts import contact_matrix
+
+    size -= int((contact_matrix(setup).free & ~setup.bodies.fixed).sum())
+    refusal = SPACE_SIZE.refusal("the number of bodies and joints in its pymunk space is", size)
+    return [] if refusal is None else [refusal]

@@ -1,0 +1,178 @@
+"""Joint impulses: impulses of springs and motors on their bodies in a substep."""
+
+from typing import NamedTuple, Self, TypeAlias
+
+import numpy as np
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.geometry import rotate
+from sandbox.engines.pymunk_adapter.joints import SpaceJoints, elastic, relative
+from sandbox.scene.compile.joint_arrays import LinkKind, Links
+
+
+class JointImpulses(NamedTuple):
+    """Impulses of K joints on their second bodies, and with opposite sign on their first."""
+
+    a: IntArray
+    """(K,) index of the first body; −1 is the world"""
+    b: IntArray
+    """(K,) index of the second"""
+    arm_a: FloatArray
+    """(K, 2) m, from the first body's centre to its anchor"""
+    arm_b: FloatArray
+    """(K, 2) likewise of the second"""
+    impulse: FloatArray
+    """(K, 2) N·s"""
+    twist: FloatArray
+    """(K,) N·m·s, angular impulse in addition to that of `impulse` at its arms"""
+
+    def scaled(self, fraction: float | FloatArray) -> Self:
+        """Return fractions of them, one for all or (K,)."""
+        return self._replace(impulse=(self.impulse.T * fraction).T, twist=self.twist * fraction)
+
+    def separating_velocity(self, velocity: FloatArray, spin: FloatArray) -> FloatArray:
+        """Return the velocities of the second anchors relative to the first, (K, 2) m/s.
+
+        Args:
+            velocity: (N + 1, 2) m/s, of all bodies and of the world, which is the last.
+            spin: (N + 1,) rad/s.
+        """
+        where = (self.a, self.arm_a), (self.b, self.arm_b)
+        first, second = (velocity[n] + spin[n, None] * _left(arm) for n, arm in where)
+        return np.asarray(second - first)
+
+    def work(self, velocity: FloatArray, spin: FloatArray) -> float:
+        """Return their work, J, at mean velocities."""
+        turning = self.twist @ (spin[self.b] - spin[self.a])
+        return float(np.sum(self.impulse * self.separating_velocity(velocity, spin)) + turning)
+
+
+Pair: TypeAlias = tuple[JointImpulses, JointImpulses]
+
+
+class ImpulseSums(NamedTuple):
+    """Sums of some impulses on N bodies, and on the world as the last."""
+
+    linear: FloatArray
+    """(N + 1, 2) N·s"""
+    angular: FloatArray
+    """(N + 1,) N·m·s"""
+    joined: IntArray
+    """indices of bodies with joints"""
+
+    def subtract(self, joint_impulses: JointImpulses) -> None:
+        """Subtract the impulses of joints or contacts."""
+        for n, arm, sign in (
+            (joint_impulses.a, joint_impulses.arm_a, -1.0),
+            (joint_impulses.b, joint_impulses.arm_b, 1.0),
+        ):
+            np.subtract.at(self.linear, n, sign * joint_impulses.impulse)
+            np.subtract.at(self.angular, n, sign * (cross(arm, joint_impulses.impulse) + joint_impulses.twist))
+
+    def work(self, velocity: FloatArray, spin: FloatArray) -> float:
+        """Return their work on bodies with joints, J, at mean velocities and spins."""
+        n = self.joined
+        return float(np.sum(self.linear[n] * velocity[n]) + self.angular[n] @ spin[n])
+
+
+def springs(joints: SpaceJoints, position: FloatArray, angle: FloatArray, h: float) -> tuple[Pair, Pair]:
+    """Return the impulses of springs and rotary springs by their stiffness, and by their dampers.
+
+    Args:
+        joints: the joints of the space.
+        position: (N, 2) m, at the end of the substep, where pymunk evaluates springs.
+        angle: (N,) rad.
+        h: substep, s.
+    """
+    links = joints.by_kind.springs
+    arm_a, place_a = _anchors(links.a, links.anchor_a, position, angle)
+    arm_b, place_b = _anchors(links.b, links.anchor_b, position, angle)
+    displacement = place_b - place_a
+    length = np.hypot(displacement[:, 0], displacement[:, 1])
+    along = displacement / np.where(length > 0.0, length, 1.0)[:, None]
+    stiff = elastic(links, length) * h
+    damped = joints.impulses(links) - stiff
+    nothing = np.zeros(len(links))
+    ends = links.a, links.b, arm_a, arm_b
+
+    rotary = joints.by_kind.rotary
+    wound = elastic(rotary, relative(rotary, angle)) * h
+    slowed = joints.impulses(rotary) - wound
+    still = np.zeros((len(rotary), 2))
+    rotary_ends = rotary.a, rotary.b, still, still, still
+    stiffness = JointImpulses(*ends, along * stiff[:, None], nothing), JointImpulses(*rotary_ends, wound)
+    dampers = JointImpulses(*ends, along * damped[:, None], nothing), JointImpulses(*rotary_ends, slowed)
+    return stiffness, dampers
+
+
+def motors(joints: SpaceJoints, position: FloatArray, angle: FloatArray, given: ImpulseSums) -> JointImpulses:
+    """Return the impulses of motors.
+
+    pymunk reports their magnitudes. Their signs follow from the sum of the impulses of all joints, by least squares.
+
+    Args:
+        joints: the joints of the space.
+        position: (N, 2) m.
+        angle: (N,) rad.
+        given: sum of the impulses of all joints but springs.
+    """
+    rigid, chosen = joints.by_kind.rigid, joints.by_kind.motors
+    still = np.zeros((len(chosen), 2))
+    if not len(chosen):
+        return JointImpulses(chosen.a, chosen.b, still, still, still, np.zeros(0))
+    unknown = np.linalg.lstsq(_unit_responses(rigid, position, angle), _stacked(given), rcond=None)[0]
+    first = np.cumsum(_component_counts(rigid)) - _component_counts(rigid)
+    signs = np.sign(unknown[first[rigid.kind == LinkKind.MOTOR]])
+    return JointImpulses(chosen.a, chosen.b, still, still, still, signs * np.abs(joints.impulses(chosen)))
+
+
+def _component_counts(links: Links) -> IntArray:
+    """Return the number of components of the impulse of each joint, (K,)."""
+    return np.where(np.isin(links.kind, (LinkKind.PIVOT, LinkKind.GROOVE)), 2, 1)
+
+
+def _stacked(given: ImpulseSums) -> FloatArray:
+    return np.column_stack((given.linear, given.angular))[:-1].reshape(-1)
+
+
+def _unit_responses(links: Links, position: FloatArray, angle: FloatArray) -> FloatArray:
+    """Return the effect of unit impulses of joints, (U,), on all bodies: (3N, U); x, y and angular for each body."""
+    count = _component_counts(links)
+    column = np.cumsum(count) - count
+    table = np.zeros((len(position) + 1, 3, int(count.sum())))
+    arm_a, place_a = _anchors(links.a, links.anchor_a, position, angle)
+    arm_b, place_b = _anchors(links.b, links.anchor_b, position, angle)
+    for k, kind in enumerate(links.kind.tolist()):
+        a, b, at = int(links.a[k]), int(links.b[k]), int(column[k])
+        if kind in (LinkKind.MOTOR, LinkKind.ROTARY_LIMIT, LinkKind.GEAR):
+            table[b, 2, at] += 1.0
+            table[a, 2, at] -= 1.0 / links.figures[k, 1] if kind == LinkKind.GEAR else 1.0
+            continue
+        middle = position[a] if a >= 0 else np.zeros(2)
+        own = place_b[k] - middle if kind == LinkKind.GROOVE else arm_a[k]
+        directions = np.eye(2) if count[k] == 2 else (place_b - place_a)[k : k + 1]
+        for extra, direction in enumerate(directions):
+            for body, arm, sign in ((a, own, -1.0), (b, arm_b[k], 1.0)):
+                table[body, :2, at + extra] += sign * direction
+                table[body, 2, at + extra] += sign * float(cross(arm, direction))
+    return table[:-1].reshape(-1, table.shape[2])
+
+
+def cross(arm: FloatArray, impulse: FloatArray) -> FloatArray:
+    """Return the angular impulses (…,) of impulses (…, 2) at arms (…, 2)."""
+    return np.asarray(arm[..., 0] * impulse[..., 1] - arm[..., 1] * impulse[..., 0])
+
+
+def _left(arm: FloatArray) -> FloatArray:
+    return np.column_stack((-arm[:, 1], arm[:, 0]))
+
+
+def _anchors(
+    index: IntArray, anchor: FloatArray, position: FloatArray, angle: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the anchors of joints, (K, 2) m, relative to the bodies' centres and in the world."""
+    cos, sin = np.cos(angle[index]), np.sin(angle[index])
+    x, y = anchor.T
+    arm = np.column_stack(rotate(cos, sin, x, y))
+    world = (index < 0)[:, None]
+    return np.where(world, 0.0, arm), np.where(world, anchor, position[index] + arm)

@@ -1,0 +1,259 @@
+"""Joints as pymunk constraints, their breaking, and the forces of springs."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import pymunk
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.geometry import rotate
+from sandbox.scene.compile.joint_arrays import WORLD, LinkKind, Links
+
+
+def constraint_of(links: Links, k: int, a: pymunk.Body, b: pymunk.Body, bias: float) -> pymunk.Constraint:
+    """Create the constraint of joint k between two bodies of a space.
+
+    Args:
+        links: of the scene.
+        k: index of the joint.
+        a: first body; the space's static body if that is the world.
+        b: second body.
+        bias: fraction of a joint's error that remains after one second.
+    """
+    constraint = _made(links, k, a, b)
+    constraint.collide_bodies = bool(links.collide[k])
+    constraint.error_bias = bias
+    constraint.max_bias = math.inf
+    constraint.max_force = float(links.most_force[k])
+    return constraint
+
+
+def _made(links: Links, k: int, a: pymunk.Body, b: pymunk.Body) -> pymunk.Constraint:
+    x, y, z = links.figures[k].tolist()
+    at, on = tuple(links.anchor_a[k].tolist()), tuple(links.anchor_b[k].tolist())
+    match LinkKind(int(links.kind[k])):
+        case LinkKind.ROD:
+            rod = pymunk.PinJoint(a, b, at, on)
+            rod.distance = x
+            return rod
+        case LinkKind.PIVOT:
+            return pymunk.PivotJoint(a, b, at, on)
+        case LinkKind.SLIDE:
+            return pymunk.SlideJoint(a, b, at, on, x, y)
+        case LinkKind.GROOVE:
+            return pymunk.GrooveJoint(a, b, at, (x, y), on)
+        case LinkKind.ROTARY_LIMIT:
+            return pymunk.RotaryLimitJoint(a, b, x, y)
+        case LinkKind.MOTOR:
+            return pymunk.SimpleMotor(a, b, -x)  # pymunk: rate of the first body relative to the second
+        case LinkKind.GEAR:
+            return pymunk.GearJoint(a, b, x, y)
+        case LinkKind.SPRING:
+            return pymunk.DampedSpring(a, b, at, on, x, y, z)
+        case LinkKind.ROTARY_SPRING:
+            return pymunk.DampedRotarySpring(a, b, -x, y, z)  # pymunk: angle of the first body relative to the second
+
+
+def tension(
+    links: Links, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray
+) -> FloatArray:
+    """Return the magnitude of the force of springs, (K,) N.
+
+    Args:
+        links: K springs.
+        position: (N, 2) m.
+        velocity: (N, 2) m/s.
+        angle: (N,) rad.
+        spin: (N,) rad/s.
+    """
+    bodies = position, velocity, angle, spin
+    place_a, speed_a = _anchors(links.a, links.anchor_a, *bodies)
+    place_b, speed_b = _anchors(links.b, links.anchor_b, *bodies)
+    displacement, parting = place_b - place_a, speed_b - speed_a
+    length = np.hypot(displacement[:, 0], displacement[:, 1])
+    rate = np.einsum("kd,kd->k", displacement, parting) / np.where(length > 0.0, length, 1.0)
+    return np.asarray(np.abs(links.figures[:, 2] * rate - elastic(links, length)))
+
+
+def spring_forces(links: Links, position: FloatArray, angle: FloatArray) -> FloatArray:
+    """Return the forces (N, 2), N, of springs on bodies, without their dampers.
+
+    Args:
+        links: K springs.
+        position: (N, 2) m.
+        angle: (N,) rad.
+    """
+    still = np.zeros_like(position), angle, np.zeros_like(angle)
+    place_a, _ = _anchors(links.a, links.anchor_a, position, *still)
+    place_b, _ = _anchors(links.b, links.anchor_b, position, *still)
+    displacement = place_b - place_a
+    length = np.hypot(displacement[:, 0], displacement[:, 1])
+    per_length = np.divide(elastic(links, length), length, out=np.zeros_like(length), where=length > 0.0)
+    force = displacement * per_length[:, None]
+    total = np.zeros((len(position) + 1, 2))  # the last row is the world, −1
+    np.add.at(total, links.b, force)
+    np.subtract.at(total, links.a, force)
+    return total[:-1]
+
+
+def torsion(links: Links, angle: FloatArray, spin: FloatArray) -> FloatArray:
+    """Return the magnitude of the torque of rotary springs, (K,) N·m."""
+    turned, rate = relative(links, angle), relative(links, spin)
+    return np.asarray(np.abs(links.figures[:, 2] * rate - elastic(links, turned)))
+
+
+def elastic(links: Links, extent: FloatArray) -> FloatArray:
+    """Return the force, N, of springs at lengths (K,), m, or the torque, N·m, of rotary springs at angles (K,), rad.
+
+    It is stiffness · (rest − extent), without the damper, and positive where it increases the extent.
+    """
+    rest, stiffness, _ = links.figures.T
+    return np.asarray(stiffness * (rest - extent))
+
+
+def relative(links: Links, values: FloatArray) -> FloatArray:
+    """Return values (N,) of second bodies minus those of first bodies, (K,); 0 for the world."""
+    return np.asarray(values[links.b] - np.where(links.a >= 0, values[links.a], 0.0))
+
+
+def _anchors(
+    index: IntArray,
+    anchor: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    angle: FloatArray,
+    spin: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the anchors of joints on their first or second bodies, (K, 2) m, and their velocities, (K, 2) m/s."""
+    place, speed, own = position[index], velocity[index], anchor.any(axis=1)
+    if own.any():  # most anchors are at the centre
+        at, (x, y) = index[own], anchor[own].T
+        cos, sin, rate = np.cos(angle[at]), np.sin(angle[at]), spin[at]
+        arm_x, arm_y = rotate(cos, sin, x, y)
+        place[own] += np.column_stack((arm_x, arm_y))
+        speed[own] += np.column_stack((-rate * arm_y, rate * arm_x))
+    world = index < 0
+    if world.any():
+        place[world], speed[world] = anchor[world], 0.0
+    return place, speed
+
+
+class JointsByKind(NamedTuple):
+    """Joints by kind."""
+
+    springs: Links
+    rotary: Links
+    """rotary springs"""
+    rigid: Links
+    """all but springs and rotary springs"""
+    motors: Links
+    """the motors among the rigid joints"""
+
+    def __bool__(self) -> bool:
+        """Return whether there are any."""
+        return len(self.springs) + len(self.rotary) + len(self.rigid) > 0
+
+
+class SpaceJoints:
+    """Constraints in a space, by the indices of their joints."""
+
+    def __init__(self, space: pymunk.Space) -> None:
+        self._space = space
+        self._links: Links | None = None
+        self._constraints: dict[int, pymunk.Constraint] = {}
+        self._by_kind: JointsByKind | None = None
+        self.count = 0
+        """number of constraints"""
+        self._rebuild(Links.none())
+
+    def add(self, links: Links, body: Callable[[int], pymunk.Body], bias: float) -> None:
+        """Add the joints of a scene, once.
+
+        Args:
+            links: of the scene; all their bodies are in the space.
+            body: returns a body by its index.
+            bias: fraction of a joint's error that remains after one second.
+        """
+        if self._links is not None:
+            return
+        self._links = links
+        for k, (a, b) in enumerate(zip(links.a.tolist(), links.b.tolist(), strict=True)):
+            first = self._space.static_body if a == WORLD else body(a)
+            constraint = constraint_of(links, k, first, body(b), bias)
+            self._space.add(constraint)
+            self._constraints[k] = constraint
+        self._rebuild(links.counted())
+
+    def remove(self, index: int) -> None:
+        """Remove the joints of a body that leaves."""
+        if self._links is None:
+            return
+        those = np.flatnonzero((self._links.a == index) | (self._links.b == index))
+        self._remove([k for k in those.tolist() if k in self._constraints])
+
+    def break_overloaded(
+        self, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray, h: float
+    ) -> IntArray:
+        """Remove joints whose load exceeded their strength in the last substep; return their indices.
+
+        pymunk returns the impulse of one constraint at a time, 1 µs each. The force of springs is computed for all at
+        once, from the state at the end of the substep; it differs from pymunk's by rounding and a part of the damper's
+        force.
+
+        Args:
+            position: (N, 2) m, of all bodies.
+            velocity: (N, 2) m/s.
+            angle: (N,) rad.
+            spin: (N,) rad/s.
+            h: substep, s.
+        """
+        held, springs, rotary = self._breakable_joints, self._breakable_springs, self._breakable_rotary
+        given = np.asarray([self._constraints[k].impulse for k in held.number.tolist()]) / h
+        gone = [held.number[given > held.strength]]
+        if len(springs):
+            gone.append(springs.number[tension(springs, position, velocity, angle, spin) > springs.strength])
+        if len(rotary):
+            gone.append(rotary.number[torsion(rotary, angle, spin) > rotary.strength])
+        indices = np.sort(np.concatenate(gone))
+        if len(indices):
+            self._remove(indices.tolist())
+        return indices
+
+    @property
+    def by_kind(self) -> "JointsByKind":
+        """The present joints by kind."""
+        if self._by_kind is None:
+            springs, rotary = LinkKind.SPRING, LinkKind.ROTARY_SPRING
+            present = self._present
+            rigid = present.some(~np.isin(present.kind, (springs, rotary)))
+            self._by_kind = JointsByKind(present.of(springs), present.of(rotary), rigid, rigid.of(LinkKind.MOTOR))
+        return self._by_kind
+
+    def impulses(self, links: Links) -> FloatArray:
+        """Return pymunk's impulse of each of some joints in the last substep, (K,) N·s or N·m·s.
+
+        For joints it is the magnitude; for springs it is signed, positive if it pushes the bodies apart.
+        """
+        return np.asarray([self._constraints[k].impulse for k in links.number.tolist()], dtype=np.float64)
+
+    def _remove(self, indices: list[int]) -> None:
+        if not indices:
+            return
+        for k in indices:
+            self._space.remove(self._constraints.pop(k))
+        assert self._links is not None
+        self._rebuild(self._links.counted().some(np.asarray(sorted(self._constraints), dtype=np.int64)))
+
+    def _rebuild(self, links: Links) -> None:
+        """Update the lists of present joints, and of those that can break."""
+        self.count = len(self._constraints)
+        self._present: Links = links
+        self._by_kind = None
+        breakable = links.some(np.isfinite(links.strength))
+        kinds = LinkKind.SPRING, LinkKind.ROTARY_SPRING
+        self._breakable_springs, self._breakable_rotary = breakable.of(kinds[0]), breakable.of(kinds[1])
+        self._breakable_joints = breakable.some(~np.isin(breakable.kind, kinds))
+        self.has_breakable = len(breakable) > 0
+        """whether a present joint can break"""

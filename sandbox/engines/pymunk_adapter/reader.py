@@ -1,0 +1,262 @@
+"""Bulk reads from Munk2D: bodies, arbiters, and the indices of pymunk's bodies.
+
+Of the contact of two shapes, pymunk's public calls return the impulse of the pair, which does not determine the angular
+impulse of polygons that touch in two points. `points_of` reads the contact points from Munk2D's arbiters, as pymunk
+does to pickle a space.
+"""
+
+from typing import Any
+
+import numpy as np
+import pymunk
+from pymunk import Arbiter
+from pymunk._chipmunk_cffi import ffi, lib
+from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
+
+from sandbox.arrays import ComplexArray, FloatArray, IntArray
+from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch
+
+LARGEST_TABLE = 1 << 22
+"""Slots; 32 MB. If addresses are more scattered than that, ids are searched instead."""
+
+
+class IdTable:
+    """Maps ids to indices: by a table if the addresses lie close together, else by a search."""
+
+    def __init__(self, indices: dict[int, int]) -> None:
+        """Create the map from the index of each id."""
+        pairs = np.array(sorted(indices.items()), dtype=np.int64).reshape(-1, 2)
+        self._ids, self._indices = pairs[:, 0].copy(), pairs[:, 1].copy()
+        self._base = int(self._ids[0]) if len(pairs) else 0
+        slots = self._slots(self._ids)
+        self._table: IntArray | None = None
+        if len(pairs) and int(slots[-1]) < LARGEST_TABLE:
+            self._table = np.zeros(int(slots[-1]) + 1, np.int64)
+            self._table[slots] = self._indices
+
+    def _slots(self, ids: IntArray) -> IntArray:
+        """Return a slot for each id: objects lie at least 32 bytes apart, so no two share one."""
+        return (ids - self._base) >> 4
+
+    def indices(self, ids: IntArray) -> IntArray:
+        """Return the index of each id (K,); every id must be known."""
+        if self._table is not None:
+            return self._table[self._slots(ids)]
+        return self._indices[np.searchsorted(self._ids, ids)]
+
+
+STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
+STATE_WIDTH = 6  # x, y, angle, vx, vy, ω, in the order of pymunk's flags
+
+TOUCH = (
+    ArbiterFields.BODY_A_ID
+    | ArbiterFields.BODY_B_ID
+    | ArbiterFields.TOTAL_IMPULSE
+    | ArbiterFields.NORMAL
+    | ArbiterFields.CONTACT_COUNT
+    | ArbiterFields.POINT_A_1
+    | ArbiterFields.POINT_B_1
+)
+
+
+WHO = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID | ArbiterFields.CONTACT_COUNT
+
+SECOND = TOUCH | ArbiterFields.POINT_A_2 | ArbiterFields.POINT_B_2
+"""Fields for polygons, which touch in up to two points."""
+
+TOUCH_FLAGS, SECOND_FLAGS = TOUCH.value, SECOND.value
+
+WORD = ffi.sizeof("uintptr_t")
+"""bytes of an integer in a buffer"""
+
+LIST = ffi.addressof(lib, "pmSpaceArbiterIteratorFuncBatched")
+"""Function that writes an arbiter into a buffer. `get_space_arbiters` looks it up at each call, which takes as long as
+the call itself."""
+
+
+class SpaceReader:
+    """Reads bodies and arbiters of one space.
+
+    pymunk lists bodies in its own order, which changes when a body is removed, so rows are identified by body id. The
+    memory of a buffer moves when it grows, and each new buffer leaks. Hence there is one buffer of each kind, and only
+    copies of its contents are returned.
+    """
+
+    def __init__(self, space: pymunk.Space) -> None:
+        self._space = space
+        self._bodies, self._arbiters, self._forces = Buffer(), Buffer(), Buffer()
+        self._listing = _listing(self._arbiters)
+        self.keep_last = False
+        """whether the vectors of the previous `look` are kept; set once, after a `look`"""
+        self._last: tuple[Buffer, Any, IntArray] | None = None  # previous listing: buffer, listing, rows
+        self._index_of = IdTable({})
+        self._moving: IntArray = np.empty(0, np.int64)
+        self._words, self._width = b"", 4  # ids at the last look, and number of vectors of a contact
+        self._live: IntArray = np.empty(0, np.int64)
+        self._firsts = self._live  # first vector of each
+        self._moved, self._first, self._all = True, True, 0
+        self._rows: IntArray = np.empty(0, np.int64)
+        self._indices: IntArray = np.empty(0, np.int64)
+        self.records: dict[Any, int] = {}
+        """index of the body of each `cpBody` that moves; bodies that have left may still be listed"""
+        self.slots: slice | IntArray = self._indices
+        """positions of the rows of `state` in scene order; a slice where possible, which is faster"""
+
+    def assign(self, moving: dict[int, int], still: dict[int, int]) -> None:
+        """Set the body index of each id: of moving bodies, and of static ones."""
+        self._index_of = IdTable(moving | still)
+        self._moving = np.array(sorted(moving), dtype=np.int64)
+        self._moved = True
+
+    def state(self) -> tuple[IntArray, FloatArray]:
+        """Return the indices (R,) of the moving bodies, and their states (R, 6): x, y, angle, vx, vy, ω.
+
+        Both are valid until the next call.
+        """
+        if self._moved:
+            self._read_order()
+        self._bodies.clear()
+        get_space_bodies(self._space, STATE, self._bodies)
+        table = np.frombuffer(self._bodies.float_buf()).reshape(-1, STATE_WIDTH)
+        return self._indices, table[: len(self._rows)] if self._first else table[self._rows]
+
+    def indices(self, ids: IntArray) -> IntArray:
+        """Return the body indices of ids."""
+        return self._index_of.indices(ids)
+
+    def invalidate_order(self) -> None:
+        """Record that bodies were added or removed, which changes the order of rows."""
+        self._moved = True
+
+    def _read_order(self) -> None:
+        """Read the order of the rows by their ids. It holds until bodies are added or removed."""
+        self._bodies.clear()
+        get_space_bodies(self._space, BodyFields.BODY_ID, self._bodies)
+        ids = np.frombuffer(self._bodies.int_buf(), np.int64)
+        self._rows = np.flatnonzero(np.isin(ids, self._moving))
+        self._indices = self._index_of.indices(ids[self._rows])
+        self._first = np.array_equal(self._rows, np.arange(len(self._rows)))  # static bodies come last
+        self._all = len(ids)
+        first = int(self._indices[0]) if len(self._indices) else 0
+        consecutive = np.array_equal(self._indices, np.arange(first, first + len(self._indices)))
+        self.slots = slice(first, first + len(self._indices)) if consecutive else self._indices
+        self._moved = False
+
+    def push(self, force: FloatArray) -> None:
+        """Set the force, N, on each body of the last `state`, in its order, for the next step only."""
+        self._outgoing = np.zeros((self._all, 2))  # kept alive: pymunk holds a bare pointer into it
+        self._outgoing[self._rows] = force
+        self._forces.set_float_buf(self._outgoing.reshape(-1))
+        set_space_bodies(self._space, BodyFields.FORCE, self._forces)
+
+    def drive(self, velocity: FloatArray) -> None:
+        """Set the velocities of all moving bodies to those of (N, 2), m/s, in scene order."""
+        if self._moved:
+            self._read_order()
+        self._outgoing = np.zeros((self._all, 2))  # kept alive, as in `push`; static bodies do not move
+        self._outgoing[self._rows] = velocity[self._indices]
+        self._forces.set_float_buf(self._outgoing.reshape(-1))
+        set_space_bodies(self._space, BodyFields.VELOCITY, self._forces)
+
+    def pairs(self) -> IntArray:
+        """Return the indices (K, 2) of bodies in contact. A pair is listed once for each two shapes that touch."""
+        self._arbiters.clear()
+        get_space_arbiters(self._space, WHO, self._arbiters)
+        words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
+        if not len(words):
+            return np.empty((0, 2), np.int64)
+        live = words[words[:, 2] > 0]
+        return np.column_stack([self._index_of.indices(live[:, k]) for k in (0, 1)])
+
+    def look(self, polygons: bool = False) -> bool:
+        """Read the present contacts, with `polygons` up to two points each. Return whether they are the previous ones.
+
+        If the same ids are listed in the same order as at the last call, the contacts are the same, and only their
+        impulses are new.
+        """
+        if self.keep_last:
+            self._turn_over()
+        self._arbiters.clear()
+        self._listing.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
+        lib.cpSpaceEachCachedArbiter(self._space._space, LIST, self._listing)
+        self._width = 6 if polygons else 4
+        found = self._arbiters._int_arr  # the memory behind `int_buf`
+        words = ffi.buffer(found.arr, found.num * WORD)[:] if found.num else b""
+        same = words == self._words
+        if not same:
+            self._words = words
+            # An ended contact stays cached for a while, with no points.
+            self._live = np.flatnonzero(np.frombuffer(words, np.int64)[2::3])
+            self._firsts = self._live * self._width
+        return same
+
+    def _turn_over(self) -> None:
+        """Keep the present listing as the previous one, and reuse the buffers of the one before it."""
+        spare = Buffer() if self._last is None else self._last[0]
+        listing = _listing(spare) if self._last is None else self._last[1]
+        self._last = self._arbiters, self._listing, self._firsts
+        self._arbiters, self._listing = spare, listing
+
+    def last_vectors(self, rows: IntArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return the impulses, N·s, and normals (K,) of some rows of the previous look."""
+        assert self._last is not None
+        arbiters, _, firsts = self._last
+        vectors = np.frombuffer(arbiters.float_buf(), np.complex128)
+        return vectors[firsts[rows]], vectors[firsts[rows] + 1]
+
+    def cached(self) -> IntArray:
+        """Return the body indices (C, 2) of contacts that have ended and that Munk2D still caches."""
+        words = np.frombuffer(self._words, np.int64).reshape(-1, 3)
+        gone = words[words[:, 2] == 0]
+        return np.column_stack([self._index_of.indices(gone[:, k]) for k in (0, 1)])
+
+    def impulses(self) -> ComplexArray:
+        """Return the impulses (K,), N·s, of the present contacts, on the first body of each."""
+        if not len(self._live):
+            return NO_CONTACTS.impulse
+        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128)
+        return vectors.take(self._firsts)
+
+    def touching(self) -> ContactBatch:
+        """Return the present contacts as new arrays."""
+        live = self._live
+        if not len(live):
+            return NO_CONTACTS
+        words = np.frombuffer(self._words, np.int64).reshape(-1, 3)
+        a, b = (self._index_of.indices(words[:, k].take(live)) for k in (0, 1))
+        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128).reshape(-1, self._width).take(live, axis=0)
+        point = (vectors[:, 2] + vectors[:, 3]) * 0.5
+        if self._width > 4:
+            twice = words[:, 2].take(live) > 1
+            point = np.where(twice, 0.5 * (point + (vectors[:, 4] + vectors[:, 5]) * 0.5), point)
+        return ContactBatch(a, b, vectors[:, 0], vectors[:, 1], point)
+
+
+def _listing(arbiters: Buffer) -> Any:
+    """Return the struct that listing arbiters writes to; `get_space_arbiters` creates one at each call."""
+    listing = ffi.new("pmBatchedData *")
+    listing.floatArray, listing.intArray = arbiters._float_arr, arbiters._int_arr
+    return listing
+
+
+WIDTH = 12
+"""Doubles of a contact point (`cpContact`): two arms, two effective masses, bounce, impulses along the normal and to
+its left, three more, hash."""
+
+ARMS, IMPULSES = slice(0, 4), slice(7, 9)
+
+
+def points_of(arbiter: Any) -> FloatArray:
+    """Return the contact points of a `cpArbiter`, (C, 12)."""
+    size = 8 * WIDTH * arbiter.count
+    return np.frombuffer(ffi.buffer(arbiter.contacts, size)[:]).reshape(-1, WIDTH).copy()
+
+
+def address_of(arbiter: Any) -> int:
+    """Return the address of a `cpArbiter`."""
+    return int(ffi.cast("uintptr_t", arbiter))
+
+
+def impulses_of(arbiter: Arbiter) -> tuple[int, FloatArray]:
+    """Return the address of an arbiter, and the present impulses (C, 2) of its points, N·s."""
+    return address_of(arbiter._arbiter), points_of(arbiter._arbiter)[:, IMPULSES]

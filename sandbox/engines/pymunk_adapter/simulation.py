@@ -1,0 +1,382 @@
+"""Simulation on a pymunk space, and the recording of its contacts and zone entries."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from sandbox.action import Action
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.actions import apply_action
+from sandbox.engines.common.base import BaseSimulation
+from sandbox.engines.common.contact_log import ContactBatch, ContactLog, joined
+from sandbox.engines.common.energy_balance import booked
+from sandbox.engines.common.lifetimes import Lifetimes
+from sandbox.engines.contract import Divergence, Exhaustion, Observer
+from sandbox.engines.energy_ledger import Cause, EnergyLedger
+from sandbox.engines.pymunk_adapter.bodies import PymunkBodies
+from sandbox.engines.pymunk_adapter.energy import PymunkEnergyLedger
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.fixed import PlaneReach
+from sandbox.scene.description.world import Settings
+from sandbox.trajectory import Contacts, Frame
+
+
+class EventRecorder:
+    """Records contacts and zone entries, until they are taken."""
+
+    def __init__(self, population: PymunkBodies, time: float) -> None:
+        """Start with the contacts at a time, s. Zone entries so far are recorded now and at the end of the substep."""
+        self._population = population
+        self._log = ContactLog(len(population.scene.fixed_names), population.space_bodies.can_repeat_pairs)
+        self.contacts = 0
+        """number of contacts found so far; a lasting contact counts at every substep"""
+        self.record(time, opening=True)
+
+    def record(self, time: float, opening: bool = False) -> None:
+        """Record contacts and zone entries at a time, s; entries at the opening are recorded again at the next call."""
+        tabletop, zone_tracker, log = self._population.tabletop, self._population.zone_tracker, self._log
+        entries = None if zone_tracker is None else zone_tracker.drain_entries(again=opening)
+        steady = log.steady and entries is None
+        now = self._population.space_bodies.touching(steady) if tabletop is None else tabletop.drain_contacts()
+        if isinstance(now, ContactBatch):
+            log.record(time, now if entries is None else joined(now, entries))
+            self.contacts += len(now.a)
+        else:
+            log.add_impulses(now)
+            self.contacts += len(now)
+        if entries is not None:
+            log.steady = False  # a zone entry is no lasting contact: the next contacts are different ones
+
+    def rebuild(self) -> None:
+        """Update after an action: a spawned body may have several shapes."""
+        self._log.can_repeat_pairs = self._population.space_bodies.can_repeat_pairs
+
+    def pairs(self) -> IntArray:
+        """Return the pairs (K, 2) of the last record."""
+        return self._log.pairs()
+
+    def take(self) -> Contacts:
+        """Return the contacts since the last call."""
+        return self._log.take()
+
+
+class PymunkSimulation(BaseSimulation):
+    """Running scene.
+
+    Scheme: drift–kick, explicit Euler for free motion (position error +g·h·T/2, velocity exact). With `half_kick`
+    velocities start g·h/2 ahead and are reported without that offset: positions under gravity are then exact to
+    rounding until the first contact. In contact the offset is still subtracted, but has no meaning there.
+
+    Contacts are found at the end of a substep, without a time of impact: a body that passes a thin collider within a
+    substep is not found in contact with it.
+
+    On a surface, balls slide and roll as in `tabletop/stepper.py`: exactly without contacts, and collisions are
+    resolved at the time of impact.
+    """
+
+    def __init__(self, setup: Setup, settings: Settings) -> None:
+        super().__init__(settings)
+        self._population = PymunkBodies(setup, settings)
+        self._h = settings.h
+        self._recorder: EventRecorder | None = None
+        self._observer: Observer | None = None
+        self._ledger: PymunkEnergyLedger | None = None
+        self._retired: dict[int, float] = {}
+        self._broken: dict[int, float] = {}
+        self._joint_iterations = 0
+        self._lifetimes = Lifetimes(setup.bodies, setup.time, settings.h)
+        self._shared_angles: tuple[FloatArray, FloatArray] | None = None  # angles and spins, shared by frames
+
+    @property
+    def setup(self) -> Setup:
+        """State from which the simulation started, with the changes that actions have made to its scene."""
+        return self._population.setup
+
+    @property
+    def bodies(self) -> Bodies:
+        """Bodies at their start as arrays; spawned bodies are appended."""
+        return self._population.bodies
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
+        return MappingProxyType(self._retired)
+
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """Time in s, by index in `setup.links`, at which joints broke."""
+        return MappingProxyType(self._broken)
+
+    @property
+    def plane_reach(self) -> PlaneReach | None:
+        """Present extent of pymunk's half-planes; None while there are none."""
+        return self._population.space_bodies.plane_reach
+
+    @property
+    def work(self) -> Mapping[str, int]:
+        """Work counters since the start. pymunk does not report the number of pairs that it tests.
+
+        Contacts, and with them `contact_iterations`, are counted from the first call of `contacts` or `watch` on:
+        before that they are not read from pymunk.
+        """
+        contacts = 0 if self._recorder is None else self._recorder.contacts
+        return {
+            "substeps": self.substeps,
+            "contacts": contacts,
+            "contact_iterations": contacts * self._settings.iterations,
+            "joint_iterations": self._joint_iterations,
+        }
+
+    @property
+    def flying(self) -> int:
+        """Number of bodies that are advanced as arrays, outside of pymunk."""
+        return len(self._population.particles)
+
+    def step(self) -> None:
+        """Advance by one time step dt.
+
+        Raises:
+            Divergence: a body is not finite, or out of bounds. The state can still be read.
+            Exhaustion: so many balls on a surface touch at once that resolving their collisions would take too long.
+        """
+        with self._turn:
+            self._check_running()
+            self._advance(self._settings.substeps)
+            self._steps += 1
+            self._check_state()
+            self._retire()
+
+    def finish(self, part: float) -> None:
+        """Advance by a last fraction of dt. No step can follow.
+
+        Whole substeps come first. The state within the last, shortened substep is interpolated, which for positions is
+        the path of the scheme.
+
+        Args:
+            part: fraction of dt, 0 < part < 1.
+
+        Raises:
+            Divergence: as `step`.
+            Exhaustion: as `step`.
+            ValueError: `part` is out of range.
+        """
+        self._check_part(part)
+        with self._turn:
+            self._check_running()
+            whole, rest = divmod(part * self._settings.substeps, 1.0)
+            self._advance(int(whole))
+            population, start = self._population, None
+            if population.tabletop is None:
+                start = [array.copy() for array in self._state()], population.space_bodies.drives.current_state()
+                self._integrate(int(whole), self.time, fraction=rest)  # its contacts lie beyond the end
+            elif rest:  # the tabletop stepper supports a shorter substep, with its contacts
+                self._substep(int(whole), self.time, fraction=rest)
+            self._part = part
+            self._check_state()
+            if start is not None:
+                self._interpolate(*start, rest)
+            self._retire()
+            population.end()
+
+    def _interpolate(self, start: list[FloatArray], drives: FloatArray, fraction: float) -> None:
+        """Set the state to a fraction of the last substep, from its start: four arrays, and drives (D, 3)."""
+        for now, old in zip(self._state(), start, strict=True):
+            now[...] = old + (now - old) * fraction
+        self._population.space_bodies.drives.place_on_hinges(*self._state())
+        self._population.space_bodies.drives.end(drives, fraction)
+
+    def apply(self, action: Action) -> None:
+        """Apply an action at once.
+
+        Raises:
+            ActionError: the action cannot be applied. The simulation is left unchanged.
+        """
+        with self._turn:
+            self._check_running()
+            self._shared_angles = None
+            with booked(self._action_ledger, Cause.ACTIONS, self):
+                leaving = apply_action(action, self._population)
+                self._population.invalidate()
+                self._shared_angles = None
+            self._population.space_bodies.extend_planes()
+            self._population.capture()
+            if self._recorder is not None:
+                self._recorder.rebuild()
+            if leaving is not None:
+                self._take_out(np.asarray([leaving]))
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+        population = self._population
+        position, velocity, angle, angular_velocity = self._state()
+        position, velocity = position.copy(), velocity.copy()
+        if self._settings.half_kick:
+            velocity[population.moving] -= population.ahead
+        if population.can_turn or population.tabletop is not None or self._shared_angles is None:
+            self._shared_angles = angle.copy(), angular_velocity.copy()
+        angle, angular_velocity = self._shared_angles
+        roll = None if population.tabletop is None else population.roll.copy()
+        scene, present = population.scene, population.present.copy()
+        layer = population.layer.copy() if len(scene.layers) > 1 else None
+        visits = population.visits.copy() if scene.zones else None
+        drives = population.space_bodies.drives.current_state() if scene.drives else None
+        passing = population.space_bodies.passing()
+        return Frame(
+            self.time, position, velocity, angle, angular_velocity, present, roll, layer, visits, drives, passing
+        )
+
+    def contacts(self) -> Contacts:
+        """Return the contacts since the last call; the first call starts the recording."""
+        if self._recorder is None:
+            self._recorder = EventRecorder(self._population, self.time)
+        return self._recorder.take()
+
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy change, J, by each cause since the first call, which switches accounting on."""
+        tabletop = self._population.tabletop
+        if tabletop is not None:  # it keeps its own ledger
+            tabletop.account = tabletop.account or EnergyLedger()
+            return tabletop.account.entries()
+        if self._ledger is None:
+            self._ledger = PymunkEnergyLedger(self._population)
+        return self._ledger.account.entries()
+
+    @property
+    def _action_ledger(self) -> EnergyLedger | None:
+        tabletop = self._population.tabletop
+        if tabletop is not None:
+            return tabletop.account
+        return None if self._ledger is None else self._ledger.account
+
+    def watch(self, observer: Observer) -> None:
+        """Register an observer that is called after every substep. This records contacts too."""
+        if self._recorder is None:
+            self.contacts()
+        self._observer = observer
+
+    def close(self) -> None:
+        """End the simulation and release what it holds."""
+        self._population.end()
+        super().close()
+
+    def _check_running(self) -> None:
+        if self._population.ended:
+            raise RuntimeError("the simulation has ended; its state can be read, but it cannot continue")
+
+    def _advance(self, substeps: int) -> None:
+        """Advance by some substeps from the start of a step. Particles and the space are independent of each other."""
+        # An observer gets all bodies after each substep, and the ledger needs them all too.
+        together = self._observer is not None or self._ledger is not None
+        if not together:
+            self._population.particles.step(substeps)
+        if together or self._recorder is not None or len(self._population.space_bodies):
+            time = self.time
+            for k in range(substeps):
+                self._substep(k, time, with_particles=together)
+
+    def _substep(self, k: int, time: float, with_particles: bool = True, fraction: float = 1.0) -> None:
+        """Advance by one substep as `_integrate`, and process its events: broken joints, zone entries, contacts."""
+        observer, start = self._observer, time + k * self._h
+        before = self._observed_positions() if observer is not None else None
+        self._integrate(k, time, with_particles, fraction)
+        population = self._population
+        if population.space_bodies.joints.has_breakable:
+            self._record_broken(population.break_joints(), self._after(k + 1))
+        if population.has_pending_zones:
+            self._update_zones()
+        if self._recorder is not None:
+            self._recorder.record(start + self._h * fraction)
+            if observer is not None and before is not None:
+                observer(start, before, self._observed_positions(), self._recorder.pairs())
+
+    def _integrate(self, k: int, time: float, with_particles: bool = True, fraction: float = 1.0) -> None:
+        """Advance by h, the k-th substep of the step that began at a time, s.
+
+        Args:
+            k: index of the substep.
+            time: start of the step, s.
+            with_particles: whether to advance the particles; False if they have been advanced already.
+            fraction: fraction of the substep that counts; the rest is cut off.
+        """
+        population, ledger = self._population, self._ledger
+        space_bodies, tabletop, start = population.space_bodies, population.tabletop, time + k * self._h
+        opening = ledger.opening() if ledger is not None else None
+        if with_particles:
+            population.particles.step()
+        if tabletop is None:
+            space_bodies.step(start)
+        else:
+            if self._recorder is None:
+                tabletop.drain_contacts()  # captures before recording started are dropped
+            try:
+                tabletop.step(space_bodies, space_bodies.constant_forces.items(), start, fraction)
+            except Exhaustion:
+                population.end()
+                raise
+            population.capture()
+        if space_bodies.joints.count:
+            self._joint_iterations += space_bodies.solved_joint_count * self._settings.iterations
+        population.invalidate()
+        if ledger is not None:
+            ledger.substep(opening, fraction)
+
+    def _update_zones(self) -> None:
+        """Apply the effects of zones that bodies have entered."""
+        with booked(self._action_ledger, Cause.DRIVES, self):
+            self._population.update_zones()
+        zone_tracker = self._population.zone_tracker
+        if self._recorder is None and zone_tracker is not None:
+            zone_tracker.drain_entries()  # entries before recording started are dropped
+
+    def _observed_positions(self) -> FloatArray:
+        """Return the centres, (N, 2) m, for an observer; nan for balls that lie in pockets."""
+        position, tabletop = self._state()[0].copy(), self._population.tabletop
+        if tabletop is not None:
+            position[tabletop.pocket >= 0] = np.nan
+        return position
+
+    def _record_broken(self, indices: IntArray, time: float) -> None:
+        """Record that joints, by their indices, have broken."""
+        self._broken |= dict.fromkeys(indices.tolist(), time)
+        if self._ledger is not None and len(indices):
+            self._ledger.joints_broken(indices)
+
+    def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return the present arrays in scene order; they belong to the population."""
+        population = self._population
+        population.refresh()
+        return population.position, population.velocity, population.angle, population.angular_velocity
+
+    def _check_state(self) -> None:
+        """Check the state, and end the simulation if a body is not finite, out of bounds, or beyond the half-planes."""
+        population = self._population
+        for part in (
+            population.particles,
+            population.space_bodies,
+            *(() if population.tabletop is None else (population.tabletop,)),
+        ):
+            beyond = part.beyond()
+            if beyond is not None:
+                self._population.end()
+                index, what = beyond
+                raise Divergence(self.time, self.bodies.names[index], what)
+
+    def _retire(self) -> None:
+        """Remove bodies whose lifetime has ended or that are outside of world.bounds."""
+        population, bounds = self._population, self._population.scene.world.bounds
+        if bounds is not None:
+            population.refresh()
+        removed = self._lifetimes.expired(
+            self.time, population.position, population.present, population.bodies.fixed, bounds
+        )
+        if len(removed):
+            self._take_out(removed)
+
+    def _take_out(self, indices: IntArray) -> None:
+        with booked(self._action_ledger, Cause.RETIRED, self):
+            self._shared_angles = None
+            self._population.take_out(indices)
+        self._shared_angles = None
+        self._retired |= dict.fromkeys(indices.tolist(), self.time)

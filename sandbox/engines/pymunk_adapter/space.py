@@ -1,0 +1,557 @@
+"""Bodies in the pymunk space: creation, state, and constant forces."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import pymunk
+from pymunk._chipmunk_cffi import ffi, lib
+
+from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from sandbox.engines.common.base import BEYOND, FARTHEST
+from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch
+from sandbox.engines.pymunk_adapter.colliders import (
+    StaticShapes,
+    SurfaceSetter,
+    body_shapes,
+    category,
+    gravity_of,
+    jointed_surfaces,
+    new_space,
+    shuffled,
+)
+from sandbox.engines.pymunk_adapter.contacts import ContactReader
+from sandbox.engines.pymunk_adapter.drives import SpaceDrives
+from sandbox.engines.pymunk_adapter.forces import SpaceForceField, acceleration, has_drag, mean_fraction, rates
+from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
+from sandbox.engines.pymunk_adapter.reader import SpaceReader
+from sandbox.engines.pymunk_adapter.zones import ZoneSensors
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import ContactMatrix
+from sandbox.scene.compile.joint_arrays import WORLD, Links
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.fixed import PlaneReach
+from sandbox.scene.description.world import Settings, World
+from sandbox.scene.scene import Scene
+
+
+class SpaceBody(NamedTuple):
+    """A body in the space, with its shapes; a body that can touch nothing has none."""
+
+    body: pymunk.Body
+    shapes: tuple[tuple[int, pymunk.Shape], ...]
+    """each shape with its index among the shapes of all bodies"""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is not fixed."""
+        return self.body.body_type != pymunk.Body.STATIC  # kinematic bodies are held by a zone or moved by a drive
+
+
+class SpaceBodyTable:
+    """Bodies in a space by index, and operations on single bodies."""
+
+    def __init__(self, space: pymunk.Space) -> None:
+        self._space = space
+        self._members: dict[int, SpaceBody] = {}
+        self._resting: dict[int, tuple[float, float]] = {}  # mass and moment of bodies held by zones
+        self._state: tuple[IntArray, FloatArray] | None = None  # as last read; None after a change
+
+    def holds(self, index: int) -> bool:
+        """Return whether a body is in the space."""
+        return index in self._members
+
+    def movers(self) -> list[int]:
+        """Return the indices of the bodies that are not fixed."""
+        return [index for index, member in self._members.items() if member.moves]
+
+    def moment(self, index: int) -> float:
+        """Return a body's moment of inertia, kg·m²; infinite if nothing in the scene can turn it."""
+        return self._resting[index][1] if index in self._resting else self._members[index].body.moment
+
+    def give_moment(self, index: int, moment: float) -> None:
+        """Set a body's moment of inertia, kg·m², so that it can turn."""
+        if index in self._resting:
+            self._resting[index] = self._resting[index][0], moment
+        else:
+            self._members[index].body.moment = moment
+
+    def set_position(self, index: int, position: FloatArray) -> None:
+        """Set the position of a body, m."""
+        body = self._members[index].body
+        body.position = float(position[0]), float(position[1])
+        self._space.reindex_shapes_for_body(body)
+        self._state = None
+
+    def set_velocity(self, index: int, velocity: FloatArray) -> None:
+        """Set the velocity of a body, m/s."""
+        self._members[index].body.velocity = float(velocity[0]), float(velocity[1])
+        self._state = None
+
+    def set_spin(self, index: int, spin: float) -> None:
+        """Set the angular velocity of a body, rad/s."""
+        self._members[index].body.angular_velocity = spin
+        self._state = None
+
+    def hold(self, index: int) -> None:
+        """Hold a body in place, whatever it collides with, until `release`."""
+        if index in self._resting:  # it is kinematic already and has no mass in pymunk
+            return
+        body = self._members[index].body
+        self._resting[index] = body.mass, body.moment
+        body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
+        body.body_type = pymunk.Body.KINEMATIC
+        pymunk.Body.update_position(body, 0.0)  # resets the bias velocity of the overlap correction
+        self._state = None
+
+    def release(self, index: int) -> None:
+        """Release a body that was held."""
+        body = self._members[index].body
+        body.body_type = pymunk.Body.DYNAMIC
+        body.mass, body.moment = self._resting.pop(index)
+        body.force, body.torque = (0.0, 0.0), 0.0  # thrusts have accumulated meanwhile
+        self._state = None
+
+
+class ConstantForces:
+    """Constant force (N) and torque (N·m) on each body, by body index."""
+
+    def __init__(self) -> None:
+        self._action_forces: dict[int, tuple[FloatArray, float]] = {}
+        self._zone_forces: dict[int, FloatArray] = {}
+        self._total: dict[int, tuple[FloatArray, float]] = {}  # sums of both
+        self._ready: list[tuple[Any, Any, float]] | None = None  # `cpBody`, force and torque of each
+
+    @property
+    def with_zone_force(self) -> list[int]:
+        """Indices of the bodies on which a zone's gravity acts."""
+        return list(self._zone_forces)
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._total)
+
+    def items(self) -> list[tuple[int, tuple[FloatArray, float]]]:
+        """Return index, and force and torque, of each body that has some."""
+        return list(self._total.items())
+
+    def set_force(self, index: int, force: FloatArray, torque: float) -> None:
+        """Apply a force and a torque to a body from now on."""
+        if force.any() or torque:
+            self._action_forces[index] = force, torque
+        else:
+            self._action_forces.pop(index, None)
+        self._sum(index)
+
+    def set_zone_force(self, index: int, force: FloatArray | None) -> None:
+        """Apply a zone's force (2,), N, to a body from now on, in place of any other zone's; None: no zone's."""
+        if force is None and index not in self._zone_forces:
+            return
+        if force is None:
+            del self._zone_forces[index]
+        else:
+            self._zone_forces[index] = force
+        self._sum(index)
+
+    def _sum(self, index: int) -> None:
+        self._ready = None
+        action, zone_force = self._action_forces.get(index), self._zone_forces.get(index)
+        if action is not None:
+            self._total[index] = action if zone_force is None else (action[0] + zone_force, action[1])
+        elif zone_force is not None:
+            self._total[index] = zone_force, 0.0
+        else:
+            self._total.pop(index, None)
+
+    def drop(self, index: int) -> None:
+        """Remove all forces on a body."""
+        for each in (self._action_forces, self._zone_forces, self._total):
+            each.pop(index, None)
+        self._ready = None
+
+    def apply(self, members: Mapping[int, SpaceBody]) -> None:
+        """Set forces and torques for the next step, in a scene without drag."""
+        if self._ready is None:
+            self._ready = [
+                (members[index].body._body, ffi.new("cpVect *", force.tolist())[0], torque)
+                for index, (force, torque) in self._total.items()
+            ]
+        for record, force, torque in self._ready:  # pymunk's setters take five times as long
+            lib.cpBodySetForce(record, force)
+            if torque:  # pymunk resets it to 0 after each step
+                lib.cpBodySetTorque(record, torque)
+
+    def apply_with_drag(
+        self,
+        members: Mapping[int, SpaceBody],
+        reader: SpaceReader,
+        state: tuple[IntArray, FloatArray],
+        springs: FloatArray | None,
+        world: World,
+        h: float,
+    ) -> None:
+        """Set forces and torques for the next step of h, s, in a scene with drag.
+
+        Args:
+            members: bodies by index.
+            reader: of the space; it sets the forces on all bodies at once.
+            state: body indices (R,), and position, angle, velocity, spin (R, 6).
+            springs: (R, 2) N, which pymunk itself adds in that step, or None. Drag reduces their effect.
+            world: drag and wind.
+            h: substep, s.
+        """
+        indices, values = state
+        mass = np.asarray([members[n].body.mass for n in indices.tolist()])[:, None]
+        mass[np.isinf(mass)] = 0.0  # of bodies moved by a drive or held by a zone: no force affects them
+        push = np.zeros((len(indices), 2))
+        for row, index in enumerate(indices.tolist()):
+            if index in self._total and mass[row]:
+                push[row] = self._total[index][0] * (1.0 / mass[row])
+        if springs is None:
+            reader.push(mass * acceleration(world, values[:, 3:5], push, h))
+        else:
+            pull = np.divide(springs, mass, out=np.zeros_like(springs), where=mass > 0.0)
+            reader.push(mass * (acceleration(world, values[:, 3:5], push + pull, h) - pull))
+        self._set_torques(members)
+
+    def _set_torques(self, members: Mapping[int, SpaceBody]) -> None:
+        for index, (_, torque) in self._total.items():
+            members[index].body.torque = torque
+
+
+class SpaceBodies(SpaceBodyTable):
+    """Bodies in a space, addressed by their indices. Static shapes are added when the first body joins."""
+
+    def __init__(self, setup: Setup, settings: Settings, skin: float = 0.0) -> None:
+        """Create an empty space.
+
+        Args:
+            setup: the scene.
+            settings: resolved.
+            skin: fraction of its radius by which the shape of each single disc is larger than the disc.
+        """
+        scene = setup.scene
+        self._setup, self._scene, self._settings, self._skin = setup, scene, settings, skin
+        self._h, self._dragged = settings.h, has_drag(scene.world)
+        super().__init__(new_space(scene, settings))
+        self._reader = SpaceReader(self._space)
+        self._surface_setter = SurfaceSetter(self._space, settings.h)
+        self._static_shapes = StaticShapes(self._space, self._surface_setter)
+        self._surface_of: IntArray = np.empty(0, np.int64)
+        self._moments: FloatArray = np.empty(0)
+        self._can_touch: BoolArray = np.empty(0, np.bool_)
+        self._sensed: BoolArray = np.empty(0, np.bool_)
+        self.layer: IntArray = setup.bodies.layer
+        """(N,) collision layer of each body"""
+        self.zone_sensors = ZoneSensors(self._space, scene.zones)
+        self.joints = SpaceJoints(self._space)
+        self._polygons = False
+        self._has_single_contacts = False  # whether two bodies have at most one contact, and no sensors are listed
+        self._by_name: dict[str, pymunk.Body] = {}
+        self._name_of: dict[int, str] = {}
+        self.contact_reader = ContactReader(
+            self._space, self._reader, self._surface_setter.pair_callbacks, len(scene.fixed_names)
+        )
+        """reads the contacts of the space"""
+        self.field = SpaceForceField(setup)
+        self.drives = SpaceDrives(setup, self._space, settings.h)
+        self.drives.set_gravity(scene.world.gravity, gravity_of(scene))
+        self._surface_of_fixed: IntArray = np.empty(0, np.int64)
+        self.constant_forces = ConstantForces()
+        self._moving = 0
+
+    def __len__(self) -> int:
+        return self._moving
+
+    def join(
+        self,
+        indices: IntArray,
+        bodies: Bodies,
+        position: FloatArray,
+        velocity: FloatArray,
+        angle: FloatArray,
+        angular_velocity: FloatArray,
+        moment: FloatArray,
+    ) -> None:
+        """Add bodies: their (M,) indices and present state."""
+        if not len(indices):
+            return
+        self._static_shapes.create(self._scene, self._setup.plane_reach, bodies, self._surface_of_fixed)
+        self._moments = bodies.moment
+        self._polygons = self._polygons or not bodies.round.all()
+        order = np.asarray(shuffled(len(indices)))
+        states = np.column_stack((position, angle, velocity, angular_velocity, bodies.mass[indices], moment))
+        for index, state in zip(indices[order].tolist(), states[order].tolist(), strict=True):
+            self._add(index, bodies, state)
+        self._register()
+        self._has_single_contacts = not (
+            self._polygons or self.can_repeat_pairs or self._scene.zones or self._surface_setter.one_way_walls.walls
+        )
+        self.drives.add_callbacks(self._collision_types)
+        if self._setup.time and self._surface_setter.one_way_walls.walls:
+            walls = {index: each for each, index in self._static_shapes.ids.items()}
+            pairs = [(n, walls[wall]) for n, wall in self._setup.passing if n in self._members]
+            self._surface_setter.one_way_walls.resume([(self._members[n].body.id, wall) for n, wall in pairs])
+
+    def passing(self) -> IntArray | None:
+        """Return the pairs (P, 2) of a body and the one-way wall, −1 − k, that it passes through; None without any."""
+        ids = self._surface_setter.one_way_walls.passing()
+        if not ids:
+            return None
+        indices = {member.body.id: n for n, member in self._members.items()}
+        walls = self._static_shapes.ids
+        pairs = sorted((indices[body], walls[wall]) for body, wall in ids if body in indices)
+        return np.asarray(pairs, np.int64) if pairs else None
+
+    def _collision_types(self, index: int) -> set[int]:
+        """Return the collision types of a body's shapes."""
+        return {shape.collision_type for _, shape in self._members[index].shapes}
+
+    def _add(self, index: int, bodies: Bodies, state: list[float]) -> None:
+        """Add a body with its state: x, y, angle, vx, vy, ω, mass, moment."""
+        x, y, angle, vx, vy, spin, mass, moment = state
+        fixed, name = bool(bodies.fixed[index]), bodies.names[index]
+        driven = self.drives.holds(name)
+        if driven:
+            body = self.drives.body(name, index, bodies, state)
+            self._moving += 1
+        else:
+            body = pymunk.Body(mass, moment, body_type=pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC)
+            body.position = x, y
+            if angle:
+                body.angle = angle
+            if not fixed:
+                body.velocity = vx, vy
+                if spin:
+                    body.angular_velocity = spin
+                self._moving += 1
+        self._space.add(body)
+        self._members[index] = SpaceBody(body, ())
+        if self._can_touch[index] or fixed:
+            self._give_shapes(index, bodies)
+        if self._sensed[index]:
+            self.zone_sensors.add(index, body)
+        self._by_name[name], self._name_of[index] = body, name
+        if driven:
+            self.drives.join(name, index, body, state)
+        elif not fixed and (self.field.attracts or self.field.has_thrust(name)):
+            self.field.apply_to(name, body, self._by_name)
+
+    def _give_shapes(self, index: int, bodies: Bodies) -> None:
+        """Add the shapes of a body in the space."""
+        body = self._members[index].body
+        shapes = tuple(body_shapes(body, bodies, index, self._skin))
+        shape_filter = self._filter(index, bodies)
+        for piece, shape in shapes:
+            shape.filter = shape_filter
+            self._surface_setter.set_surface(shape, int(self._surface_of[piece]))
+        self._space.add(*(shape for _, shape in shapes))
+        self._members[index] = SpaceBody(body, shapes)
+
+    def _filter(self, index: int, bodies: Bodies) -> pymunk.ShapeFilter:
+        collides = bodies.elements[bodies.element[index]].collides
+        layers = 1 << int(self.layer[index])
+        return category(bool(bodies.fixed[index]), collides, int(bodies.group[index]), layers)
+
+    def set_layer(self, index: int, bodies: Bodies) -> None:
+        """Apply a body's changed collision layer from now on. Its contacts on the old layer end."""
+        shape_filter = self._filter(index, bodies)
+        for _, shape in self._members[index].shapes:
+            shape.filter = shape_filter
+
+    def is_sensed(self, index: int) -> bool:
+        """Return whether a body is in the space and zones sense it."""
+        return index in self._members and bool(self._sensed[index])
+
+    def add_missing_shapes(self, bodies: Bodies) -> None:
+        """Add shapes to bodies that so far were only joined or driven, and can now touch something."""
+        for index, member in self._members.items():
+            if not member.shapes and self._can_touch[index]:
+                self._give_shapes(index, bodies)
+
+    def _register(self) -> None:
+        moving = {m.body.id: index for index, m in self._members.items() if m.moves}
+        self._reader.records = {self._members[index].body._body: index for index in moving.values()}
+        still = {m.body.id: index for index, m in self._members.items() if not m.moves}
+        self._reader.assign(moving, still | self._static_shapes.ids)
+        self._state = None
+
+    def leave(self, indices: IntArray) -> None:
+        """Remove bodies."""
+        if not len(indices):
+            return
+        for index in indices.tolist():
+            self.joints.remove(index)
+            self.zone_sensors.drop(index)
+            self._resting.pop(index, None)
+            self.drives.leave(index)
+            member = self._members.pop(index)
+            self._moving -= member.moves
+            self._space.remove(*(shape for _, shape in member.shapes), member.body)
+            del self._by_name[self._name_of.pop(index)]  # in place: the force field holds a reference
+            self.constant_forces.drop(index)
+        self._reader.invalidate_order()
+        self._state = None
+
+    def link(self, links: Links) -> None:
+        """Add the scene's joints, once; jointed bodies are always in the space."""
+        assert self._settings.bias is not None
+        if self._members:
+            self.joints.add(links, lambda index: self._members[index].body, self._settings.bias)
+
+    @property
+    def solved_joint_count(self) -> int:
+        """Number of joints that pymunk solves."""
+        return self.joints.count if self._moving else 0
+
+    @property
+    def can_repeat_pairs(self) -> bool:
+        """Whether two bodies can have several contacts at once."""
+        return self._static_shapes.has_several_shapes or any(
+            len(member.shapes) > 1 for member in self._members.values()
+        )
+
+    def rebuild(self, scene: Scene, meet: ContactMatrix) -> None:
+        """Update after a change of the scene's coefficients, walls, surfaces or world."""
+        if self._static_shapes.reshape(self._scene, scene):
+            self._has_single_contacts = False  # contacts with the removed shapes vanish without being listed as ended
+        self.rebuild_world(scene)
+        self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
+        self._can_touch, self._sensed = meet.touches, meet.noted
+        self._surface_setter.rebuild(meet, jointed_surfaces(scene, self._surface_of_fixed))
+        for index, (_, own) in self._members.items():
+            for piece, shape in own:
+                self._surface_setter.set_surface(shape, int(self._surface_of[piece]))
+            heavy = meet.turnable[index] and math.isinf(self.moment(index))
+            if heavy and index not in self.drives.indices:
+                self.give_moment(index, float(self._moments[index]))
+        if self.drives.driven_bodies:
+            self.drives.add_callbacks(self._collision_types)
+        self._static_shapes.rebuild(scene, self._surface_of_fixed)
+
+    def rebuild_world(self, scene: Scene) -> None:
+        """Update after a change of the scene's gravity, drag or wind."""
+        self._scene = scene
+        self._dragged = has_drag(scene.world)
+        self.field.fractions.clear()
+        self._space.gravity = gravity_of(scene)
+        if self.drives.driven_bodies:
+            self.drives.set_gravity(scene.world.gravity, gravity_of(scene))
+
+    def step(self, time: float) -> None:
+        """Advance by one substep, from a time, s."""
+        if not self._moving:
+            return
+        self.field.time = time
+        if self._dragged:
+            self._apply_drag(*self._read())
+        else:
+            self.constant_forces.apply(self._members)
+        if self._surface_setter.one_way_walls.walls:
+            self._surface_setter.one_way_walls.tick += 1
+        if self.drives.driven_bodies:
+            self.drives.before()
+            self._space.step(self._h)
+            self.drives.after()
+        else:
+            self._space.step(self._h)
+        self._state = None
+
+    def _apply_drag(self, indices: IntArray, state: FloatArray) -> None:
+        """Set the forces of the next substep on bodies (R,) of a state (R, 6), in a scene with drag."""
+        world, springs = self._scene.world, self._springs(indices, state)
+        self.constant_forces.apply_with_drag(self._members, self._reader, (indices, state), springs, world, self._h)
+        if self.field.kicks:
+            fractions = mean_fraction(rates(world, state[:, 3:5]), self._h).tolist()
+            self.field.fractions = {self._name_of[n]: each for n, each in zip(indices.tolist(), fractions, strict=True)}
+
+    def _springs(self, indices: IntArray, state: FloatArray) -> FloatArray | None:
+        """Return the forces, N, of springs on bodies (R,) of a state (R, 6) in the next substep; None without springs.
+
+        pymunk evaluates springs after positions have moved by the old velocities.
+        """
+        links = self.joints.by_kind.springs
+        if not len(links):
+            return None
+        position, angle = np.zeros((len(self._can_touch), 2)), np.zeros(len(self._can_touch))
+        position[indices] = state[:, 0:2] + state[:, 3:5] * self._h
+        angle[indices] = state[:, 2] + state[:, 5] * self._h
+        for index in np.setdiff1d(np.concatenate((links.a, links.b)), [WORLD, *indices]).tolist():  # fixed bodies
+            body = self._members[index].body
+            position[index], angle[index] = body.position, body.angle
+        return spring_forces(links, position, angle)[indices]
+
+    def find_pairs(self, velocity: FloatArray, time: float) -> IntArray:
+        """Move all bodies by a substep with velocities (N, 2), m/s, from a time, s; return pairs in contact, (K, 2).
+
+        Static body k has the index −1 − k. A pair may be listed twice.
+        """
+        if not self._moving:
+            return np.empty((0, 2), np.int64)
+        self._reader.drive(velocity)
+        self.step(time)
+        return self._reader.pairs()
+
+    def _read(self) -> tuple[IntArray, FloatArray]:
+        if self._state is None:
+            self._state = self._reader.state()
+        return self._state
+
+    def write(
+        self, position: FloatArray, velocity: FloatArray, angle: FloatArray, angular_velocity: FloatArray
+    ) -> None:
+        """Write the present state into arrays in scene order."""
+        if not self._moving:
+            return
+        _, state = self._read()
+        at = self._reader.slots
+        position[at], velocity[at] = state[:, 0:2], state[:, 3:5]
+        angle[at], angular_velocity[at] = state[:, 2], state[:, 5]
+        if self.drives.driven_bodies:
+            self.drives.write(position, velocity, angle, angular_velocity)
+
+    def touching(self, steady: bool = False) -> ContactBatch | ComplexArray:
+        """Return the present contacts, as `ContactReader.touching` does."""
+        if not self._moving:
+            return NO_CONTACTS
+        return self.contact_reader.touching(self._polygons, self._has_single_contacts, steady)
+
+    def beyond(self) -> tuple[int, str] | None:
+        """Return a body that is not finite or out of bounds, and a description; else None.
+
+        Half-planes are extended first if a body is beyond them.
+        """
+        if not self._moving:
+            return None
+        indices, state = self._read()
+        within = self._static_shapes.within(state)
+        if within.all():
+            return None
+        self.extend_planes()
+        within = self._static_shapes.within(state)
+        if within.all():
+            return None
+        worst = int(np.argmin(np.all(within, axis=1)))
+        if not np.isfinite(state[worst]).all() or self._static_shapes.reach > FARTHEST:
+            return int(indices[worst]), BEYOND
+        return int(
+            indices[worst]
+        ), f"is more than {self._static_shapes.reach:g} m out, beyond the range of pymunk's half-planes"
+
+    @property
+    def plane_reach(self) -> PlaneReach | None:
+        """Present extent of half-planes; None while there are none."""
+        return self._static_shapes.plane_reach
+
+    def reaches(self, place: FloatArray) -> bool:
+        """Return whether half-planes can be extended to a position."""
+        return self._static_shapes.reaches(place)
+
+    def extend_planes(self) -> None:
+        """Extend half-planes to the bodies in the space."""
+        if self._moving and math.isfinite(self._static_shapes.reach):
+            self._static_shapes.extend(self._read()[1][:, 0:2])
+
+    def push(self, index: int, force: FloatArray, torque: float) -> None:
+        """Apply a constant force (N) and torque (N·m) to a body from now on."""
+        self.constant_forces.set_force(index, force, torque)

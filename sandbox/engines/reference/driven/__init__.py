@@ -1,1 +1,0 @@
-"""Driven: bodies that drives hold, on the hand-written solvers."""

@@ -1,0 +1,515 @@
+"""Driven bodies: motors, flippers and plungers, and how they take part in the solver.
+
+DrivenBody: a body that a drive holds, as a stage has it. What turns about a hinge has its hinge for a centre there.
+
+So contacts have their levers from the hinge: its mass nothing can move, and about it the body has one moment.
+
+Drives: the driven bodies of a stage, and how contacts find them.
+
+A body on a hinge has its moment about that, and is held by its stops as by one-sided joints. Where all that it meets
+presses it onto its stop as well, it is immovable for that substep: contact and stop in turn would not get there in
+10 iterations. What a stroke or a plunger leads is moved by nothing, and has its velocity all through a substep.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.motors import (
+    HingeDrive,
+    HingeState,
+    advance_plunger,
+    centre_about_pivot,
+    gravity_torque,
+    hinge_to_centre,
+    plunger_state,
+    stroke_direction,
+    turn_at_rate,
+)
+from sandbox.engines.reference.collision import CollisionPipeline
+from sandbox.engines.reference.integrators import Inputs, State, transition
+from sandbox.engines.reference.joint_data import ties_of
+from sandbox.engines.reference.joint_rows import VelocityConstraints, rows_of
+from sandbox.engines.reference.joints import JointSolver
+from sandbox.engines.reference.manifold import Manifolds
+from sandbox.engines.reference.sequential_impulses import AngularStops, solve_together
+from sandbox.engines.reference.velocity_solver import ContactMemory, ImpulseSolver, Motion
+from sandbox.scene.compile.drives import Mount, about_hinge
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.forces import PlungerDrive, StrokeDrive, TorqueDrive
+from sandbox.scene.description.world import Settings
+
+STILL = 1e-9
+"""rad/s, angular velocity that rounding leaves to a body pressed onto its stop"""
+
+
+class DrivenBody(ABC):
+    """Base of driven bodies. A substep calls `plan`, `begin`, `place`, and after the contacts `done`."""
+
+    def __init__(self, roster: BodyStore, number: int, mount: Mount) -> None:
+        self.number, self.mount = number, mount
+        self.mass = float(roster.bodies.mass[number])
+        self.moment = about_hinge(mount, self.mass, float(roster.bodies.moment[number]))
+        """moment of inertia about the hinge, kg·m²"""
+        self.gravity: Point = roster.scene.world.gravity
+        self.state: FloatArray = roster.drives[mount.number]
+        """(3,) of its drive, as in a frame; written to"""
+        drive = mount.drive
+        self._seat = mount.home if isinstance(drive, PlungerDrive) else drive.pivot
+
+    @abstractmethod
+    def plan(self, x: State, h: float) -> None:
+        """Plan the motion of the body from a state (2, N, 3) over h, s, as if nothing were hit."""
+
+    @abstractmethod
+    def begin(self, x: State) -> None:
+        """Write into a state the velocity that the body has during the planned substep."""
+
+    def glide(self, x: State, h: float) -> None:
+        """Write into a state the constant velocity that leads to the end of the planned substep of h, s."""
+        n = self.number
+        end = np.zeros_like(x)
+        self.place(end)
+        x[1, n] = (end[0, n] - x[0, n]) / h
+
+    @abstractmethod
+    def place(self, moved: State) -> None:
+        """Write the end of the planned substep into a state."""
+
+    @abstractmethod
+    def done(self, after: State) -> None:
+        """Commit the planned substep, after its contacts are solved."""
+
+    def enter(self, x: State) -> None:
+        """Replace the centre of mass by the hinge in a state."""
+        n = self.number
+        x[0, n, 0], x[0, n, 1] = self._seat
+        x[1, n, 0] = x[1, n, 1] = 0.0
+
+    def centre(self, pose: FloatArray, rate: FloatArray) -> tuple[Point, Point]:
+        """Return position, m, and velocity, m/s, of the centre of mass for poses and rates (N, 3)."""
+        return centre_about_pivot(
+            self.mount.hinge, self._seat, float(pose[self.number, 2]), float(rate[self.number, 2])
+        )
+
+    def kinetic(self, rate: FloatArray) -> float:
+        """Return the kinetic energy of the body, J, for rates (N, 3)."""
+        return 0.5 * self.moment * float(rate[self.number, 2]) ** 2
+
+    def height(self, pose: FloatArray) -> float:
+        """Return the potential energy in gravity, J, up to a constant."""
+        x, y = hinge_to_centre(self.mount.hinge, float(pose[self.number, 2]))
+        return -self.mass * (self.gravity[0] * x + self.gravity[1] * y)
+
+
+class HingeMotor(DrivenBody):
+    """A body on a hinge, driven by a torque."""
+
+    turned: HingeState
+    fall: float
+    """torque of the weight in the planned substep, N·m"""
+
+    def __init__(self, roster: BodyStore, number: int, mount: Mount) -> None:
+        super().__init__(roster, number, mount)
+        assert isinstance(mount.drive, TorqueDrive)
+        self._law = HingeDrive(mount.drive, self.moment)
+        self._h = 0.0
+        self._planned = 0.0, 0.0, 0.0, 0.0  # angle, spin, torque of the drive, its level
+        self._held = 0, 0.0, 0.0  # by a stop: at which, N·m·s, in which time
+        self._low, self._high = sorted(mount.drive.stops)
+
+    @property
+    def direction(self) -> float:
+        """Direction in which the planned substep presses it onto a stop: 1, −1, or 0 for none."""
+        return self.turned.stop * self._law.sense
+
+    @property
+    def given(self) -> float:
+        """Impulse of the stop to begin with, N·m·s: that of the last substep, scaled to a shorter one."""
+        at, impulse, h = self._held
+        return impulse * min(self._h / h, 1.0) if at and at == self.turned.stop else 0.0
+
+    def hold(self, given: float) -> None:
+        """Remember the impulse of the stop, N·m·s."""
+        self._held = self.turned.stop, given, self._h
+
+    def follow(self, old: "HingeMotor") -> None:
+        """Take over the impulse of the stop from another body object."""
+        self._held = old._held
+
+    def plan(self, x: State, h: float) -> None:
+        """Plan the motion under the ramped torque, between the stops."""
+        level, torque, _ = self.state.tolist()
+        angle, spin = float(x[0, self.number, 2]), float(x[1, self.number, 2])
+        self.fall = gravity_torque(self.mount.hinge, angle, self.mass, self.gravity)
+        self._planned = angle, spin, torque, level
+        self.turned, self._h = self._law.turn(*self._planned, self.fall, h), h
+
+    def begin(self, x: State) -> None:
+        """Keep the present velocity: the torque acts like any other force."""
+
+    def place(self, moved: State) -> None:
+        """Write the end of the planned substep; the stop later removes the angular velocity that presses onto it."""
+        n, turned = self.number, self.turned
+        self.enter(moved)
+        moved[0, n, 2] = turned.angle
+        moved[1, n, 2] = turned.spin + turned.press * self._h / self.moment
+
+    @property
+    def stands(self) -> bool:
+        """Whether the body is pressed onto a stop during the whole planned substep."""
+        return self.turned.stop != 0 and not self._planned[1] and self._planned[0] == self.turned.angle
+
+    def sprung(self, spun: float) -> bool:
+        """Count the change of angular velocity by springs in the planned substep, rad/s, as a torque.
+
+        Return whether that leaves it pressed onto a stop on which it stands.
+        """
+        stood = self.stands
+        turned = self._law.turn(*self._planned, self.fall + self.moment * spun / self._h, self._h)
+        self.turned = turned._replace(press=0.0)
+        return stood and self.stands
+
+    def done(self, after: State) -> None:
+        """Keep the body between the stops, also if a contact changed its motion, and at rest on a stop."""
+        n = self.number
+        after[0, n, 2] = min(max(after[0, n, 2], self._low), self._high)
+        if self.turned.stop and abs(after[1, n, 2]) <= STILL:
+            after[1, n, 2] = 0.0
+        self.state[1] = self.turned.torque
+
+
+class KinematicHinge(DrivenBody):
+    """A body that turns about a hinge at a given rate."""
+
+    def plan(self, x: State, h: float) -> None:
+        """Plan a rotation at the rate."""
+        assert isinstance(self.mount.drive, StrokeDrive)
+        self._planned = turn_at_rate(self.mount.drive, float(self.state[0]), float(x[0, self.number, 2]), h)
+
+    def begin(self, x: State) -> None:
+        """Write the rate, from the beginning of the substep."""
+        x[1, self.number, 2] = self._planned.spin
+
+    def place(self, moved: State) -> None:
+        """Write the end of the planned substep."""
+        self.enter(moved)
+        moved[0, self.number, 2], moved[1, self.number, 2] = self._planned.angle, self._planned.spin
+
+    def done(self, after: State) -> None:
+        """Set the rate to 0 at a stop."""
+        if self._planned.arrives:
+            after[1, self.number, 2] = 0.0
+
+
+class DrivenPlunger(DrivenBody):
+    """A body that is pulled back along a line, and released by a spring."""
+
+    def __init__(self, roster: BodyStore, number: int, mount: Mount) -> None:
+        super().__init__(roster, number, mount)
+        assert isinstance(mount.drive, PlungerDrive)
+        self._drive, self._along = mount.drive, stroke_direction(mount.drive)
+
+    def plan(self, x: State, h: float) -> None:
+        """Plan the pull, or the release by the spring, depending on the level."""
+        del x
+        level, pull, rate = self.state.tolist()
+        self._planned = advance_plunger(self._drive, level, pull, rate, h)
+
+    def enter(self, x: State) -> None:
+        """Do nothing: the pose is that of the centre already."""
+
+    def begin(self, x: State) -> None:
+        """Write the final velocity of the substep from its beginning."""
+        x[1, self.number, :2] = self._where()[1]
+
+    def _where(self) -> tuple[Point, Point]:
+        return plunger_state(self._seat, self._along, self._planned.pull, self._planned.rate)
+
+    def place(self, moved: State) -> None:
+        """Write the end of the planned substep."""
+        n = self.number
+        moved[0, n, :2], moved[1, n, :2] = self._where()
+        moved[1, n, 2] = 0.0
+
+    def done(self, after: State) -> None:
+        """Set the velocity to 0 at the target."""
+        rate = 0.0 if self._planned.arrives else self._planned.rate
+        if not rate:
+            after[1, self.number, :2] = 0.0
+        self.state[1:] = self._planned.pull, rate
+
+    def centre(self, pose: FloatArray, rate: FloatArray) -> tuple[Point, Point]:
+        """Return position, m, and velocity, m/s."""
+        x, y = pose[self.number, :2].tolist()
+        vx, vy = rate[self.number, :2].tolist()
+        return (x, y), (vx, vy)
+
+    def kinetic(self, rate: FloatArray) -> float:
+        """Return the kinetic energy of the body, J, for rates (N, 3)."""
+        return 0.5 * self.mass * float(rate[self.number, 0] ** 2 + rate[self.number, 1] ** 2)
+
+    def height(self, pose: FloatArray) -> float:
+        """Return the potential energy in gravity, J, up to a constant."""
+        return -self.mass * float(np.dot(self.gravity, pose[self.number, :2]))
+
+
+def lead_of(roster: BodyStore, number: int, mount: Mount) -> DrivenBody:
+    """Return the driven body with an index."""
+    kinds: dict[str, type[HingeMotor] | type[KinematicHinge] | type[DrivenPlunger]]
+    kinds = {"torque": HingeMotor, "stroke": KinematicHinge, "plunger": DrivenPlunger}
+    return kinds[mount.drive.kind](roster, number, mount)
+
+
+class DriveWork(NamedTuple):
+    """Energy that a substep gave to driven bodies, J."""
+
+    gained: float
+    """kinetic energy, and potential energy of bodies that nothing stops"""
+    weight: float
+    """work of the weight of bodies on hinges, as the step computes it"""
+    lifted: float
+    """increase of their potential energy"""
+
+
+class Drives:
+    """The driven bodies that are present."""
+
+    def __init__(self, roster: BodyStore) -> None:
+        self._roster = roster
+        self.leads: list[DrivenBody] = [lead_of(roster, number, mount) for number, mount in roster.held.items()]
+        self._hinges = [lead for lead in self.leads if isinstance(lead, HingeMotor)]
+        self._numbers: IntArray = np.asarray([lead.number for lead in self.leads], np.int64)
+        self._turning = not roster.led[self._numbers].all()
+        self.firm: FloatArray = roster.inverse_moment.copy()
+        """(N,) 1/(kg·m²), inverse moments for the correction of overlaps: 0 for driven bodies, which keep their pose"""
+        self.firm[self._numbers] = 0.0
+        self.yielding: FloatArray = roster.inverse_moment
+        """(N,) 1/(kg·m²), inverse moments for forces in the planned substep: 0 for a body pressed onto a stop"""
+        self._no_rows: VelocityConstraints = rows_of(ties_of(roster.setup.links, among=np.empty(0, np.int64)))
+
+    @classmethod
+    def of(cls, roster: BodyStore, old: Self | None) -> Self | None:
+        """Return the drives of the bodies in a roster, continuing old ones; None if no body is driven."""
+        if not roster.held:
+            return None
+        new = cls(roster)
+        stopped = {} if old is None else {hinge.number: hinge for hinge in old._hinges}
+        for hinge in new._hinges:
+            if hinge.number in stopped:
+                hinge.follow(stopped[hinge.number])
+        return new
+
+    def enter(self, x: State) -> None:
+        """Replace centres of mass by hinges in a state (2, N, 3)."""
+        for lead in self.leads:
+            lead.enter(x)
+
+    def leave(self, x: State) -> None:
+        """Write the centres of mass of a state into the body store."""
+        roster = self._roster
+        for lead in self.leads:
+            roster.position[lead.number], roster.velocity[lead.number] = lead.centre(*x)
+
+    def centred(self, x: State) -> FloatArray:
+        """Return the centres of mass of all bodies in a state, (N, 2) m."""
+        position = x[0, :, :2].copy()
+        for lead in self.leads:
+            position[lead.number] = lead.centre(*x)[0]
+        return position
+
+    def begin(self, x: State, h: float) -> State:
+        """Plan a substep of h, s, from a state; return the state with the velocities of kinematic bodies during it."""
+        self.start = x.copy()
+        """(2, N, 3) state at the beginning of the planned substep"""
+        for lead in self.leads:
+            lead.plan(x, h)
+            lead.begin(self.start)
+        return self.start
+
+    def spring(self, x: State, h: float, spring: Callable[[State], tuple[State, Manifolds, FloatArray]]) -> State:
+        """Return the state h, s, ahead, under contacts that are forces all the way.
+
+        What stands on a stop stands still as long as they, too, press it there, or less off than its drive presses.
+        Whatever else is on a hinge goes evenly, and they turn it besides; how far, with stops, is its drive's matter.
+
+        Args:
+            x: (2, N, 3) the state.
+            h: s.
+            spring: the way of all bodies from a state, with the contacts and what each gave, (K, 2) N·s.
+        """
+        self.begin(x, h)
+        for lead in self.leads:
+            lead.glide(self.start, h)
+        self.yielding = self._roster.inverse_moment.copy()
+        standing = [hinge for hinge in self._hinges if hinge.stands]
+        self.yielding[[hinge.number for hinge in standing]] = 0.0
+        while True:  # at most once for each of them
+            moved, contacts, given = spring(self.start)
+            loose = [each for each in standing if not each.sprung(self._turn(each, contacts, given))]
+            if not loose:
+                break
+            for hinge in loose:
+                hinge.plan(x, h)
+                self.yielding[hinge.number] = 1.0 / hinge.moment
+            standing = [hinge for hinge in standing if hinge not in loose]
+            for hinge in standing:
+                hinge.plan(x, h)
+        for hinge in self._hinges:
+            if hinge not in standing:
+                n = hinge.number
+                hinge.sprung(float(moved[1, n, 2] - self.start[1, n, 2]))
+        return moved
+
+    def _turn(self, hinge: HingeMotor, contacts: Manifolds, impulse: FloatArray) -> float:
+        """Return the change of angular velocity, rad/s, of a body on a hinge by impulses (K, 2), N·s."""
+        turn = 0.0
+        for body, side, sign in ((contacts.first, 0, -1.0), (contacts.second, 1, 1.0)):
+            which = body == hinge.number
+            turn -= float(contacts.arm[which, side] @ impulse[which, 1])
+            turn -= sign * float(contacts.offset[which, side] @ impulse[which, 0])
+        return turn / hinge.moment
+
+    def place(self, moved: State) -> None:
+        """Write the end of the planned substep into a state."""
+        for lead in self.leads:
+            lead.place(moved)
+
+    def released(self, rates: FloatArray) -> FloatArray:
+        """Return rates (N, 3) after the planned substep, without the part that presses onto stops."""
+        rates = rates.copy()
+        for hinge in self._hinges:
+            rates[hinge.number, 2] = hinge.turned.spin
+        return rates
+
+    def solve(
+        self,
+        contacts: Manifolds,
+        bounce: FloatArray,
+        rows: VelocityConstraints | None,
+        velocity: FloatArray,
+        impulse: FloatArray,
+        iterations: int,
+    ) -> None:
+        """Solve contacts, joints and stops together; the arguments are those of `solve_together`."""
+        inverse_moment, stopped = self._roster.inverse_moment.copy(), list[HingeMotor]()
+        for hinge in self._hinges:
+            if hinge.direction and _presses(contacts, hinge.number, hinge.direction):
+                inverse_moment[hinge.number] = velocity[hinge.number, 2] = 0.0
+            elif hinge.direction:
+                stopped.append(hinge)
+        stops = AngularStops(
+            np.asarray([hinge.number for hinge in stopped], np.int64),
+            np.asarray([hinge.direction for hinge in stopped]),
+            np.asarray([hinge.given for hinge in stopped]),
+        )
+        rows = self._no_rows if rows is None else rows
+        inverse = self._roster.inverse_mass, inverse_moment
+        solve_together(contacts, bounce, rows, stops, velocity, *inverse, impulse, iterations)
+        given = dict(zip(stops.body.tolist(), stops.given.tolist(), strict=True))
+        for hinge in self._hinges:
+            hinge.hold(given.get(hinge.number, 0.0))
+
+    def done(self, after: State) -> None:
+        """Commit the planned substep."""
+        for lead in self.leads:
+            lead.done(after)
+
+    def taken(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray) -> float:
+        """Return the work of impulses (K, 2), N·s, on driven bodies at mean rates (N, 3), J."""
+        if not contacts.size:
+            return 0.0
+        along, across = impulse.T
+        push = contacts.normal * along[:, None] + _left(contacts.normal) * across[:, None]
+        work = 0.0
+        for body, side, sign in ((contacts.first, 0, -1.0), (contacts.second, 1, 1.0)):
+            which = np.isin(body, self._numbers)
+            rate = mean[body[which]]
+            lever = contacts.arm[which, side] * across[which] + sign * contacts.offset[which, side] * along[which]
+            work += sign * float((push[which] * rate[:, :2]).sum()) - float(lever @ rate[:, 2])
+        return work
+
+    def work(self, before: State, after: State, h: float) -> DriveWork:
+        """Return the energy that a substep of h, s, between two states gave to driven bodies."""
+        gained = weight = lifted = 0.0
+        for lead in self.leads:
+            gained += lead.kinetic(after[1]) - lead.kinetic(before[1])
+            rise = lead.height(after[0]) - lead.height(before[0])
+            if isinstance(lead, HingeMotor):
+                n = lead.number
+                weight += lead.fall * h * 0.5 * float(before[1, n, 2] + after[1, n, 2])
+                lifted += rise
+            else:
+                gained += rise
+        return DriveWork(gained, weight, lifted)
+
+
+class DrivenSolver(ImpulseSolver):
+    """Sequential impulses with driven bodies: their drives plan the motion, and their stops take turns with contacts.
+
+    Args:
+        drives: of the driven bodies.
+        roster: the other arguments are those of `ImpulseSolver`.
+        settings: likewise.
+        pipeline: likewise.
+        joints: likewise.
+        memory: likewise.
+    """
+
+    def __init__(
+        self,
+        drives: Drives,
+        roster: BodyStore,
+        settings: Settings,
+        pipeline: CollisionPipeline,
+        joints: JointSolver | None,
+        memory: ContactMemory,
+    ) -> None:
+        super().__init__(roster, settings, pipeline, joints, memory)
+        self._drives, self._always = drives, True
+        self._inverse_overlap = roster.inverse_mass, drives.firm
+
+    def integrate(self, x: State, forces: Inputs, time: float, h: float) -> Motion:
+        """Return the motion from a state at a time, s, over h, s, as if nothing were hit."""
+        start = self._drives.begin(x, h)
+        free = self._integrator.step(transition, time, start, forces, h)
+        self._drives.place(free)
+        return self.place(start, free, h)
+
+    def finish(self, after: State) -> State:
+        """Return the start state of the next step: driven bodies are between their stops, and at rest on a stop."""
+        after = after.copy()
+        self._drives.done(after)
+        return after
+
+    def _released(self, rates: FloatArray) -> FloatArray:
+        return self._drives.released(rates)
+
+    def _iterate(
+        self,
+        contacts: Manifolds,
+        bounce: FloatArray,
+        rows: VelocityConstraints | None,
+        velocity: FloatArray,
+        impulse: FloatArray,
+    ) -> None:
+        self._drives.solve(contacts, bounce, rows, velocity, impulse, self._iterations)
+
+
+def _left(normal: FloatArray) -> FloatArray:
+    """Return normals (K, 2) turned left."""
+    return np.column_stack((-normal[:, 1], normal[:, 0]))
+
+
+def _presses(contacts: Manifolds, number: int, direction: float) -> bool:
+    """Return whether a body has contacts and all of them turn it in the same direction, or not at all."""
+    first, second = contacts.first == number, contacts.second == number
+    if not (first.any() or second.any()):
+        return False
+    return bool(
+        (direction * contacts.offset[first, 0] >= 0.0).all() and (direction * contacts.offset[second, 1] <= 0.0).all()
+    )

@@ -1,0 +1,230 @@
+"""Energy ledger of a reference run: what each stage of a step does to the energy, by cause.
+
+A contact, or a joint, acts through the whole of a step, and is not to be blamed for the kick that the step's forces
+give before it can answer. So its impulse J is booked with the mean of the velocities u at the step's two ends,
+
+    work = J·(u_start + u_end)/2,
+
+which is ½μ(1 − e²)u² for an impact, μ m g s for a slide, and nothing at all for what rests. The rest of what it did to
+the kinetic energy, J·(kick)/2, it took back from the integrator, and so did positions that follow velocities: both are
+the integrator's. Joints that are held by positions are booked likewise, by the velocities that they give; where they
+shift positions beyond what follows from those, that is position correction. An impact at a moment of its own is booked
+with the velocities just before and after it. What acts from afar, in the air or by design is booked with its work along
+the way that each body really went.
+"""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from sandbox.arrays import FloatArray
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.energy_ledger import Cause, EnergyLedger
+from sandbox.engines.reference.drives import Drives
+from sandbox.engines.reference.integrators import State
+from sandbox.engines.reference.manifold import Manifolds
+from sandbox.engines.reference.sequential_impulses import contact_work
+from sandbox.engines.reference.step import StepRecord, WorldState
+from sandbox.scene.compile.potential import Potential
+
+GAUSS = tuple((0.5 + 0.5 * node * math.sqrt(0.6), weight / 18.0) for node, weight in ((-1, 5), (0, 8), (1, 5)))
+"""Places in a step, as fractions of it, and their weights: exact for polynomials up to degree 5."""
+
+
+class StepEnergyLedger:
+    """Energy ledger of a running world: it reads the record of each step after that is done.
+
+    Args:
+        roster: the bodies.
+        world: their state, forces, joints and drives.
+    """
+
+    def __init__(self, roster: BodyStore, world: WorldState) -> None:
+        self.account = EnergyLedger()
+        self._roster, self._world, self._field = roster, world, world.field
+        self._fraction = world.position_fraction
+        self.rebuild()
+
+    def rebuild(self) -> None:
+        """Derive masses, weights and potential anew from the bodies, forces, joints and drives of the world.
+
+        The penalty contacts of the ledger use a collision pipeline of their own, so that they are not counted as work.
+        """
+        roster, world = self._roster, self._world
+        self._u, self._joints, self._drives = world.forces, world.joints, world.drives
+        self._penalty = world.ledger_penalty()
+        moving = roster.mobile  # a body that a zone holds has no motion, but height
+        self._everyone: FloatArray = np.where(moving, (roster.bodies.mass,) * 2 + (roster.bodies.moment,), 0.0).T
+        self._inertia = self._everyone
+        if self._drives is not None:  # the motion of driven bodies is booked separately
+            self._inertia = self._everyone.copy()
+            self._inertia[list(roster.held)] = 0.0
+        self._weight: FloatArray = self._inertia[:, :1] * roster.scene.world.gravity
+        self._lifted: FloatArray = self._inertia[:, :1] * (roster.gravity - np.asarray(roster.scene.world.gravity))
+        breaks = np.full(len(roster.setup.links), np.inf)
+        breaks[list(roster.broken)] = -np.inf
+        self._potential = Potential(roster.setup, roster.bodies, breaks=breaks)
+        self._no_spin: FloatArray = np.zeros(len(moving))
+        steady = bool(roster.force.any() or roster.torque.any() or self._lifted.any())
+        u = self._u
+        self._worked = u.dragged or u.rubbing or steady or self._field.thrusting or self._penalty is not None
+        self._compliant = self._joints is not None and self._joints.method == "xpbd"
+
+    @contextmanager
+    def booking(self, cause: Cause) -> Iterator[None]:
+        """Book the change of energy by all that is done to the body store meanwhile to one cause."""
+        before = self._total()
+        yield
+        self.account.enter(cause, self._total() - before)
+
+    def book(self, record: StepRecord) -> None:
+        """Book a step: contacts and joints through it, the impact at its end, drives, and the rest."""
+        start, impact = record.motion.start[1], record.impact
+        mean = 0.5 * (start + record.end)
+        if self._penalty is None:
+            self._book_contacts(record.contacts, record.impulse, mean, record.kick_energy)
+        if self._joints is not None and self._joints.method == "impulses":
+            self.account.enter(Cause.JOINTS, self._joints.work(mean))
+        if impact is not None:
+            at_impact = 0.5 * (record.end + record.after[1])
+            self._book_contacts(impact.contacts, impact.impulse, at_impact, impact.kick_energy)
+        if self._drives is not None:
+            self._book_drives(self._drives, record, mean)
+        self._book_motion(record)
+
+    def _book_drives(self, drives: Drives, record: StepRecord, mean: FloatArray) -> None:
+        """Book drives: what driven bodies gained, less what contacts and weight gave them."""
+        work = drives.work(record.before, record.after, record.h)
+        taken = drives.taken(record.contacts, record.impulse, mean)
+        if self._penalty is not None:  # its forces are booked whole, and against freely moving bodies alone
+            self.account.enter(Cause.INTEGRATOR, taken)
+        self.account.enter(Cause.DRIVES, work.gained - taken - work.weight)
+        self.account.enter(Cause.INTEGRATOR, work.weight + work.lifted)
+
+    def _book_contacts(
+        self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray, kick_energy: FloatArray | None
+    ) -> None:
+        if contacts.size:
+            spin = mean[:, 2] if mean.shape[1] == 3 else self._no_spin
+            along, across = contact_work(contacts, impulse, mean, spin)
+            kicks = 0.0 if kick_energy is None else float(impulse[:, 0] @ kick_energy)
+            self.account.touch(along - kicks, across)
+            self.account.enter(Cause.KICKS, kicks)
+
+    def _book_motion(self, record: StepRecord) -> None:
+        """Book forces, joints solved by positions, position correction, and the integrator."""
+        h, after, end, motion = record.h, record.after, record.end, record.motion
+        start, free, placed = motion.start, motion.free, motion.placed
+        shift = 0.0 if motion.shift is None else motion.shift
+        work = self._work(record.time, start, np.stack((after[0] - shift, end)), h)
+        for cause in (Cause.DRAG, Cause.DAMPING, Cause.DRIVES):
+            self.account.enter(cause, work[cause])
+        forces = work[Cause.DRAG] + work[Cause.DRIVES] + self._spring_contacts(work, start[0], after[0])
+
+        put = placed[1] - free[1]  # by joints that are solved by positions
+        displaced = bool(put.any())
+        pushed = free[0] if motion.shift is None else free[0] + shift
+        followed = pushed + (self._fraction * h) * (end - free[1]) if displaced else after[0]
+        drift = self._kinetic(start[1], free[1]) + self._lift(start[0], free[0]) + self._lift(pushed, followed)
+        # What contacts and joints took back of the kick that they were not given time to withstand.
+        drift += 0.5 * self._product(put, free[1] - start[1] + placed[1] - end)
+        drift += 0.5 * self._product(end - placed[1], placed[1] - start[1])
+        correction = self._lift(free[0], pushed) + self._strain(free[0], pushed) + self._lift(followed, after[0])
+        strain, strain_after = self._strain(start[0], free[0]) + self._strain(pushed, followed), 0.0
+        if displaced:
+            strain_after = self._strain(followed, after[0])
+        joints = 0.5 * self._product(put, start[1] + end)
+        if self._compliant:  # springs are held as joints are: what they store is theirs, but for what dampers take
+            joints += strain + strain_after - work[Cause.DAMPING]
+        else:
+            drift, correction, forces = drift + strain, correction + strain_after, forces + work[Cause.DAMPING]
+        self.account.enter(Cause.JOINTS, joints)
+        self.account.enter(Cause.CORRECTION, correction)
+        self.account.enter(Cause.INTEGRATOR, drift - forces)
+
+    def _spring_contacts(self, work: dict[Cause, float], start: FloatArray, end: FloatArray) -> float:
+        """Book contacts that are springs; return their work, J. What they store is restitution's until given back."""
+        if self._penalty is None:
+            return 0.0
+        given_back = self._penalty.stored(start) - self._penalty.stored(end)
+        self.account.add(Cause.RESTITUTION, given_back)
+        self.account.touch(work[Cause.RESTITUTION], work[Cause.FRICTION])
+        return given_back + work[Cause.RESTITUTION] + work[Cause.FRICTION]
+
+    def _work(self, time: float, start: State, end: State, h: float) -> dict[Cause, float]:
+        """Return the work, J, of what takes or gives along the way of a step, a parabola between its ends."""
+        work = dict.fromkeys(Cause, 0.0)
+        if h <= 0.0 or not self._worked:
+            return work
+        off = end[0] - start[0] - (0.5 * h) * (start[1] + end[1])  # where the scheme leaves the parabola of its kick
+        for fraction, weight in GAUSS:
+            rate = start[1] + fraction * (end[1] - start[1]) + off / h
+            pose = start[0] + (fraction * h) * (start[1] + (0.5 * fraction) * (end[1] - start[1])) + fraction * off
+            for cause, power in self._powers(time + fraction * h, np.stack((pose, rate))):
+                work[cause] += weight * h * power
+        return work
+
+    def _powers(self, time: float, x: State) -> Iterator[tuple[Cause, float]]:
+        """Yield the power, W, of each cause in a state."""
+        u, roster, rate = self._u, self._roster, x[1]
+        if u.dragged:
+            wind = rate[:, :2] - u.wind
+            fraction = u.linear_drag + u.quadratic_drag * np.hypot(wind[:, :1], wind[:, 1:])
+            yield Cause.DRAG, -float((self._inertia[:, :1] * fraction * wind * rate[:, :2]).sum())
+        if u.rubbing and self._joints is not None:
+            yield Cause.DAMPING, self._joints.damper_power(x)
+        if roster.force.any() or roster.torque.any():
+            yield Cause.DRIVES, float((roster.force * rate[:, :2]).sum())
+            yield Cause.DRIVES, float(roster.torque @ rate[:, 2]) if rate.shape[1] == 3 else 0.0
+        if self._lifted.any():  # what zones give beyond the world's gravity
+            yield Cause.DRIVES, float((self._lifted * rate[:, :2]).sum())
+        if self._field.thrusting:
+            yield Cause.DRIVES, self._product(self._field.thrusts(time, x), rate)
+        if self._penalty is not None:
+            normal, tangential = self._penalty.losses(x)
+            yield Cause.RESTITUTION, normal
+            yield Cause.FRICTION, tangential
+
+    def _product(self, change: FloatArray, rate: FloatArray) -> float:
+        """Return m Δv·w + I Δω w, J, summed over all bodies."""
+        return float((self._inertia[:, : rate.shape[1]] * change * rate).sum())
+
+    def _kinetic(self, before: FloatArray, after: FloatArray) -> float:
+        """Return the change of kinetic energy, J, between two sets of rates."""
+        return 0.5 * self._product(after - before, after + before)
+
+    def _lift(self, before: FloatArray, after: FloatArray) -> float:
+        """Return the change, J, of what gravity and attraction store, between two sets of poses."""
+        if before is after:
+            return 0.0
+        change = -float((self._weight * (after[:, :2] - before[:, :2])).sum())
+        if self._potential.attracts:
+            change += self._attracted(after) - self._attracted(before)
+        return change
+
+    def _strain(self, before: FloatArray, after: FloatArray) -> float:
+        """Return the change, J, of what springs store, between two sets of poses."""
+        if before is after or not self._potential.springs:
+            return 0.0
+        return self._strained(after) - self._strained(before)
+
+    def _attracted(self, pose: FloatArray) -> float:
+        return float(self._potential.of_attraction(pose[None, :, :2], self._roster.present[None])[0])
+
+    def _strained(self, pose: FloatArray) -> float:
+        angle = pose[:, 2] if pose.shape[1] == 3 else self._roster.angle
+        here = pose[None, :, :2], angle[None], self._roster.present[None]
+        return float(self._potential.of_springs(np.zeros(1), *here)[0])
+
+    def _total(self) -> float:
+        """Return the energy of the roster, J."""
+        roster = self._roster
+        pose = np.column_stack((roster.position, roster.angle))
+        rate = np.column_stack((roster.velocity, roster.angular_velocity))
+        weight = self._everyone[:, :1] * roster.scene.world.gravity
+        total = 0.5 * float((self._everyone * rate * rate).sum()) - float((weight * roster.position).sum())
+        if self._potential.attracts:
+            total += self._attracted(pose)
+        return total + self._strained(pose) if self._potential.springs else total

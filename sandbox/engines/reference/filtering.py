@@ -1,0 +1,173 @@
+"""Collision filtering: layers, bodies that a zone holds, and one-way walls.
+
+OneWayWalls: a one-way wall is solid on its left. A body that first overlaps it from the right passes until they
+separate.
+
+The side is that of the centre of the body at the beginning of the piece of a substep in which the two begin to touch.
+The decision holds until they separate: a body that turns round inside the wall returns unhindered, and a body that was
+stopped does not pass, however deep it is. For a polyline the nearest segment decides; at a vertex, where two segments
+are equally near, the sum of their normals does (Bærentzen & Aanæs 2005, pseudonormals).
+
+CollisionFilter: removes candidate pairs by layer, one-way walls, and pairs in which neither body can move (held,
+driven by a stroke or plunger, or fixed). A scene with none of these has no filter.
+"""
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.reference.broad_phase import FIRST, SECOND, CandidatePairs
+from sandbox.engines.reference.manifold import KIND, Manifolds
+from sandbox.scene.description.fixed import Wall, mask_of
+from sandbox.scene.scene import Scene
+
+EQUAL = 1e-9
+"""Relative difference of two distances below which both segments meet at one vertex of a wall."""
+
+Pair = tuple[int, int]
+"""Indices of a body and of a static collider."""
+
+
+class OneWayWalls:
+    """The one-way walls of a run, and the bodies that touch them."""
+
+    def __init__(self, roster: BodyStore) -> None:
+        self._roster = roster
+        self.of_thing: BoolArray = np.asarray([isinstance(t, Wall) and t.one_way for t in roster.scene.fixed], np.bool_)
+        """(F,) which static colliders are one-way walls"""
+        self._passing: set[Pair] = {(body, -1 - wall) for body, wall in roster.setup.passing}
+        self._stopped: set[Pair] = set()
+        self._goes_on = roster.setup.time > 0.0  # the state says which bodies pass: others on the left are stopped
+
+    def rebuild(self, start: FloatArray) -> None:
+        """Take centres (N, ≥ 2), m, and walls that may have another course, or have become solid."""
+        fixtures, self._start = self._roster.fixtures, start
+        order = np.argsort(fixtures.segment_thing, kind="stable")
+        things = np.flatnonzero(self.of_thing)
+        begin, end = (np.searchsorted(fixtures.segment_thing[order], things, side) for side in ("left", "right"))
+        self._segments = {
+            thing: fixtures.segments[order[first:last], :4]
+            for thing, first, last in zip(things.tolist(), begin.tolist(), end.tolist(), strict=True)
+        }
+
+    def stop(self, bodies: IntArray, things: IntArray) -> BoolArray:
+        """Return which pairs (K,) of a body and a fixed thing collide: all but bodies that pass a one-way wall."""
+        found = np.ones(len(bodies), np.bool_)
+        for k in np.flatnonzero(self.of_thing[things]).tolist():
+            found[k] = self._stops((int(bodies[k]), int(things[k])))
+        return found
+
+    def settle(self, overlaps: Manifolds, end: FloatArray) -> None:
+        """Take the overlaps at the end of a piece of a substep, and the centres there, (N, ≥ 2) m."""
+        touching = _pairs(overlaps)
+        self._passing = {pair for pair in touching if not self._stops(pair)}
+        self._stopped, self._start = touching - self._passing, end
+
+    def begin(self, overlaps: Manifolds, closing: FloatArray) -> None:
+        """Take the overlaps at the beginning, and how fast they close, (K,) m/s.
+
+        A new body on the left is stopped unless it leaves.
+        """
+        coming = _pairs(overlaps if self._goes_on else overlaps.of(closing >= 0.0))
+        self._goes_on = False
+        touching, known = _pairs(overlaps), self._passing | self._stopped
+        passing = {pair for pair in touching - known if pair not in coming or not self._on_left(pair)}
+        self._passing = passing | (self._passing & touching)
+        self._stopped = touching - self._passing
+
+    @property
+    def passing(self) -> IntArray | None:
+        """Bodies that pass a wall, and the wall, −1 − k, (P, 2); None if no body does."""
+        pairs = sorted((body, -1 - thing) for body, thing in self._passing)
+        return np.asarray(pairs, np.int64) if pairs else None
+
+    def _stops(self, pair: Pair) -> bool:
+        if pair in self._passing:
+            return False
+        return pair in self._stopped or self._on_left(pair)
+
+    def _on_left(self, pair: Pair) -> bool:
+        """Return whether a body is on the left of a wall, or on its line."""
+        body, thing = pair
+        segments = self._segments[thing]
+        a, b, place = segments[:, :2], segments[:, 2:], self._start[body, :2]
+        along = b - a
+        length = np.sqrt((along * along).sum(axis=1))
+        unit = along / length[:, None]
+        off = place - a
+        along_segment = np.clip((off * unit).sum(axis=1), 0.0, length)
+        away = np.hypot(*(off - along_segment[:, None] * unit).T)
+        nearest = away <= away.min() * (1.0 + EQUAL)
+        across = unit[:, 0] * off[:, 1] - unit[:, 1] * off[:, 0]
+        return bool(across[nearest].sum() >= 0.0)
+
+
+def _pairs(contacts: Manifolds) -> set[Pair]:
+    return set(zip(contacts.first.tolist(), (-1 - contacts.second).tolist(), strict=True))
+
+
+class CollisionFilter:
+    """Removes candidate pairs of a roster that do not collide."""
+
+    def __init__(self, roster: BodyStore) -> None:
+        self._roster, scene = roster, roster.scene
+        self._of_fixed: IntArray = np.asarray([mask_of(t.layers, scene.layers) for t in scene.fixed], np.int64)
+        every = (1 << len(scene.layers)) - 1
+        self._planes_apart = bool((self._of_fixed[: len(scene.planes)] != every).any())
+        self.walls = OneWayWalls(roster) if any(wall.one_way for wall in scene.walls) else None
+        """the one-way walls, if there are any"""
+        self.rebuild(roster.position)
+
+    @staticmethod
+    def is_needed(scene: Scene) -> bool:
+        """Return whether a scene has layers, one-way walls, or zones that hold."""
+        return len(scene.layers) > 1 or any(wall.one_way for wall in scene.walls) or any(z.holds for z in scene.zones)
+
+    def rebuild(self, position: FloatArray) -> None:
+        """Derive layers, movable bodies and walls anew from the roster; positions are (N, ≥ 2) m."""
+        self._bits: IntArray = 1 << self._roster.layer
+        self._yields: BoolArray = (self._roster.inverse_mass > 0.0) | (self._roster.inverse_moment > 0.0)
+        self._thing = self._roster.fixtures.segment_thing
+        if self.walls is not None:
+            self.walls.rebuild(position)
+
+    def apply(self, near: CandidatePairs, owner: IntArray) -> CandidatePairs:
+        """Return the candidates that meet; `owner` is the body of each ball, or piece."""
+        balls, segments = near
+        if len(balls):
+            a, b = owner[balls >> FIRST], owner[balls & SECOND]
+            balls = balls[(self._yields[a] | self._yields[b]) & (self._bits[a] & self._bits[b] != 0)]
+        if len(segments):
+            body, thing = owner[segments >> FIRST], self._thing[segments & SECOND]
+            meets = self._bits[body] & self._of_fixed[thing] != 0
+            if self.walls is not None:
+                meets[meets] = self.walls.stop(body[meets], thing[meets])
+            segments = segments[meets]
+        return CandidatePairs(balls, segments)
+
+    def at_one_way_walls(self, near: CandidatePairs, owner: IntArray) -> CandidatePairs:
+        """Return the candidates of one-way walls that share a layer with them, and no others."""
+        assert self.walls is not None
+        body, thing = owner[near.segments >> FIRST], self._thing[near.segments & SECOND]
+        meets = self.walls.of_thing[thing] & (self._bits[body] & self._of_fixed[thing] != 0)
+        return CandidatePairs(near.balls[:0], near.segments[meets])
+
+    def is_one_way(self, second: IntArray) -> BoolArray:
+        """Return which second partners of contacts (K,) are one-way walls."""
+        assert self.walls is not None
+        return np.asarray(self.walls.of_thing[np.maximum(-1 - second, 0)] & (second < 0))
+
+    def on_planes(self, contacts: Manifolds) -> Manifolds:
+        """Return contacts without those of planes on other layers, of which every body is a candidate."""
+        if not self._planes_apart:
+            return contacts
+        thing = np.maximum(-1 - contacts.second, 0)
+        return contacts.of((contacts.second >= 0) | (self._bits[contacts.first] & self._of_fixed[thing] != 0))
+
+    def with_planes_apart(self, keys: IntArray, can_touch: BoolArray) -> IntArray:
+        """Return keys, ascending, with those of all can_touch balls and planes on other layers."""
+        if not self._planes_apart:
+            return keys
+        apart = can_touch[:, None] & (self._bits[:, None] & self._of_fixed[self._roster.fixtures.plane_thing] == 0)
+        ball, plane = np.nonzero(apart)
+        return np.union1d(keys, (1 << KIND) + (ball << FIRST) + plane)

@@ -1,1 +1,0 @@
-"""Joints of the reference engine: springs as forces, the rest by impulses or by moving bodies into place."""

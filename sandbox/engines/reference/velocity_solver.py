@@ -1,0 +1,476 @@
+"""The impulse solver: contacts and joints by sequential impulses, restitution targets, and kicks.
+
+ImpulseSolver has the verbs that all solvers share, in the order of a step: `integrate`, `detect`, `solve`, `correct`,
+`finish`. `drives.DrivenSolver`, `penalty.PenaltySolver` and `penalty.DrivenPenaltySolver` are its siblings.
+
+ReboundModel gives the restitution targets where restitution depends on speed, or something kicks. Elsewhere the target
+is restitution times approach.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.kernel import kernel
+from sandbox.engines.common.restitution import compiled_rebound, fraction_at, kick_gain, kicked, segment_fractions
+from sandbox.engines.contract import Exhaustion
+from sandbox.engines.reference.collision import CollisionPipeline
+from sandbox.engines.reference.dissipation import ROUNDING, Bilinear, largest_fractions
+from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, State, Step, transition
+from sandbox.engines.reference.joint_rows import VelocityConstraints
+from sandbox.engines.reference.joints import JointSolver, kick_pose
+from sandbox.engines.reference.manifold import Manifolds
+from sandbox.engines.reference.sequential_impulses import (
+    NO_STOPS,
+    approach,
+    rebound_speeds,
+    remembered,
+    solve_once,
+    solve_overlaps,
+    solve_together,
+    solve_velocities,
+    start_with,
+)
+from sandbox.resource_limits import STEP_WORK
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.fixed import Post, Wall
+from sandbox.scene.description.world import Kick, Settings
+
+
+class Rebound(NamedTuple):
+    """Restitution targets of K contacts."""
+
+    speed: FloatArray
+    """(K,) m/s, negative: the wanted normal velocity is its opposite"""
+    kick_energy: FloatArray | None
+    """(K,) J that kicks add for each N·s along the normal; None if nothing was kicked"""
+
+
+class ReboundModel:
+    """Rebound of contacts with kicks, or with restitution that depends on speed."""
+
+    def __init__(self, roster: BodyStore) -> None:
+        self._roster = roster
+        self._kicks = {k: thing for k, thing in enumerate(roster.scene.fixed) if _kick_of(thing) is not None}
+
+    @staticmethod
+    def is_needed(roster: BodyStore) -> bool:
+        """Return whether a pair that can touch has a kick, or restitution that depends on speed."""
+        return bool((roster.meet.touching & ~roster.meet.surfaces.fixed_coefficients).any())
+
+    def bounce(self, contacts: Manifolds, approach: FloatArray) -> Rebound:
+        """Return the restitution targets of contacts that approach at (K,) m/s, negative."""
+        pair = contacts.surface_pair
+        restitution, falloff = self._roster.restitution.ravel()[pair], self._roster.falloff.ravel()[pair]
+        speed = np.empty(contacts.size)
+        _rebounds(restitution, falloff, approach, speed)
+        kick = np.zeros(contacts.size)
+        for k in np.flatnonzero(contacts.second < 0).tolist():
+            number = -1 - int(contacts.second[k])
+            if number in self._kicks:
+                x, y = contacts.point[k].tolist()
+                kick[k] = self._gain(number, (x, y), restitution[k], falloff[k], -float(approach[k]))
+        if not kick.any():
+            return Rebound(speed, None)
+        whole = kick - speed
+        met = kick > 0.0
+        energy = np.zeros(contacts.size)
+        # From `-speed` on an impulse is the kick's: half of it finds the speed before it, half that after.
+        energy[met] = (kick / (whole - approach) * 0.5 * (whole - speed))[met]
+        return Rebound(speed - kick, energy)
+
+    def _gain(self, number: int, point: Point, restitution: float, falloff: float, closing: float) -> float:
+        """Return by how much a fixed thing that is hit at a point raises the speed of parting, m/s."""
+        thing = self._kicks[number]
+        kick = _kick_of(thing)
+        assert kick is not None
+        fraction, middle = 0.5, kick.profile == "middle"
+        if middle and isinstance(thing, Wall):
+            ends = (*thing.points, thing.points[0]) if thing.closed else thing.points
+            each = zip(ends[:-1], ends[1:], segment_fractions(ends), strict=True)
+            fraction = min((_away(a, b, point), fraction_at(a, b, part, point)) for a, b, part in each)[1]
+        speed = kicked(kick.speed, kick.threshold, middle, fraction, closing)
+        return kick_gain(restitution, falloff, speed, kick.adds_to == "approach", closing)
+
+
+def _kick_of(thing: object) -> Kick | None:
+    return thing.kick if isinstance(thing, Wall | Post) else None
+
+
+def _away(a: Point, b: Point, point: Point) -> float:
+    """Return the square of how far a point is from a segment, m²."""
+    dx, dy, x, y = b[0] - a[0], b[1] - a[1], point[0] - a[0], point[1] - a[1]
+    along = min(max((x * dx + y * dy) / (dx * dx + dy * dy), 0.0), 1.0)
+    return (x - along * dx) ** 2 + (y - along * dy) ** 2
+
+
+@kernel
+def _rebounds(restitution: FloatArray, falloff: FloatArray, approach: FloatArray, out: FloatArray) -> None:
+    for k in range(len(out)):
+        out[k] = -compiled_rebound(restitution[k], falloff[k], -approach[k])
+
+
+MAX_PASSES = 1000
+"""Passes over the contacts of one impact."""
+
+CONVERGED = 1e-15
+"""Part of the largest impulse by which a pass changes others by rounding alone."""
+
+
+NO_IMPULSE: FloatArray = np.zeros((0, 2))
+
+
+class Motion(NamedTuple):
+    """Motion of all bodies over a step, as if they hit nothing. The arrays are never written to again."""
+
+    start: State
+    """(2, N, D) at the start, with the velocities that driven bodies have through the step"""
+    free: State
+    """(2, N, D) at the end, by forces alone"""
+    shift: FloatArray | None
+    """(N, D) m and rad, by which overlap of the last step is undone; None if nothing overlapped"""
+    placed: State
+    """(2, N, D) at the end: `free`, shifted, and moved by the joints that are solved by positions"""
+
+
+class Impact(NamedTuple):
+    """Contacts that act at the end of a step alone."""
+
+    contacts: Manifolds
+    impulse: FloatArray
+    """(K, 2) N·s"""
+    kick_energy: FloatArray | None
+    """(K,) J that kicks add for each N·s along the normal; None if nothing was kicked"""
+
+
+class Solution(NamedTuple):
+    """State at the end of a step, and the contacts that led to it."""
+
+    after: State
+    """(2, N, D)"""
+    end: FloatArray
+    """(N, D) rates after contacts and joints that act through the step"""
+    contacts: Manifolds
+    impulse: FloatArray
+    """(K, 2) N·s"""
+    kick_energy: FloatArray | None
+    """(K,) J that kicks add for each N·s along the normal; None if nothing was kicked"""
+    impact: Impact | None = None
+
+
+class ContactMemory:
+    """What the contacts of a step leave to the next: impulses to start with, and velocities that undo overlap."""
+
+    def __init__(self, h: float) -> None:
+        self.forget(h)
+        self.push: FloatArray = np.zeros((0, 3))
+        """(N, 3) m/s and rad/s, by which overlap is undone in the next step; no part of the motion"""
+        self.pushes = False
+        """whether any of these is not 0"""
+
+    def forget(self, h: float) -> None:
+        """Forget impulses, as those of a step of h, s: their keys mean other pairs now."""
+        self.key: IntArray = np.empty(0, np.int64)
+        self.impulse: FloatArray = np.empty((0, 2))
+        self.h = h
+
+    def rebuild(self, moving: BoolArray) -> None:
+        """Adapt to more bodies, or to bodies that no longer move: (N,) which do."""
+        kept = np.zeros((len(moving), 3))
+        kept[: len(self.push)] = self.push
+        self.push = np.where(moving[:, None], kept, 0.0)
+        self.pushes = bool(self.push.any())
+
+
+class ImpulseSolver:
+    """Solver by sequential impulses (Catto 2005). Its verbs, in the order of a step: integrate, detect, solve, correct.
+
+    Args:
+        roster: the bodies.
+        settings: with every choice filled in.
+        pipeline: detects collisions; its work counters count the iterations, too.
+        joints: solver of the scene's joints, if it has any.
+        memory: of the last step, changed by `correct`.
+    """
+
+    def __init__(
+        self,
+        roster: BodyStore,
+        settings: Settings,
+        pipeline: CollisionPipeline,
+        joints: JointSolver | None,
+        memory: ContactMemory,
+    ) -> None:
+        assert settings.integrator and settings.slop is not None and settings.bias is not None
+        self._integrator = INTEGRATORS[settings.integrator]
+        self._pipeline, self._memory, self._work = pipeline, memory, pipeline.work
+        by_impulses = joints is not None and joints.method == "impulses"
+        self._velocity_joints = joints if by_impulses else None
+        self._position_joints = None if by_impulses else joints
+        self._always = by_impulses
+        """whether there is something to solve without any contact"""
+        self._inverse = roster.inverse_mass, roster.inverse_moment
+        self._inverse_overlap = self._inverse
+        """inverse masses and moments with which overlap is undone"""
+        self._iterations, self._slop, self._bias = settings.iterations, settings.slop, settings.bias
+        self._dissipative = settings.impact == "dissipative"
+        self._substeps, self._max_work = settings.substeps, STEP_WORK.value // settings.substeps
+        self._no_spin: FloatArray = np.zeros((len(roster.position), 3))
+        self._restitution: FloatArray = roster.restitution.ravel()
+        self._rebound_model = ReboundModel(roster) if ReboundModel.is_needed(roster) else None
+        """for kicks and velocity-dependent restitution; None if every pair has constant restitution and no kick"""
+
+    @property
+    def scheme(self) -> Step:
+        """The step function of the integrator."""
+        return self._integrator.step
+
+    def integrate(self, x: State, forces: Inputs, time: float, h: float) -> Motion:
+        """Return the motion from a state at a time, s, over h, s, as if nothing were hit."""
+        return self.place(x, self._integrator.step(transition, time, x, forces, h), h)
+
+    def place(self, start: State, free: State, h: float) -> Motion:
+        """Return a motion that ends at `free`, with overlap undone and joints held that are solved by positions."""
+        shift, placed = None, free
+        if self._memory.pushes:
+            shift = h * self._memory.push[:, : free.shape[2]]
+            placed = np.empty_like(free)
+            np.add(free[0], shift, out=placed[0])
+            placed[1] = free[1]
+        if self._position_joints is not None:
+            placed = free.copy() if placed is free else placed
+            self._position_joints.project(start, placed, h)
+            self._work["joint_iterations"] += self._position_joints.visits
+        return Motion(start, free, shift, placed)
+
+    def detect(self, x: State) -> Manifolds:
+        """Return the contacts in a state (2, N, D). They are valid until the next detection.
+
+        Raises:
+            Exhaustion: there are too many.
+        """
+        return self._pipeline.overlaps(x[0])
+
+    def solve(self, motion: Motion, contacts: Manifolds, h: float) -> Solution:
+        """Return the state at the end of a motion over h, s, with contacts and joints that act through it.
+
+        The separations of contacts are brought up to date.
+
+        Raises:
+            Exhaustion: that takes too many passes over contacts.
+        """
+        placed = motion.placed
+        if not (len(contacts.key) or self._always):
+            return Solution(placed, placed[1], contacts, NO_IMPULSE, None)
+        after, impulse = placed.copy(), np.zeros((contacts.size, 2))
+        memory, fraction = self._memory, self._integrator.fraction
+        if self._velocity_joints is not None:
+            self._velocity_joints.prepare(kick_pose(placed, fraction, h), h)
+        bounce = self.bounce(contacts, motion.start[1])
+        remembered(contacts.key, memory.key, memory.impulse, impulse)
+        # The impulse of a resting contact is proportional to the time. It never grows: that of an impact is not.
+        impulse *= min(h / memory.h, 1.0)
+        self._resolve(contacts, bounce, motion.start[1], after[1], impulse, joined=True)
+        if fraction:
+            change = after[1] - self._released(placed[1])
+            after[0] += (fraction * h) * change
+            contacts.separation[:] += (fraction * h) * self.approach(contacts, change)
+        return Solution(after, after[1], contacts, impulse, bounce.kick_energy)
+
+    def impact(self, motion: Motion, lasting: Manifolds, clash: Manifolds, h: float) -> Solution:
+        """Return the state at the end of a motion over h, s, with lasting contacts and an impact at its end.
+
+        Engines refuse drives and joints with the detections that solve impacts one by one.
+        """
+        held = self.solve(motion, lasting, h)
+        after, impulse = held.after.copy(), np.zeros((clash.size, 2))
+        bounce = self.bounce(clash, after[1])
+        self._resolve(clash, bounce, held.after[1], after[1], impulse, settled=True)
+        return held._replace(after=after, impact=Impact(clash, impulse, bounce.kick_energy))
+
+    def correct(self, solution: Solution, h: float) -> None:
+        """Find the velocities that undo overlap in the next step; keep the impulses of this one, of h, s, for it."""
+        contacts, memory = solution.contacts, self._memory
+        if memory.pushes:
+            memory.pushes = False
+            memory.push[:] = 0.0
+        memory.key, memory.impulse, memory.h = contacts.key, solution.impulse, h
+        if len(contacts.key):
+            memory.key = contacts.key.copy()
+            # One substep undoes a fraction of the overlap beyond the slop, by the motion of the next.
+            target = -(1.0 - self._bias**h) / h * np.minimum(contacts.separation + self._slop, 0.0)
+            memory.pushes = bool(target.any())
+            if memory.pushes:
+                self._work["contact_iterations"] += contacts.size * self._iterations
+                total = np.zeros_like(target)
+                solve_overlaps(contacts, target, memory.push, *self._inverse_overlap, total, self._iterations)
+
+    def finish(self, after: State) -> State:
+        """Return the state to begin the next step with."""
+        return after
+
+    def _released(self, rates: FloatArray) -> FloatArray:
+        """Return rates (N, D) at the end of a motion without those that a stop is to take away."""
+        return rates
+
+    def approach(self, contacts: Manifolds, velocity: FloatArray) -> FloatArray:
+        """Return how fast each contact opens under velocities (N, D), (K,) m/s."""
+        out = np.empty(contacts.size)
+        approach(contacts, velocity, self._spin(velocity), out)
+        return out
+
+    def bounce(self, contacts: Manifolds, velocity: FloatArray) -> Rebound:
+        """Return the restitution targets of contacts at velocities (N, D)."""
+        if self._rebound_model is not None:
+            return self._rebound_model.bounce(contacts, self.approach(contacts, velocity))
+        speed = np.empty(contacts.size)
+        rebound_speeds(contacts, velocity, self._spin(velocity), self._restitution, speed)
+        return Rebound(speed, None)
+
+    def _solve(
+        self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray, joined: bool = False
+    ) -> None:
+        """Change velocities (N, D) and impulses (K, 2), N·s, by passes over contacts, and over joints if `joined`.
+
+        Args:
+            contacts: K of them.
+            bounce: (K,) m/s, how fast each is to part.
+            velocity: (N, D).
+            impulse: (K, 2) N·s to begin with.
+            joined: whether joints take turns with contacts.
+
+        Raises:
+            Exhaustion: that takes too many passes over contacts.
+        """
+        passes, rows = self._iterations, None
+        if contacts.size * passes > self._max_work:
+            work = contacts.size * passes * self._substeps
+            raise Exhaustion(f"a step of {contacts.size:,} contacts takes too long; {STEP_WORK.remedy(work)}")
+        self._work["contact_iterations"] += contacts.size * passes
+        if self._velocity_joints is not None and joined:
+            self._work["joint_iterations"] += self._velocity_joints.visits
+            rows = self._velocity_joints.rows
+        self._iterate(contacts, bounce, rows, velocity, impulse)
+
+    def _iterate(
+        self,
+        contacts: Manifolds,
+        bounce: FloatArray,
+        rows: VelocityConstraints | None,
+        velocity: FloatArray,
+        impulse: FloatArray,
+    ) -> None:
+        """Pass over contacts and the rows of joints, if there are any; the other arguments are those of `_solve`."""
+        if rows is None:
+            solve_velocities(
+                contacts, bounce, velocity, self._spin(velocity), *self._inverse, impulse, self._iterations
+            )
+        else:
+            solve_together(contacts, bounce, rows, NO_STOPS, velocity, *self._inverse, impulse, self._iterations)
+
+    def _settle(self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray) -> None:
+        """Change velocities and impulses as `_solve` does, until a pass changes nothing; contacts alone.
+
+        A single contact takes one pass. The two corners of a box that falls flat take more, the taller it is.
+        """
+        if contacts.size == 1:
+            self._solve(contacts, bounce, velocity, impulse)
+            return
+        spin = self._spin(velocity)
+        start_with(contacts, velocity, spin, *self._inverse, impulse)
+        for _ in range(min(MAX_PASSES, max(self._max_work // max(contacts.size, 1), 1))):
+            before = impulse.copy()
+            solve_once(contacts, bounce, velocity, spin, *self._inverse, impulse)
+            self._work["contact_iterations"] += contacts.size
+            if np.abs(impulse - before).max(initial=0.0) <= CONVERGED * np.abs(impulse).max(initial=0.0):
+                break
+
+    def _resolve(
+        self,
+        contacts: Manifolds,
+        bounce: Rebound,
+        start: FloatArray,
+        velocity: FloatArray,
+        impulse: FloatArray,
+        joined: bool = False,
+        settled: bool = False,
+    ) -> None:
+        """Change velocities and impulses as `_solve` or, if settled, `_settle` does, by the chosen law of impact.
+
+        Args:
+            contacts: what touches.
+            bounce: how fast each is to part.
+            start: (N, D) velocities at the beginning of the substep, to which energy is compared.
+            velocity: (N, D), changed.
+            impulse: (K, 2) N·s to begin with, changed.
+            joined: whether joints take turns with contacts.
+            settled: whether to iterate until nothing changes.
+        """
+        limited = self._dissipative and contacts.size > 0
+        kicked, warm = (velocity.copy(), impulse.copy()) if limited else (velocity, impulse)
+        if settled:
+            self._settle(contacts, bounce.speed, velocity, impulse)
+        else:
+            self._solve(contacts, bounce.speed, velocity, impulse, joined)
+        if limited:
+            self._limit(contacts, bounce, start, kicked, warm, velocity, impulse)
+
+    def _limit(
+        self,
+        contacts: Manifolds,
+        bounce: Rebound,
+        start: FloatArray,
+        kicked: FloatArray,
+        warm: FloatArray,
+        velocity: FloatArray,
+        impulse: FloatArray,
+    ) -> None:
+        """Cut the restitution of groups of bodies whose contacts would give energy.
+
+        Args:
+            contacts: what touches.
+            bounce: how fast each is to part.
+            start: (N, D) velocities at the beginning of the substep.
+            kicked: (N, D) velocities before the solution by Newton's law; overwritten.
+            warm: (K, 2) N·s, the impulses that this started with; overwritten.
+            velocity: (N, D) after it, changed.
+            impulse: (K, 2) N·s after it, changed.
+        """
+        spin, works = self._spin, Bilinear(contacts, *self._inverse)
+        kicks = np.zeros(contacts.size) if bounce.kick_energy is None else bounce.kick_energy
+
+        def work(push: FloatArray, rates: FloatArray) -> FloatArray:
+            return works.work(push, rates, spin(rates))[0]
+
+        def kicked_by(push: FloatArray) -> FloatArray:
+            return np.asarray(np.bincount(works.of_contact, push[:, 0] * kicks, len(works.group)), np.float64)
+
+        given, turnover = works.work(impulse, mean := 0.5 * (start + velocity), spin(mean))
+        gains = given - kicked_by(impulse) > ROUNDING * turnover
+        if not gains.any():
+            return
+        free = kicked.copy()
+        self._settle(contacts, np.zeros(contacts.size), kicked, warm)
+        # The passes may end unconverged, and gravity kicks within the substep: both can give energy at s = 0 too.
+        least = largest_fractions(0.0 * given, work(warm, 0.5 * (start + free)), work(warm, 0.5 * (kicked - free)))
+        least = np.where(gains, least, 1.0)
+        warm *= least[works.of_contact][:, None]
+        kicked[:] = free + least[works.group][:, None] * (kicked - free)
+        push, change = impulse - warm, velocity - kicked
+        fraction = largest_fractions(
+            work(warm, 0.5 * (start + kicked)) - kicked_by(warm),
+            work(push, 0.5 * (start + kicked)) + work(warm, 0.5 * change) - kicked_by(push),
+            work(push, 0.5 * change),
+        )
+        fraction = np.where(gains, fraction, 1.0)
+        of_contact, of_body = fraction[works.of_contact][:, None], fraction[works.group][:, None]
+        cut = of_contact[:, 0] < 1.0
+        impulse[cut] = (warm + of_contact * push)[cut]
+        cut = of_body[:, 0] < 1.0
+        velocity[cut] = (kicked + of_body * change)[cut]
+
+    def _spin(self, velocity: FloatArray) -> FloatArray:
+        """Return the spins (N,) among rates (N, D): zeros where nothing turns."""
+        return (velocity if velocity.shape[1] == 3 else self._no_spin)[:, 2]

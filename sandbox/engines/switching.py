@@ -1,0 +1,461 @@
+"""A simulation whose engine, settings and bodies can be changed while it runs.
+
+Each segment is a simulation of its own that starts from the last state of the segment before; body indices and time
+continue. Other engine state, such as the impulses of lasting contacts, starts anew.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Self
+
+import numpy as np
+from pydantic import ValidationError
+
+from sandbox.action import Action, ActionError, Force, Launch, Pull, Remove, SetParameter, Spawn, Switch, Throttle
+from sandbox.arrays import BoolArray
+from sandbox.echo import MAX_MESSAGE, MAX_NAMED, shorten
+from sandbox.engines.common.energy_balance import LedgerHandover
+from sandbox.engines.contract import Divergence, Exhaustion, Observer, Refusal
+from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.mouse_joint import MouseJoints
+from sandbox.engines.registry import UnknownEngineError
+from sandbox.engines.registry import start as start_engine
+from sandbox.engines.segment import Checkpoint, Segment, start_segment
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.generators import GeneratorError, count_of, layout_of
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import BodySource
+from sandbox.scene.description.fixed import AWAY, PlaneReach
+from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import path_of
+from sandbox.scene.files.load import as_scene
+from sandbox.scene.scene import Scene
+from sandbox.scene.validate.references import generators
+from sandbox.trajectory import Contacts, Frame
+
+
+class PersistentActions:
+    """Actions that keep acting: constant forces by the name of the body, throttles by the name of the thrust."""
+
+    def __init__(
+        self, forces: Mapping[str, Force] | None = None, throttles: Mapping[str, Throttle] | None = None
+    ) -> None:
+        self._forces, self._throttles = dict(forces or {}), dict(throttles or {})
+
+    def record(self, action: Action) -> None:
+        """Record an action that was applied."""
+        if isinstance(action, Force):
+            self._forces[action.body] = action
+        elif isinstance(action, Throttle):
+            self._throttles[action.thrust] = action
+        elif isinstance(action, Remove):
+            self._forces.pop(action.body, None)
+
+    def remove_forces(self, gone: Iterable[str]) -> None:
+        """Remove the forces on bodies that have left the scene."""
+        for name in gone:
+            self._forces.pop(name, None)
+
+    @property
+    def forces(self) -> dict[str, Force]:
+        """Constant force on each body."""
+        return dict(self._forces)
+
+    @property
+    def throttles(self) -> dict[str, Throttle]:
+        """Throttle of each thrust."""
+        return dict(self._throttles)
+
+    def actions(self) -> list[Force | Throttle]:
+        """Return the actions that reproduce the forces and throttles in another simulation."""
+        return [*self._forces.values(), *self._throttles.values()]
+
+
+def launch_state(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tuple[Frame, Bodies, BoolArray]:
+    """Return the state after a launch of a generator, all bodies, and which of them were launched, (N,).
+
+    Bodies of the generator that were gone return; lifetimes start again.
+
+    Raises:
+        ActionError: there is no such generator, or its bodies do not fit.
+    """
+    found = next(((index, mover) for name, index, mover in generators(scene) if name == action.generator), None)
+    if found is None:
+        raise ActionError(f"no generator is named {action.generator!r}")
+    index, generator = found
+    try:
+        layout = layout_of(generator, action.seed, index, scene.world.gravity)
+    except GeneratorError as error:
+        raise ActionError(str(error)) from None
+    first = _first_body(scene, generator)
+    is_launched = np.zeros(len(bodies), np.bool_)
+    is_launched[first : first + len(layout)] = True
+    columns = {}
+    for key in ("position", "velocity", "angle", "angular_velocity"):
+        columns[key] = getattr(frame, key).copy()
+        columns[key][is_launched] = getattr(layout, key)
+    if layout.lifetime is not None:
+        born, lifetime = bodies.born.copy(), bodies.lifetime.copy()
+        born[is_launched], lifetime[is_launched] = frame.time, layout.lifetime
+        bodies = replace(bodies, born=born, lifetime=lifetime)
+    roll = frame.roll
+    if roll is not None:  # bodies of a generator start without roll
+        roll = np.where(is_launched[:, None], 0.0, roll)
+    layer, visits = frame.layer, frame.visits
+    if layer is not None:
+        layer = np.where(is_launched, scene.layers.index(generator.layer), layer)
+    if visits is not None:
+        visits = np.where(is_launched[:, None], AWAY, visits)
+    launched_frame = Frame(
+        frame.time, present=frame.present | is_launched, roll=roll, layer=layer, visits=visits, **columns
+    )
+    passing = frame.passing
+    if passing is not None:
+        passing = passing[~is_launched[passing[:, 0]]]
+    return replace(launched_frame, drives=frame.drives, passing=passing), bodies, is_launched
+
+
+def _first_body(scene: Scene, generator: BodySource) -> int:
+    """Return the index of a generator's first body."""
+    movers = scene.movers
+    return sum(count_of(each) for each in movers[: next(k for k, each in enumerate(movers) if each is generator)])
+
+
+def start(
+    scene: Scene | Setup | str | Path, engine: str = "pymunk", settings: Settings | None = None
+) -> "SwitchableSimulation":
+    """Start a scene on an engine, to be stepped by hand.
+
+    Args:
+        scene: the scene, or its name or path, as `load` takes it; or a setup, to start from another state.
+        engine: name of the engine.
+        settings: settings of the solver; default: the `[solver]` of the scene.
+
+    Returns:
+        A `Simulation` that accepts every action, also `Switch`, `Launch` and `Pull`.
+
+    Raises:
+        UnknownEngineError: no engine has that name.
+        Refusal: the engine does not support something that the scene or a setting needs.
+        SceneError: the name or path is not that of a valid scene.
+    """
+    return SwitchableSimulation(scene if isinstance(scene, Setup) else as_scene(scene), engine, settings)
+
+
+class SwitchableSimulation:
+    """Running scene whose engine and settings can be changed during the run. It is a `Simulation`.
+
+    Attributes:
+        engine: name of the present engine.
+        wanted: settings as requested; those that are None are chosen by the engine.
+    """
+
+    def __init__(self, start: Scene | Setup, engine: str = "pymunk", settings: Settings | None = None) -> None:
+        setup = Setup.of(start)
+        self.engine = engine
+        """name of the present engine"""
+        self.wanted = setup.scene.solver if settings is None else settings
+        """settings as requested; those that are None are chosen by the engine"""
+        self._segment = Segment(start_engine(setup, engine, self.wanted), setup.bodies)
+        self._retired: dict[int, float] = {}
+        self._broken: dict[int, float] = {}
+        self._work: Counter[str] = Counter()
+        self._pulls = MouseJoints()
+        self._persistent = PersistentActions()
+        # Contacts of earlier segments since the last call of `contacts`; None before the first call.
+        self._earlier_contacts: list[Contacts] | None = None
+        self._observer: Observer | None = None
+        self._ledger = LedgerHandover()
+
+    def __repr__(self) -> str:
+        title = f" of {shorten(self.scene.title)!r}" if self.scene.title else ""
+        bodies = "1 body" if len(self.bodies) == 1 else f"{len(self.bodies):,} bodies"
+        return f"<Simulation{title} on {self.engine} at {self.time:g} s, {bodies}>"
+
+    def checkpoint(self) -> Checkpoint:
+        """Return a checkpoint, from which `resumed` continues."""
+        return Checkpoint(
+            engine=self.engine,
+            wanted=self.wanted,
+            bodies=self.bodies,
+            frame=self.frame(),
+            origin=self._segment.origin,
+            steps=self._segment.steps,
+            retired=dict(self.retired),
+            broken=dict(self.broken),
+            forces=self._active_actions().forces,
+            throttles=self._persistent.throttles,
+            pulls=self._pulls.pulls,
+            setup=self.setup,
+            plane_reach=self.plane_reach,
+        )
+
+    @classmethod
+    def resumed(cls, point: Checkpoint) -> Self:
+        """Continue from a checkpoint.
+
+        In free flight, the states equal those of an uninterrupted run, bit for bit, if the method of the engine depends
+        on the state only. In contact they differ, because a checkpoint does not contain the contact data of the engine.
+
+        Args:
+            point: the checkpoint.
+
+        Raises:
+            Refusal: the engine cannot start from that state.
+            ActionError: the engine cannot take over a constant force.
+        """
+        simulation = cls.__new__(cls)
+        simulation.engine, simulation.wanted = point.engine, point.wanted
+        simulation._persistent = PersistentActions(point.forces, point.throttles)
+        persistent = simulation._persistent.actions()
+        simulation._segment = start_segment(
+            point.setup,
+            point.engine,
+            point.wanted,
+            point.bodies,
+            point.frame,
+            persistent,
+            point.broken,
+            point.plane_reach,
+        )
+        simulation._segment.origin, simulation._segment.steps = point.origin, point.steps
+        simulation._retired, simulation._broken, simulation._work = dict(point.retired), dict(point.broken), Counter()
+        simulation._earlier_contacts, simulation._observer, simulation._ledger, simulation._pulls = (
+            None,
+            None,
+            LedgerHandover(),
+            MouseJoints(point.pulls),
+        )
+        return simulation
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._segment.time
+
+    @property
+    def patience(self) -> float | None:
+        """Largest computing time of a step, s, after which it raises `Exhaustion`; None: unlimited."""
+        return self._segment.simulation.patience
+
+    @patience.setter
+    def patience(self, seconds: float | None) -> None:
+        self._segment.simulation.patience = seconds
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, with all changes that actions have made."""
+        return self._segment.simulation.scene
+
+    @property
+    def setup(self) -> Setup:
+        """State from which the present engine started, of all bodies and joints, with the scene as it is now."""
+        return self._segment.setup
+
+    @property
+    def settings(self) -> Settings:
+        """The settings, with every default chosen by the engine filled in."""
+        return self._segment.simulation.settings
+
+    @property
+    def bodies(self) -> Bodies:
+        """Bodies at their start as arrays; spawned bodies are appended."""
+        return self._segment.bodies
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
+        return MappingProxyType({**self._retired, **self._segment.retired})
+
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """Time in s, by index in `setup.links`, at which joints broke."""
+        return MappingProxyType({**self._broken, **self._segment.broken}) if self._broken else self._segment.broken
+
+    @property
+    def plane_reach(self) -> PlaneReach | None:
+        """Present extent of half-planes as (x, y, distance), m; None if they are infinite."""
+        return self._segment.simulation.plane_reach
+
+    @property
+    def pulls(self) -> Mapping[str, Pull]:
+        """Active pulls by the name of the body."""
+        return self._pulls.pulls
+
+    @property
+    def throttles(self) -> Mapping[str, Throttle]:
+        """Throttles that were set, by the name of the thrust."""
+        return self._persistent.throttles
+
+    @property
+    def work(self) -> Mapping[str, int]:
+        """Work counters since the start, summed over all engines used."""
+        total = Counter(self._work)
+        total.update(self._segment.simulation.work)
+        return dict(total)
+
+    def step(self) -> None:
+        """Advance by one time step dt.
+
+        Raises:
+            Divergence: the state is not finite, or exceeds the bounds.
+            Exhaustion: the step needs more memory or work than its limit.
+        """
+        self._advance(1.0, self._segment.simulation.step)
+
+    def finish(self, part: float) -> None:
+        """Advance by a last fraction of dt. No step can follow.
+
+        Args:
+            part: fraction of dt, 0 < part < 1.
+
+        Raises:
+            Divergence: as `step`.
+            ValueError: `part` is out of range.
+        """
+        self._advance(part, lambda: self._segment.simulation.finish(part))
+
+    def _advance(self, part: float, advance: Callable[[], None]) -> None:
+        """Apply the mouse joints, and advance the engine, for a fraction of a step."""
+        simulation = self._segment.simulation
+        if self._pulls.any:
+            with self._ledger.hands(simulation):
+                self._pulls.apply_impulses(simulation, self.settings.dt * part)
+        self._segment.steps += part
+        try:
+            advance()
+        except Divergence as divergence:
+            raise Divergence(self.time, divergence.body, divergence.what) from None
+        except Exhaustion:
+            self._segment.steps -= part
+            raise
+
+    def apply(self, action: Action) -> None:
+        """Apply an action at once. Its `time` is ignored.
+
+        Args:
+            action: the action.
+
+        Raises:
+            ActionError: the action cannot be applied. The simulation is left unchanged.
+        """
+        match action:
+            case Pull():
+                self._pulls.set_pull(action, self._segment.simulation)
+            case Switch():
+                self._switch(action)
+            case Launch():
+                frame, bodies, is_launched = launch_state(action, self.scene, self.bodies, self.frame())
+                retired = {n: time for n, time in self.retired.items() if not is_launched[n]}
+                self._hand_over(self.engine, self.wanted, bodies, frame, retired)
+            case Spawn():
+                self._spawn(action)
+            case _:
+                self._segment.simulation.apply(action)
+                self._persistent.record(action)
+                if isinstance(action, SetParameter):
+                    self._segment.bodies = replace(
+                        self._segment.bodies, elements=self._segment.simulation.bodies.elements
+                    )
+
+    def _spawn(self, action: Spawn) -> None:
+        name = action.single.name or self.bodies.new_name("spawned", self.scene.fixed_names)
+        if name in self.bodies.names:
+            raise ActionError(f"a body or fixed object is already named {name!r}")
+        named = action.named(name)
+        self._segment.simulation.apply(named)
+        self._segment.add_body(self.bodies.joined_by(named.single, name))
+
+    def _switch(self, action: Switch) -> None:
+        try:
+            wanted = self.wanted.replace(**action.settings)
+        except ValidationError as error:
+            from sandbox.scene.files.diagnosis import explained  # only faults need it
+
+            faults = (
+                f"{shorten(path_of(location, {}), MAX_NAMED)}: {message}"
+                for location, message in explained(error, ("solver",))
+            )
+            raise ActionError(shorten("; ".join(faults), MAX_MESSAGE)) from None
+        engine, plane_reach = action.engine or self.engine, self.plane_reach if action.resumes else None
+        self._hand_over(engine, wanted, self.bodies, self.frame(), dict(self.retired), plane_reach)
+
+    def _hand_over(
+        self,
+        engine: str,
+        wanted: Settings,
+        bodies: Bodies,
+        frame: Frame,
+        retired: dict[int, float],
+        plane_reach: PlaneReach | None = None,
+    ) -> None:
+        """Start the next segment from a state.
+
+        Raises:
+            ActionError: the engine cannot continue from the state. Nothing has changed then.
+        """
+        try:
+            persistent, broken = self._active_actions().actions(), dict(self.broken)
+            segment = start_segment(self.setup, engine, wanted, bodies, frame, persistent, broken, plane_reach)
+        except (Refusal, UnknownEngineError) as refusal:
+            raise ActionError(str(refusal)) from None
+        with self._ledger.passing(self, segment.simulation):
+            self._replace_segment(segment, retired, broken)
+            self.engine, self.wanted = engine, wanted
+
+    def _replace_segment(self, segment: Segment, retired: dict[int, float], broken: dict[int, float]) -> None:
+        """Replace the present segment, and close its simulation."""
+        old = self._segment
+        if segment.simulation.settings.dt == old.simulation.settings.dt:  # keeps frames at k·dt
+            segment.origin, segment.steps = old.origin, old.steps
+        segment.simulation.patience = old.simulation.patience
+        if self._earlier_contacts is not None:
+            self._earlier_contacts.append(old.contacts())
+            segment.simulation.contacts()
+        self._work.update(old.simulation.work)
+        self._retired, self._broken = retired, broken
+        old.simulation.close()
+        self._segment = segment
+        if self._observer is not None:
+            self._segment.watch(self._observer)
+
+    def _active_actions(self) -> PersistentActions:
+        """Return the persistent actions, without forces on bodies that have left the scene."""
+        if self._persistent.forces:
+            present = zip(self.bodies.names, self.frame().present.tolist(), strict=True)
+            self._persistent.remove_forces(name for name, there in present if not there)
+        return self._persistent
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+        return self._segment.frame()
+
+    def contacts(self) -> Contacts:
+        """Return the contacts since the last call; the first call starts the recording.
+
+        A contact that lasts through a change of engine becomes a new contact.
+        """
+        earlier, self._earlier_contacts = self._earlier_contacts or [], []
+        found = self._segment.contacts()
+        return Contacts.joined([*earlier, found]) if earlier else found
+
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy change, J, by each cause since the first call, summed over all engines used."""
+        return self._ledger.entries(self._segment.simulation)
+
+    def watch(self, observer: Observer) -> None:
+        """Register an observer that is called after every substep."""
+        self._observer = observer
+        self._earlier_contacts = self._earlier_contacts or []
+        self._segment.watch(observer)
+
+    def state_hash(self) -> str:
+        """Return a hash of the time and of the exact state of every body."""
+        return self.frame().state_hash()
+
+    def close(self) -> None:
+        """Release the resources of the engine."""
+        self._segment.simulation.close()

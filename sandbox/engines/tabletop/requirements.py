@@ -1,0 +1,60 @@
+"""Requirements of scenes with a surface: what engines do not support there, and the pockets that contain points."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.demands import SURFACES, demands
+from sandbox.scene.compile.demands import on_floor as has_floor
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.scene import Scene
+
+
+def unlevel(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:
+    """Yield what is not supported on a surface by any engine, with the scene's bodies and those spawned since.
+
+    Sides of pucks are upright, so that pucks of different radii collide horizontally; balls of different radii do not.
+    """
+    setup = Setup.of(start)
+    scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
+    if scene.world.gravity != (0.0, 0.0):
+        yield "it does not model world.gravity in the plane of a floor"
+    if does := demands(setup) & SURFACES:
+        yield f"it does not model {', '.join(sorted(does))} on a floor"
+    meets = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
+    if scene.surface is not None and bodies.spheres and len(np.unique(bodies.radius[meets & bodies.round])) > 1:
+        yield "it does not model collisions of balls with different radii on a floor"
+
+
+def caught(scene: Scene, position: FloatArray) -> IntArray:
+    """Return the index of the pocket that contains each of N centres (N, 2), m, (N,); −1 for none.
+
+    Where pockets overlap it is the first of them.
+    """
+    found = np.full(len(position), -1, dtype=np.int64)
+    for k, pocket in enumerate(scene.pockets):
+        apart = position - np.asarray(pocket.position)
+        found[(found < 0) & (np.einsum("nk,nk->n", apart, apart) < pocket.radius**2)] = k
+    return found
+
+
+def on_floor(start: Scene | Setup) -> bool:
+    """Return whether a scene needs the motion of balls on a surface; in other scenes they are plain discs."""
+    scene = start.scene if isinstance(start, Setup) else start
+    return (scene.surface is not None or bool(scene.pockets)) and has_floor(start)
+
+
+def of_floors(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:
+    """Yield what is not supported on a surface by time-step solvers, with the scene's bodies or with given ones."""
+    setup = Setup.of(start)
+    scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
+    world = scene.world
+    yield from unlevel(setup, bodies)
+    if world.linear_drag or world.quadratic_drag:
+        yield "it does not model drag on a floor"
+    if len(setup.links) or scene.attractions or scene.thrusts or scene.drives:
+        yield "it does not model joints, attraction, thrusts or drives on a floor"
+    if not bodies.round.all():
+        yield "it does not model bodies other than balls on a floor"

@@ -1,0 +1,22 @@
+"""CurlingMatch: length and players of a match of curling, `[play.curling]`."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from sandbox.scene.description.base import Part
+from sandbox.scene.description.game_tables import GameTable
+
+
+class CurlingMatch(Part):
+    """A match of two teams, red and yellow, on a scene with their stones."""
+
+    ends: Annotated[int, Field(ge=1, le=20)] = 2
+    """number of ends of the match"""
+    people: Annotated[int, Field(ge=0, le=2)] = 1
+    """number of teams played by a person, red first; the computer plays the others"""
+    error: Annotated[float, Field(ge=0, le=100)] = 1.0
+    """error of the computer's stones: 1 means about 0.3 m in length and 0.1 m sideways"""
+
+
+MATCH = GameTable(CurlingMatch, "settings of a curling match")

@@ -1,0 +1,255 @@
+"""Expansion of a pinball table, and its faults."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from sandbox.games.pinball import build
+from sandbox.games.pinball.build import MATERIALS, Building, pairs, rolling_gravity
+from sandbox.games.pinball.elements import (
+    LEAST_DEPTH,
+    Art,
+    Corner,
+    Drain,
+    DropTargets,
+    Element,
+    Flipper,
+    Gate,
+    Line,
+    Pinball,
+    Plunger,
+    Ramp,
+    Slingshot,
+    Spinner,
+    Standup,
+    both,
+)
+from sandbox.scene.description.game_tables import table_of
+from sandbox.scene.errors import Location, path_of
+from sandbox.scene.files.merge import added, paired, stated
+from sandbox.scene.files.presets import Preset
+from sandbox.scene.geometry.polyline import RoundingError, length_of, rounded
+from sandbox.scene.scene import Scene
+
+Found = tuple[Location, str]
+
+CLOSEST = 1e-6
+"""m: the least distance of an element's points"""
+MAX_COORDINATE = 1e6
+"""m: farther from the origin, zones 0.1 mm wide along a ramp are lost to rounding."""
+_TOO_FAR = f"is too far away; the coordinates of a pinball table are at most {MAX_COORDINATE:g} m"
+
+
+def faults_of(scene: Scene) -> Iterator[Found]:
+    """Yield why a scene's `[pinball]` stands for nothing."""
+    pinball = table_of(scene, Pinball)
+    if pinball is None:
+        return
+    if scene.surface is not None:
+        yield ("surface",), "applies to billiards; a pinball table uses `slope` instead, remove it"
+    if abs(pinball.axis) > MAX_COORDINATE:
+        yield ("pinball", "axis"), _TOO_FAR
+    if pinball.outline is not None:
+        yield from ((("pinball", "outline", k), _TOO_FAR) for k in _far_corners(pinball.outline))
+        yield from _corners(("pinball", "outline"), pinball.outline, True, pinball.tolerance)
+    for kind, those in elements_of(pinball):
+        for k, element in enumerate(those):
+            far = list(_far_away(element))
+            for location, message in far or _wrong(element, pinball):
+                yield ("pinball", kind, k, *location), message
+    yield from _called_alike(pinball)
+
+
+def _far_away(element: Element) -> Iterator[Found]:
+    """Yield which points of an element are too far from the origin."""
+    for key in ("position", "pivot"):
+        point = getattr(element, key, None)
+        if point is not None and list(_far_corners((point,))):
+            yield (key,), _TOO_FAR
+    yield from ((("points", k), _TOO_FAR) for k in _far_corners(getattr(element, "points", None) or ()))
+
+
+def _far_corners(corners: Sequence[tuple[float, ...]]) -> Iterator[int]:
+    """Yield the numbers of the corners that are too far from the origin."""
+    for k, (x, y, *_) in enumerate(corners):
+        if max(abs(x), abs(y)) > MAX_COORDINATE:
+            yield k
+
+
+def elements_of(pinball: Pinball) -> Iterator[tuple[str, tuple[Element, ...]]]:
+    """Yield the elements of a table by the headings of their tables, in the order in which they are built."""
+    for name, field in type(pinball).model_fields.items():
+        if field.alias is not None:
+            yield field.alias, getattr(pinball, name)
+
+
+def _called_alike(pinball: Pinball) -> Iterator[Found]:
+    """Yield the elements that are called as another one is."""
+    first: dict[str, Location] = {}
+    for kind, those in elements_of(pinball):
+        for k, element in enumerate(those if kind != "art" else ()):  # of paint nobody speaks by name
+            here: Location = ("pinball", kind, k)
+            names = [name for name, _ in both(element, kind, k, pinball.axis)]
+            if len(set(names)) < len(names):
+                yield (
+                    (*here, "mirrored"),
+                    f"has no effect: the element is on the table's axis, x = {pinball.axis!r} m; remove it",
+                )
+                names = names[:1]
+            for name in names:
+                there = first.setdefault(name, here)
+                if there is not here:
+                    yield (*here, "name"), f"{path_of(there, {})} is also named {name!r}; names must be unique"
+
+
+def _wrong(element: Element, pinball: Pinball) -> Iterator[Found]:
+    """Yield what is wrong with one element, located within it."""
+    tolerance = pinball.tolerance
+    match element:
+        case Line():
+            yield from _corners(("points",), element.points, element.closed, tolerance)
+            if element.fill is not None and not element.closed:
+                yield ("fill",), "applies to closed lines only; set `closed = true`, or remove it"
+        case Art() if element.points is not None:
+            yield from _corners(("points",), element.points, True, tolerance)
+        case Ramp():
+            yield from _ramp(element, tolerance, 2.0 * pinball.ball_radius)
+        case Gate() | Spinner() | Drain() if math.dist(*element.points) < CLOSEST:
+            yield ("points", 1), "is at the same place as the point before; the ends of a line must differ"
+        case Spinner() if math.dist(*element.points) <= element.thickness:
+            yield ("points",), f"must be farther apart than the thickness, {element.thickness!r} m"
+        case Slingshot() if _height(element) <= element.thickness:
+            yield (
+                ("points",),
+                f"are nearly on a line; a band of {element.thickness!r} m must fit around the three posts",
+            )
+        case Standup() | DropTargets():
+            if not any(element.facing):
+                yield (
+                    ("facing",),
+                    "has no direction; use a vector such as [1, 0] for a target on the left that faces right",
+                )
+            if element.width <= element.thickness:
+                yield ("width",), f"must be greater than the thickness, {element.thickness!r} m"
+        case Plunger() if not any(element.direction):
+            yield ("direction",), "has no direction; use a vector such as [0, 1] for up the table"
+        case Flipper():
+            if element.length <= abs(element.base - element.tip):
+                yield ("length",), "must be greater than the difference of `base` and `tip`"
+            if element.stops[0] == element.stops[1]:
+                yield ("stops",), "must be two different angles: at rest and raised, rad"
+
+
+def _corners(at: Location, corners: tuple[Corner, ...], closed: bool, tolerance: float) -> Iterator[Found]:
+    sharp = next((k for k, corner in enumerate(corners) if len(corner) > 2 and corner[2] < 0.0), None)
+    if sharp is not None:
+        yield (*at, sharp, 2), "must not be negative: it is the radius of the corner"
+        return
+    if closed and len(corners) < 3:
+        yield at, "must be at least three points for a closed line"
+        return
+    try:
+        rounded(corners, closed, tolerance)
+    except RoundingError as error:
+        yield (*at, error.corner), str(error)
+
+
+def _ramp(ramp: Ramp, tolerance: float, ball: float) -> Iterator[Found]:
+    wrong = list(_corners(("points",), ramp.points, False, tolerance))
+    yield from wrong
+    if ramp.width <= max(ball, LEAST_DEPTH):
+        yield ("width",), f"is too narrow for the ball; it must be more than {max(ball, LEAST_DEPTH):.4g} m"
+    if wrong:
+        return
+    length = length_of(rounded(ramp.points, False, tolerance))
+    if ramp.climb >= length:
+        yield ("climb",), f"must be less than the length of the ramp, {length:.4g} m"
+    elif ramp.climb < 4.0 * LEAST_DEPTH:
+        yield ("climb",), f"is too short for a mouth; it must be at least {4.0 * LEAST_DEPTH:g} m"
+
+
+def _height(slingshot: Slingshot) -> float:
+    """Return how far the post behind lies from the side that kicks, m."""
+    (ax, ay), (bx, by), (cx, cy) = slingshot.points
+    return abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / max(math.hypot(bx - ax, by - ay), CLOSEST)
+
+
+SUBSTEPS = 10
+"""for engines that step: at 1 kHz a ball at 8 m/s covers less than its radius in one"""
+DURATION = 60.0
+"""s"""
+
+BUILD: dict[str, Callable[[Building, str, Any], None]] = {
+    "art": build.art,
+    "wall": build.wall,
+    "rubber": build.wall,
+    "post": build.post,
+    "gate": build.gate,
+    "bumper": build.bumper,
+    "slingshot": build.slingshot,
+    "standup": build.standup,
+    "drops": build.drops,
+    "rollover": build.rollover,
+    "spinner": build.spinner,
+    "kicker": build.kicker,
+    "ramp": build.ramp,
+    "drain": build.drain,
+    "flipper": build.flipper,
+    "plunger": build.plunger,
+    "ball": build.ball,
+}
+"""How each kind of element is built."""
+
+
+def expanded(scene: Scene) -> Scene:
+    """Return the scene of primitives that a scene with a sound `[pinball]` stands for; another as it is.
+
+    What the scene states itself comes first in each list, and outranks what is of the same name.
+    """
+    pinball = table_of(scene, Pinball)
+    if pinball is None:
+        return scene
+    gravity = scene.world.gravity if "gravity" in scene.world.model_fields_set else rolling_gravity(pinball.slope)
+    to = _built(pinball, gravity)
+    changes: dict[str, Any] = {
+        "pinball": None,
+        "world": stated(scene.world, {"gravity": gravity, "duration": DURATION}),
+        "solver": stated(scene.solver, {"substeps": SUBSTEPS}),
+        "materials": added(scene.materials, MATERIALS),
+        "pairs": paired(scene.pairs, pairs(pinball.ball_restitution)),
+        "play": stated(scene.play, {"game": pinball.game, "ground": "playfield"}).model_copy(
+            update={"parts": added(scene.play.parts, to.parts), "markings": (*to.markings, *scene.play.markings)}
+        ),
+    }
+    for key in ("walls", "posts", "zones", "balls", "polygons", "drives"):
+        changes[key] = added(getattr(scene, key), getattr(to, key))
+    return scene.model_copy(update=changes)
+
+
+def origins(scene: Scene) -> dict[str, Location]:
+    """Return which element of a scene's sound `[pinball]` each name is of that it would write out."""
+    pinball = table_of(scene, Pinball)
+    return {} if pinball is None else _built(pinball, rolling_gravity(pinball.slope)).origins
+
+
+def _built(pinball: Pinball, gravity: tuple[float, float]) -> Building:
+    to = Building(pinball.axis, pinball.tolerance, pinball.ball_radius, pinball.ball_mass, gravity)
+    if pinball.outline is not None:
+        to.paint(pinball.colour, to.line(pinball.outline, closed=True))
+    for kind, those in elements_of(pinball):
+        for k, element in enumerate(those):
+            to.here = ("pinball", kind, k)
+            for name, one in both(element, kind, k, pinball.axis):
+                BUILD[kind](to, name, one)
+    return to
+
+
+PINBALL = Preset(
+    Pinball,
+    "expanded to primitives when the scene is read; None afterwards",
+    is_kept=False,
+    faults_of=faults_of,
+    expanded=expanded,
+    origins=origins,
+    excludes=("billiards",),
+)

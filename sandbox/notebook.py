@@ -1,0 +1,81 @@
+"""Notebooks: scenes, runs, comparisons, trade-offs, shots and shot odds as HTML that needs no network.
+
+Each is a page of the report in a frame of its own (`<iframe srcdoc>`): its styles, scripts and identifiers cannot
+clash with the notebook or with another page, and its content security policy lets it fetch nothing. The page reports
+its height, and a script beside the frame makes the frame as tall. Where a notebook runs no scripts (JupyterLab, as long
+as it does not trust the notebook), the frame keeps a fixed height and scrolls.
+"""
+
+import html
+from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sandbox.report.page.document import Page
+
+MAX_LETTERS = 1_500_000
+"""Of one display; a page that is longer is shown without its replay."""
+TALL, LOW = 560, 380
+"""Heights of frames, px, until the page has reported its own."""
+
+FITTING = """
+if (!window.sandboxFrames) {
+  window.sandboxFrames = true;
+  window.addEventListener("message", (event) => {
+    const height = event.data && Number(event.data.sandboxHeight);
+    if (!(height > 0 && height < 20000)) return;
+    for (const frame of document.querySelectorAll("iframe.sandbox-page")) {
+      if (frame.contentWindow !== event.source) continue;
+      frame.style.height = `${Math.ceil(height) + frame.offsetHeight - frame.clientHeight}px`;
+    }
+  });
+}
+"""
+"""Sets the height of a frame to what its page reports; one listener serves all frames of a document."""
+
+PageOf = Callable[..., "Page"]
+
+_PAGES = {
+    "Scene": ("sandbox.report.page.scene_page", "scene_page", LOW),
+    "Trajectory": ("sandbox.report.page.run_page", "run_page", TALL),
+    "Comparison": ("sandbox.report.page.comparison_page", "comparison_page", TALL),
+    "Tradeoff": ("sandbox.report.page.tradeoff_page", "page_of_tradeoff", TALL),
+    "ShotResult": ("sandbox.report.page.shot_page", "shot_page", TALL),
+    "Odds": ("sandbox.report.page.odds_page", "odds_page", TALL),
+}
+"""By the name of the class: module and function of its page, and the height of its frame, px."""
+
+
+def html_of(value: object) -> str:
+    """Return a value as HTML.
+
+    Raises:
+        TypeError: nothing renders values of its class.
+    """
+    name = next((each.__name__ for each in type(value).__mro__ if each.__name__ in _PAGES), None)
+    if name is None:
+        raise TypeError(f"nothing displays a {type(value).__name__}")
+    module, function, height = _PAGES[name]
+    page_of: PageOf = getattr(import_module(module), function)
+    text = _frame(page_of(value), height)
+    if len(text) > MAX_LETTERS:
+        text = _frame(page_of(value, **_without_replay(name)), height)
+    return text
+
+
+def _without_replay(name: str) -> dict[str, Any]:
+    """Return the arguments that make a page shorter."""
+    return {"replayed": False} if name in ("Trajectory", "Comparison", "ShotResult") else {}
+
+
+def _frame(page: "Page", height: int) -> str:
+    """Return a page as a frame: scripts run, but have no access to the notebook around it."""
+    document, title = html.escape(page.html(compact=True)), html.escape(page.title)
+    style = f"box-sizing: border-box; width: 100%; height: {height}px; border: 1px solid #8886; border-radius: 6px"
+    # the listener comes first: a page that is shown at once reports its height at once
+    return (
+        f"<script>{FITTING}</script>"
+        f'<iframe srcdoc="{document}" sandbox="allow-scripts" class="sandbox-page" title="{title}" loading="lazy"'
+        f' style="{style}"></iframe>'
+    )

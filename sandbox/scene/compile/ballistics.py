@@ -1,0 +1,55 @@
+"""Free flight in closed form, under uniform gravity and linear drag."""
+
+import math
+
+import numpy as np
+
+from sandbox.arrays import FloatArray
+from sandbox.scene.description.world import World
+
+_SERIES = tuple((-1) ** n / math.factorial(n + 2) for n in range(20))
+
+
+def free_flight(
+    time: FloatArray, position: FloatArray, velocity: FloatArray, world: World
+) -> tuple[FloatArray, FloatArray]:
+    """Return positions and velocities of a body without contacts, under a = g − k (v − wind).
+
+    With z = k t: v = v₀ e⁻ᶻ + (g + k·wind) t φ₁ and x = x₀ + v₀ t φ₁ + (g + k·wind) t² φ₂, where
+    φ₁ = (1 − e⁻ᶻ)/z and φ₂ = (z − 1 + e⁻ᶻ)/z² tend to 1 and ½: no cancellation for small z, and at k = 0 the
+    exact parabola.
+
+    Args:
+        time: (T,) s since the start.
+        position: (2,) or (N, 2) m, at the start.
+        velocity: of the same shape, m/s.
+        world: its gravity, linear drag and wind are used.
+
+    Returns:
+        Positions and velocities, (T, 2) or (T, N, 2).
+
+    Raises:
+        ValueError: the world has quadratic drag.
+    """
+    if world.quadratic_drag > 0:
+        raise ValueError("free flight under quadratic drag has no closed form")
+    x, v = np.asarray(position, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
+    t = np.asarray(time, dtype=np.float64).reshape(-1, *(1,) * x.ndim)
+    z = world.linear_drag * t
+    phi_1, phi_2 = _phi(z)
+    pull, wind = np.asarray(world.gravity), np.asarray(world.wind)
+    flown = x + v * (t * phi_1) + pull * (t * t * phi_2) + wind * (t * z * phi_2)
+    return flown, v * np.exp(-z) + pull * (t * phi_1) + wind * -np.expm1(-z)
+
+
+def _phi(z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (1 − e⁻ᶻ)/z and (z − 1 + e⁻ᶻ)/z² for z ≥ 0; below 1 the second is its Taylor series."""
+    large = np.maximum(z, 1.0)
+    small = np.minimum(z, 1.0)
+    series = np.zeros_like(z)
+    for coefficient in reversed(_SERIES):
+        series = series * small + coefficient
+    nonzero = np.where(z > 0, z, 1.0)
+    first = np.where(z > 0, -np.expm1(-nonzero) / nonzero, 1.0)
+    # Two divisions, because a square could overflow.
+    return first, np.where(z < 1, series, (large + np.expm1(-large)) / large / large)

@@ -1,0 +1,384 @@
+"""Which pairs of bodies and colliders can ever touch, and the coefficients of each pair of surfaces.
+
+The contact matrix is derived from the scene by kind, without simulation. Bodies that can touch nothing need no shape;
+bodies that can touch frictionless surfaces only need no moment of inertia.
+
+Restitution and friction belong to a *pair* of materials. A `[[pair]]` states them; for other pairs `mix` holds: a value
+stated on one side of a contact applies, values on both sides multiply (pymunk's rule), and without any it is 0. A value
+stated on a shape takes precedence over its material's. The same holds for the falloff of restitution with speed, except
+that the values of two sides add. Kicks and one-way walls belong to one side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.drives import driven_in
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import BodySource, HasMaterial
+from sandbox.scene.description.bodies import Compound
+from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
+from sandbox.scene.description.world import Kick
+from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.scene import Scene
+
+
+class ContactMaterial(NamedTuple):
+    """One side of a contact. The material is kept only if some `[[pair]]` names it."""
+
+    material: str | None
+    restitution: float | None
+    friction: float | None
+    falloff: float | None = None
+    """s/m"""
+    kick: Kick | None = None
+    one_way: bool = False
+
+
+def mix(a: float | None, b: float | None) -> float:
+    """Return the coefficient of a contact whose sides state `a` and `b`."""
+    if a is None:
+        return 0.0 if b is None else b
+    return a if b is None else a * b
+
+
+@dataclass(frozen=True, eq=False)
+class PairTable:
+    """The S distinct surfaces of a scene, and which bodies and colliders have them."""
+
+    surfaces: tuple[ContactMaterial, ...]
+    of_body: IntArray
+    """(N,) surface index of each body; of a compound, that of its first piece"""
+    of_shape: IntArray
+    """(S,) surface index of each convex piece, in the order of `Bodies.shapes`"""
+    of_fixed: IntArray
+    """(F,) surface index of each static collider"""
+    restitution: FloatArray
+    """(S, S) of each pair, symmetric"""
+    friction: FloatArray
+    """(S, S) of each pair, symmetric"""
+    falloff: FloatArray
+    """(S, S) s/m, of each pair, symmetric"""
+
+    @property
+    def kicks(self) -> BoolArray:
+        """(S,) whether each has a kick."""
+        return np.asarray([surface.kick is not None for surface in self.surfaces], np.bool_)
+
+    @property
+    def one_way(self) -> BoolArray:
+        """(S,) whether each belongs to a one-way wall."""
+        return np.asarray([surface.one_way for surface in self.surfaces], np.bool_)
+
+    @property
+    def fixed_coefficients(self) -> BoolArray:
+        """(S, S) whether the restitution of each pair is independent of speed."""
+        return np.asarray((self.falloff == 0.0) & ~self.kicks & ~self.kicks[:, None])
+
+
+def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
+    """Return the distinct surfaces of a scene and the coefficients of every pair, O(S²).
+
+    Raises:
+        KeyError: an element names a material that the scene does not declare.
+    """
+    surfaces, of_bearer = numbered(scene, bearers_of(bodies.elements))
+    more, of_fixed = numbered(scene, scene.fixed, surfaces)
+    surfaces = (*surfaces, *more)
+    restitution, friction = _mixed([s.restitution for s in surfaces]), _mixed([s.friction for s in surfaces])
+    falloff = np.add.outer(*[np.asarray([s.falloff or 0.0 for s in surfaces], dtype=np.float64)] * 2)
+    bearers: dict[str | None, list[int]] = {}
+    for number, surface in enumerate(surfaces):
+        bearers.setdefault(surface.material, []).append(number)
+    for pair in scene.pairs:
+        first, second = (bearers.get(name, []) for name in pair.between)
+        figures = (restitution, pair.restitution), (friction, pair.friction), (falloff, pair.restitution_falloff)
+        for table, stated in figures:
+            if stated is not None:
+                table[np.ix_(first, second)] = table[np.ix_(second, first)] = stated
+    counts = np.asarray([len(_bearers(element)) for element in bodies.elements], dtype=np.int64)
+    begin = np.cumsum(counts) - counts
+    of_body = of_bearer[begin[bodies.element]] if len(bodies) else np.empty(0, np.int64)
+    of_shape = of_body
+    if not bodies.round.all():
+        shapes = bodies.shapes
+        of_shape = of_bearer[begin[bodies.element[shapes.body]] + shapes.bearer]
+    return PairTable(surfaces, of_body, of_shape, of_fixed, restitution, friction, falloff)
+
+
+def bearers_of(elements: Sequence[BodySource]) -> list[HasMaterial]:
+    """Return the parts that have surfaces: each element itself, or each of its parts."""
+    return [each for element in elements for each in _bearers(element)]
+
+
+def _bearers(element: BodySource) -> Sequence[HasMaterial]:
+    if not isinstance(element, Compound):
+        return (element,)
+    return [_dressed(part, element) for part in element.parts]
+
+
+def _dressed(part: HasMaterial, body: HasMaterial) -> HasMaterial:
+    """Return a part with the surface of its body where it states none; a material of its own replaces all of it."""
+    if part.material is not None:
+        return part
+    return HasMaterial(
+        material=body.material,
+        restitution=body.restitution if part.restitution is None else part.restitution,
+        restitution_falloff=body.restitution_falloff if part.restitution_falloff is None else part.restitution_falloff,
+        friction=body.friction if part.friction is None else part.friction,
+    )
+
+
+def numbered(
+    scene: Scene, things: Sequence[HasMaterial], known: tuple[ContactMaterial, ...] = ()
+) -> tuple[tuple[ContactMaterial, ...], IntArray]:
+    """Return the known surfaces followed by the new distinct ones, and the index of each element's surface.
+
+    Raises:
+        KeyError: an element names a material that the scene does not declare.
+    """
+    materials = {m.name: m for m in scene.materials}
+    paired = {name for p in scene.pairs for name in p.between}
+    numbers = {surface: k for k, surface in enumerate(known)}
+
+    def number(thing: HasMaterial) -> int:
+        material = None if thing.material is None else materials[thing.material]
+        restitution, friction, falloff = thing.restitution, thing.friction, thing.restitution_falloff
+        if material is not None:
+            restitution = material.restitution if restitution is None else restitution
+            friction = material.friction if friction is None else friction
+            falloff = material.restitution_falloff if falloff is None else falloff
+        kept = thing.material if thing.material in paired else None
+        kick = thing.kick if isinstance(thing, Wall | Post) else None
+        one_way = isinstance(thing, Wall) and thing.one_way
+        return numbers.setdefault(ContactMaterial(kept, restitution, friction, falloff, kick, one_way), len(numbers))
+
+    of_thing = np.asarray([number(thing) for thing in things], dtype=np.int64)
+    return tuple(numbers)[len(known) :], of_thing
+
+
+def _mixed(stated: list[float | None]) -> FloatArray:
+    """Return `mix` of all pairs of S values, (S, S)."""
+    table = np.asarray([[mix(a, b) for b in stated] for a in stated], dtype=np.float64)
+    return table.reshape(len(stated), len(stated))
+
+
+FIXED_KINDS = (Plane, Wall, Post)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMatrix:
+    """Which pairs can touch, among N bodies and F static colliders with S surfaces."""
+
+    surfaces: PairTable
+    touches: BoolArray
+    """(N,) can touch something"""
+    held: BoolArray
+    """(N,) has a joint"""
+    noted: BoolArray
+    """(N,) can enter a zone; driven bodies are not detected"""
+    turnable: BoolArray
+    """(N,) can rotate: by friction; for other shapes than balls by any contact; by joints, thrusts or drives"""
+    mutual: bool
+    """whether two bodies can touch"""
+    ball_ball: bool
+    """whether two balls can touch"""
+    solid: BoolArray
+    """(S,) surfaces of pieces other than balls that can touch something"""
+    ball_fixed: dict[type[Plane] | type[Wall] | type[Post], bool]
+    """whether a ball can touch a plane, a wall, a post"""
+    touching: BoolArray
+    """(S, S) surfaces of which some pair can touch, symmetric"""
+
+    @property
+    def solids(self) -> bool:
+        """Whether a body other than a ball can touch something."""
+        return bool(self.solid.any())
+
+    @property
+    def free(self) -> BoolArray:
+        """(N,) can touch nothing, enters no zone, and has no joint."""
+        return ~self.touches & ~self.held & ~self.noted
+
+    @property
+    def restitution(self) -> float:
+        """Largest restitution of any possible contact."""
+        return float(np.max(self.surfaces.restitution[self.touching], initial=0.0))
+
+    @property
+    def friction(self) -> float:
+        """Largest friction of any possible contact."""
+        return float(np.max(self.surfaces.friction[self.touching], initial=0.0))
+
+
+class Kinds(NamedTuple):
+    """The K distinct kinds of pieces; pieces of one kind can touch the same."""
+
+    surface: IntArray
+    """(K,)"""
+    fixed: BoolArray
+    """(K,)"""
+    to_all: BoolArray
+    """(K,) of bodies that collide with everything"""
+    to_any: BoolArray
+    """(K,) of bodies that collide with anything"""
+    layers: IntArray
+    """(K,) bit mask of all layers that they can reach"""
+    ball: BoolArray
+    """(K,) is a single disc"""
+    alone: BoolArray
+    """(K,) all pieces belong to one body, which does not touch itself"""
+    of_piece: IntArray
+    """(S,) kind of each piece"""
+
+
+def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> ContactMatrix:
+    """Return the contact matrix: which bodies can ever collide with what.
+
+    Args:
+        start: scene or setup.
+        bodies: bodies after some were added; default: those of `start`.
+    """
+    setup = Setup.of(start)
+    scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
+    surfaces = pair_table(scene, bodies)
+    reached = reach(scene, bodies)
+    kinds = _kinds(bodies, surfaces, reached)
+    surface, to_all = kinds.surface, kinds.to_all
+    moving, still = ~kinds.fixed & kinds.to_any, kinds.fixed & kinds.to_any
+    pair = np.outer(moving & to_all, moving & to_all) & ~(np.eye(len(surface), dtype=bool) & kinds.alone)
+    pair |= np.outer(moving, still & to_all) | np.outer(still & to_all, moving)
+    pair &= (kinds.layers[:, None] & kinds.layers) != 0
+
+    size = len(surfaces.surfaces)
+    touching = np.zeros((size, size), dtype=bool)
+    rows, columns = np.nonzero(pair)
+    touching[surface[rows], surface[columns]] = True
+    rubs = surfaces.friction > 0
+    ground = [(moving & ((kinds.layers & mask) != 0), rows) for mask, rows in _by_layers(scene)]
+    meets: BoolArray = np.asarray(pair.any(axis=1))
+    for able, _ in ground:
+        meets |= able
+    turned = np.asarray((pair & rubs[np.ix_(surface, surface)]).any(axis=1)) | (meets & ~kinds.ball)
+
+    for able, rows in ground:
+        fixed_surface = np.unique(surfaces.of_fixed[rows])
+        reaching = surface[able]
+        touching[np.ix_(reaching, fixed_surface)] = True
+        touching[np.ix_(fixed_surface, reaching)] = True
+        turned |= able & rubs[np.ix_(surface, fixed_surface)].any(axis=1)
+
+    links, body = setup.links, _body_of_piece(bodies)
+    turnable = _any_of(body, (turned & moving)[kinds.of_piece], len(bodies)) | links.turned(len(bodies))
+    return ContactMatrix(
+        surfaces=surfaces,
+        touches=_any_of(body, meets[kinds.of_piece], len(bodies)),
+        held=links.held(len(bodies)),
+        noted=_noted(scene, bodies, reached) & ~driven_in(scene, bodies),
+        turnable=(turnable | _thrust_turned(scene, bodies) | driven_in(scene, bodies, turning=True)) & ~bodies.fixed,
+        mutual=bool(pair.any()),
+        ball_ball=bool((pair & np.outer(kinds.ball, kinds.ball)).any()),
+        solid=np.isin(np.arange(size), surface[meets & ~kinds.ball]),
+        ball_fixed={
+            kind: any(
+                bool((able & kinds.ball).any()) and any(isinstance(scene.fixed[k], kind) for k in rows.tolist())
+                for able, rows in ground
+            )
+            for kind in FIXED_KINDS
+        },
+        touching=touching,
+    )
+
+
+def reach(scene: Scene, bodies: Bodies) -> IntArray:
+    """Return the bit mask of all layers that each body can reach from its own, (N,)."""
+    layers = scene.layers
+    if len(layers) == 1:
+        return np.ones(len(bodies), np.int64)
+    of_layer = [1 << k for k in range(len(layers))]
+    mouths = [(mask_of(z.layers, layers), 1 << layers.index(z.to_layer)) for z in scene.zones if z.to_layer is not None]
+    for _ in layers:  # a path between two layers is no longer than their number
+        for mask, to in mouths:
+            of_layer = [bits | to if bits & mask else bits for bits in of_layer]
+    goes = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.fixed
+    return np.asarray(np.where(goes, np.asarray(of_layer)[bodies.layer], 1 << bodies.layer))
+
+
+def bits_of(layer: IntArray | None, count: int) -> IntArray:
+    """Return the layers of bodies as bit masks, (N,), from a frame's indices; default: the first layer."""
+    return np.ones(count, np.int64) if layer is None else 1 << layer
+
+
+def _noted(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArray:
+    """Return which bodies zones can detect, (N,)."""
+    if not scene.zones:
+        return np.zeros(len(bodies), np.bool_)
+    some = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.fixed
+    every = 0
+    for zone in scene.zones:
+        every |= mask_of(zone.layers, scene.layers)
+    still_inside = bodies.visits.any(axis=1)  # leaving a zone is detected after a change of layer too
+    return np.asarray(some & ((reached & every != 0) | still_inside))
+
+
+def _by_layers(scene: Scene) -> list[tuple[int, IntArray]]:
+    """Return each bit mask of layers of static colliders, with the indices of those that have it."""
+    masks = np.asarray([mask_of(thing.layers, scene.layers) for thing in scene.fixed], dtype=np.int64)
+    return [(mask, np.flatnonzero(masks == mask)) for mask in np.unique(masks).tolist()]
+
+
+def _kinds(bodies: Bodies, surfaces: PairTable, reached: IntArray) -> Kinds:
+    """Group pieces by (surface, layers, ball, fixed, collides with all, collides with any)."""
+    collides = [element.collides for element in bodies.elements]
+    meets_all = np.asarray([c == "all" for c in collides], dtype=np.int64)[bodies.element]
+    meets_any = np.asarray([c != "none" for c in collides], dtype=np.int64)[bodies.element]
+    traits = bodies.round.astype(np.int64) << 3 | bodies.fixed.astype(np.int64) << 2 | meets_all << 1 | meets_any
+    body = _body_of_piece(bodies)
+    masks, layers = np.unique(reached, return_inverse=True)
+    traits |= layers.reshape(-1) << 4
+    count = max(len(masks), 1)
+    code = surfaces.of_shape * (count << 4) + (traits if body is None else traits[body])
+    counts = np.bincount(code if body is None else np.unique(np.column_stack((code, body)), axis=0)[:, 0])
+    present = np.flatnonzero(counts)
+    row_of = np.zeros(len(counts), np.int64)
+    row_of[present] = np.arange(len(present))
+    bits = [(present >> k & 1).astype(bool) for k in range(4)]
+    return Kinds(
+        surface=(present >> 4) // count,
+        layers=masks[(present >> 4) % count] if len(masks) else np.empty(0, np.int64),
+        fixed=bits[2],
+        to_all=bits[1],
+        to_any=bits[0],
+        ball=bits[3],
+        alone=counts[present] < 2,
+        of_piece=row_of[code],
+    )
+
+
+def _body_of_piece(bodies: Bodies) -> IntArray | None:
+    """Return the body of each piece; None if each body is one piece, as balls are."""
+    return None if bodies.round.all() else bodies.shapes.body
+
+
+def _any_of(body: IntArray | None, pieces: BoolArray, count: int) -> BoolArray:
+    """Return which bodies have a piece with a property."""
+    if body is None:
+        return pieces
+    found = np.zeros(count, dtype=np.bool_)
+    found[body[pieces]] = True
+    return found
+
+
+def _thrust_turned(scene: Scene, bodies: Bodies) -> BoolArray:
+    """Return which bodies have a thrust that does not act through their centre of mass."""
+    found = np.zeros(len(bodies), dtype=np.bool_)
+    for thrust in scene.thrusts:
+        if thrust.body in bodies.number_of:
+            number = bodies.number_of[thrust.body]
+            x, y = form_of(bodies.elements[bodies.element[number]]).centre
+            found[number] |= (thrust.point[0] - x) * thrust.force[1] != (thrust.point[1] - y) * thrust.force[0]
+    return found

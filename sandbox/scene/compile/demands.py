@@ -1,0 +1,250 @@
+"""Demands: the physics that a scene needs, derived from the scene alone.
+
+An engine assembles only the demanded parts, and refuses a scene with a demand that it does not support.
+"""
+
+from collections.abc import Iterator
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.scene import Scene
+
+
+class Demand(StrEnum):
+    """One kind of physics that a scene can need and an engine can model."""
+
+    TRANSLATION = "translation"
+    ROTATION = "rotation"
+    GRAVITY = "gravity"
+    DRAG = "drag"
+    BALL_BALL = "ball-ball"
+    BALL_PLANE = "ball-plane"
+    BALL_SEGMENT = "ball-segment"
+    BALL_POST = "ball-post"
+    POLYGONS = "polygons"
+    RESTITUTION = "restitution"
+    FRICTION = "friction"
+    FALLOFF = "falloff"
+    KICKS = "kicks"
+    ONE_WAY = "one-way walls"
+    PASSABLE = "openings"
+    RODS = "rods"
+    PIVOTS = "pivots"
+    SLIDES = "slides"
+    GROOVES = "grooves"
+    ROTARY_LIMITS = "rotary limits"
+    MOTORS = "motors"
+    GEARS = "gears"
+    SPRINGS = "springs"
+    ROTARY_SPRINGS = "rotary springs"
+    ATTRACTION = "attraction"
+    THRUST = "thrust"
+    DRIVES = "drives"
+    BOUNDS = "bounds"
+    LIFETIMES = "lifetimes"
+    SURFACE = "surface"
+    SPIN = "spin"
+    POCKETS = "pockets"
+    PUCKS = "pucks"
+    CURL = "curl"
+    LAYERS = "layers"
+    ZONES = "zones"
+
+
+BALLS = frozenset(
+    {
+        Demand.TRANSLATION,
+        Demand.ROTATION,
+        Demand.GRAVITY,
+        Demand.DRAG,
+        Demand.BALL_BALL,
+        Demand.BALL_PLANE,
+        Demand.BALL_SEGMENT,
+        Demand.BALL_POST,
+        Demand.RESTITUTION,
+        Demand.FRICTION,
+        Demand.BOUNDS,
+        Demand.LIFETIMES,
+    }
+)
+"""Demands of scenes of balls and static colliders. Engines list their capabilities; a new demand is supported by
+none."""
+
+SURFACES = frozenset({Demand.FALLOFF, Demand.KICKS, Demand.ONE_WAY, Demand.PASSABLE})
+"""Properties of surfaces beyond restitution and friction."""
+
+FLOOR = frozenset({Demand.SURFACE, Demand.SPIN, Demand.POCKETS, Demand.PUCKS})
+"""Demands of spheres and pucks on a `[surface]`; curl of pucks is a demand of its own."""
+
+OF_LINKS = {
+    LinkKind.ROD: Demand.RODS,
+    LinkKind.PIVOT: Demand.PIVOTS,
+    LinkKind.SLIDE: Demand.SLIDES,
+    LinkKind.GROOVE: Demand.GROOVES,
+    LinkKind.ROTARY_LIMIT: Demand.ROTARY_LIMITS,
+    LinkKind.MOTOR: Demand.MOTORS,
+    LinkKind.GEAR: Demand.GEARS,
+    LinkKind.SPRING: Demand.SPRINGS,
+    LinkKind.ROTARY_SPRING: Demand.ROTARY_SPRINGS,
+}
+"""Demands of each kind of joint."""
+
+JOINTS = frozenset(OF_LINKS.values())
+
+
+class Item(NamedTuple):
+    """One demand, whether the scene has it, and the reason."""
+
+    demand: Demand
+    on: bool
+    why: str
+
+
+def demands(start: Scene | Setup) -> frozenset[Demand]:
+    """Return the demands of a scene or setup: the physics that an engine must model to run it."""
+    return frozenset(item.demand for item in bill(start) if item.on)
+
+
+def bill(start: Scene | Setup) -> tuple[Item, ...]:
+    """Return every demand, with the reason why the scene or setup has it or not."""
+    return tuple(Item(demand, on, why) for demand, on, why in _items(Setup.of(start)))
+
+
+def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
+    scene, bodies, meet = setup.scene, setup.bodies, contact_matrix(setup)
+    world = scene.world
+    moving = int((~bodies.fixed).sum())
+    yield Demand.TRANSLATION, moving > 0, _count(moving, "body moves", "bodies move", "nothing moves")
+
+    spinning = int(np.count_nonzero(bodies.angular_velocity))
+    turned = int(meet.turnable.sum())
+    if spinning:
+        why = _count(spinning, "body starts with a spin", "bodies start with a spin", "")
+    else:
+        why = _count(turned, "body can be turned", "bodies can be turned", "no body can be turned")
+    yield Demand.ROTATION, bool(spinning or turned), why
+
+    gravity = world.gravity != (0.0, 0.0)
+    yield Demand.GRAVITY, gravity, f"{list(world.gravity)} m/s²" if gravity else "world.gravity is zero"
+
+    drag = world.linear_drag > 0 or world.quadratic_drag > 0
+    why = f"linear {world.linear_drag:g} 1/s, quadratic {world.quadratic_drag:g} 1/m"
+    yield Demand.DRAG, drag, why if drag else "no drag"
+
+    free = int((meet.free & ~bodies.fixed).sum())
+    alone = f"; {free:,} of {moving:,} cannot collide with anything" if free else ""
+    why = f"{'balls' if meet.ball_ball else 'no two balls'} can collide{alone}"
+    yield Demand.BALL_BALL, meet.ball_ball, why
+
+    for demand, kind, things in (
+        (Demand.BALL_PLANE, Plane, scene.planes),
+        (Demand.BALL_SEGMENT, Wall, scene.walls),
+        (Demand.BALL_POST, Post, scene.posts),
+    ):
+        word = kind.__name__.lower()
+        why = "no moving body can touch one" if things else f"no {word}"
+        count = _count(len(things), word, f"{word}s", "")
+        yield demand, meet.ball_fixed[kind], count if meet.ball_fixed[kind] else why
+
+    others = int((~bodies.round & meet.touches & ~bodies.fixed).sum())
+    why = _count(int((~bodies.round).sum()), "body is not a ball", "bodies are not balls", "all bodies are balls")
+    yield Demand.POLYGONS, meet.solids, f"{why}, {others:,} of them can collide" if meet.solids else why
+
+    touch = bool(meet.touching.any())
+    for demand, most in ((Demand.RESTITUTION, meet.restitution), (Demand.FRICTION, meet.friction)):
+        why = f"up to {most:g}" if most else "0 for every pair that can collide"
+        yield demand, most > 0, why if touch else "no collisions possible"
+
+    yield from _surfaces(scene, meet)
+    yield from _joints(setup)
+    yield from _floor(setup)
+    apart = len(scene.layers) > 1
+    yield Demand.LAYERS, apart, ", ".join(scene.layers) if apart else "all bodies are in one layer"
+    yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
+    yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
+    mortal = int(np.isfinite(bodies.lifetime).sum())
+    yield (
+        Demand.LIFETIMES,
+        mortal > 0,
+        _count(mortal, "body has a lifetime", "bodies have a lifetime", "no body has a lifetime"),
+    )
+
+
+def _surfaces(scene: Scene, meet: ContactMatrix) -> Iterator[tuple[Demand, bool, str]]:
+    surfaces = meet.surfaces
+    most = float(np.max(surfaces.falloff[meet.touching & (surfaces.restitution > 0.0)], initial=0.0))
+    why = f"up to {most:g} s/m" if most else "restitution does not depend on speed"
+    yield Demand.FALLOFF, most > 0.0, why
+    touched = np.asarray(meet.touching.any(axis=1))
+    of_fixed = touched[surfaces.of_fixed]
+    for demand, does, one, many, none in (
+        (Demand.KICKS, surfaces.kicks, "wall or post kicks", "walls and posts kick", "no wall or post kicks"),
+        (Demand.ONE_WAY, surfaces.one_way, "one-way wall", "one-way walls", "none"),
+    ):
+        count = int(np.count_nonzero(does[surfaces.of_fixed] & of_fixed)) if len(does) else 0
+        yield demand, count > 0, _count(count, one, many, none)
+    things: tuple[Wall | Post, ...] = (*scene.walls, *scene.posts)
+    open_ = sum(not thing.solid for thing in things)
+    yield Demand.PASSABLE, open_ > 0, _count(open_, "wall or post", "walls and posts", "all walls and posts are solid")
+
+
+def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
+    scene = setup.scene
+    for kind, demand in OF_LINKS.items():
+        count = int(np.count_nonzero(setup.links.kind == kind))
+        yield demand, count > 0, f"{count:,}" if count else "none"
+    for demand, things in (
+        (Demand.ATTRACTION, scene.attractions),
+        (Demand.THRUST, scene.thrusts),
+        (Demand.DRIVES, scene.drives),
+    ):
+        yield demand, bool(things), f"{len(things):,}" if things else "none"
+
+
+def _floor(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
+    scene = setup.scene
+    floor, models = scene.surface, scene.contact_models
+    rubs = floor is not None and floor.rubs
+    why = "no [surface]" if floor is None else "the surface has no friction"
+    if floor is not None and rubs:
+        figures = (floor.sliding_friction, floor.rolling_friction, floor.spinning_friction)
+        why = "friction: sliding {:g}, rolling {:g}, spinning {:g}".format(*figures)
+    yield Demand.SURFACE, rubs, why
+    pucks = floor is not None and floor.bodies == "pucks"
+    slides = floor is not None and floor.sliding_friction > 0
+    rolls = floor is not None and not pucks and (slides or models.spins or bool(setup.bodies.roll.any()))
+    yield Demand.SPIN, rolls, "spheres turn about three axes" if rolls else "bodies turn about z only"
+    yield Demand.POCKETS, bool(scene.pockets), f"{len(scene.pockets):,}" if scene.pockets else "none"
+    flat = "flat discs slide and do not roll" if rubs else "without friction pucks are ordinary discs"
+    yield Demand.PUCKS, pucks and rubs, flat if pucks else "no pucks"
+    curl = floor.curl if floor is not None and slides and pucks else 0.0
+    yield Demand.CURL, curl != 0.0, f"κ = {curl:g}: rotating pucks curl" if curl else "no puck curls"
+
+
+def _count(n: int, one: str, many: str, none: str) -> str:
+    return none if n == 0 else f"{n:,} {one if n == 1 else many}"
+
+
+def on_floor(start: Scene | Setup) -> bool:
+    """Return whether a scene has a demand of `FLOOR`."""
+    return any(on and demand in FLOOR for demand, on, _ in _floor(Setup.of(start)))
+
+
+def curls(start: Scene | Setup) -> bool:
+    """Return whether a scene has a surface on which pucks curl."""
+    return any(on and demand is Demand.CURL for demand, on, _ in _floor(Setup.of(start)))
+
+
+def unmodelled(start: Scene | Setup, capabilities: frozenset[Demand]) -> list[str]:
+    """Return what a scene demands beyond the capabilities of an engine: one message, or none."""
+    *others, last = "", *sorted(map(str, demands(start) - capabilities))
+    listed = ", ".join(others[1:])
+    if listed:
+        last = f"{listed} or {last}"
+    return [f"it does not model {last}"] if last else []

@@ -1,0 +1,194 @@
+"""Joints of a scene as arrays, J of them, by the indices of their bodies."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, fields, replace
+from enum import IntEnum
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+
+WORLD = -1
+"""Index of the static world, as the first body of a joint."""
+
+
+class LinkKind(IntEnum):
+    """Kind of a joint, and the meaning of its `figures`."""
+
+    ROD = 0
+    """length, m"""
+    PIVOT = 1
+    """none"""
+    SLIDE = 2
+    """smallest and largest length, m"""
+    GROOVE = 3
+    """far end of the groove in the first body's frame, m; `anchor_a` is its near end"""
+    ROTARY_LIMIT = 4
+    """smallest and largest angle_b − angle_a, rad"""
+    MOTOR = 5
+    """target rate of angle_b − angle_a, rad/s; `most_force` is a torque"""
+    GEAR = 6
+    """phase, rad, and ratio: angle_b·ratio − angle_a = phase"""
+    SPRING = 7
+    """rest length, m, stiffness, N/m, damping, N·s/m"""
+    ROTARY_SPRING = 8
+    """rest angle of angle_b − angle_a, rad, stiffness, N·m/rad, damping, N·m·s/rad"""
+
+
+TURNING = (LinkKind.GROOVE, LinkKind.ROTARY_LIMIT, LinkKind.MOTOR, LinkKind.GEAR, LinkKind.ROTARY_SPRING)
+"""Kinds that can rotate bodies at any anchor; the others only at anchors off the centre of mass."""
+
+
+@dataclass(frozen=True, eq=False)
+class Links:
+    """The joints of a scene: those of the file in their order, then those of its generators."""
+
+    kind: IntArray
+    """(J,) `LinkKind`"""
+    a: IntArray
+    """(J,) index of the first body, or `WORLD`"""
+    b: IntArray
+    """(J,) index of the second body"""
+    anchor_a: FloatArray
+    """(J, 2) m, in the first body's frame about its centre of mass; for the world, a position"""
+    anchor_b: FloatArray
+    """(J, 2) m, in the second body's frame about its centre of mass"""
+    figures: FloatArray
+    """(J, 3) parameters by kind, unused ones 0"""
+    most_force: FloatArray
+    """(J,) largest force or torque, N or N·m; inf without a limit"""
+    collide: BoolArray
+    """(J,) whether the two bodies also collide"""
+    strength: FloatArray
+    """(J,) force or torque at which each breaks, N or N·m; inf if it cannot"""
+    number: IntArray
+    """(J,) index of each among the joints of the whole scene; 0 to J − 1 unless this is a selection"""
+    names: tuple[str, ...]
+    """(J,)"""
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return an empty set of joints."""
+        return cls(
+            kind=np.empty(0, np.int64),
+            a=np.empty(0, np.int64),
+            b=np.empty(0, np.int64),
+            anchor_a=np.empty((0, 2)),
+            anchor_b=np.empty((0, 2)),
+            figures=np.empty((0, 3)),
+            most_force=np.empty(0),
+            collide=np.empty(0, np.bool_),
+            strength=np.empty(0),
+            number=np.empty(0, np.int64),
+            names=(),
+        )
+
+    @classmethod
+    def alike(
+        cls,
+        kind: LinkKind,
+        a: npt.ArrayLike,
+        b: npt.ArrayLike,
+        anchor_a: npt.ArrayLike = (0.0, 0.0),
+        anchor_b: npt.ArrayLike = (0.0, 0.0),
+        figures: npt.ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Self:
+        """Return J nameless unbreakable joints of one kind between bodies that do not collide.
+
+        `figures` may be a single row for all of them.
+        """
+        first, second = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
+        count = len(first)
+        return cls(
+            kind=np.full(count, kind, np.int64),
+            a=first,
+            b=second,
+            anchor_a=np.broadcast_to(np.asarray(anchor_a, dtype=np.float64), (count, 2)).copy(),
+            anchor_b=np.broadcast_to(np.asarray(anchor_b, dtype=np.float64), (count, 2)).copy(),
+            figures=np.broadcast_to(np.asarray(figures, dtype=np.float64), (count, 3)).copy(),
+            most_force=np.full(count, np.inf),
+            collide=np.zeros(count, np.bool_),
+            strength=np.full(count, np.inf),
+            number=np.arange(count),
+            names=("",) * count,
+        )
+
+    def some(self, which: BoolArray | IntArray) -> Self:
+        """Return a selection, by mask or by indices."""
+        places = np.arange(len(self))[which]
+        columns = {f.name: getattr(self, f.name)[places] for f in fields(self) if f.name != "names"}
+        return replace(self, names=tuple(self.names[k] for k in places.tolist()), **columns)
+
+    def joined(self, more: Self) -> Self:
+        """Return these and more joints."""
+        columns = {
+            f.name: np.concatenate((getattr(self, f.name), getattr(more, f.name)))
+            for f in fields(self)
+            if f.name != "names"
+        }
+        return replace(self, names=(*self.names, *more.names), **columns)
+
+    def counted(self) -> Self:
+        """Return these joints numbered as those of a whole scene."""
+        return replace(self, number=np.arange(len(self)))
+
+    def without(self, broken: Collection[int]) -> Self:
+        """Return the joints without those of some indices in the whole scene."""
+        return self.some(~np.isin(self.number, list(broken))) if broken else self
+
+    def of(self, *kinds: LinkKind) -> Self:
+        """Return the joints of some kinds."""
+        return self.some(np.isin(self.kind, kinds))
+
+    @property
+    def turns(self) -> BoolArray:
+        """(J, 2) whether each can rotate its first and its second body."""
+        always = np.isin(self.kind, TURNING)[:, None]
+        off = np.column_stack((self.anchor_a.any(axis=1), self.anchor_b.any(axis=1)))
+        bodies = np.column_stack((self.a >= 0, np.ones(len(self), np.bool_)))
+        return np.asarray((always | off) & bodies)
+
+    def held(self, count: int) -> BoolArray:
+        """Return which of `count` bodies have a joint."""
+        found = np.zeros(count, np.bool_)
+        found[self.a[self.a >= 0]] = True
+        found[self.b] = True
+        return found
+
+    def turned(self, count: int) -> BoolArray:
+        """Return which of `count` bodies a joint can rotate."""
+        found, turns = np.zeros(count, np.bool_), self.turns
+        found[self.a[turns[:, 0]]] = True
+        found[self.b[turns[:, 1]]] = True
+        return found
+
+    def apart(self) -> IntArray:
+        """Return the distinct pairs of bodies (K, 2) that joints exclude from collision, the lower index first."""
+        pair = np.column_stack((self.a, self.b))[~self.collide & (self.a >= 0)]
+        return np.unique(np.sort(pair, axis=1), axis=0)
+
+    def ends(self, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the anchors of each joint in the world, (J, 2) m each, for the given poses of the bodies (N,)."""
+        return _placed(self.a, self.anchor_a, position, angle), _placed(self.b, self.anchor_b, position, angle)
+
+    def among(self, names: Sequence[str], old: Sequence[str]) -> Self:
+        """Return the joints whose bodies, by their `old` names, are among new ones, with the new indices."""
+        number = {name: k for k, name in enumerate(names)}
+        new = np.asarray(
+            [number.get(name, -2) for name in old] + [WORLD], dtype=np.int64
+        )  # a = −1 selects the last row
+        kept = (new[self.a] != -2) & (new[self.b] != -2) if len(self) else np.empty(0, np.bool_)
+        some = self.some(kept)
+        return replace(some, a=new[some.a], b=new[some.b])
+
+
+def _placed(number: IntArray, anchor: FloatArray, position: FloatArray, angle: FloatArray) -> FloatArray:
+    cos, sin = np.cos(angle[number]), np.sin(angle[number])
+    x, y = anchor.T
+    turned = position[number] + np.column_stack((cos * x - sin * y, sin * x + cos * y))
+    return np.where((number >= 0)[:, None], turned, anchor)

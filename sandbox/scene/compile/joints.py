@@ -1,0 +1,222 @@
+"""Joints of a scene as arrays, including those of ropes, cloths and ragdolls."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from sandbox.arrays import FloatArray
+from sandbox.scene.compile.articulated import ENDS_AT, STARTS_AT, cloth_links, limb_links, rope_links
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.drives import unmoved
+from sandbox.scene.compile.generators import count_of
+from sandbox.scene.compile.joint_arrays import WORLD, LinkKind, Links
+from sandbox.scene.compile.layout import turned
+from sandbox.scene.description.base import BodySource, Point
+from sandbox.scene.description.generators import ENDS, Cloth, Ragdoll, Rope, Woven
+from sandbox.scene.description.joints import (
+    Anchored,
+    Gear,
+    Groove,
+    Joint,
+    Motor,
+    Pivot,
+    Rod,
+    RotaryLimit,
+    RotarySpring,
+    Slide,
+    Spring,
+)
+from sandbox.scene.description.scene import SceneDescription, default_name
+from sandbox.scene.geometry.shapes import form_of
+
+
+def seams_of(scene: SceneDescription, bodies: Bodies) -> Links:
+    """Return the joints of a scene's generators, in their order, each numbered from 0.
+
+    The bodies that ropes are tied to must exist. Joints between bodies that cannot move are omitted.
+    """
+    links = Links.none()
+    if not (scene.ropes or scene.cloths or scene.ragdolls):
+        return links
+    first, still = 0, np.append(unmoved(scene, bodies), True)  # the world, −1, selects the last row
+    for kind, movers in scene.kinds.items():
+        for k, mover in enumerate(movers):
+            own = _own(mover, first, bodies)
+            first += count_of(mover)
+            own = own.some(~(still[own.a] & still[own.b]))
+            if isinstance(mover, Woven) and mover.strength is not None:
+                own = replace(own, strength=np.full(len(own), mover.strength))
+            stem = mover.name or default_name(kind, k)
+            links = links.joined(replace(own, names=tuple(f"{stem}-joint-{n}" for n in range(1, len(own) + 1))))
+    return links
+
+
+def _own(mover: BodySource, first: int, bodies: Bodies) -> Links:
+    """Return the joints of one generator, given the index of its first body."""
+    match mover:
+        case Rope():
+            return _tied(_numbered(rope_links(mover), first), mover, bodies)
+        case Cloth():
+            return _numbered(cloth_links(mover), first)
+        case Ragdoll():
+            return _numbered(limb_links(mover), first)
+        case _:
+            return Links.none()
+
+
+def _numbered(links: Links, first: int) -> Links:
+    """Return joints by the indices of a scene's bodies; negative indices stand for something else."""
+    return replace(
+        links, a=np.where(links.a < 0, links.a, links.a + first), b=np.where(links.b < 0, links.b, links.b + first)
+    )
+
+
+def _tied(links: Links, rope: Rope, bodies: Bodies) -> Links:
+    """Return the joints of a rope with the bodies at its ends, anchored where the ends start."""
+    for end, place, stand_in in zip(ENDS, (rope.start, rope.end), (STARTS_AT, ENDS_AT), strict=True):
+        name = rope.tied(end)
+        if name is not None:
+            number = bodies.number_of[name]
+            anchor = _seen(place, number, bodies)
+            first, second = links.a == stand_in, links.b == stand_in
+            links = replace(
+                links,
+                a=np.where(first, number, links.a),
+                b=np.where(second, number, links.b),
+                anchor_a=np.where(first[:, None], anchor, links.anchor_a),
+                anchor_b=np.where(second[:, None], anchor, links.anchor_b),
+            )
+    return links
+
+
+def _seen(place: Point, number: int, bodies: Bodies) -> FloatArray:
+    """Return a position in the world in the frame of a body about its centre of mass, (2,) m."""
+    return turned(np.asarray([place]) - bodies.position[number], -float(bodies.angle[number])).reshape(2)
+
+
+KINDS: dict[type, LinkKind] = {
+    Rod: LinkKind.ROD,
+    Pivot: LinkKind.PIVOT,
+    Slide: LinkKind.SLIDE,
+    Groove: LinkKind.GROOVE,
+    RotaryLimit: LinkKind.ROTARY_LIMIT,
+    Motor: LinkKind.MOTOR,
+    Gear: LinkKind.GEAR,
+    Spring: LinkKind.SPRING,
+    RotarySpring: LinkKind.ROTARY_SPRING,
+}
+
+
+def links_of(scene: SceneDescription, bodies: Bodies) -> Links:
+    """Return the joints of a scene between its bodies: those of the file, then those of generators."""
+    return _stated(scene, bodies).joined(seams_of(scene, bodies)).counted()
+
+
+def _stated(scene: SceneDescription, bodies: Bodies) -> Links:
+    """Return the joints of the file."""
+    if not scene.joints:
+        return Links.none()
+    number = {name: k for k, name in enumerate(bodies.names)}
+    rows = [_row(joint, bodies, number) for joint in scene.joints]
+    a, b, anchor_a, anchor_b, figures = (list(column) for column in zip(*rows, strict=True))
+    motors = [joint.max_torque if isinstance(joint, Motor) else None for joint in scene.joints]
+    strengths = [joint.strength for joint in scene.joints]
+    return Links(
+        kind=np.asarray([KINDS[type(joint)] for joint in scene.joints], dtype=np.int64),
+        a=np.asarray(a, dtype=np.int64),
+        b=np.asarray(b, dtype=np.int64),
+        anchor_a=np.asarray(anchor_a, dtype=np.float64).reshape(-1, 2),
+        anchor_b=np.asarray(anchor_b, dtype=np.float64).reshape(-1, 2),
+        figures=np.asarray(figures, dtype=np.float64).reshape(-1, 3),
+        most_force=np.asarray([math.inf if most is None else most for most in motors]),
+        collide=np.asarray([joint.collide for joint in scene.joints], dtype=np.bool_),
+        strength=np.asarray([math.inf if most is None else most for most in strengths]),
+        number=np.arange(len(scene.joints)),
+        names=tuple(joint.name or default_name("joint", k) for k, joint in enumerate(scene.joints)),
+    )
+
+
+def ends_of(joint: Rod, bodies: Bodies, number: dict[str, int]) -> tuple[Point, Point]:
+    """Return the start positions of the two anchors of a joint, m; `number` has the index of each body."""
+    a, b, anchor_a, anchor_b, _ = _row(joint, bodies, number)
+    return _world(anchor_a, a, bodies), _world(anchor_b, b, bodies)
+
+
+Row = tuple[int, int, Point, Point, tuple[float, float, float]]
+
+
+def _row(joint: Joint, bodies: Bodies, number: dict[str, int]) -> Row:
+    """Return bodies, anchors about the centres of mass, and parameters of a joint; the world comes first."""
+    if len(joint.between) == 1:
+        a, b = WORLD, number[joint.between[0]]
+    else:
+        a, b = number[joint.between[0]], number[joint.between[1]]
+    anchors: tuple[Point, Point] = (0.0, 0.0), (0.0, 0.0)
+    match joint:
+        case Pivot(at=(_, _) as at):
+            return a, b, _local(at, a, bodies), _local(at, b, bodies), (0.0, 0.0, 0.0)
+        case Anchored() | Pivot(anchors=(_, _)):
+            assert joint.anchors is not None
+            anchors = joint.anchors if a != WORLD else (joint.anchors[1], joint.anchors[0])
+        case Groove():
+            anchors = joint.groove[0], joint.anchor
+            end = _about_centre(joint.groove[1], a, bodies)
+            start = _about_centre(joint.groove[0], a, bodies)
+            return a, b, start, _about_centre(joint.anchor, b, bodies), (*end, 0.0)
+        case _:
+            pass
+    anchor_a, anchor_b = _about_centre(anchors[0], a, bodies), _about_centre(anchors[1], b, bodies)
+    return a, b, anchor_a, anchor_b, _figures(joint, a, b, anchor_a, anchor_b, bodies)
+
+
+def _figures(
+    joint: Joint, a: int, b: int, anchor_a: Point, anchor_b: Point, bodies: Bodies
+) -> tuple[float, float, float]:
+    length = math.dist(_world(anchor_a, a, bodies), _world(anchor_b, b, bodies))
+    angle_a = 0.0 if a == WORLD else float(bodies.angle[a])
+    angle_b = float(bodies.angle[b])
+    match joint:
+        case Rod():
+            return length if joint.length is None else joint.length, 0.0, 0.0
+        case Slide():
+            return joint.least, joint.most, 0.0
+        case RotaryLimit():
+            return joint.least, joint.most, 0.0
+        case Motor():
+            return joint.rate, 0.0, 0.0
+        case Gear():
+            phase = angle_b * joint.ratio - angle_a if joint.phase is None else joint.phase
+            return phase, joint.ratio, 0.0
+        case Spring():
+            return length if joint.rest_length is None else joint.rest_length, joint.stiffness, joint.damping
+        case RotarySpring():
+            rest = angle_b - angle_a if joint.rest_angle is None else joint.rest_angle
+            return rest, joint.stiffness, joint.damping
+        case _:
+            return 0.0, 0.0, 0.0
+
+
+def _about_centre(point: Point, number: int, bodies: Bodies) -> Point:
+    """Return a point of a body's described frame relative to its centre of mass."""
+    if number == WORLD:
+        return point
+    x, y = form_of(bodies.elements[bodies.element[number]]).centre
+    return point[0] - x, point[1] - y
+
+
+def _world(anchor: Point, number: int, bodies: Bodies) -> Point:
+    if number == WORLD:
+        return anchor
+    cos, sin = math.cos(bodies.angle[number]), math.sin(bodies.angle[number])
+    x, y = bodies.position[number].tolist()
+    return x + cos * anchor[0] - sin * anchor[1], y + sin * anchor[0] + cos * anchor[1]
+
+
+def _local(at: Point, number: int, bodies: Bodies) -> Point:
+    """Return a position in the world in the frame of a body about its centre of mass."""
+    if number == WORLD:
+        return at
+    cos, sin = math.cos(bodies.angle[number]), math.sin(bodies.angle[number])
+    x, y = at[0] - float(bodies.position[number, 0]), at[1] - float(bodies.position[number, 1])
+    return cos * x + sin * y, -sin * x + cos * y

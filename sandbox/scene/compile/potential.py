@@ -1,0 +1,165 @@
+"""Potential energy of springs and of attraction."""
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.forces import Attraction
+from sandbox.scene.scene import Scene
+
+ROUNDING = 1e-12
+"""Tolerance of a time, as a fraction of it."""
+
+
+class Potential:
+    """Potential energy of springs and attraction, frame by frame.
+
+    A spring stores ½ k (l − l₀)², a rotary spring ½ k (φ − φ₀)². An attraction a = s/(r² + ε²) has −m s/r where ε = 0,
+    else −(m s/ε)·atan(ε/r), which is 0 at infinity; a pair of bodies counts once. Energy between two moving bodies is
+    divided equally; energy between a body and the world or a fixed body belongs to the body.
+    """
+
+    def __init__(
+        self, start: Scene | Setup, bodies: Bodies, body: int | None = None, breaks: FloatArray | None = None
+    ) -> None:
+        """Select the springs and attractions of a scene.
+
+        Args:
+            start: scene or setup; its springs refer to the indices of its own bodies.
+            bodies: these and all spawned since, which are attracted too.
+            body: index of the only body whose energy counts; default: all.
+            breaks: (J,) s, time at which each joint broke, inf if it did not; default: none broke.
+        """
+        setup = Setup.of(start)
+        scene, links = setup.scene, setup.links
+        breaks = np.full(len(links), np.inf) if breaks is None else breaks
+        kinds = (LinkKind.SPRING, _stretch), (LinkKind.ROTARY_SPRING, _turn)
+        self._springs = [(links.of(kind), breaks[links.kind == kind], strain) for kind, strain in kinds]
+        number = {name: k for k, name in enumerate(bodies.names)} if scene.attractions else {}
+        self._attractions = [
+            (each, number.get(each.toward) if isinstance(each.toward, str) else None)
+            for each in scene.attractions
+            if not isinstance(each.toward, str) or each.toward in number
+        ]
+        self._mass = np.where(bodies.fixed, 0.0, bodies.mass)
+        self._fixed = bodies.fixed
+        self._body = body
+
+    @property
+    def springs(self) -> bool:
+        """Whether there are springs."""
+        return any(len(links) for links, _, _ in self._springs)
+
+    @property
+    def attracts(self) -> bool:
+        """Whether there is attraction."""
+        return bool(self._attractions)
+
+    def __bool__(self) -> bool:
+        """Return whether there is any potential."""
+        return self.attracts or self.springs
+
+    def at(self, time: FloatArray, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
+        """Return the energy in each of T frames, (T,) J.
+
+        Args:
+            time: (T,) s; broken springs store nothing.
+            position: (T, N, 2) m.
+            angle: (T, N) rad.
+            there: (T, N) whether each body is present; removed ones neither hold nor attract others.
+        """
+        return self.of_springs(time, position, angle, there) + self.of_attraction(position, there)
+
+    def of_springs(self, time: FloatArray, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
+        """Return the energy of springs in each of T frames, (T,) J; arguments as in `at`."""
+        stored = np.zeros(len(position))
+        for links, breaks, strain in self._springs:
+            if len(links):
+                energy = 0.5 * links.figures[:, 1] * np.square(strain(links, position, angle) - links.figures[:, 0])
+                holds = both_there(links, there) & ~parted(breaks, time)
+                stored += np.where(holds, energy, 0.0) @ self._share(links.a, links.b)
+        return stored
+
+    def of_attraction(self, position: FloatArray, there: BoolArray) -> FloatArray:
+        """Return the energy of attraction in each of T frames, (T,) J; arguments as in `at`."""
+        stored = np.zeros(len(position))
+        with np.errstate(invalid="ignore"):  # coincident bodies: an infinite potential; nan if both signs occur
+            for attraction, toward in self._attractions:
+                if attraction.strength:
+                    stored += self._attracted(attraction, toward, position, there)
+        return stored
+
+    def _attracted(
+        self, attraction: Attraction, toward: int | None, position: FloatArray, there: BoolArray
+    ) -> FloatArray:
+        drawn = np.flatnonzero(self._mass)
+        if toward is None:
+            place = np.asarray(attraction.toward, dtype=np.float64)
+            share = np.ones(len(drawn)) if self._body is None else (drawn == self._body).astype(np.float64)
+            counts = there[:, drawn]
+        else:
+            drawn = drawn[drawn != toward]
+            place = position[:, toward, None]
+            share = self._share(np.full(len(drawn), toward), drawn)
+            counts = there[:, drawn] & there[:, toward, None]
+        counts = counts & (share > 0.0)
+        away = position[:, drawn] - place
+        distance, soft = np.hypot(away[..., 0], away[..., 1]), attraction.softening
+        with np.errstate(divide="ignore"):
+            depth = np.arctan2(soft, distance) / soft if soft > 0.0 else 1.0 / distance
+        return np.asarray(np.where(counts, -attraction.strength * depth, 0.0) @ (self._mass[drawn] * share))
+
+    def _share(self, a: IntArray, b: IntArray) -> FloatArray:
+        """Return the fraction of the energy of each pair that counts, (K,)."""
+        if self._body is None:
+            return np.ones(len(b))
+        first, second = (a >= 0) & ~self._fixed[a], ~self._fixed[b]
+        mine = ((a == self._body) & first).astype(np.float64) + ((b == self._body) & second)
+        return np.asarray(mine / np.maximum(first.astype(np.float64) + second, 1.0))
+
+
+def both_there(links: Links, there: BoolArray) -> BoolArray:
+    """Return which joints still have both bodies, (T, J), from the presence of bodies, (T, N)."""
+    return np.asarray(there[:, links.b] & (there[:, links.a] | (links.a < 0)))
+
+
+def parted(breaks: FloatArray, time: FloatArray) -> BoolArray:
+    """Return which joints have broken by each of some times, (T, J).
+
+    Args:
+        breaks: (J,) s, inf for joints that do not break.
+        time: (T,) s. Times of frames are rounded sums: a break within rounding error of a time has happened by then.
+    """
+    return np.asarray(breaks * (1.0 - ROUNDING) <= time[:, None])
+
+
+def ends_over_time(links: Links, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the anchors of joints in the world, (T, J, 2) m each, in T frames."""
+    return (
+        _placed(links.a, links.anchor_a, position, angle),
+        _placed(links.b, links.anchor_b, position, angle),
+    )
+
+
+def turned_by(links: Links, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the angles of the first and second bodies of joints, (T, J) rad each; the world's is 0."""
+    return np.where(links.a >= 0, angle[:, links.a], 0.0), angle[:, links.b]
+
+
+def _stretch(links: Links, position: FloatArray, angle: FloatArray) -> FloatArray:
+    first, second = ends_over_time(links, position, angle)
+    return np.asarray(np.hypot(*np.moveaxis(second - first, 2, 0)))
+
+
+def _turn(links: Links, _: FloatArray, angle: FloatArray) -> FloatArray:
+    first, second = turned_by(links, angle)
+    return np.asarray(second - first)
+
+
+def _placed(number: IntArray, anchor: FloatArray, position: FloatArray, angle: FloatArray) -> FloatArray:
+    cos, sin = np.cos(angle[:, number]), np.sin(angle[:, number])
+    x, y = anchor.T
+    turned = position[:, number] + np.stack((cos * x - sin * y, sin * x + cos * y), axis=2)
+    return np.where((number >= 0)[:, None], turned, anchor)

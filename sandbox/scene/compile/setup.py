@@ -1,0 +1,77 @@
+"""Setup: the compiled state from which an engine starts a scene, at its beginning or in the middle of a session."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from typing import Self, Union
+
+from sandbox.arrays import FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.drives import at_rest
+from sandbox.scene.compile.joint_arrays import Links
+from sandbox.scene.description.fixed import Passing, PlaneReach
+from sandbox.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """State from which an engine starts a scene, with N bodies, J joints and D drives.
+
+    Functions that accept `Scene | Setup` treat a scene as its own start state, `Setup.of(scene)`.
+    """
+
+    scene: Scene
+    """the scene; its own `bodies` and `links` are those of its start"""
+    bodies: Bodies
+    """the N bodies that are present, in their state at `time`"""
+    links: Links
+    """the J joints that hold, with indices into `bodies`"""
+    drives: FloatArray
+    """(D, 3) state of each drive: level, torque or pull, rate of the pull"""
+    time: float = 0.0
+    """s, time in the session at which the state begins; 0 at the start of the scene"""
+    passing: Passing = ()
+    """pairs of a body and a one-way wall that it is passing"""
+    plane_reach: PlaneReach | None = None
+    """extent of half-planes; None leaves it to the engine"""
+
+    @classmethod
+    def of(cls, start: Union[Scene, "Setup"]) -> "Setup":
+        """Return the start state of a scene, or a setup as it is."""
+        return start if isinstance(start, Setup) else cls(start, start.bodies, start.links, at_rest(start))
+
+    def placed(
+        self,
+        bodies: Bodies,
+        time: float = 0.0,
+        broken: Collection[int] = (),
+        drives: FloatArray | None = None,
+        passing: Passing = (),
+        plane_reach: PlaneReach | None = None,
+    ) -> Self:
+        """Return a later state: bodies moved, removed or added, joints with their bodies, and broken ones left out.
+
+        Args:
+            bodies: bodies at that time; those of this setup are found by their names.
+            time: s.
+            broken: indices of the broken joints.
+            drives: (D, 3) state of the drives; default: their initial state.
+            passing: pairs of a body and a one-way wall that it is passing.
+            plane_reach: extent of half-planes.
+        """
+        links = self.links.without(broken).among(bodies.names, self.bodies.names)
+        drives = at_rest(self.scene) if drives is None else drives
+        return replace(
+            self, bodies=bodies, links=links, drives=drives, time=time, passing=passing, plane_reach=plane_reach
+        )
+
+    def with_scene(self, scene: Scene) -> Self:
+        """Return the same state with changed values of the scene.
+
+        Elements of the scene follow the change, elements of bodies that were added since stay. Bodies and joints are
+        not compiled anew: that would bring removed bodies and broken joints back, and hang ropes along a new gravity.
+
+        Args:
+            scene: scene with as many elements as this one, such as from `change_value`.
+        """
+        spawned = self.bodies.elements[len(self.scene.elements) :]
+        return replace(self, scene=scene, bodies=replace(self.bodies, elements=(*scene.elements, *spawned)))

@@ -1,0 +1,121 @@
+"""Base classes of a scene's elements, and the ranges of their numbers.
+
+The ranges protect compiled engines from extreme values. They are wide enough for every experiment that double precision
+can represent, and narrow enough that no square or cube of a value overflows.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+
+MAX_POSITION = 1e16  # m
+MAX_SPEED = 1e12  # m/s
+MAX_BODIES = 1_000_000
+MAX_STEPS = 1e9
+BACKING = 1000.0  # m: depth of the solid behind a plane; no centre may start deeper
+
+
+class Part(BaseModel):
+    """A frozen, strict piece of a scene: no unknown keys, no coercion, no infinities."""
+
+    # Validators are built on first use: a command mostly needs only that of a whole scene.
+    model_config = ConfigDict(
+        strict=True, extra="forbid", frozen=True, allow_inf_nan=False, validate_by_name=True, defer_build=True
+    )
+
+
+def _speed_in_range(vector: tuple[float, float]) -> tuple[float, float]:
+    speed = math.hypot(*vector)
+    if speed > MAX_SPEED:
+        raise ValueError(f"a speed of {speed:g} m/s is out of range; the limit is {MAX_SPEED:g}")
+    return vector
+
+
+@dataclass(frozen=True)
+class Wording:
+    """Annotation of a field: the words for its values in the message for an array with too few of them."""
+
+    text: str
+    """follows their number: "must be 3 <text>; has 2"; plural"""
+
+
+Coordinate = Annotated[float, Field(ge=-MAX_POSITION, le=MAX_POSITION)]
+Point = tuple[Coordinate, Coordinate]
+"""A position, m."""
+
+Vector = tuple[float, float]
+
+Velocity = Annotated[Vector, AfterValidator(_speed_in_range)]
+"""A velocity, m/s."""
+
+AngularVelocity = Annotated[float, Field(ge=-1e12, le=1e12)]
+Radius = Annotated[float, Field(ge=1e-9, le=1e9)]
+Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
+Mass = Annotated[float, Field(ge=1e-15, le=1e30)]
+Density = Annotated[float, Field(ge=1e-30, le=1e30)]
+Restitution = Annotated[float, Field(ge=0, le=1)]
+Friction = Annotated[float, Field(ge=0, le=1000)]
+Falloff = Annotated[float, Field(ge=0, le=1e6)]
+"""Decrease of restitution with speed, s/m: e(v) = e / (1 + f·v), v the speed of approach."""
+
+Name = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$")]
+"""Name of a body or material: any text without control characters."""
+
+Colour = Annotated[str, StringConstraints(pattern=r"^#[0-9a-fA-F]{6}$")]
+"""An sRGB colour, `#rrggbb`."""
+
+
+GROUND = "ground"
+"""Default collision layer."""
+
+Collides = Literal["all", "fixed", "none"]
+"""Objects that a body collides with: all, only planes, walls, posts and fixed bodies, or none."""
+
+
+class HasMaterial(Part):
+    """Object that bodies can touch. Its own coefficients take precedence over those of its material."""
+
+    name: Name | None = None
+    """without a name, it is called by its kind and its number in the file"""
+    material: Name | None = None
+    """name of a [[material]], whose values apply where this table has none"""
+    restitution: Restitution | None = None
+    """e: speed of separation / speed of approach, 0 to 1; if both sides of a contact have a value, they are
+    multiplied"""
+    restitution_falloff: Falloff | None = None
+    """f, s/m: decrease of restitution with the speed of approach, e(v) = e / (1 + f·v); the values of both sides are
+    added"""
+    friction: Friction | None = None
+    """Coulomb friction μ; if both sides of a contact have a value, they are multiplied"""
+    colour: Colour | None = None
+    """colour in the window, `#rrggbb`"""
+
+
+class BodySource(HasMaterial):
+    """Element with bodies: a single body, or a generator of many."""
+
+    mass: Mass | None = None
+    """mass, kg; default 1 if neither mass nor density is given"""
+    density: Density | None = None
+    """kg/m²"""
+    angle: Annotated[float, Field(ge=-1e12, le=1e12)] = 0.0
+    """initial angle, rad, counter-clockwise"""
+    angular_velocity: AngularVelocity = 0.0
+    """rad/s"""
+    collides: Collides = "all"
+    """bodies that it collides with: `all`, `fixed` (only planes, walls, posts and fixed bodies) or `none`"""
+    layer: Name = GROUND
+    """initial collision layer: bodies collide only with objects in the same layer"""
+
+
+class BodySpec(BodySource):
+    """One body."""
+
+    position: Point
+    """position of the origin of the body frame, m: for balls, boxes and capsules the centre"""
+    velocity: Velocity = (0.0, 0.0)
+    """velocity of the centre of mass, m/s"""
+    fixed: bool = False
+    """Never moves, as if infinitely heavy."""

@@ -1,0 +1,100 @@
+"""Bodies: boxes, capsules, polygons and compounds of them."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from sandbox.scene.description.base import BodySpec, Density, HasMaterial, Point, Radius
+
+MAX_CORNERS = 1000
+"""Largest number of corners of one outline; far more crash pymunk, and have no visible effect."""
+
+MAX_PARTS = 1000
+"""Largest number of parts of one body."""
+
+Length = Annotated[float, Field(ge=1e-9, le=1e9)]
+Angle = Annotated[float, Field(ge=-1e12, le=1e12)]
+Outline = Annotated[tuple[Point, ...], Field(min_length=3, max_length=MAX_CORNERS)]
+
+
+class Box(BodySpec):
+    """A rectangle centred at its position."""
+
+    size: tuple[Length, Length]
+    """width and height before rotation, m"""
+
+
+class Capsule(BodySpec):
+    """A rectangle with half discs at its ends, centred at its position, along x before rotation."""
+
+    length: Length
+    """distance between the centres of the half discs, m"""
+    radius: Radius
+    """radius of the round ends, m"""
+
+
+class Polygon(BodySpec):
+    """A simple polygon, clockwise or counter-clockwise; a concave one is cut into convex pieces."""
+
+    points: Outline
+    """corners relative to `position`, m"""
+    position: Point = (0.0, 0.0)
+    """origin of the points, m; the position of the body in results is its centre of mass"""
+
+
+class Attached(HasMaterial):
+    """Part of a body. Coefficients that it does not have are those of the body."""
+
+    density: Density | None = None
+    """kg/m²; default: the density of the body, or the same for all parts"""
+    position: Point = (0.0, 0.0)
+    """position relative to the body's position, m"""
+    angle: Angle = 0.0
+    """angle in the frame of the body, rad"""
+
+
+class BallPart(Attached):
+    """A disc that is part of a body."""
+
+    radius: Radius
+    """radius of the disc, m"""
+
+
+class BoxPart(Attached):
+    """A rectangle that is part of a body."""
+
+    size: tuple[Length, Length]
+    """width and height of a tank, m"""
+
+
+class CapsulePart(Attached):
+    """A capsule that is part of a body."""
+
+    length: Length
+    """distance between the centres of the round ends, m"""
+    radius: Radius
+    """radius of the round ends, m"""
+
+
+class PolygonPart(Attached):
+    """A polygon that is part of a body."""
+
+    points: Outline
+    """corners of the outline in the frame of the part, m"""
+
+
+AnyPart = BallPart | BoxPart | CapsulePart | PolygonPart
+
+
+class Compound(BodySpec):
+    """One rigid body made of several shapes, such as a hammer. Where parts overlap, their masses add up."""
+
+    balls: Annotated[tuple[BallPart, ...], Field(alias="ball", max_length=MAX_PARTS)] = ()
+    boxes: Annotated[tuple[BoxPart, ...], Field(alias="box", max_length=MAX_PARTS)] = ()
+    capsules: Annotated[tuple[CapsulePart, ...], Field(alias="capsule", max_length=MAX_PARTS)] = ()
+    polygons: Annotated[tuple[PolygonPart, ...], Field(alias="polygon", max_length=MAX_PARTS)] = ()
+
+    @property
+    def parts(self) -> tuple[AnyPart, ...]:
+        """The parts by kind, each kind in the order of the file."""
+        return self.balls + self.boxes + self.capsules + self.polygons

@@ -1,0 +1,121 @@
+"""Static elements: planes, walls, posts and zones.
+
+Zone: an area that detects bodies, `[[zone]]`, and its effects on them; and the collision layers of a scene.
+
+A visit begins when the centre of a body is inside the zone while the body is in one of the zone's layers. It ends when
+the centre is outside. A change of layer does not end it; each visit is recorded once. Bodies that collide with nothing
+(`collides = "none"`) and bodies held by a drive are not detected.
+"""
+
+from typing import Annotated, TypeAlias
+
+from pydantic import Field
+
+from sandbox.scene.description.base import GROUND, Acceleration, Colour, HasMaterial, Name, Part, Point, Radius, Vector
+from sandbox.scene.description.world import Kick
+
+Layers = Annotated[tuple[Name, ...], Field(min_length=1, max_length=10)]
+"""Collision layers of an object; objects collide if they share a layer."""
+
+MAX_LAYERS = 10
+"""Largest number of layers of a scene: three kinds of bodies on each share the 32 bits of a filter with two bits for
+zones."""
+
+MAX_ZONES = 1000
+"""Largest number of zones of a scene: the state has an entry for each body and zone."""
+
+AWAY, INSIDE, HELD, LET_GO = range(4)
+"""State of a body in a zone: outside; inside; held at the centre; released and still inside."""
+
+Width = Annotated[float, Field(gt=0, le=1e9)]
+
+
+class Zone(Part):
+    """An area that detects bodies: circle (`position`, `radius`), polygon (`points`), strip (`points`, `thickness`)."""
+
+    name: Name | None = None
+    """without a name, it is called by its kind and its number in the file"""
+    layers: Layers = (GROUND,)
+    """layers in which it acts"""
+    position: Point | None = None
+    """centre of a circle, m"""
+    radius: Radius | None = None
+    """radius of a circle, m"""
+    points: Annotated[tuple[Point, ...], Field(min_length=2, max_length=1000)] | None = None
+    """corners of a polygon, or centre line of a strip, m"""
+    thickness: Width | None = None
+    """full thickness of a strip, m"""
+    to_layer: Name | None = None
+    """moves a body that enters the zone to this collision layer, as at the mouth of a ramp"""
+    holds: bool = False
+    """A body that enters is held at the centre, one at a time, until an action moves it, as in a kicker."""
+    gravity: tuple[Acceleration, Acceleration] | None = None
+    """gravity for bodies inside the zone and in its layers, m/s²; where zones overlap, the last one applies"""
+    colour: Colour | None = None
+    """colour in the window, `#rrggbb`"""
+
+
+def mask_of(layers: Layers | None, known: tuple[str, ...]) -> int:
+    """Return layers as a bit mask; None means all."""
+    if layers is None:
+        return (1 << len(known)) - 1
+    return sum(1 << known.index(name) for name in {*layers})
+
+
+Height = Annotated[float, Field(gt=0, le=1e9)]
+Course = Annotated[tuple[Point, ...], Field(min_length=2, max_length=100_000)]
+
+Passing: TypeAlias = tuple[tuple[int, int], ...]
+"""Pairs of a body index and a one-way wall, −1 − k, that the body is passing."""
+
+PlaneReach: TypeAlias = tuple[float, float, float]
+"""Centre (x, y) of the start positions, and the distance from it within which half-planes are exact, m."""
+
+
+class Plane(HasMaterial):
+    """A half-plane, solid behind its normal."""
+
+    point: Point
+    """a point on the surface, m"""
+    normal: Vector
+    """direction out of the solid; any length"""
+    layers: Layers | None = None
+    """layers in which it is solid; default: all"""
+
+
+class Wall(HasMaterial):
+    """A polyline with round ends, solid on both sides."""
+
+    points: Course
+    """corners, m"""
+    thickness: Annotated[float, Field(ge=0, le=1e9)] = 0.0
+    """full thickness, m"""
+    closed: bool = False
+    """Connect the last point to the first."""
+    layers: Layers = (GROUND,)
+    """layers in which it is solid"""
+    height: Height | None = None
+    """height of the nose above a floor, m"""
+    kick: Kick | None = None
+    """active kick, as of a slingshot"""
+    one_way: bool = False
+    """Solid only from the left of its direction (first to last point); bodies from the right pass."""
+    solid: bool = True
+    """whether bodies collide with it; an action can change this"""
+
+
+class Post(HasMaterial):
+    """A fixed circle."""
+
+    position: Point
+    """position of the centre, m"""
+    radius: Radius
+    """radius of the circle, m"""
+    layers: Layers = (GROUND,)
+    """layers in which it is solid"""
+    height: Height | None = None
+    """height of the nose above a floor, m"""
+    kick: Kick | None = None
+    """active kick, as of a bumper"""
+    solid: bool = True
+    """whether bodies collide with it; an action can change this"""

@@ -1,0 +1,138 @@
+"""Attraction, thrusts and drives (flippers, diverters, plungers).
+
+A driven body moves only as its drive says; with a torque drive gravity and collisions act on it too. Air drag does not.
+A body led by a stroke or a plunger is never stopped: it pushes free bodies, and passes through static and other led
+bodies.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from sandbox.scene.description.base import Name, Part, Point, Vector
+
+DriveKey = Literal[
+    "up", "down", "left", "right", "space", "left shift", "right shift", "z", "slash", "return"
+]  # fmt: skip
+"""Key of the window."""
+
+Turned = Annotated[float, Field(ge=-1e9, le=1e9)]
+Torque = Annotated[float, Field(gt=0, le=1e30)]
+Moment = Annotated[float, Field(gt=0, le=1e30)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Second = Annotated[float, Field(ge=0, le=1e9)]
+Rate = Annotated[float, Field(gt=0, le=1e9)]
+
+
+class Driven(Part):
+    """What all drives have."""
+
+    name: Name | None = None
+    """without a name, it is called by its kind and its number in the file, such as `joint-1`"""
+    body: Name
+    """name of a single body that is at rest at the start"""
+    key: DriveKey | None = None
+    """The level is 1 while this key is held in the window; a `drive` action can set it at any time."""
+
+
+class TorqueDrive(Driven):
+    """Turns a body about a hinge from one stop to another by a torque, and back by a weaker torque: a flipper.
+
+    Collisions act on the body according to its moment of inertia. The target torque is `-return_ratio * torque` at
+    level 0 and `level * torque` otherwise; the torque approaches it at `torque / ramp` per second. The torque starts at
+    0, so that the first stroke does not have to overcome the return torque. Within `hold_within` of the end of a stroke
+    the target torque is multiplied by b + hold_ratio (1 − b), b = (d / hold_within)⁴, d the remaining angle.
+    """
+
+    kind: Literal["torque"]
+    pivot: Point
+    """position of the hinge at the start, m"""
+    stops: tuple[Turned, Turned]
+    """rest angle and driven angle of the body, rad; either sense"""
+    torque: Torque
+    """N·m"""
+    ramp: Second = 0.0
+    """time in which the torque rises from 0 to its full value, s"""
+    return_ratio: Share = 0.1
+    """fraction of the torque that returns it at level 0"""
+    hold_ratio: Share = 1.0
+    """fraction of the torque that remains at the end of the stroke"""
+    hold_within: Annotated[float, Field(ge=0, le=1e9)] = 0.0
+    """angle before the end of the stroke within which the torque falls to that fraction, rad"""
+    bounce: Share = 0.0
+    """restitution at the stops"""
+    moment: Moment | None = None
+    """moment of inertia about the hinge, kg·m²; default: from the shape and mass of the body"""
+
+
+class StrokeDrive(Driven):
+    """Turns a body about a hinge at a prescribed rate, whatever the load: a diverter, a windmill."""
+
+    kind: Literal["stroke"]
+    pivot: Point
+    """position of the hinge at the start, m"""
+    stops: tuple[Turned, Turned]
+    """rest angle and driven angle of the body, rad; it turns to the second while the level is above 0; either sense"""
+    rate: Rate
+    """rad/s"""
+    return_rate: Annotated[float, Field(ge=0, le=1e9)] | None = None
+    """rate at level 0, rad/s; default: `rate`; 0 means that it stays where it is"""
+
+
+class PlungerDrive(Driven):
+    """Pulls a body back along a line and releases it, so that it springs forward to its start: a plunger.
+
+    The level is the desired fraction of the pull. At level 0 the plunger is released: the remaining pull decreases as
+    cos(ω t), ω = speed / travel, until the plunger reaches its stop.
+    """
+
+    kind: Literal["plunger"]
+    direction: Vector
+    """direction of the strike; any length"""
+    travel: Annotated[float, Field(gt=0, le=1e9)]
+    """largest distance that it can be drawn back, m"""
+    speed: Annotated[float, Field(gt=0, le=1e9)]
+    """speed at the stop after a full pull, m/s; proportional to the pull"""
+    draw_time: Annotated[float, Field(gt=0, le=1e9)] = 1.0
+    """duration of a full pull, s"""
+
+
+Drive = Annotated[TorqueDrive | StrokeDrive | PlungerDrive, Field(discriminator="kind")]
+
+
+Newton = Annotated[float, Field(ge=-1e30, le=1e30)]
+
+ThrustKey = Literal["up", "down", "left", "right"]
+"""Arrow key of the window."""
+
+
+class Attraction(Part):
+    """Attracts every moving body towards a point or a body: a = strength / (r² + softening²)."""
+
+    name: Name | None = None
+    """without a name, it is called by its kind and its number in the file, such as `joint-1`"""
+    toward: Point | Name
+    """a point, m, or the name of a body; a body that can move is attracted by the reaction"""
+    strength: Annotated[float, Field(ge=-1e30, le=1e30)]
+    """G·M, m³/s²; negative values repel"""
+    softening: Annotated[float, Field(ge=0, le=1e9)] = 0.0
+    """m"""
+
+
+class Thrust(Part):
+    """A force fixed to a body, such as a rocket engine: it turns with the body."""
+
+    name: Name | None = None
+    """without a name, it is called by its kind and its number in the file, such as `joint-1`"""
+    body: Name
+    """name of the body"""
+    force: tuple[Newton, Newton]
+    """force in the frame of the body, N"""
+    point: Point = (0.0, 0.0)
+    """point of action in the frame of the body, m"""
+    begin: Second = 0.0
+    """s"""
+    end: Second | None = None
+    """end, s; default: unlimited"""
+    key: ThrustKey | None = None
+    """Acts only while this key is held or a `throttle` action has switched it on."""

@@ -1,0 +1,223 @@
+"""Generators of bodies: stacks, ropes, cloths and ragdolls.
+
+A rope of rods or springs, and a cloth, consist of small balls, the nodes, with a joint between neighbours. A rope of
+planks consists of capsules end to end, joined by pivots. `mass` is that of each node or plank.
+
+Lengths of a ragdoll are fractions of its height after Drillis and Contini (1966), as in Winter, Biomechanics and Motor
+Control of Human Movement, figure 4.1: heights of ankle .039, knee .285, hip .530, shoulder .818, chin .870; lengths of
+upper arm .186, forearm .146, hand .108, foot .152. Thicknesses, the middle of the back, the position of the ankle on
+the foot and the limits of the wrist are chosen freely. Angles of joints are positive where they bend forward, except
+for knees, which bend back, and ankles, which point the toes down.
+"""
+
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import Field
+
+from sandbox.scene.description.base import MAX_BODIES, BodySource, Collides, Name, Part, Point, Radius, Velocity
+from sandbox.scene.description.bodies import Length
+from sandbox.scene.description.discs import Count
+from sandbox.scene.description.joints import Damping, Force, Stiffness
+
+Gap = Annotated[float, Field(ge=0, le=1e9)]
+
+
+class Stack(BodySource):
+    """Equal boxes, numbered along each row from the lower left; `angle` tilts the whole stack about its base."""
+
+    base: Point
+    """centre of the bottom, m"""
+    size: tuple[Length, Length]
+    """width and height of each box, m"""
+    columns: Count
+    """number of boxes in the bottom row; 1 for a tower"""
+    rows: Count
+    """number of rows"""
+    fewer: Annotated[int, Field(ge=0, le=MAX_BODIES)] = 0
+    """decrease of the number of boxes from row to row: 0 for a wall, 1 for a pyramid"""
+    gap: Gap = 0.0
+    """gap between neighbours in a row, and between rows, m"""
+    jitter: Gap = 0.0
+    """Largest random displacement ± of each box along its row, m."""
+    velocity: Velocity = (0.0, 0.0)
+    """m/s"""
+
+    @property
+    def most_rows(self) -> int:
+        """Largest number of rows: the next row would have no box."""
+        return MAX_BODIES if self.fewer == 0 else -(-self.columns // self.fewer)
+
+    @property
+    def count(self) -> int:
+        """Number of boxes."""
+        return self.columns * self.rows - self.fewer * (self.rows * (self.rows - 1) // 2)
+
+
+End = Literal["start", "end"]
+ENDS: tuple[End, End] = ("start", "end")
+
+
+Place = Annotated[int, Field(ge=0, lt=MAX_BODIES)]
+
+
+class Ties(Part):
+    """The bodies that hold the ends of a rope."""
+
+    start: Name | None = None
+    """name of the body at the first end"""
+    end: Name | None = None
+    """name of the body at the last end"""
+
+
+class Woven(BodySource):
+    """What ropes and cloth have in common."""
+
+    radius: Radius = 0.02
+    """radius of each node, or half the thickness of planks, m"""
+    collides: Collides = "none"
+    """Bodies that nodes or planks collide with; two bodies joined by a joint never collide."""
+    velocity: Velocity = (0.0, 0.0)
+    """initial velocity of all nodes that are not fixed, m/s"""
+    stiffness: Stiffness | None = None
+    """stiffness of each spring, N/m"""
+    damping: Damping = 0.0
+    """damping of each spring, N·s/m"""
+    strength: Force | None = None
+    """strength of each joint, N: a larger force breaks it; default: unbreakable"""
+
+
+class Rope(Woven):
+    """A rope of equal links. One longer than the distance of its ends starts in an arc that sags along gravity."""
+
+    kind: Literal["rods", "springs", "planks"] = "rods"
+    """type of the links: rods or springs between nodes, or planks joined by pivots"""
+    start: Point
+    """position of the first end, m"""
+    end: Point
+    """m"""
+    links: Count
+    """number of rods, springs or planks"""
+    length: Length | None = None
+    """length of the whole rope at rest, m; default: the distance from start to end"""
+    fix: Annotated[tuple[End, ...], Field(max_length=2)] | None = None
+    """ends that are fixed in the world; default: both, except tied ends"""
+    tie: Ties = Field(default_factory=Ties)
+    """bodies that the ends are tied to"""
+
+    def tied(self, end: End) -> str | None:
+        """Return the name of the body that an end is tied to, or None."""
+        return self.tie.start if end == "start" else self.tie.end
+
+    def holds(self, end: End) -> bool:
+        """Return whether an end is fixed in the world."""
+        return self.tied(end) is None if self.fix is None else end in self.fix
+
+
+class Cloth(Woven):
+    """A grid of nodes joined to their neighbours, numbered along each row from the upper left."""
+
+    kind: Literal["springs", "rods"] = "springs"
+    """type of the joints along rows and columns"""
+    corner: Point
+    """position of the upper left node, m"""
+    columns: Count
+    """number of nodes in each row"""
+    rows: Count
+    """number of rows"""
+    spacing: tuple[Length, Length]
+    """distance between columns and between rows, m"""
+    shear: Stiffness | None = None
+    """stiffness of diagonal springs, N/m; default: no diagonal springs"""
+    bend: Stiffness | None = None
+    """stiffness of springs from each node to the next but one, N/m; default: no such springs"""
+    pins: Literal["top", "corners", "left"] | tuple[tuple[Place, Place], ...] = "top"
+    """fixed nodes: a row, a column, the upper corners, or a list of [column, row], counted from 0"""
+
+    @property
+    def pinned(self) -> tuple[tuple[int, int], ...]:
+        """Column and row of each fixed node."""
+        match self.pins:
+            case "top":
+                return tuple((column, 0) for column in range(self.columns))
+            case "left":
+                return tuple((0, row) for row in range(self.rows))
+            case "corners":
+                return ((0, 0), (self.columns - 1, 0))
+            case _:
+                return self.pins
+
+
+DEFAULT_MASS = 75.0
+"""kg"""
+
+
+class Ragdoll(BodySource):
+    """A figure that stands upright in mid-stride; `angle` and `angular_velocity` turn all of it about its position."""
+
+    position: Point
+    """point on the ground under it, m"""
+    height: Annotated[float, Field(ge=1e-3, le=1e6)] = 1.75
+    """m"""
+    mass: Annotated[float, Field(ge=1e-9, le=1e30)] | None = None
+    """total mass, kg; default 75"""
+    facing: Literal["right", "left"] = "right"
+    """direction that it faces"""
+    velocity: Velocity = (0.0, 0.0)
+    """m/s"""
+
+
+class BodySegment(NamedTuple):
+    """Segment of the body in the anatomical position, facing right, with its soles at the origin.
+
+    All lengths are fractions of the height.
+    """
+
+    share: float
+    """of the mass, %"""
+    ends: tuple[Point, ...]
+    """the centres of its capsule's half discs; of the head the one of its ball"""
+    radius: float
+    parent: str = ""
+    """what a joint joins it to"""
+    joint: Point = (0.0, 0.0)
+    """where"""
+    bounds: tuple[float, float] = (0.0, 0.0)
+    """least and most of its angle to its parent, degrees, positive anticlockwise"""
+
+
+TRUNK = {
+    "pelvis": BodySegment(21.75, ((0.0, 0.674), (0.0, 0.530)), 0.065),
+    "chest": BodySegment(21.75, ((0.0, 0.818), (0.0, 0.674)), 0.065, "pelvis", (0.0, 0.674), (-35.0, 35.0)),
+    "head": BodySegment(6.9, ((0.0, 0.935),), 0.065, "chest", (0.0, 0.870), (-50.0, 50.0)),
+}
+LIMBS = {
+    "upper-arm": BodySegment(2.7, ((0.0, 0.818), (0.0, 0.632)), 0.027, "chest", (0.0, 0.818), (-60.0, 180.0)),
+    "forearm": BodySegment(1.6, ((0.0, 0.632), (0.0, 0.486)), 0.022, "upper-arm", (0.0, 0.632), (0.0, 145.0)),
+    "hand": BodySegment(0.6, ((0.0, 0.486), (0.0, 0.398)), 0.020, "forearm", (0.0, 0.486), (-70.0, 70.0)),
+    "thigh": BodySegment(14.2, ((0.0, 0.530), (0.0, 0.285)), 0.045, "pelvis", (0.0, 0.530), (-20.0, 120.0)),
+    "shank": BodySegment(4.3, ((0.0, 0.285), (0.0, 0.039)), 0.030, "thigh", (0.0, 0.285), (-135.0, 0.0)),
+    "foot": BodySegment(1.4, ((-0.0185, 0.0195), (0.0945, 0.0195)), 0.0195, "shank", (0.0, 0.039), (-50.0, 20.0)),
+}
+"""Segments of one side."""
+
+STRIDE = {
+    "right": {"upper-arm": -12.0, "forearm": 15.0, "thigh": 10.0, "shank": -10.0, "foot": 0.0},
+    "left": {"upper-arm": 12.0, "forearm": 10.0, "thigh": -5.0, "shank": -5.0, "foot": 10.0},
+}
+"""Joint angles at the start, degrees; the others are 0."""
+
+NEAR, FAR = "#e69f00", "#56b4e9"
+"""Default colours of the limbs in front of and behind the trunk."""
+
+
+def segments(ragdoll: Ragdoll) -> dict[str, BodySegment]:
+    """Return the segments by name, in the order of the bodies: those behind the trunk first."""
+    near, far = ("right", "left") if ragdoll.facing == "right" else ("left", "right")
+    return {**_limbs(far), **TRUNK, **_limbs(near)}
+
+
+def _limbs(side: str) -> dict[str, BodySegment]:
+    return {
+        f"{side}-{name}": limb._replace(parent=limb.parent if limb.parent in TRUNK else f"{side}-{limb.parent}")
+        for name, limb in LIMBS.items()
+    }

@@ -1,0 +1,136 @@
+"""Joints between bodies, or between a body and the world.
+
+`between` names one or two bodies. A single body is joined to the world. Angles are those of the second body relative to
+the first; of a single body, relative to the world.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from sandbox.scene.description.base import Name, Part, Point
+
+Force = Annotated[float, Field(gt=0, le=1e42)]
+Distance = Annotated[float, Field(ge=0, le=1e9)]
+Turned = Annotated[float, Field(ge=-1e12, le=1e12)]
+Stiffness = Annotated[float, Field(gt=0, le=1e30)]
+Damping = Annotated[float, Field(ge=0, le=1e30)]
+
+
+class Joined(Part):
+    """What all joints have."""
+
+    name: Name | None = None
+    """without a name, it is called by its kind and its number in the file, such as `joint-1`"""
+    between: Annotated[tuple[Name, ...], Field(min_length=1, max_length=2)]
+    """names of one body (joined to the world) or of two"""
+    collide: bool = False
+    """Allow collisions between the two bodies."""
+    strength: Force | None = None
+    """strength, N (N·m for joints that hold an angle): a larger load breaks the joint; default: unbreakable"""
+
+
+class Anchored(Joined):
+    """A joint that holds each body in one point."""
+
+    anchors: tuple[Point, Point] = ((0.0, 0.0), (0.0, 0.0))
+    """the two end points, m, in the order of `between`, each in the frame of its body. With one body, the second is a
+    point in the world"""
+
+
+class Rod(Anchored):
+    """Keeps two points at a constant distance, as a massless rod. `pin` is a synonym (pymunk's term)."""
+
+    kind: Literal["rod", "pin"]
+    length: Distance | None = None
+    """m; default: the distance at the start"""
+
+
+class Pivot(Joined):
+    """Joins two bodies at one point, about which they turn."""
+
+    kind: Literal["pivot"]
+    at: Point | None = None
+    """position of the pivot in the world at the start, m"""
+    anchors: tuple[Point, Point] | None = None
+    """or its position in the frame of each body, m, in the order of `between`; with one body, the second is a point in
+    the world"""
+
+
+class Slide(Anchored):
+    """Keeps the distance of two points between two limits; a string if the lower limit is 0."""
+
+    kind: Literal["slide"]
+    least: Distance = 0.0
+    """smallest distance, m"""
+    most: Distance
+    """m"""
+
+
+class Groove(Joined):
+    """Lets a point of the second body slide along a groove in the first; with one body, the groove is in the world."""
+
+    kind: Literal["groove"]
+    groove: tuple[Point, Point]
+    """ends of the groove in the frame of the first body, m"""
+    anchor: Point = (0.0, 0.0)
+    """point of the other body in its own frame, m"""
+
+
+class RotaryLimit(Joined):
+    """Keeps the angle between two bodies within limits."""
+
+    kind: Literal["rotary_limit"]
+    least: Turned
+    """smallest angle, rad"""
+    most: Turned
+    """rad"""
+
+
+class Motor(Joined):
+    """Turns the second body relative to the first at a constant rate."""
+
+    kind: Literal["motor"]
+    rate: Turned
+    """rad/s"""
+    max_torque: Force | None = None
+    """largest torque, N·m; default: unlimited"""
+
+
+class Gear(Joined):
+    """Keeps angle₂·ratio − angle₁ = phase: the first body turns `ratio` times as fast as the second."""
+
+    kind: Literal["gear"]
+    ratio: Annotated[float, Field(ge=-1e6, le=1e6)]
+    """angle₁ / angle₂"""
+    phase: Turned | None = None
+    """rad; default: as at the start"""
+
+
+class Spring(Anchored):
+    """A damped spring between two points: F = −k (l − l₀) − c l̇ along their line."""
+
+    kind: Literal["spring"]
+    rest_length: Distance | None = None
+    """m; default: the distance at the start"""
+    stiffness: Stiffness
+    """k, N/m"""
+    damping: Damping = 0.0
+    """c, N·s/m"""
+
+
+class RotarySpring(Joined):
+    """A damped spring of the angle between two bodies: τ = −k (φ − φ₀) − c φ̇."""
+
+    kind: Literal["rotary_spring"]
+    rest_angle: Turned | None = None
+    """rad; default: as at the start"""
+    stiffness: Stiffness
+    """k, N·m/rad"""
+    damping: Damping = 0.0
+    """c, N·m·s/rad"""
+
+
+Joint = Annotated[
+    Rod | Pivot | Slide | Groove | RotaryLimit | Motor | Gear | Spring | RotarySpring, Field(discriminator="kind")
+]

@@ -1,0 +1,158 @@
+"""SceneDescription: the contents of a scene file as frozen values. SI units, y up, radians.
+
+Generators are not expanded, and coefficients of pairs are not mixed: see `sandbox.scene.compile`.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+from pydantic import Field, StringConstraints
+
+from sandbox.scene.description.base import GROUND, BodySource, HasMaterial, Part
+from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
+from sandbox.scene.description.discs import Ball, Emitter, Grid, Scatter
+from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
+from sandbox.scene.description.forces import Attraction, Drive, Thrust
+from sandbox.scene.description.game_tables import with_game_tables
+from sandbox.scene.description.generators import Cloth, Ragdoll, Rope, Stack
+from sandbox.scene.description.joints import Joint
+from sandbox.scene.description.play import Play
+from sandbox.scene.description.surface import ContactModels, Floor, Pocket, Shot
+from sandbox.scene.description.world import Material, Pair, Settings, World
+
+if TYPE_CHECKING:
+    from sandbox.arrays import BoolArray, IntArray
+
+
+@with_game_tables()
+class _Header(Part):
+    """First fields of a scene, in the order of a file; the tables of games come next."""
+
+    title: Annotated[str, StringConstraints(max_length=200)] = ""
+    """Title of the scene."""
+    about: Annotated[str, StringConstraints(max_length=2000)] = ""
+    """What to observe."""
+    world: World = Field(default_factory=World)
+    solver: Settings = Field(default_factory=Settings)
+    play: Play = Field(default_factory=Play)
+
+
+class SceneDescription(_Header):
+    """Contents of a scene file."""
+
+    surface: Floor | None = None
+    contact_models: ContactModels = Field(default_factory=ContactModels)
+    materials: tuple[Material, ...] = Field((), alias="material")
+    pairs: tuple[Pair, ...] = Field((), alias="pair")
+    planes: tuple[Plane, ...] = Field((), alias="plane")
+    walls: tuple[Wall, ...] = Field((), alias="wall")
+    posts: tuple[Post, ...] = Field((), alias="post")
+    pockets: tuple[Pocket, ...] = Field((), alias="pocket")
+    zones: tuple[Zone, ...] = Field((), alias="zone")
+    balls: tuple[Ball, ...] = Field((), alias="ball")
+    grids: tuple[Grid, ...] = Field((), alias="grid")
+    scatters: tuple[Scatter, ...] = Field((), alias="scatter")
+    emitters: tuple[Emitter, ...] = Field((), alias="emitter")
+    boxes: tuple[Box, ...] = Field((), alias="box")
+    capsules: tuple[Capsule, ...] = Field((), alias="capsule")
+    polygons: tuple[Polygon, ...] = Field((), alias="polygon")
+    compounds: tuple[Compound, ...] = Field((), alias="body")
+    stacks: tuple[Stack, ...] = Field((), alias="stack")
+    ropes: tuple[Rope, ...] = Field((), alias="rope")
+    cloths: tuple[Cloth, ...] = Field((), alias="cloth")
+    ragdolls: tuple[Ragdoll, ...] = Field((), alias="ragdoll")
+    joints: tuple[Joint, ...] = Field((), alias="joint")
+    """Joint of one body to the world, or of two bodies: rod, pivot, slide, groove, rotary_limit, motor, gear, spring,
+    rotary_spring."""
+    attractions: tuple[Attraction, ...] = Field((), alias="attraction")
+    thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
+    drives: tuple[Drive, ...] = Field((), alias="drive")
+    """Drive that moves a body between two positions: torque, stroke or plunger."""
+    shots: tuple[Shot, ...] = Field((), alias="shot")
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy, with other values for some fields. What is derived from the fields follows them."""
+        scene = super().model_copy(update=update, deep=deep)
+        if update:
+            for name in _derived(type(self)) & scene.__dict__.keys():
+                del scene.__dict__[name]
+        return scene
+
+    @property
+    def kinds(self) -> dict[str, tuple[BodySource, ...]]:
+        """Elements with bodies, by table heading, in scene order."""
+        return {
+            "ball": self.balls,
+            "grid": self.grids,
+            "scatter": self.scatters,
+            "emitter": self.emitters,
+            "box": self.boxes,
+            "capsule": self.capsules,
+            "polygon": self.polygons,
+            "body": self.compounds,
+            "stack": self.stacks,
+            "rope": self.ropes,
+            "cloth": self.cloths,
+            "ragdoll": self.ragdolls,
+        }
+
+    @property
+    def movers(self) -> tuple[BodySource, ...]:
+        """Elements with bodies, in scene order."""
+        return tuple(each for those in self.kinds.values() for each in those)
+
+    @property
+    def fixed(self) -> tuple[Plane | Wall | Post, ...]:
+        """Solid fixed objects in the order of their indices: planes, walls, posts. Pockets and zones follow."""
+        return self.planes + self.walls + self.posts
+
+    @cached_property
+    def layers(self) -> tuple[str, ...]:
+        """Names of the collision layers in the order of their indices; the first is `ground`."""
+        named: dict[str, None] = {GROUND: None}
+        for collider in self.fixed:
+            named |= dict.fromkeys(collider.layers or ())
+        for zone in self.zones:
+            named |= dict.fromkeys(zone.layers)
+            if zone.to_layer is not None:
+                named[zone.to_layer] = None
+        for mover in self.movers:
+            named[mover.layer] = None
+        return tuple(named)
+
+    @cached_property
+    def fixed_names(self) -> tuple[str, ...]:
+        """Names of the fixed objects, pockets and zones.
+
+        An object without a name is called by its kind and its position in the file, such as `wall-1`.
+        """
+        kinds: dict[str, Sequence[HasMaterial | Pocket | Zone]] = {
+            "plane": self.planes,
+            "wall": self.walls,
+            "post": self.posts,
+            "pocket": self.pockets,
+            "zone": self.zones,
+        }
+        return tuple(
+            each.name or default_name(kind, k) for kind, those in kinds.items() for k, each in enumerate(those)
+        )
+
+
+@cache
+def _derived(model: type) -> frozenset[str]:
+    """Return the names of the cached properties of a model."""
+    return frozenset(
+        name for base in model.__mro__ for name, value in vars(base).items() if isinstance(value, cached_property)
+    )
+
+
+def default_name(kind: str, index: int) -> str:
+    """Return the name of the index-th (from 0) unnamed element of a kind."""
+    return f"{kind}-{index + 1}"
+
+
+def zone_visits(pair: "IntArray", scene: SceneDescription) -> "BoolArray":
+    """Return which contacts, by their pairs (C, 2), are visits of zones and no collisions, (C,)."""
+    found: BoolArray = pair[:, 1] < -len(scene.fixed) - len(scene.pockets)
+    return found

@@ -1,0 +1,178 @@
+"""`[world]`, `[solver]`, materials, pairs of materials, and kicks."""
+
+import difflib
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from sandbox.scene.description.base import Acceleration, Falloff, Friction, Name, Part, Point, Restitution, Velocity
+
+Drag = Annotated[float, Field(ge=0, le=1e9)]
+
+
+class World(Part):
+    """Gravity, air, duration, random seed, and the bounds outside which bodies are removed."""
+
+    gravity: tuple[Acceleration, Acceleration] = (0.0, 0.0)
+    """m/s²"""
+    duration: Annotated[float, Field(gt=0, le=1e9)] = 10.0
+    """duration of a run without a window, s"""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    """Seed of all random numbers of the scene."""
+    linear_drag: Drag = 0.0
+    """k, 1/s: a = −k (v − wind)"""
+    quadratic_drag: Drag = 0.0
+    """c, 1/m: a = −c |v − wind| (v − wind)"""
+    wind: Velocity = (0.0, 0.0)
+    """m/s"""
+    bounds: tuple[Point, Point] | None = None
+    """Lower left and upper right corner, m. A body whose centre leaves the box is removed."""
+
+
+Integrator = Literal["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]
+Detection = Literal["discrete", "bisect", "swept", "shrink"]
+Response = Literal["impulse", "penalty"]
+Impact = Literal["newton", "dissipative"]
+Joints = Literal["impulses", "relaxation", "xpbd", "rattle"]
+BroadPhase = Literal["all_pairs", "circles", "sweep", "grid", "oriented"]
+
+
+COMMON = ("dt", "substeps", "iterations", "record_every")
+"""Settings that every engine supports; the others are choices that some engines have."""
+
+
+MAX_SLOP = 1e9
+"""m"""
+MAX_STIFFNESS = 1e30
+"""N/m"""
+
+
+class Settings(Part):
+    """Settings of the solver. A setting that is left out is chosen by the engine, and reported with the run.
+
+    An engine that does not support a given setting refuses the scene.
+
+    """
+
+    dt: Annotated[float, Field(ge=1e-9, le=10)] = 0.01
+    """Time step of a frame, s. Frames are at k·dt."""
+    substeps: Annotated[int, Field(ge=1, le=1000)] = 1
+    """Number of solver steps per frame; each advances h = dt / substeps."""
+    iterations: Annotated[int, Field(ge=1, le=10_000)] = 10
+    """Iterations of the contact solver in each substep."""
+    slop: Annotated[float, Field(ge=0, le=MAX_SLOP)] | None = None
+    """Overlap that is not corrected, m."""
+    bias: Annotated[float, Field(ge=0, le=1)] | None = None
+    """Fraction of an overlap that remains after one second of correction."""
+    persistence: Annotated[int, Field(ge=1, le=1000)] | None = None
+    """Substeps for which the impulses of a separated contact are kept for warm starting."""
+    stiffness: Annotated[float, Field(gt=0, le=MAX_STIFFNESS)] | None = None
+    """Stiffness of penalty springs, N/m."""
+    damping: Annotated[float, Field(ge=0, le=10)] | None = None
+    """Damping of penalty springs as a fraction of critical damping; default: from the restitution of each pair."""
+    half_kick: bool = False
+    """Start with the velocity v + g·h/2, which makes uniformly accelerated motion exact."""
+    integrator: Integrator | None = None
+    """Integrator of free motion; pymunk supports explicit_euler only."""
+    detection: Detection | None = None
+    """Contact detection: at the end of each step, by bisection, by time of impact, or by shorter steps."""
+    response: Response | None = None
+    """Contact response: impulses or penalty springs."""
+    impact: Impact | None = None
+    """Impact law: Newton's (separation = e times approach), or Newton's limited so that friction does not create
+    energy."""
+    broad_phase: BroadPhase | None = None
+    """Search for candidate pairs; affects the cost and not the result."""
+    joints: Joints | None = None
+    """Joint solver: impulses on velocities, position relaxation, position with compliance (XPBD), or both positions and
+    velocities (RATTLE)."""
+    stretch: Annotated[float, Field(ge=0, le=1e3)] | None = None
+    """Largest stretch of springs as a fraction of their rest length, with joints = "relaxation"."""
+    record_every: Annotated[int, Field(ge=1, le=1_000_000_000)] = 1
+    """Record every n-th frame, and always the last."""
+
+    @property
+    def h(self) -> float:
+        """Substep, s: dt / substeps."""
+        return self.dt / self.substeps
+
+    def replace(self, /, **changes: Any) -> Self:
+        """Return a copy with some settings changed, validated as strictly as a scene file.
+
+        Args:
+            changes: new values by name.
+
+        Raises:
+            pydantic.ValidationError: a name or a value is invalid.
+        """
+        unknown = [name for name in changes if name not in type(self).model_fields]
+        if unknown:
+            errors = [
+                InitErrorDetails(
+                    type=PydanticCustomError("unknown_setting", "{reason}", {"reason": _unknown(name)}),
+                    loc=(name,),
+                    input=changes[name],
+                )
+                for name in unknown
+            ]
+            raise ValidationError.from_exception_data(type(self).__name__, errors)
+        return type(self).model_validate({**self.model_dump(), **changes})
+
+    def common(self) -> Self:
+        """Return the settings with only those that every engine supports; the others get their defaults."""
+        return type(self)(**{key: getattr(self, key) for key in COMMON})
+
+
+class Material(Part):
+    """A named set of contact coefficients."""
+
+    name: Name
+    """name that shapes and pairs refer to"""
+    restitution: Restitution | None = None
+    """e: speed of separation / speed of approach, 0 to 1"""
+    restitution_falloff: Falloff | None = None
+    """s/m"""
+    friction: Friction | None = None
+    """Coulomb friction μ"""
+
+
+class Pair(Part):
+    """Coefficients of the contact of two materials, used in place of their combined values."""
+
+    between: tuple[Name, Name]
+    """names of the two materials"""
+    restitution: Restitution | None = None
+    """e of this pair, 0 to 1, whatever the values of the two materials"""
+    restitution_falloff: Falloff | None = None
+    """s/m"""
+    friction: Friction | None = None
+    """μ of this pair, whatever the values of the two materials"""
+
+
+LEAST_THRESHOLD = 1e-3
+"""m/s: at lower speeds of approach engines do not distinguish rest, micro-bounces and pressing."""
+
+
+class Kick(Part):
+    """Adds `speed` along the normal when a body approaches faster than `threshold`."""
+
+    speed: Annotated[float, Field(ge=0, le=1e6)]
+    """speed that is added, m/s; with the profile `middle`, the value in the middle"""
+    threshold: Annotated[float, Field(ge=LEAST_THRESHOLD, le=1e12)] = 0.05
+    """smallest speed of approach along the normal, m/s"""
+    profile: Literal["even", "middle"] = "even"
+    """`even`: the same everywhere; `middle`: times 4 s (1 − s) along the length of a wall, s from 0 to 1"""
+    adds_to: Literal["rebound", "approach"] = "rebound"
+    """`rebound`: the speed is added after the bounce, as at a bumper; `approach`: the speed is added to the approach
+    before the bounce, as at a slingshot"""
+
+
+def _unknown(name: str) -> str:
+    """Return a suggestion for a name that is no setting."""
+    if name in World.model_fields:
+        value = "2" if name == "seed" else "…"
+        return f"no setting of the solver; give it to the scene: load(…, ['world.{name}={value}'])"
+    known = list(Settings.model_fields)
+    close = difflib.get_close_matches(name.lower(), known, n=1)
+    return f"unknown key; did you mean {close[0]!r}?" if close else f"unknown key; known: {', '.join(known)}"

@@ -1,0 +1,183 @@
+"""Faults: errors in a scene, each with file, line, path and a message that states the valid values."""
+
+import json
+import re
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Self
+
+from sandbox.echo import MAX_MESSAGE, MAX_NAMED, printable, shorten
+
+Key = str | int
+Location = tuple[Key, ...]
+"""Position in a document: keys of tables and indices of arrays, as in `("ball", 0, "velocity", 1)`."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One error in a scene file. `str()` is `file:line: path: message`."""
+
+    file: str
+    """name of the file"""
+    line: int | None
+    """line in the file, from 1; None if unknown"""
+    path: str
+    """path of the key, such as `ball.cue.velocity[1]`; empty if the fault concerns the whole file"""
+    message: str
+    """description of the error and of the valid values"""
+
+    def __str__(self) -> str:
+        file, path = shorten(self.file, MAX_NAMED), shorten(self.path, MAX_NAMED)
+        place = file if self.line is None else f"{file}:{self.line}"
+        text = f"{place}: {path}: " if path else f"{place}: "
+        return printable(text + shorten(self.message, MAX_MESSAGE))
+
+
+class SceneError(Exception):
+    """A scene is invalid. `str()` has one line for each fault.
+
+    Attributes:
+        faults: every `Fault` that was found.
+    """
+
+    def __init__(self, faults: Sequence[Fault]) -> None:
+        super().__init__("\n".join(map(str, faults)))
+        self.faults = tuple(faults)
+
+    def __reduce__(self) -> tuple[type[Self], tuple[tuple[Fault, ...]]]:
+        """Keep the faults when the error is pickled for another process."""
+        return type(self), (self.faults,)
+
+
+def path_of(location: Location, document: Any) -> str:
+    """Return the path of a location, such as `ball.cue.velocity[1]`; named elements appear by name."""
+    parts: list[str] = []
+    here = document
+    for key in location:
+        here = _child(here, key)
+        if isinstance(key, str):
+            key = key if key.isprintable() and key else json.dumps(key)
+            parts.append(f".{key}" if parts else key)
+            continue
+        name = here.get("name") if isinstance(here, dict) else None
+        parts.append(f".{quoted(name)}" if isinstance(name, str) and name.isprintable() and name else f"[{key}]")
+    return "".join(parts)
+
+
+def quoted(name: str) -> str:
+    """Return a name as one part of a path, in quotes if it contains separators."""
+    if not any(sign in name for sign in ".\"'[]="):
+        return name
+    return f'"{name}"' if '"' not in name else f"'{name}'"
+
+
+def _child(value: Any, key: Key) -> Any:
+    try:
+        return value[key]
+    except (KeyError, IndexError, TypeError):
+        return None
+
+
+class Lines:
+    """Finds the line at which a location of a TOML text begins: a key, a heading, or an element of an array.
+
+    The text is known to be valid, so one linear pass over its tokens suffices. Keys and headings are parsed by tomllib.
+    """
+
+    MAX_TEXT = 16_000_000  # characters; beyond it faults have no line, which saves memory
+
+    def __init__(self, text: str) -> None:
+        self._text = text if len(text) <= self.MAX_TEXT else ""
+        self._lines: dict[Location, int] | None = None
+
+    def find(self, location: Location) -> int | None:
+        """Return the line (from 1) of a location, or of the nearest table around it that exists."""
+        if self._lines is None:
+            self._lines = _lines_of(self._text)
+        while location and location not in self._lines:
+            location = location[:-1]
+        return self._lines.get(location)
+
+
+TOKEN = re.compile(
+    r'''"""(?:\\.|[^\\])*?"{3,5}|'{3}.*?'{3,5}|"(?:\\.|[^"\\])*"|'[^']*'|#[^\n]*|[][{},=\n]|[^][{},=#"'\s]+''',
+    re.DOTALL,
+)
+"""Strings of the four kinds, comments, punctuation, and runs of other characters."""
+
+
+def _lines_of(text: str) -> dict[Location, int]:
+    """Return the line of every location of a valid TOML text."""
+    lines: dict[Location, int] = {}
+    table: Location = ()  # of the present heading
+    counts: dict[Location, int] = {}  # elements so far of each [[table]]
+    within: list[tuple[Location, int]] = []  # open arrays with their next index, inline tables with −1
+    line, start, begun, state = 1, 0, 1, "key"
+    where: Location = ()  # of the present value
+
+    for token in TOKEN.finditer(text + "\n"):
+        sign = token[0]
+        if sign == "\n" or sign[0] == "#":
+            if state == "heading":
+                table = _enter(_parsed(text[start : token.start()].rstrip()), counts)
+                _note(lines, table, begun)
+            if not within:
+                state = "key"
+        elif state == "key" and sign != "}":
+            start, begun = token.start(), line
+            state = "heading" if sign == "[" else "in key"
+        elif state == "in key":
+            if sign == "=":
+                keys = _parsed(text[start : token.start()] + "=0")[0]
+                where = (within[-1][0] if within else table) + keys
+                _note(lines, where, begun)
+                state = "value"
+        elif state == "value" and sign != "]":
+            if within and within[-1][1] >= 0:
+                array, index = within.pop()
+                within.append((array, index + 1))
+                where = (*array, index)
+                lines[where] = line
+            if sign in ("[", "{"):
+                within.append((where, 0 if sign == "[" else -1))
+            state = {"[": "value", "{": "key"}.get(sign, "done")
+        elif sign in ("]", "}") and state != "heading":
+            within.pop()
+            state = "done"
+        elif sign == "," and state == "done":
+            state = "value" if within[-1][1] >= 0 else "key"
+        line += sign.count("\n")
+    return lines
+
+
+@lru_cache(maxsize=10_000)
+def _parsed(text: str) -> tuple[tuple[str, ...], bool]:
+    """Return the keys of `key = 0`, `[heading]` or `[[heading]]`, and whether it was the last form."""
+    keys: list[str] = []
+    here: Any = tomllib.loads(text)
+    while isinstance(here, dict) and here:
+        key, here = next(iter(here.items()))
+        keys.append(key)
+    return tuple(keys), isinstance(here, list)
+
+
+def _enter(heading: tuple[tuple[str, ...], bool], counts: dict[Location, int]) -> Location:
+    """Return the location of the table that a heading opens."""
+    keys, many = heading
+    location: Location = ()
+    for key in keys[:-1]:
+        location += (key,)
+        if location in counts:
+            location += (counts[location] - 1,)
+    location += (keys[-1],)
+    if many:
+        counts[location] = counts.get(location, 0) + 1
+    return (*location, counts[location] - 1) if many else location
+
+
+def _note(lines: dict[Location, int], location: Location, line: int) -> None:
+    """Store the line of a location and of the tables around it that it creates."""
+    for length in range(1, len(location) + 1):
+        lines.setdefault(location[:length], line)

@@ -1,0 +1,405 @@
+"""Messages for the faults of a file, and checks of the rest of a file with faults."""
+
+import copy
+import difflib
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Any, get_args, get_origin
+
+from pydantic import ValidationError
+
+from sandbox.echo import shorten
+from sandbox.scene.description.base import Wording
+from sandbox.scene.description.game_tables import PRESETS
+from sandbox.scene.errors import Location
+from sandbox.scene.files.document import read_model
+from sandbox.scene.files.presets import has_preset, place_of, written_out
+from sandbox.scene.files.tables import TAGGED, keys_of, list_tables, model_at
+from sandbox.scene.scene import Scene
+from sandbox.scene.validate.scene import Found, crosscheck
+
+_EXPECTED = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "finite_number": "a finite number",
+    "bool_type": "true or false",
+    "string_type": "text in quotes",
+    "tuple_type": "an array, such as [0.0, 1.0]",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "dict_type": "a table",
+    "too_short": "an array of {min_length} or more",
+    "too_long": "an array of {max_length} at most",
+    "string_too_short": "text of {min_length} or more characters",
+    "string_too_long": "text of {max_length} characters at most",
+    "literal_error": "one of {expected}",
+}
+
+_RANGES = {"greater_than": "gt", "greater_than_equal": "ge", "less_than": "lt", "less_than_equal": "le"}
+"""The bound that each of pydantic's errors is about."""
+
+_LARGE = 1e5
+"""Bounds beyond this only protect the engines from extreme values: a message gives such a bound only if it is the one
+exceeded. The same holds for a smallest positive value below its reciprocal."""
+
+_DEGREES = 720
+"""Largest magnitude, two turns, that may be an angle given in degrees by mistake."""
+
+_RAD = re.compile(r"\brad\b(?!/)")
+"""rad, but not rad/s"""
+
+
+def explain(details: Any) -> tuple[Location, str]:
+    """Return the location of a pydantic error, and a message with the fault and the valid values."""
+    location = location_of(details)
+    kind, value, context = details["type"], details["input"], details.get("ctx", {})
+    if location[:1] == ("cloth",) and location[2:3] == ("pins",):
+        return location[:3], "must be 'top', 'corners', 'left', or columns and rows of nodes, such as [[0, 0], [9, 0]]"
+    if location[:1] == ("attraction",) and location[2:3] == ("toward",) and (kind != "missing" or len(location) > 3):
+        return location[:3], "must be a position, such as [0.0, 0.0], or the name of a body"
+    if kind == "missing":
+        if isinstance(location[-1], int):
+            return location[:-1], _missing_elements(details)
+        return location, "is missing; this key is required"
+    if kind == "extra_forbidden":
+        return location, f"unknown key; {_known_keys(tuple(details['loc']))}"
+    if kind == "json_invalid":
+        return location, f"the scene cannot be read: {context['error']}"
+    if kind == "union_tag_not_found":
+        return location, f"is missing; {_one_of(location)}"
+    if kind == "union_tag_invalid":
+        return location, f"is {_shown(context['tag'])}; {_one_of(location)}"
+    if kind == "value_error":
+        return location, str(context["error"])
+    if kind == "unknown_setting":
+        return location, str(context["reason"])
+    if kind == "string_pattern_mismatch":
+        expected = "text '#rrggbb'" if location[-1] == "colour" else "text without control characters"
+    elif kind == "tuple_type" and len(location) == 1:
+        expected = f"tables, each under a heading [[{location[0]}]]"
+    elif kind in ("model_type", "model_attributes_type") and location[-1] == "kick":
+        expected = "a table, such as { speed = 3.0 }"
+    elif location[:1] == ("joint",) and location[-1] == "between":
+        expected = 'the name of one body or of two, such as ["a", "b"]'
+    elif kind in ("too_short", "too_long") and location[-1] != "points":
+        expected = f"an array of {_length(tuple(details['loc']), context)}"
+    elif kind in _RANGES:
+        expected = _range(tuple(details["loc"]), _RANGES[kind], context, value)
+    elif kind in _EXPECTED:
+        expected = _EXPECTED[kind].format(**context)
+    else:
+        expected = details["msg"].removeprefix("Input should be ")
+    message = f"must be {expected}, is {_shown(value)}"
+    if kind in _RANGES and abs(value) <= _DEGREES and _is_angle(tuple(details["loc"])):
+        message += f"; angles are in radians, {value:g}° is {math.radians(value):.4g}"
+    elif kind == "less_than_equal" and location[-1] == "restitution":
+        message += "; walls and posts add speed with kick = { speed = … }, in m/s"
+    return location, message
+
+
+def explained(error: ValidationError, location: Location) -> list[tuple[Location, str]]:
+    """Return location and message of each error of a part of a scene that was validated by itself.
+
+    Args:
+        error: its locations are relative to the part.
+        location: of the part in the document.
+    """
+    return [explain({**each, "loc": (*location, *each["loc"])}) for each in error.errors(include_url=False)]
+
+
+def _missing_elements(details: Any) -> str:
+    """Return the message for an array with too few values: how many it must have, and how many it has."""
+    location = tuple(details["loc"])
+    wanted = len(get_args(_annotation_at(location[:-1]))) or location[-1] + 1
+    has = len(details["input"])
+    field = _field_at(location[:-1])
+    for each in () if field is None else field.metadata:
+        if isinstance(each, Wording):
+            return f"must be {wanted} {each.text}; has {has}"
+    return f"must be an array of {wanted}, has {has}"
+
+
+def _length(location: Location, context: Any) -> str:
+    """Return the valid lengths of an array in words; pydantic's error has only one bound."""
+    for each in _bounds(location):
+        low, high = each.get("min_length"), each.get("max_length")
+        if low != high and context.get("min_length", low) == low and context.get("max_length", high) == high:
+            return f"{low} or {high}" if low is not None and high == low + 1 else f"{low or 0} to {high}"
+    return str(context.get("max_length", context.get("min_length")))
+
+
+def _range(location: Location, violated: str, context: Any, value: float) -> str:
+    """Return in words the valid numbers at a location of which one bound was `violated`.
+
+    Both bounds are given if both are of a usual size, else the one that was violated.
+    """
+    bound = context[violated]
+    bounds = next((each for each in _bounds(location) if each.get(violated) == bound), {violated: bound})
+    low, high = bounds.get("ge", bounds.get("gt")), bounds.get("le", bounds.get("lt"))
+    if low is not None and high is not None and (low == -high or (low >= 0 and high <= _LARGE)):
+        positive = "gt" in bounds or 0 < low < 1 / _LARGE
+        if not positive:
+            return f"between {low:g} and {high:g}" + (" exclusive" if "lt" in bounds else "")
+        if value <= 0 or violated in ("le", "lt"):
+            return f"greater than 0 and at most {high:g}"
+    if violated == "ge" and 0 < bound < 1 / _LARGE and value <= 0:
+        return "greater than 0"
+    words = {"gt": "greater than {:g}", "ge": "at least {:g}", "lt": "less than {:g}", "le": "at most {:g}"}
+    return words[violated].format(bound)
+
+
+_KEYS = ("ge", "gt", "le", "lt", "min_length", "max_length")
+"""The bounds of a value by pydantic's names."""
+
+
+def _bounds(location: Location) -> Iterator[dict[str, float]]:
+    """Yield the bounds, by their `_KEYS`, of a field and of the elements of its value."""
+    field = _field_at(location)
+    if field is not None:
+        yield from _bounds_in(field.annotation, field.metadata)
+
+
+def _bounds_in(annotation: Any, metadata: Any = ()) -> Iterator[dict[str, float]]:
+    if get_origin(annotation) is Annotated:
+        annotation, *more = get_args(annotation)
+        metadata = [each for one in more for each in getattr(one, "metadata", [one])]
+    found = {key: getattr(each, key) for each in metadata for key in _KEYS if hasattr(each, key)}
+    if found:
+        yield found
+    for inner in get_args(annotation):
+        yield from _bounds_in(inner)
+
+
+def _field_at(location: Location) -> Any:
+    """Return the field at a location; None if its value may have one of several forms."""
+    last = max((k for k, key in enumerate(location) if isinstance(key, str)), default=None)
+    if last is None:
+        return None
+    try:
+        model = model_at(location[:last])
+    except (KeyError, StopIteration):
+        return None
+    fields = ((field.alias or name, field) for name, field in model.model_fields.items())
+    return next((field for name, field in fields if name == location[last]), None)
+
+
+def _annotation_at(location: Location) -> Any:
+    """Return the type at a location within arrays of fixed length; None elsewhere."""
+    field = _field_at(location)
+    annotation = None if field is None else field.annotation
+    last = max(k for k, key in enumerate(location) if isinstance(key, str))
+    for key in (None, *location[last + 1 :]):  # None: the field itself
+        if key is not None:
+            inner = get_args(annotation)
+            if not inner:
+                return None
+            annotation = inner[0] if inner[-1] is Ellipsis else inner[int(key)] if int(key) < len(inner) else None
+        while get_origin(annotation) is not tuple and get_args(annotation):  # Annotated or optional
+            annotation = get_args(annotation)[0]
+    return annotation if Ellipsis not in get_args(annotation) else None
+
+
+def _is_angle(location: Location) -> bool:
+    """Return whether the value at a location is in rad, according to the docstring of its field."""
+    from sandbox.scene.files.json_schema import docstrings  # reads source files; imported only if needed
+
+    last = max(k for k, key in enumerate(location) if isinstance(key, str))
+    try:
+        model = model_at(location[:last])
+    except (KeyError, StopIteration):  # the value may have one of several forms
+        return False
+    texts = docstrings(model)
+    name = next((name for name, field in model.model_fields.items() if (field.alias or name) == location[last]), "")
+    return _RAD.search(texts.get(name, "")) is not None
+
+
+def location_of(details: Any) -> Location:
+    """Return the location of a pydantic error in the document; for joints and drives the tag is removed."""
+    location: Location = tuple(details["loc"])
+    if len(location) > 2 and location[0] in TAGGED:
+        return location[:2] + location[3:]
+    if details["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        return (*location, "kind")
+    return location
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float) and value.is_integer():
+        return f"{value:.15g}"
+    return shorten(json.dumps(value, ensure_ascii=False, default=str))
+
+
+def _known_keys(location: Location) -> str:
+    """Return the valid keys at a location, or the key that was probably meant, there or in another table."""
+    key, known = str(location[-1]), keys_of(model_at(location[:-1]))
+    if key in ("engine", "engines"):
+        return "the engine is not part of a scene; choose it with --engine NAME"
+    for table in _COMMON_TABLES:
+        if key in keys_of(model_at((table,))):
+            return f"did you mean {table}.{key}?"
+    if len(location) == 1:
+        homes = [table for table in list_tables() if key in keys_of(model_at((table, 0)))]
+        if homes:
+            some = ", ".join(f"[[{table}]]" for table in homes[:3])
+            return f"it is a key of {some}{' and others' if len(homes) > 3 else ''}; put it under that heading"
+    word = key.lower()
+    if word == "static":
+        here = "fixed = true" if "fixed" in known else "plane, wall or post, or a body with fixed = true"
+        return f"did you mean {here}?"
+    same = [name for name, words in _SYNONYMS.items() if name in known and {word, word.removesuffix("s")} & words]
+    close = same or difflib.get_close_matches(key, known, n=1)
+    return f"did you mean {close[0]!r}?" if close else f"known keys: {', '.join(known)}"
+
+
+_SYNONYMS: dict[str, set[str]] = {
+    "ball": {"circle", "disc", "disk", "sphere"},
+    "box": {"crate", "rect", "rectangle", "square"},
+    "plane": {"floor", "ground"},
+    "wall": {"edge", "line", "segment"},
+    "position": {"pos", "xy"},
+    "velocity": {"speed", "vel"},
+    "angle": {"rot", "rotation"},
+    "angular_velocity": {"angvel", "omega"},
+    "restitution": {"bounce", "bounciness", "elasticity"},
+    "friction": {"friction_coefficient", "mu"},
+    "mass": {"density", "weight"},
+}
+"""Keys of the scene file, and words that other engines and file formats use for them."""
+
+_COMMON_TABLES = ("solver", "world")
+"""Tables that every scene has; their keys are often misplaced in others."""
+
+
+def _one_of(location: Location) -> str:
+    return f"kinds of {location[0]}: {', '.join(TAGGED[str(location[0])][0])}"
+
+
+PLACEHOLDERS: dict[str, Any] = {
+    "position": [0.0, 0.0],
+    "point": [0.0, 0.0],
+    "normal": [0.0, 1.0],
+    "points": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+    "radius": 1.0,
+    "size": [1.0, 1.0],
+    "length": 1.0,
+    "origin": [0.0, 0.0],
+    "spacing": [10.0, 10.0],
+    "columns": 1,
+    "rows": 1,
+    "base": [0.0, 0.0],
+    "corner": [0.0, 0.0],
+    "start": [0.0, 0.0],
+    "end": [1.0, 0.0],
+    "links": 1,
+    "count": 1,
+    "lower": [0.0, 0.0],
+    "upper": [1.0, 1.0],
+    "velocity_min": [0.0, 0.0],
+    "velocity_max": [0.0, 0.0],
+}
+"""Values for required keys, in place of faulty ones."""
+
+NEUTRAL_VALUES: dict[str, dict[str, Any]] = {
+    "plane": {"point": [0.0, -1e16], "normal": [0.0, 1.0]},
+    "world": {"duration": 1e-6},
+    "pocket": {"position": [1e16, 1e16], "radius": 1e-9},
+    **{kind: {"collides": "none"} for kind in Scene().kinds},
+}
+"""Further values for a table with a fault, so that it causes no consequential faults."""
+
+_TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - {"title", "about"}
+
+
+REFERENCING_TABLES = {("joint",), ("attraction",), ("thrust",), ("drive",), ("shot",)}
+"""Tables that refer to bodies, and to which nothing refers: faulty ones are omitted."""
+
+PARTS = ("ball", "box", "capsule", "polygon")
+"""Tables of the parts of a body, which needs at least one."""
+
+INDEPENDENT_KEYS = {("material",), ("name",), ("between",)}
+"""Keys that no placeholder affects: their faults are reported even for an element with other faults."""
+
+
+def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -> list[Found]:
+    """Cross-check a document whose values at `wrong` are faulty.
+
+    These values are removed, or replaced by placeholders if required. Faults of the elements that they belong to are
+    then dropped, except those of independent keys. The result is empty if too much is wrong for a reliable check.
+    """
+    document = copy.deepcopy(document)
+    touched: set[Location] = set()
+    wrong = list(wrong)
+    if () in wrong or any(location[:1] == (key,) for location in wrong for key in PRESETS):
+        return []  # the document, or the preset that makes most of it, cannot be read
+    kept = _without_faulty(document, wrong)
+    for location in wrong:
+        if location[:1] in REFERENCING_TABLES:
+            continue
+        if len(location) == 1 and location[0] in document and location[0] not in _TABLES:
+            if difflib.get_close_matches(str(location[0]), _TABLES, n=1) == ["material"]:
+                return []  # many references would seem to be missing
+            del document[location[0]]  # an unknown key or a title: nothing depends on it
+            continue
+        depth = 2 if len(location) > 1 and isinstance(location[1], int) else 1
+        holder: Any = document
+        for key in location[:depth]:
+            holder = holder[key]
+        if len(location) <= depth or not isinstance(holder, dict):
+            return []
+        holder.pop(location[depth], None)
+        if "duration" not in holder:
+            holder.update(NEUTRAL_VALUES.get(str(location[0]), {}))
+        touched.add(location[:depth])
+        if location[0] == "body" and not any(holder.get(part) for part in PARTS):
+            holder["ball"] = [{"radius": 1.0}]
+        for name, field in model_at(location[:depth]).model_fields.items():
+            if field.is_required() and name not in holder and name in PLACEHOLDERS:
+                holder[name] = PLACEHOLDERS[name]
+    stated = document
+    if has_preset(stated):
+        document = written_out(stated) or {}
+    try:
+        scene = read_model(document)
+    except ValueError:
+        return []
+    found = [f for f in crosscheck(scene) if touched.isdisjoint((f[0][:1], f[0][:2])) or f[0][2:3] in INDEPENDENT_KEYS]
+    if document is not stated:
+        found = [(place_of(location, document, stated), message) for location, message in found]
+    return [(_original_index(location, kept), message) for location, message in found]
+
+
+def _without_faulty(document: dict[str, Any], wrong: list[Location]) -> dict[str, list[int]]:
+    """Remove faulty joints and other referencing tables; return the original indices of those that remain.
+
+    All of them are removed if a body's name may be faulty, because they would seem to refer to a missing body.
+    """
+    nameless = any(_may_hide_name(location) for location in wrong)
+    kept: dict[str, list[int]] = {}
+    for (key,) in REFERENCING_TABLES:
+        those = document.get(key)
+        faulty = [location for location in wrong if location[0] == key]
+        if nameless or not isinstance(those, list) or any(len(location) < 2 for location in faulty):
+            document.pop(key, None)
+            continue
+        out = {location[1] for location in faulty}
+        kept[key] = [k for k in range(len(those)) if k not in out]
+        document[key] = [those[k] for k in kept[key]]
+    return kept
+
+
+def _may_hide_name(location: Location) -> bool:
+    """Return whether a fault may be the reason that a body is not found by its name."""
+    if len(location) < 2:
+        return location not in (("title",), ("about",), *REFERENCING_TABLES)
+    key = str(location[2]) if len(location) == 3 else ""
+    return location[0] in Scene().kinds and bool(difflib.get_close_matches("name", [key]))
+
+
+def _original_index(location: Location, kept: dict[str, list[int]]) -> Location:
+    """Return a location with the index that a referencing table has in the whole document."""
+    if location[:1] in REFERENCING_TABLES and len(location) > 1:
+        return (location[0], kept[str(location[0])][int(location[1])], *location[2:])
+    return location

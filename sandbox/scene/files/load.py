@@ -1,0 +1,236 @@
+"""Reading, checking and writing of scene files. All faults of a file are reported at once.
+
+tomllib parses; pydantic validates in strict mode on JSON, so that arrays become tuples; `validate/scene.py` checks what
+no single model can, such as names that do not exist.
+"""
+
+import re
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from sandbox.resource_limits import FILE_SIZE
+from sandbox.scene.errors import Fault, Lines, Location, SceneError, path_of
+from sandbox.scene.files import presets
+from sandbox.scene.files.document import read_model, to_document
+from sandbox.scene.files.nesting import NestingError, check_text, check_value
+from sandbox.scene.files.overrides import AddressError, assign, parse_assignment
+from sandbox.scene.files.shipped_scenes import UnknownSceneError, find
+from sandbox.scene.scene import Scene
+from sandbox.scene.validate.scene import crosscheck
+from sandbox.whole import read_whole
+
+NO_TIME = 5e-324
+"""s, smallest duration of a scene: replaces 0 while the scene of a session without steps is checked."""
+
+Override = str | tuple[str, Any]
+"""`"KEY=VALUE"`, or `(KEY, value)`."""
+
+
+def load(path: str | Path, overrides: Iterable[Override] = ()) -> Scene:
+    """Read a scene file.
+
+    Args:
+        path: path of the file, or name of a shipped scene, such as `bounce` or `tutorial/bounce`.
+        overrides: values that are set before the scene is checked, each `"KEY=VALUE"` or `(KEY, value)`.
+
+    Returns:
+        The scene.
+
+    Raises:
+        SceneError: the file cannot be found or read, or the scene is invalid; the error has every fault that was found.
+    """
+    try:
+        file = find(str(path))
+    except UnknownSceneError as error:
+        raise SceneError([Fault(str(path), None, "", str(error))]) from None
+    return loads(_read(file), str(file), overrides)
+
+
+def as_scene(scene: Scene | str | Path) -> Scene:
+    """Return a scene, loaded if it is given by its name or path.
+
+    Raises:
+        SceneError: as `load`.
+    """
+    return scene if isinstance(scene, Scene) else load(scene)
+
+
+def loads(text: str, file: str = "<scene>", overrides: Iterable[Override] = ()) -> Scene:
+    """Read a scene from a TOML text.
+
+    Args:
+        text: the text.
+        file: name of the text in faults.
+        overrides: values that are set before the scene is checked, each `"KEY=VALUE"` or `(KEY, value)`.
+
+    Returns:
+        The scene.
+
+    Raises:
+        SceneError: the scene is invalid; the error has every fault that was found.
+    """
+    try:
+        check_text(text)
+        document = tomllib.loads(text)
+        check_value(document)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError([_syntax_fault(file, text, error)]) from None
+    except NestingError as error:
+        raise SceneError([Fault(file, error.line, "", str(error))]) from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise SceneError([Fault(file, None, "", f"cannot be read: {error}")]) from None
+    if not document:
+        message = "the file is empty; a scene needs at least one body, such as a [[ball]] with position and radius"
+        raise SceneError([Fault(file, 1, "", message)])
+    return from_document(document, file, overrides, text)
+
+
+def from_document(
+    document: dict[str, Any], file: str = "<scene>", overrides: Iterable[Override] = (), text: str = ""
+) -> Scene:
+    """Check a scene given as nested dicts and lists, as parsed from TOML or JSON.
+
+    Args:
+        document: the scene.
+        file: name of the document in faults.
+        overrides: values that are set before the scene is checked.
+        text: source text of the document, from which faults get their line; without it they have none.
+
+    Raises:
+        SceneError: the scene is invalid; the error has every fault that was found.
+    """
+    try:
+        check_value(document)
+    except NestingError as error:
+        raise SceneError([Fault(file, None, "", str(error))]) from None
+    assignments, faults = _parse_overrides(overrides, file)
+    stated, whole, changed = document, True, set[Location]()
+    if presets.has_preset(document, (path for path, _ in assignments)):
+        stated, changed, assignments, wrong = presets.set_first(document, assignments)
+        faults += [Fault(file, None, "--set", message) for message in wrong]
+        written = presets.written_out(stated)
+        document, whole = (stated, False) if written is None else (written, True)
+    remaining: list[Override] = []
+    for path, value in assignments:
+        try:
+            document, location = assign(document, path, value)
+            changed.add(location)
+        except AddressError as error:
+            remaining.append((path, value))
+            if whole:
+                faults.append(Fault(file, None, "--set", str(error)))
+    if faults:
+        raise SceneError(faults)
+
+    found: list[tuple[Location, str]]
+    try:
+        scene = read_model(document)
+    except ValidationError as error:
+        # imported only if there are faults
+        from sandbox.scene.files.diagnosis import check_valid_remainder, explain
+
+        errors = [e for e in error.errors(include_url=False) if not _is_long_enough(e)]
+        found = [explain(details) for details in errors]
+        found += check_valid_remainder(document, [tuple(details["loc"]) for details in errors])
+    except ValueError as error:
+        found = [((), f"the scene cannot be read: {error}")]
+    else:
+        if not whole:
+            from sandbox.scene.files.presets import faults_of  # few scenes have presets
+
+            found = list(faults_of(scene))
+            if not found:  # an override has removed the fault
+                return from_document(document, file, remaining, text)
+        else:
+            found = crosscheck(scene)
+            if not found:
+                return scene
+
+    lines = Lines(text)
+    for location, message in dict.fromkeys(found):
+        is_set = any(location[: len(c)] == c for c in changed)
+        place = presets.place_of(location, document, stated) if whole else location
+        line = None if is_set else lines.find(place)
+        path = path_of(location, document) + (" (set)" if is_set else "")
+        faults.append(Fault(file, line, path, message))
+    raise SceneError(sorted(faults, key=lambda fault: (fault.line is None, fault.line or 0)))
+
+
+def from_session(document: dict[str, Any], file: str = "<session>", overrides: Iterable[Override] = ()) -> Scene:
+    """Check the scene of a session or of a stored run, as `from_document` does; its duration may be 0 s.
+
+    Raises:
+        SceneError: the scene is invalid; the error has every fault that was found.
+    """
+    world = document.get("world")
+    if not isinstance(world, dict) or world.get("duration") != 0 or isinstance(world["duration"], bool):
+        return from_document(document, file, overrides)
+    scene = from_document({**document, "world": {**world, "duration": NO_TIME}}, file, overrides)
+    if scene.world.duration != NO_TIME:  # it was set
+        return scene
+    return scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.0})})
+
+
+def _parse_overrides(overrides: Iterable[Override], file: str) -> tuple[list[tuple[str, Any]], list[Fault]]:
+    """Return overrides as paths and values, and the faults of invalid ones."""
+    parsed, faults = [], []
+    for override in overrides:
+        try:
+            path, value = parse_assignment(override) if isinstance(override, str) else override
+            check_value(value)
+            parsed.append((path, value))
+        except (AddressError, NestingError) as error:
+            faults.append(Fault(file, None, "--set", str(error)))
+    return parsed, faults
+
+
+def dumps(scene: Scene) -> str:
+    """Return a scene as TOML. Values equal to their default are left out.
+
+    `loads(dumps(scene)) == scene`.
+
+    Args:
+        scene: the scene.
+    """
+    import tomlkit
+
+    return tomlkit.dumps(to_document(scene))
+
+
+def too_large(size: int) -> str | None:
+    """Return the reason why a scene file of this size in bytes is not read, or None if it is within the limit."""
+    subject = "generators such as [[grid]] need less text than this file's"
+    return FILE_SIZE.refusal(subject, size)
+
+
+def _read(path: str | Path) -> str:
+    file = str(path)
+    try:
+        if (message := too_large(Path(path).stat().st_size)) is not None:
+            raise SceneError([Fault(file, None, "", message)])
+        return read_whole(Path(path), FILE_SIZE.value).decode("utf-8-sig").replace("\r\n", "\n")
+    except OSError as error:
+        raise SceneError([Fault(file, None, "", f"cannot be read: {error.strerror or error}")]) from None
+    except ValueError as error:
+        if isinstance(error, UnicodeDecodeError):
+            reason = "is not UTF-8 text; a scene is a TOML file"
+        else:
+            reason = f"{error}; generators such as [[grid]] need less text"
+        raise SceneError([Fault(file, None, "", reason)]) from None
+
+
+def _is_long_enough(details: Any) -> bool:
+    """Return whether an array is long enough; pydantic counts only the elements without faults."""
+    return bool(details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"])
+
+
+def _syntax_fault(file: str, text: str, error: tomllib.TOMLDecodeError) -> Fault:
+    message = str(error)
+    at = re.search(r" \(at line (\d+), column (\d+)\)$", message)
+    if at is None:  # at the end of the document
+        return Fault(file, text.rstrip("\n").count("\n") + 1, "", f"not TOML: {message}")
+    return Fault(file, int(at[1]), "", f"not TOML: {message[: at.start()]}, at column {at[2]}")

@@ -1,0 +1,154 @@
+"""Presets: tables of games that are expanded into primitive elements before the scene is read."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ValidationError
+
+from sandbox.scene.description.game_tables import PRESETS, GameTable, game_table
+from sandbox.scene.errors import Location
+from sandbox.scene.files.document import read_model, to_document
+from sandbox.scene.files.overrides import AddressError, assign, parse_path
+from sandbox.scene.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class Preset(GameTable):
+    """Table of a game that expands to elements. Two tables that expand together have the same functions."""
+
+    faults_of: Callable[[Scene], Iterable[tuple[Location, str]]]
+    """returns the reasons why a scene with the table cannot be expanded"""
+    expanded: Callable[[Scene], Scene]
+    """returns the scene of elements that a scene with the table, which has no faults, stands for"""
+    origins: Callable[[Scene], dict[str, Location]] | None = None
+    """returns the location within the table from which each element is made, by the name of the element"""
+    excludes: tuple[str, ...] = ()
+    """tables of other presets that a scene cannot have besides"""
+
+
+Assignment = tuple[str, Any]
+
+_LISTS = {field.alias for name, field in Scene.model_fields.items() if field.alias is not None}
+"""Tables that may occur several times, to which a preset may add."""
+
+
+def has_preset(document: dict[str, Any], paths: Iterable[str] = ()) -> bool:
+    """Return whether a document has a preset, or an override adds one."""
+    return any(key in document for key in PRESETS) or any(path.startswith(PRESETS) for path in paths)
+
+
+def written_out(document: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the expanded document of one with presets; None if it has faults."""
+    try:
+        scene = read_model(document)
+        return None if any(stated_faults_of(scene)) else to_document(expanded(scene))
+    except ValueError:  # the next reader reports it with all others
+        return None
+
+
+def set_first(
+    document: dict[str, Any], assignments: list[Assignment]
+) -> tuple[dict[str, Any], set[Location], list[Assignment], list[str]]:
+    """Apply the overrides of presets and of values that take precedence over presets.
+
+    Returns:
+        The document; the locations that were set; the assignments to elements that a preset may create; messages for
+        other assignments, whose paths into a preset do not exist.
+    """
+    wrong: list[str] = []
+    changed: set[Location] = set()
+    later: list[Assignment] = []
+    for path, value in assignments:
+        try:
+            if parse_path(path)[0] in _LISTS:
+                raise AddressError(path)
+            document, location = assign(document, path, value)
+            changed.add(location)
+        except AddressError as error:
+            if any(key in document and _begins(path, key) for key in PRESETS):
+                wrong.append(str(error))
+            else:
+                later.append((path, value))
+    return document, changed, later, wrong
+
+
+def _begins(path: str, key: str) -> bool:
+    """Return whether a path leads into a table."""
+    return path == key or path.startswith((f"{key}.", f"{key}["))
+
+
+def place_of(location: Location, document: dict[str, Any], stated: dict[str, Any]) -> Location:
+    """Return the location in the stated document for a location in the expanded one.
+
+    It is the same location, except for an element that a preset created: then it is the preset, or an element of it.
+    """
+    if not _is_written(location, stated):
+        return location
+    presets = presets_of(stated)
+    for key, preset in presets.items():
+        if preset.origins is not None:
+            those, number = document.get(str(location[0])), location[1] if len(location) > 1 else None
+            name = those[number].get("name") if isinstance(those, list) and isinstance(number, int) else None
+            return preset.origins(read_model(stated)).get(str(name), (key,))
+    return (next(iter(presets), PRESETS[0]),)
+
+
+def _is_written(location: Location, stated: dict[str, Any]) -> bool:
+    """Return whether a location is of an element that a preset created."""
+    if not location:
+        return False
+    here = stated.get(str(location[0]))
+    if isinstance(here, list) and len(location) > 1 and isinstance(location[1], int):
+        return location[1] >= len(here)
+    return here is None
+
+
+def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
+    """Yield the reasons why presets of a scene cannot be expanded."""
+    found = False
+    for fault in stated_faults_of(scene):
+        found = True
+        yield fault
+    if not found:
+        try:
+            expanded(scene)
+        except ValidationError as error:
+            preset = next(iter(presets_of(_stated(scene))))
+            for each in error.errors(include_url=False):
+                path = ".".join(map(str, (error.title.lower(), *each["loc"])))
+                yield (preset,), f"one of its parts is out of range: {path}: {each['msg'].lower()}"
+
+
+def stated_faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
+    """Yield the faults of presets that are found without expanding them."""
+    presets = presets_of(_stated(scene))
+    for key, preset in presets.items():
+        for other in preset.excludes:
+            if other in presets:
+                yield (key,), f"cannot be combined with [{other}]; remove one of the two"
+    for find in dict.fromkeys(preset.faults_of for preset in presets.values()):
+        yield from find(scene)
+
+
+def expanded(scene: Scene) -> Scene:
+    """Return the scene with valid presets expanded into primitives; a scene without presets unchanged.
+
+    Raises:
+        pydantic.ValidationError: values that are valid by themselves lead to an invalid primitive.
+    """
+    for expand in dict.fromkeys(preset.expanded for preset in presets_of(_stated(scene)).values()):
+        scene = expand(scene)
+    return scene
+
+
+def presets_of(keys: Iterable[str]) -> dict[str, Preset]:
+    """Return the presets among the keys of a document, in the order of expansion. Their games are imported."""
+    stated = set(keys)
+    tables = {key: game_table(key) for key in PRESETS if key in stated}
+    return {key: table for key, table in tables.items() if isinstance(table, Preset)}
+
+
+def _stated(scene: Scene) -> list[str]:
+    """Return the keys of the presets that a scene has."""
+    return [key for key in PRESETS if getattr(scene, key) is not None]

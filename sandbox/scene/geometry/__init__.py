@@ -1,0 +1,1 @@
+"""Geometry of scenes: polygons, convex pieces, polylines and neighbours."""

@@ -1,0 +1,326 @@
+"""Convex pieces of bodies with their mass properties, and the areas of zones.
+
+A piece is the convex hull of its corners, widened by its radius: one corner is a disc, two are a capsule, three or more
+a polygon. So one narrow phase and one drawing routine serve all of them. Pieces are in the frame of their body, about
+its centre of mass.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.description.base import BodySource, Point
+from sandbox.scene.description.bodies import (
+    AnyPart,
+    Attached,
+    BallPart,
+    Box,
+    BoxPart,
+    Capsule,
+    CapsulePart,
+    Compound,
+    Polygon,
+    PolygonPart,
+)
+from sandbox.scene.description.discs import Disc
+from sandbox.scene.description.fixed import Zone
+from sandbox.scene.description.generators import Stack
+from sandbox.scene.geometry.polygon import Moments, anticlockwise, capsule_moments, disc_moments, polygon_moments
+from sandbox.scene.geometry.triangulation import convex_parts
+
+
+class Piece(NamedTuple):
+    """One convex piece of a body."""
+
+    corners: tuple[Point, ...]
+    """counter-clockwise, m, about the centre of mass of its body"""
+    radius: float
+    """m"""
+    bearer: int = 0
+    """index of the part of the body that it belongs to"""
+
+
+class Form(NamedTuple):
+    """Pieces and mass properties of an element."""
+
+    pieces: tuple[Piece, ...]
+    mass: float
+    """kg"""
+    moment: float
+    """moment of inertia about the centre of mass, kg·m²"""
+    centre: Point
+    """centre of mass in the frame in which the element is described, m"""
+    reach: float
+    """distance from the centre of mass to the farthest point, m"""
+    core: float
+    """radius of the largest disc about the centre of mass inside one piece, m; 0 if the centre is outside all pieces"""
+    thin: float
+    """half the smallest width of the thinnest piece, m; of a disc its radius"""
+
+
+def form_of(element: BodySource) -> Form:
+    """Return pieces, mass and moment of inertia of an element; of a generator, those of one of its bodies.
+
+    Raises:
+        OutlineError: an outline cannot be divided into convex pieces.
+    """
+    if isinstance(element, Disc):
+        area = math.pi * element.radius**2
+        mass = element.mass if element.mass is not None else 1.0 if element.density is None else element.density * area
+        piece = Piece(((0.0, 0.0),), element.radius)
+        moment = 0.5 * mass * (element.radius * element.radius)
+        radius = element.radius
+        return Form((piece,), mass, moment, (0.0, 0.0), reach=radius, core=radius, thin=radius)
+    return _solid_form(element)
+
+
+@lru_cache(maxsize=4096)
+def _solid_form(element: BodySource) -> Form:
+    drawn = tuple(_drawn(element))
+    shares = [_moments(piece) for piece, _ in drawn]
+    density = _densities(element, [stated for _, stated in drawn], [fraction.area for fraction in shares])
+    weight = [rho * fraction.area for rho, fraction in zip(density, shares, strict=True)]
+    mass = math.fsum(weight)
+    x, y = (math.fsum(w * s.centroid[k] for w, s in zip(weight, shares, strict=True)) / mass for k in (0, 1))
+    moment = math.fsum(
+        rho * s.second + w * math.dist(s.centroid, (x, y)) ** 2
+        for rho, w, s in zip(density, weight, shares, strict=True)
+    )
+    pieces = tuple(p._replace(corners=tuple((a - x, b - y) for a, b in p.corners)) for p, _ in drawn)
+    reach = max(math.hypot(*corner) + p.radius for p in pieces for corner in p.corners)
+    core, thin = max(map(_inside, pieces)), min(map(_half_width, pieces))
+    return Form(pieces, mass, moment, (x, y), reach, core, thin)
+
+
+def _densities(element: BodySource, stated: list[float | None], area: list[float]) -> list[float]:
+    """Return the density of each piece, kg/m²: of its part, else of the body, else 1; scaled to a stated mass."""
+    own = [element.density if rho is None else rho for rho in stated]
+    density = [1.0 if rho is None else rho for rho in own]
+    mass = element.mass
+    if mass is None and all(rho is None for rho in own):
+        mass = 1.0
+    if mass is None:
+        return density
+    total = math.fsum(rho * a for rho, a in zip(density, area, strict=True))
+    return [rho * (mass / total) for rho in density]
+
+
+def _drawn(element: BodySource) -> list[tuple[Piece, float | None]]:
+    """Return the pieces of an element in the frame in which it is described, with their stated densities."""
+    if isinstance(element, Compound):
+        return [
+            (_moved(piece, part)._replace(bearer=bearer), part.density)
+            for bearer, part in enumerate(element.parts)
+            for piece in _pieces_of(part)
+        ]
+    assert isinstance(element, Box | Capsule | Polygon | Stack)
+    return [(piece, None) for piece in _pieces_of(element)]
+
+
+def _pieces_of(shape: Box | Capsule | Polygon | Stack | AnyPart) -> list[Piece]:
+    match shape:
+        case BallPart():
+            return [Piece(((0.0, 0.0),), shape.radius)]
+        case Capsule() | CapsulePart():
+            half = 0.5 * shape.length
+            return [Piece(((-half, 0.0), (half, 0.0)), shape.radius)]
+        case Box() | BoxPart() | Stack():
+            x, y = 0.5 * shape.size[0], 0.5 * shape.size[1]
+            return [Piece(((-x, -y), (x, -y), (x, y), (-x, y)), 0.0)]
+        case Polygon() | PolygonPart():
+            return [Piece(part, 0.0) for part in convex_parts(anticlockwise(shape.points))]
+
+
+def _moved(piece: Piece, part: Attached) -> Piece:
+    """Return a piece of a part in the frame of its body."""
+    cos, sin = math.cos(part.angle), math.sin(part.angle)
+    px, py = part.position
+    return piece._replace(corners=tuple((px + cos * x - sin * y, py + sin * x + cos * y) for x, y in piece.corners))
+
+
+def _moments(piece: Piece) -> Moments:
+    match len(piece.corners):
+        case 1:
+            return disc_moments(piece.corners[0], piece.radius)
+        case 2:
+            return capsule_moments(piece.corners[0], piece.corners[1], piece.radius)
+        case _:
+            return polygon_moments(piece.corners)
+
+
+def _inside(piece: Piece) -> float:
+    """Return the radius of the largest disc about the origin inside a piece, m; 0 if the origin is outside."""
+    corners = piece.corners
+    if len(corners) < 3:
+        (ax, ay), (bx, by) = corners[0], corners[-1]
+        x, y = bx - ax, by - ay
+        length2 = x * x + y * y
+        fraction = min(max(-(ax * x + ay * y) / length2, 0.0), 1.0) if length2 else 0.0
+        return max(piece.radius - math.hypot(ax + fraction * x, ay + fraction * y), 0.0)
+    depth = math.inf
+    for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
+        depth = min(depth, (ax * by - ay * bx) / math.hypot(bx - ax, by - ay))
+    return max(depth, 0.0)
+
+
+def _half_width(piece: Piece) -> float:
+    """Return half the smallest distance of two parallel lines enclosing a piece, m; one contains an edge."""
+    corners = piece.corners
+    if len(corners) < 3:
+        return piece.radius
+    width = math.inf
+    for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
+        length = math.hypot(bx - ax, by - ay)
+        width = min(width, max((bx - ax) * (y - ay) - (by - ay) * (x - ax) for x, y in corners) / length)
+    return 0.5 * width + piece.radius
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Pieces of N bodies: S pieces with V corners in all."""
+
+    body: IntArray
+    """(S,) index of the body of each piece, ascending"""
+    first: IntArray
+    """(S + 1,) row in `corner` of the first corner of each piece; the last entry is V"""
+    corner: FloatArray
+    """(V, 2) m, counter-clockwise, in the frame of the body about its centre of mass"""
+    radius: FloatArray
+    """(S,) m"""
+    middle: FloatArray
+    """(S, 2) m, centre of the bounding disc, in the same frame"""
+    reach: FloatArray
+    """(S,) m, radius of the disc about `middle` that contains the piece"""
+    piece: IntArray
+    """(S,) index of the piece within its element"""
+    bearer: IntArray
+    """(S,) index of the part within its element; 0 without parts"""
+
+    def __len__(self) -> int:
+        return len(self.body)
+
+    @property
+    def corners(self) -> IntArray:
+        """(S,) number of corners of each piece."""
+        return np.diff(self.first)
+
+
+def shapes_of(element: IntArray, elements: tuple[BodySource, ...]) -> Shapes:
+    """Return the pieces of N bodies as arrays.
+
+    Args:
+        element: (N,) index of each body's element.
+        elements: the elements.
+    """
+    forms = [form_of(each).pieces for each in elements]
+    count = np.asarray([len(pieces) for pieces in forms], dtype=np.int64)
+    of_body = count[element]
+    body = np.repeat(np.arange(len(element)), of_body)
+    piece = np.arange(len(body)) - np.repeat(np.cumsum(of_body) - of_body, of_body)
+    begin = np.cumsum(count) - count
+    which = begin[element[body]] + piece  # among all pieces of all elements
+    flat = [p for pieces in forms for p in pieces]
+    size = np.asarray([len(p.corners) for p in flat], dtype=np.int64)
+    start = np.cumsum(size) - size
+    every = np.asarray([c for p in flat for c in p.corners], dtype=np.float64).reshape(-1, 2)
+    middle = np.asarray([_middle(p) for p in flat], dtype=np.float64).reshape(-1, 2)
+    radius = np.asarray([p.radius for p in flat], dtype=np.float64)
+    reach = np.asarray(
+        [max(math.dist(c, m) for c in p.corners) + p.radius for p, m in zip(flat, middle.tolist(), strict=True)]
+    ).reshape(-1)
+    bearer = np.asarray([p.bearer for p in flat], dtype=np.int64)
+    own = size[which]
+    first = np.concatenate(([0], np.cumsum(own)))
+    row = np.repeat(start[which], own) + np.arange(first[-1]) - np.repeat(first[:-1], own)
+    return Shapes(body, first, every[row], radius[which], middle[which], reach[which], piece, bearer[which])
+
+
+def _middle(piece: Piece) -> tuple[float, float]:
+    """Return the centre of the bounding box of a piece."""
+    xs, ys = [x for x, _ in piece.corners], [y for _, y in piece.corners]
+    return 0.5 * (min(xs) + max(xs)), 0.5 * (min(ys) + max(ys))
+
+
+class ZonePiece(NamedTuple):
+    """A disc (one corner), a segment with round ends (two corners) or a convex polygon (more)."""
+
+    corners: tuple[Point, ...]
+    """m, counter-clockwise"""
+    radius: float
+    """m; 0 for a polygon"""
+
+
+@lru_cache(maxsize=1024)
+def pieces_of(zone: Zone) -> tuple[ZonePiece, ...]:
+    """Return the pieces of a zone that has a shape.
+
+    Raises:
+        OutlineError: its outline cannot be divided into convex pieces.
+    """
+    if zone.points is None:
+        assert zone.position is not None and zone.radius is not None
+        return (ZonePiece((zone.position,), zone.radius),)
+    if zone.thickness is not None:
+        return tuple(ZonePiece((a, b), 0.5 * zone.thickness) for a, b in pairwise(zone.points))
+    return tuple(ZonePiece(tuple(part), 0.0) for part in convex_parts(anticlockwise(zone.points)))
+
+
+@lru_cache(maxsize=1024)
+def middle_of(zone: Zone) -> Point:
+    """Return the centre of a zone, m: the centroid of a polygon, the midpoint of a strip's line."""
+    if zone.points is None:
+        assert zone.position is not None
+        return zone.position
+    if zone.thickness is not None:
+        left = 0.5 * math.fsum(math.dist(a, b) for a, b in pairwise(zone.points))
+        for a, b in pairwise(zone.points):
+            length = math.dist(a, b)
+            if left <= length:
+                break
+            left -= length
+        fraction = min(left / length, 1.0)
+        return a[0] + fraction * (b[0] - a[0]), a[1] + fraction * (b[1] - a[1])
+    corners = anticlockwise(zone.points)
+    ox, oy = corners[0]
+    spokes = [(x - ox, y - oy) for x, y in corners[1:]]
+    crosses = [(a[0] * b[1] - a[1] * b[0], a, b) for a, b in pairwise(spokes)]
+    area = 3.0 * math.fsum(cross for cross, _, _ in crosses)
+    x = math.fsum(cross * (a[0] + b[0]) for cross, a, b in crosses) / area
+    y = math.fsum(cross * (a[1] + b[1]) for cross, a, b in crosses) / area
+    return ox + x, oy + y
+
+
+def contains(zone: Zone, point: Point) -> bool:
+    """Return whether a point, m, is inside a zone."""
+    return any(_holds(piece, point) for piece in pieces_of(zone))
+
+
+def _holds(piece: ZonePiece, point: Point) -> bool:
+    corners = piece.corners
+    if len(corners) > 2:
+        sides = zip(corners, (*corners[1:], corners[0]), strict=True)
+        return all((bx - ax) * (point[1] - ay) - (by - ay) * (point[0] - ax) >= 0.0 for (ax, ay), (bx, by) in sides)
+    (ax, ay), (bx, by) = corners[0], corners[-1]
+    x, y = bx - ax, by - ay
+    length2 = x * x + y * y
+    fraction = min(max(((point[0] - ax) * x + (point[1] - ay) * y) / length2, 0.0), 1.0) if length2 else 0.0
+    return math.hypot(point[0] - ax - fraction * x, point[1] - ay - fraction * y) < piece.radius
+
+
+def width_of(zone: Zone) -> float:
+    """Return the approximate smallest width of a zone, m; a body that moves farther in one substep can miss it."""
+    return min(2.0 * piece.radius if len(piece.corners) < 3 else _width(piece.corners) for piece in pieces_of(zone))
+
+
+def _width(corners: tuple[Point, ...]) -> float:
+    """Return the smallest distance of two parallel lines enclosing a convex polygon, m."""
+    width = math.inf
+    for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True):
+        length = math.hypot(bx - ax, by - ay)
+        width = min(width, max((bx - ax) * (y - ay) - (by - ay) * (x - ax) for x, y in corners) / length)
+    return width

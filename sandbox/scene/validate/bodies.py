@@ -1,0 +1,310 @@
+"""Checks of start positions, overlaps and generators."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.resource_limits import MEMORY, OVERLAPS
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.generators import count_of
+from sandbox.scene.compile.layout import pitch
+from sandbox.scene.description.base import BACKING, MAX_BODIES, BodySource
+from sandbox.scene.description.discs import Emitter
+from sandbox.scene.description.fixed import Plane
+from sandbox.scene.description.generators import ENDS, Cloth, Rope
+from sandbox.scene.errors import Location
+from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.scene import Scene
+
+LocatedElement = tuple[Location, BodySource]
+
+MAX_OVERLAPS, MAX_OVERLAPS_EACH = 10_000, 10
+"""Largest number of overlapping pairs at the start: a constant, and an amount for each body."""
+OVERLAP_BUDGET = 50_000_000
+"""Candidate pairs after which the search for overlaps is abandoned; a few seconds."""
+PLACES = {"grid": "origin", "scatter": "lower", "stack": "base", "rope": "start", "cloth": "corner"}
+"""Keys that give the position of a generator; for other elements it is `position`."""
+
+
+def check_start_positions(
+    scene: Scene, bodies: Bodies, elements: list[LocatedElement], prototypes: list[LocatedElement]
+) -> Iterator[tuple[Location, str]]:
+    """Yield the faults of start positions.
+
+    Args:
+        scene: the scene.
+        bodies: its bodies.
+        elements: elements that have bodies, each with its location.
+        prototypes: `bodies.elements`, each with the location of its element.
+    """
+    touches = np.asarray([e.collides != "none" for e in bodies.elements], dtype=bool)[bodies.element]
+    for plane, name in zip(scene.planes, scene.fixed_names, strict=False):
+        if not has_direction(plane):
+            continue
+        depth = -height_above(plane, bodies.position)
+        for element in distinct(bodies.element[touches & (depth > BACKING)]):
+            deepest = float(depth[(bodies.element == element) & touches].max())
+            message = (
+                f"a centre starts {deepest:g} m behind the plane {name!r}; the limit is {BACKING:g} m, "
+                "beyond which it could leave on the wrong side"
+            )
+            location = prototypes[element][0]
+            key = PLACES.get(str(location[0]), "position")
+            yield (*location, key), message
+
+    movers = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
+    most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(movers.sum())
+    overlaps = count_overlaps(bodies.position[movers], bodies.core[movers], most)
+    location = max(elements, key=lambda e: count_of(e[1]))[0] if elements else ()
+    if overlaps > most:
+        message = (
+            f"the scene starts with {overlaps:,} or more overlapping pairs of bodies; the limit is {most:,}. "
+            'Spread them, or let them pass through each other with collides = "none" or "fixed"'
+        )
+        yield location, message
+        return
+    if _is_crowded(bodies, movers):
+        message = (
+            f"the scene starts with more than {OVERLAPS.value:,} pairs of pieces so close that an engine must test "
+            "them at every step. Spread the bodies, or use fewer pieces; "
+            f"{OVERLAPS.remedy(2 * OVERLAPS.value)}"
+        )
+        yield location, message
+    passing = touches & ~bodies.fixed
+    most = max(most, OVERLAPS.value)
+    if passing.sum() > movers.sum() and count_overlaps(bodies.position[passing], bodies.core[passing], most) > most:
+        message = (
+            f"the scene starts with more than {most:,} overlapping pairs of bodies that pass through each other, which "
+            "must be tested at every step. Spread them, use fewer, or switch off all their collisions with "
+            f'collides = "none"; {OVERLAPS.remedy(2 * OVERLAPS.value)}'
+        )
+        yield location, message
+    inside = _count_bodies_in_zones(scene, bodies.position[touches & ~bodies.fixed])
+    refusal = OVERLAPS.refusal("the scene starts with bodies inside zones; the number of such pairs is", inside)
+    if refusal is not None:
+        yield ("zone", 0), refusal
+
+
+def _is_crowded(bodies: Bodies, movers: BoolArray) -> bool:
+    """Return whether pieces of bodies other than balls have too many close pairs."""
+    among = movers & ~bodies.round
+    if not among.any():
+        return False
+    shapes = bodies.shapes
+    chosen = among[shapes.body]
+    body = shapes.body[chosen]
+    cos, sin = np.cos(bodies.angle[body]), np.sin(bodies.angle[body])
+    x, y = shapes.middle[chosen].T
+    centre = bodies.position[body] + np.column_stack((cos * x - sin * y, sin * x + cos * y))
+    return count_overlaps(centre, shapes.reach[chosen], OVERLAPS.value, body) > OVERLAPS.value
+
+
+def _count_bodies_in_zones(scene: Scene, position: FloatArray) -> int:
+    """Return the number of pairs of a position (N, 2), m, and a zone whose bounding box contains it."""
+    count = 0
+    for zone in scene.zones:
+        points = np.asarray(zone.points if zone.points is not None else [zone.position], np.float64)
+        wide = zone.radius or zone.thickness or 0.0
+        low, high = points.min(axis=0) - wide, points.max(axis=0) + wide
+        count += int(((position >= low) & (position <= high)).all(axis=1).sum())
+    return count
+
+
+def distinct(elements: IntArray) -> list[int]:
+    """Return the distinct element indices, ascending."""
+    return sorted(set(elements.tolist()))
+
+
+def has_direction(plane: Plane) -> bool:
+    """Return whether the normal of a plane can be normalised."""
+    return 1e-100 <= math.hypot(*plane.normal) <= 1e100
+
+
+def height_above(plane: Plane, position: FloatArray) -> FloatArray:
+    """Return the signed distances (N,) of points (N, 2) from a plane's surface, m."""
+    normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+    return np.asarray((position - np.asarray(plane.point)) @ normal)
+
+
+def count_overlaps(
+    position: FloatArray, radius: FloatArray, enough: float = math.inf, owner: IntArray | None = None
+) -> int:
+    """Count overlapping pairs of discs, stopping early once there are enough or the budget is spent.
+
+    If radii differ much, one large ball has all small ones as candidates, and the budget may be spent before a crowd of
+    small ones is found. So each octave of radii is first counted by itself: of K octaves at one position, the number of
+    all pairs is at most K times the number within octaves.
+
+    Args:
+        position: (N, 2) m.
+        radius: (N,) m.
+        enough: counting stops beyond this number.
+        owner: (N,) index of the body of each disc; two discs of one body are no pair.
+    """
+    owner = np.arange(len(radius)) if owner is None else owner
+    position, radius, owner = position[radius > 0.0], radius[radius > 0.0], owner[radius > 0.0]
+    octave = np.floor(np.log2(radius))
+    present = np.unique(octave).tolist()
+    alike = 0
+    for each in present if len(present) > 1 else ():
+        those = octave == each
+        alike += _overlaps(position[those], radius[those], owner[those], enough - alike)
+        if alike > enough:
+            return alike
+    return max(alike, _overlaps(position, radius, owner, enough))
+
+
+def _overlaps(position: FloatArray, radius: FloatArray, owner: IntArray, enough: float) -> int:
+    if len(radius) < 2:
+        return 0
+    overlaps = tested = 0
+    for i, j in near_pairs(position, 2.0 * float(radius.max())):
+        near = (np.hypot(*(position[i] - position[j]).T) < radius[i] + radius[j]) & (owner[i] != owner[j])
+        overlaps += int(near.sum())
+        tested += len(i)
+        if overlaps > enough or tested > OVERLAP_BUDGET:
+            break
+    return overlaps
+
+
+Found = tuple[Location, str]
+
+BYTES_PER_VISIT = 4 * 8
+"""Bytes for a body and a zone: the scene, the engine and two frames hold the state of every such pair."""
+
+SHORTEST, LONGEST = 1e-9, 1e9
+"""m, smallest and largest length of a link"""
+
+
+def check_generators(scene: Scene) -> Iterator[Found]:
+    """Yield the faults of generators."""
+    for k, scatter in enumerate(scene.scatters):
+        if any(low > high for low, high in zip(scatter.lower, scatter.upper, strict=True)):
+            yield ("scatter", k, "upper"), "must be the upper right corner, so not below or to the left of `lower`"
+    for k, emitter in enumerate(scene.emitters):
+        if any(low > high for low, high in zip(emitter.velocity_min, emitter.velocity_max, strict=True)):
+            yield ("emitter", k, "velocity_max"), "must not be smaller than `velocity_min` in any component"
+        for key, message in _check_lifetimes(emitter):
+            yield ("emitter", k, key), message
+    for k, stack in enumerate(scene.stacks):
+        if stack.rows > stack.most_rows:
+            most = stack.most_rows
+            message = (
+                f"must be at most {most}: with {stack.columns} columns and {stack.fewer} fewer in each "
+                f"row, row {most + 1} is empty"
+            )
+            yield ("stack", k, "rows"), message
+    for k, rope in enumerate(scene.ropes):
+        for key, message in (*_check_lengths(rope), *_check_springs(rope, rope.kind == "springs"), *_check_ends(rope)):
+            yield ("rope", k, key), message
+    for k, cloth in enumerate(scene.cloths):
+        wanted = cloth.kind == "springs"
+        for where, message in (*_check_springs(cloth, wanted), *_check_pins(cloth)):
+            yield ("cloth", k, *((where,) if isinstance(where, str) else where)), message
+    for k, ragdoll in enumerate(scene.ragdolls):
+        if ragdoll.density is not None:
+            yield (
+                ("ragdoll", k, "density"),
+                "does not apply to a ragdoll, whose segments divide its mass as in a human body; use `mass`",
+            )
+    yield from _check_counts(scene)
+
+
+def _check_counts(scene: Scene) -> Iterator[Found]:
+    total, last = 0, ("", 0)
+    for kind, movers in scene.kinds.items():
+        for k, mover in enumerate(movers):
+            total, last = total + max(count_of(mover), 0), (kind, k)
+    if total > MAX_BODIES:
+        yield last, f"the scene would have {total:,} bodies; the limit is {MAX_BODIES:,}"
+    taken = total * len(scene.zones) * BYTES_PER_VISIT
+    refusal = MEMORY.refusal(f"the table of {total:,} bodies in {len(scene.zones):,} zones takes", taken)
+    if refusal is not None:
+        yield ("zone", len(scene.zones) - 1), refusal
+
+
+def _check_lifetimes(emitter: Emitter) -> Iterator[tuple[str, str]]:
+    """Check lifetimes and colours of an emitter's particles."""
+    if emitter.lifetime is None:
+        if emitter.lifetime_jitter:
+            yield "lifetime_jitter", "needs a `lifetime`, s"
+        if emitter.colours is not None:
+            yield "colours", "need a `lifetime`, s, over which they fade; add one, or use a single `colour`"
+    elif emitter.lifetime_jitter >= emitter.lifetime:
+        yield "lifetime_jitter", f"must be less than `lifetime`, which is {emitter.lifetime!r} s"
+    if emitter.colours is not None and emitter.colour is not None:
+        yield "colours", "cannot be combined with `colour`; remove one of the two"
+
+
+def _check_lengths(rope: Rope) -> Iterator[tuple[str, str]]:
+    """Check the length of a rope and of its links."""
+    distance, each = math.dist(rope.start, rope.end), pitch(rope)
+    key = "end" if rope.length is None else "length"
+    if not SHORTEST <= each <= LONGEST:
+        yield key, f"makes each link {each:g} m long; a link must be {SHORTEST:g} to {LONGEST:g} m long"
+        return
+    if rope.length is not None and rope.length < distance and rope.kind != "springs":
+        yield (
+            key,
+            f"must be at least the distance from start to end, {distance!r} m, because {rope.kind} do not stretch",
+        )
+    if rope.length is not None and rope.length > distance and rope.links == 1:
+        yield (
+            "links",
+            f"must be 2 or more for a rope that is longer than the distance from start to end, {distance!r} m",
+        )
+    # Next-but-one neighbours collide: planks are one plank apart, nodes two links.
+    room = each if rope.kind == "planks" else 2.0 * each
+    if rope.collides == "all" and rope.links > 2 and 2.0 * rope.radius >= room:
+        yield "radius", f'makes next-but-one neighbours overlap; use less than {0.5 * room:g} m, or collides = "fixed"'
+    if rope.kind == "planks":
+        for which in ("angle", "angular_velocity"):
+            if getattr(rope, which):
+                yield which, "has no effect, because planks start at rest along the rope; remove it"
+
+
+def _check_springs(woven: Rope | Cloth, needed: bool) -> Iterator[tuple[str, str]]:
+    """Check that springs have a stiffness, and that nothing else has."""
+    if needed and woven.stiffness is None:
+        yield "stiffness", "is missing; springs need a stiffness, N/m"
+    if not needed and woven.stiffness is not None:
+        yield "stiffness", f"applies to springs only, and `kind` is {woven.kind!r}; remove it"
+    if not needed and woven.damping and not (isinstance(woven, Cloth) and (woven.shear or woven.bend)):
+        yield "damping", f"applies to springs only, and `kind` is {woven.kind!r}; remove it"
+
+
+def _check_ends(rope: Rope) -> Iterator[tuple[str, str]]:
+    """Check how the ends of a rope are fixed or tied."""
+    for end in ENDS:
+        if rope.fix is not None and end in rope.fix and rope.tied(end) is not None:
+            yield "fix", f"the {end} is also tied to {rope.tied(end)!r}; fix it or tie it, not both"
+    if rope.links == 1 and rope.tie.start is not None and rope.tie.start == rope.tie.end:
+        yield "tie", "names one body twice; a single link joins two different bodies"
+
+
+def _check_pins(cloth: Cloth) -> Iterator[tuple[str | tuple[str | int, ...], str]]:
+    """Check that pinned nodes exist, and that nodes do not overlap."""
+    if not isinstance(cloth.pins, str):
+        for n, (column, row) in enumerate(cloth.pins):
+            if column >= cloth.columns or row >= cloth.rows:
+                most = f"[{cloth.columns - 1}, {cloth.rows - 1}]"
+                yield ("pins", n), f"[{column}, {row}] is outside the cloth, whose last node is {most}"
+    if cloth.collides == "all" and cloth.columns * cloth.rows > 1 and 2.0 * cloth.radius > min(cloth.spacing):
+        yield "radius", f'makes neighbours overlap; use at most {0.5 * min(cloth.spacing):g} m, or collides = "fixed"'
+
+
+def check_rope_ties(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    """Yield the faults of the bodies that ropes are tied to."""
+    first = len(bodies) - sum(map(count_of, (*scene.ropes, *scene.cloths, *scene.ragdolls)))
+    for k, rope in enumerate(scene.ropes):
+        count = count_of(rope)
+        for end in ENDS:
+            name = rope.tied(end)
+            if name is not None and name not in bodies.number_of:
+                known = ", ".join(map(repr, bodies.names[:5])) + (" …" if len(bodies) > 5 else "")
+                yield ("rope", k, "tie", end), f"no body is named {name!r}; bodies: {known or 'none'}"
+            elif name is not None and first <= bodies.number_of[name] < first + count:
+                yield ("rope", k, "tie", end), f"{name!r} is part of the rope itself; name another body"
+        first += count

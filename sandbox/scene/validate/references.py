@@ -1,0 +1,295 @@
+"""Checks of references: joints, forces, drives, `[play]` and `[surface]`."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.drives import driven, unmoved
+from sandbox.scene.compile.joints import ends_of
+from sandbox.scene.description.base import BodySource, BodySpec
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.fixed import Post, Wall
+from sandbox.scene.description.forces import Attraction, Driven, Thrust
+from sandbox.scene.description.joints import Gear, Groove, Joint, Pivot, Rod, RotaryLimit, Slide
+from sandbox.scene.description.play import marking_fault
+from sandbox.scene.description.scene import default_name
+from sandbox.scene.description.surface import MISCUE, Floor, Shot, miscues
+from sandbox.scene.errors import Location
+from sandbox.scene.scene import Scene
+
+Found = tuple[Location, str]
+
+SHORTEST = 1e-9
+"""m, smallest length of rods and grooves"""
+
+LEAST_RATIO = 1e-6
+"""Smallest magnitude of a gear ratio; engines divide by it."""
+
+
+def check_attachments(scene: Scene, bodies: Bodies) -> list[Found]:
+    """Return the faults of joints, thrusts, attractions and drives."""
+    return [
+        *_check_joints(scene, bodies),
+        *_check_thrusts(scene, bodies),
+        *_check_attractions(scene, bodies),
+        *_check_drives(scene, bodies),
+    ]
+
+
+def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    index, is_driven = {name: k for k, name in enumerate(bodies.names)}, unmoved(scene, bodies)
+    yield from _check_names("joint", scene.joints)
+    for k, joint in enumerate(scene.joints):
+        for side, name in enumerate(joint.between):
+            if name not in index:
+                yield ("joint", k, "between", side), f"no body is named {name!r}; {_known(bodies)}"
+        if len(set(joint.between)) < len(joint.between):
+            yield ("joint", k, "between"), "names one body twice; name two bodies, or one to attach it to the world"
+        elif all(name in index and bodies.fixed[index[name]] for name in joint.between):
+            yield ("joint", k, "between"), "all its bodies are fixed; at least one must be able to move"
+        elif all(name in index and is_driven[index[name]] for name in joint.between):
+            led = next(name for name in joint.between if not bodies.fixed[index[name]])
+            message = f"no joint can move these bodies: the drive of {led!r} prescribes its motion"
+            yield ("joint", k, "between"), message
+        else:
+            yield from _check_rod(k, joint, bodies, index)
+        for where, message in _check_joint(joint):
+            yield ("joint", k, where), message
+
+
+def _check_names(kind: str, those: Sequence[Joint | Thrust | Attraction | Driven]) -> Iterator[Found]:
+    """Yield the elements whose name, stated or by default, is used twice within their kind."""
+    seen: set[str] = set()
+    for k, each in enumerate(those):
+        name = each.name or default_name(kind, k)
+        if name in seen:
+            yield (kind, k, "name"), f"another {kind} is also named {name!r}; names must be unique"
+        seen.add(name)
+
+
+def _check_rod(k: int, joint: Joint, bodies: Bodies, number: dict[str, int]) -> Iterator[Found]:
+    """Yield a rod whose ends start at one point, where it has no direction."""
+    if not isinstance(joint, Rod) or any(name not in number for name in joint.between) or joint.length == 0.0:
+        return
+    start, end = ends_of(joint, bodies, number)
+    if math.dist(start, end) < SHORTEST:
+        message = (
+            f"both points start at ({start[0]:g}, {start[1]:g}) m, so the rod has no direction; "
+            "separate them with `anchors`, or use a pivot"
+        )
+        yield ("joint", k, "anchors" if "anchors" in joint.model_fields_set else "between"), message
+
+
+def _check_joint(joint: Joint) -> Iterator[tuple[str, str]]:
+    """Yield the keys of a joint that are invalid by themselves, and why."""
+    match joint:
+        case Pivot():
+            if (joint.at is None) == (joint.anchors is None):
+                yield (
+                    "at",
+                    "must have either `at`, a point in the world, or `anchors`, one point in the frame of each body",
+                )
+        case Rod():
+            if joint.length is not None and joint.length < SHORTEST:
+                yield "length", f"must be at least {SHORTEST:g} m; use a pivot to hold two points together"
+        case Gear():
+            if abs(joint.ratio) < LEAST_RATIO:
+                yield "ratio", f"must be at least {LEAST_RATIO:g} in magnitude"
+        case Slide() | RotaryLimit():
+            if joint.least > joint.most:
+                yield "most", "must not be smaller than `least`"
+        case Groove():
+            if math.dist(*joint.groove) < SHORTEST:
+                yield "groove", f"is too short; its ends must be at least {SHORTEST:g} m apart"
+        case _:
+            pass
+
+
+def _check_thrusts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    yield from _check_names("thrust", scene.thrusts)
+    for k, thrust in enumerate(scene.thrusts):
+        if thrust.body not in bodies.number_of:
+            yield ("thrust", k, "body"), f"no body is named {thrust.body!r}; {_known(bodies)}"
+        elif bodies.fixed[bodies.number_of[thrust.body]]:
+            yield ("thrust", k, "body"), f"{thrust.body!r} is fixed and cannot move"
+        if thrust.end is not None and thrust.end <= thrust.begin:
+            yield ("thrust", k, "end"), "must be later than `begin`"
+
+
+def _check_attractions(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    yield from _check_names("attraction", scene.attractions)
+    for k, attraction in enumerate(scene.attractions):
+        toward = attraction.toward
+        if isinstance(toward, str) and toward not in bodies.number_of:
+            yield ("attraction", k, "toward"), f"no body is named {toward!r}; {_known(bodies)}"
+
+
+def _check_drives(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    yield from _check_names("drive", scene.drives)
+    yield from driven(scene, bodies)
+
+
+def _known(bodies: Bodies) -> str:
+    names = bodies.names
+    return (
+        f"bodies: {', '.join(map(repr, names[:5]))}{' …' if len(names) > 5 else ''}"
+        if names
+        else "the scene has no bodies"
+    )
+
+
+def check_play(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
+    """Yield the faults of `[play]`."""
+    arrows, relaunch = scene.play.arrows, scene.play.relaunch
+    if arrows is not None and arrows not in bodies.names:
+        yield ("play", "arrows"), f"no body is named {arrows!r}; known names: {_some(bodies.names)}"
+    names = generator_names(scene)
+    if relaunch is not None and relaunch not in names:
+        yield ("play", "relaunch"), f"no generator is named {relaunch!r}; known names: {_some(names)}"
+    spots = [spot.name for spot in scene.play.spots]
+    for key, box in (("area", scene.play.area), ("view", scene.play.view), ("inset", scene.play.inset)):
+        if box is not None and not all(low < high for low, high in zip(*box, strict=True)):
+            yield ("play", key), "must be the lower left and then the upper right corner"
+    for k, marking in enumerate(scene.play.markings):
+        why = marking_fault(marking)
+        if why is not None:
+            yield ("play", "marking", k), why
+    for k, name in enumerate(spots):
+        if name in spots[:k]:
+            yield ("play", "spot", k, "name"), f"another spot is also named {name!r}; names must be unique"
+    yield from _check_parts(scene, bodies)
+
+
+def _check_parts(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
+    """Check that each part names an existing body, collider or zone, and that no name occurs twice."""
+    known, seen = {*bodies.names, *scene.fixed_names}, set[str]()
+    for k, part in enumerate(scene.play.parts):
+        if part.name not in known:
+            yield ("play", "part", k, "name"), f"no body, fixed object or zone is named {part.name!r}"
+        if part.name in seen:
+            yield ("play", "part", k, "name"), f"{part.name!r} already has a part; remove one of the two"
+        seen.add(part.name)
+
+
+def generator_names(scene: Scene) -> tuple[str, ...]:
+    """Return the name of each generator, in scene order."""
+    return tuple(name for name, _, _ in generators(scene))
+
+
+def generators(scene: Scene) -> Iterator[tuple[str, int, BodySource]]:
+    """Yield name, index within its kind, and specification of each generator, in scene order."""
+    for kind, movers in scene.kinds.items():
+        for k, mover in enumerate(movers):
+            if not isinstance(mover, BodySpec):
+                yield mover.name or default_name(kind, k), k, mover
+
+
+def _some(names: tuple[str, ...]) -> str:
+    return ", ".join(map(repr, names[:5])) + (" …" if len(names) > 5 else "") if names else "none"
+
+
+OR_SPHERES = 'Remove it, or set bodies = "spheres" in the [surface]'
+"""Remedy for settings of spheres on a `[surface]` with pucks."""
+
+NEEDS_FLOOR = "applies to balls on a floor only; add a [surface]"
+
+
+def check_surface(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+    """Yield the faults of settings that need a `[surface]`."""
+    if scene.surface is not None:
+        yield from _check_body_kind(scene, scene.surface)
+    for k, ball in enumerate(scene.balls):
+        if ball.spin is None:
+            continue
+        if scene.surface is None:
+            yield ("ball", k, "spin"), f"{NEEDS_FLOOR}, or use `angular_velocity`"
+        if ball.angular_velocity:
+            yield (
+                ("ball", k, "angular_velocity"),
+                "cannot be combined with `spin`, whose third component is the same quantity",
+            )
+        if ball.fixed and any(ball.spin):
+            yield ("ball", k, "spin"), "a fixed body cannot move; remove this key, or `fixed`"
+    if scene.surface is None:
+        for key in sorted(scene.contact_models.model_fields_set):
+            yield ("contact_models", key), NEEDS_FLOOR
+    yield from _check_nose_heights(scene)
+    names: set[str] = set()
+    for k, shot in enumerate(scene.shots):
+        name = shot.name or default_name("shot", k)
+        if name in names:
+            yield ("shot", k, "name"), f"another shot is also named {name!r}; names must be unique"
+        names.add(name)
+        yield from _check_shot(scene, bodies, k, shot)
+
+
+def _check_body_kind(scene: Scene, floor: Floor) -> Iterator[Found]:
+    """Check that spheres have no settings of pucks, and the reverse."""
+    if floor.bodies == "spheres":
+        if floor.curl:
+            yield ("surface", "curl"), 'applies to pucks only; set bodies = "pucks", or remove it'
+        return
+    if floor.rolling_friction:
+        yield ("surface", "rolling_friction"), "pucks do not roll; remove it"
+    for key in sorted(scene.contact_models.model_fields_set):
+        yield (
+            ("contact_models", key),
+            f"applies to spheres only; pucks collide by restitution and friction. {OR_SPHERES}",
+        )
+    for k, ball in enumerate(scene.balls):
+        if ball.spin is not None:
+            yield ("ball", k, "spin"), "applies to spheres only; a puck turns about z, use `angular_velocity`"
+    noses: dict[str, Sequence[Wall | Post]] = {"wall": scene.walls, "post": scene.posts}
+    for kind, colliders in noses.items():
+        for k, collider in enumerate(colliders):
+            if collider.height is not None:
+                yield (
+                    (kind, k, "height"),
+                    f"applies to the cushions of spheres only; pucks have upright sides. {OR_SPHERES}",
+                )
+    for k in range(len(scene.shots)):
+        yield ("shot", k), f"a cue can strike spheres only; give the puck a velocity. {OR_SPHERES}"
+
+
+def _check_nose_heights(scene: Scene) -> Iterator[Found]:
+    """Check the heights of cushions: a nose must touch the balls, and some cushion models need it."""
+    model = scene.contact_models.cushion
+    radii = sorted({ball.radius for ball in scene.balls if not ball.fixed and ball.collides != "none"})
+    noses: dict[str, Sequence[Wall | Post]] = {"wall": scene.walls, "post": scene.posts}
+    for kind, colliders in noses.items():
+        for k, collider in enumerate(colliders):
+            if collider.height is None:
+                if model != "simple" and scene.surface is not None:
+                    message = f"the cushion model {model!r} needs the height of the nose; add `height`, m"
+                    yield (kind, k), message
+            elif scene.surface is None:
+                yield (kind, k, "height"), "applies to a cushion above a floor only; add a [surface]"
+            elif radii and not collider.height < 2.0 * radii[0]:
+                message = (
+                    f"must be less than {2.0 * radii[0]:g} m, or the nose does not touch a ball of "
+                    f"radius {radii[0]:g} m"
+                )
+                yield (kind, k, "height"), message
+
+
+def _check_shot(scene: Scene, bodies: Bodies, k: int, shot: Shot) -> Iterator[Found]:
+    if miscues(shot):
+        off = math.hypot(shot.side, shot.height)
+        yield (
+            ("shot", k, "side"),
+            f"with `height`, the tip is {off:g} of the radius off centre; beyond {MISCUE:g} it slips",
+        )
+    if scene.surface is None:
+        yield ("shot", k), "a shot needs a floor; add a [surface]"
+    if shot.ball not in bodies.number_of:
+        yield ("shot", k, "ball"), f"no body is named {shot.ball!r}"
+        return
+    number = bodies.number_of[shot.ball]
+    if not isinstance(bodies.elements[bodies.element[number]], Ball):
+        yield ("shot", k, "ball"), f"{shot.ball!r} is not a single ball"
+    elif bodies.fixed[number]:
+        yield ("shot", k, "ball"), f"{shot.ball!r} is fixed and cannot move"
+    elif any(math.dist(bodies.position[number], pocket.position) < pocket.radius for pocket in scene.pockets):
+        yield ("shot", k, "ball"), f"{shot.ball!r} is in a pocket, where it cannot be struck"
+    if any(each.ball == shot.ball for each in scene.shots[:k]):
+        yield ("shot", k, "ball"), f"another shot already strikes {shot.ball!r}; each ball can have one shot"

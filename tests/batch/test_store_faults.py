@@ -1,0 +1,248 @@
+"""Faults of a store: a damaged database is refused or mended, a lock is waited for with a word, leftovers go."""
+
+import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+from test_store import ID, OTHER, a_run, files
+
+from sandbox.batch import store as module
+from sandbox.batch.store import DATABASE, TABLE, Store, StoreError
+from sandbox.interrupt import uninterrupted
+
+SAVING = f"""
+import sys
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+from test_store import Store, Trajectory, a_run
+class Slow(Trajectory):
+    def save(self, path):
+        path.write_bytes(b"half")
+        print("ready", flush=True)
+        sys.stdin.read()
+with Store(sys.argv[1]) as store:
+    store.add(Slow(**vars(a_run())), "{OTHER}")
+"""
+
+
+@pytest.fixture
+def filled(tmp_path: Path) -> Path:
+    """A folder with one run."""
+    with Store(tmp_path) as store:
+        store.add(a_run(), ID)
+    return tmp_path
+
+
+def change(folder: Path, *statements: str) -> None:
+    with closing(sqlite3.connect(folder / DATABASE, isolation_level=None)) as database:
+        for statement in statements:
+            database.execute(statement)
+
+
+@contextmanager
+def saving(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """A process in the middle of saving a run."""
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", SAVING, str(folder)], stdin=pipe, stdout=pipe, text=True) as process:
+        try:
+            assert process.stdout is not None and process.stdout.readline() == "ready\n"
+            yield process
+        finally:
+            process.kill()
+
+
+def test_opening_removes_what_a_killed_process_left_and_not_what_a_live_one_writes(filled: Path) -> None:
+    whole = files(filled)
+    with saving(filled) as process:
+        assert len(files(filled) - whole) == 1
+        Store(filled).close()
+        assert len(files(filled) - whole) == 1
+        process.kill()
+        process.wait()
+        Store(filled).close()
+    assert files(filled) == whole
+
+
+DAMAGED = {
+    "a path outside": "path = '../outside.npz'",
+    "an absolute path": "path = '/etc/passwd'",
+    "another run's path": f"path = '{OTHER}.npz'",
+    "a path of bytes": "path = x'00ff'",
+    "a number for a path": "path = x'31'",
+    "text that is not UTF-8": "scene_title = CAST(x'ff80' AS TEXT)",
+    "a path that is not UTF-8": "path = CAST(x'ff' AS TEXT)",
+    "text for a number": "steps = 'many'",
+    "a fraction for a count": "contacts = 0.5",
+    "bytes for a number": "seconds = x'00'",
+    "an unknown status": "status = 'fine'",
+    "settings that are no JSON": "settings = '{'",
+    "settings that are no object": "settings = '[1]'",
+    "settings that are nested deeply": f"settings = '{'[' * 100_000}'",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGED.values(), ids=DAMAGED)
+def test_damaged_row_is_reported_and_not_trusted_and_its_run_can_be_added_again(filled: Path, damage: str) -> None:
+    change(filled, f"UPDATE runs SET {damage}")
+    notices: list[str] = []
+    with Store(filled, notices.append) as store:
+        assert store.find(ID) is None
+        assert store.find(ID) is None
+        assert len(notices) == 1
+        assert f"{DATABASE}: a damaged row" in notices[0]
+        assert len(notices[0]) < len(str(filled)) + 200
+        assert store.rows() == ()
+        added = store.add(a_run(seconds=2.0), ID)
+        assert store.find(ID) == added
+        assert store.rows() == (added,)
+
+
+def test_row_without_a_value_is_damaged(filled: Path) -> None:
+    loose = TABLE.replace(" NOT NULL", "")
+    with closing(sqlite3.connect(filled / DATABASE, isolation_level=None)) as database:
+        database.execute("PRAGMA writable_schema = ON")
+        database.execute("UPDATE sqlite_master SET sql = ? WHERE name = 'runs'", (loose.strip(),))
+    change(filled, "UPDATE runs SET status = NULL")
+    with closing(sqlite3.connect(filled / DATABASE, isolation_level=None)) as database:
+        database.execute("PRAGMA writable_schema = ON")
+        database.execute("UPDATE sqlite_master SET sql = ? WHERE name = 'runs'", (TABLE.strip(),))
+    with Store(filled) as store:
+        assert store.find(ID) is None
+
+
+LAYOUTS = {
+    "no table": ["DROP TABLE runs"],
+    "a missing column": ["ALTER TABLE runs DROP COLUMN reason"],
+    "a column more": ["ALTER TABLE runs ADD COLUMN more TEXT"],
+    "a column of another name": ["ALTER TABLE runs RENAME COLUMN score TO points"],
+    "a view in place of the table": ["ALTER TABLE runs RENAME TO others", "CREATE VIEW runs AS SELECT * FROM others"],
+    "a trigger": ["CREATE TRIGGER t AFTER INSERT ON runs BEGIN DELETE FROM runs; END"],
+    "an earlier version than its table": ["PRAGMA user_version = 1"],
+    "a version below all": ["PRAGMA user_version = -1"],
+    "no version": ["PRAGMA user_version = 0"],
+}
+
+
+@pytest.mark.parametrize("statements", LAYOUTS.values(), ids=LAYOUTS)
+def test_database_of_another_layout_is_refused_and_left_alone(filled: Path, statements: list[str]) -> None:
+    change(filled, *statements)
+    before = (filled / DATABASE).read_bytes()
+    with pytest.raises(StoreError, match=r"runs\.sqlite: "):
+        Store(filled)
+    assert (filled / DATABASE).read_bytes() == before
+
+
+def test_store_of_the_first_version_is_brought_up_to_date(filled: Path) -> None:
+    change(filled, "ALTER TABLE runs DROP COLUMN score", "PRAGMA user_version = 1")
+    with Store(filled) as store:
+        assert store.find(ID) is not None
+
+
+def test_damaged_database_is_a_store_error_whatever_the_damage(filled: Path) -> None:
+    with Store(filled) as store:
+        for k in range(30):
+            store.add(a_run(scene={"title": "μ" * 50}), f"{k:020x}")
+    sound = (filled / DATABASE).read_bytes()
+    chance = random.Random(3)
+    for k in range(150):
+        damaged = bytearray(sound)
+        if k % 3 == 0:
+            damaged = damaged[: chance.randrange(len(damaged))]
+        else:
+            start = chance.choice([0, 100, chance.randrange(len(damaged))])
+            for at in range(start, min(start + chance.choice([1, 16, 400]), len(damaged))):
+                damaged[at] = chance.randrange(256)
+        (filled / DATABASE).write_bytes(damaged)
+        try:
+            with Store(filled) as store:
+                store.rows()
+                store.find(ID)
+                store.add(a_run(), ID)
+        except StoreError as error:
+            assert DATABASE in str(error)
+
+
+def test_run_is_replaced_with_its_row(filled: Path) -> None:
+    with Store(filled) as store:
+        assert store.add(a_run(seconds=9.0), ID).seconds == 0.25
+        assert store.add(a_run(seconds=9.0), ID, replace=True).seconds == 9.0
+        assert [row.seconds for row in store.rows()] == [9.0]
+    assert files(filled) == {DATABASE, f"{ID}.npz"}
+
+
+@pytest.fixture
+def locked(filled: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A store that another connection writes to, and that is waited for shortly."""
+    monkeypatch.setattr(module, "NOTICE", 0.01)
+    monkeypatch.setattr(module, "WAIT", 0.1)
+    with closing(sqlite3.connect(filled / DATABASE, isolation_level=None)) as database:
+        database.execute("BEGIN EXCLUSIVE")
+        yield filled
+
+
+def test_locked_store_is_waited_for_with_one_notice_and_then_given_up(locked: Path) -> None:
+    notices: list[str] = []
+    with pytest.raises(StoreError, match="another process has locked it"):
+        Store(locked, notices.append)
+    assert len(notices) == 1
+    assert "waiting" in notices[0]
+
+
+def test_interrupt_ends_the_wait_for_a_lock_also_where_it_is_held_back(
+    locked: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "WAIT", 600.0)
+    with pytest.raises(KeyboardInterrupt), uninterrupted():
+        Store(locked, lambda _: os.kill(os.getpid(), signal.SIGINT))
+
+
+def test_lock_that_is_let_go_in_time_is_taken(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "NOTICE", 0.01)
+    with closing(sqlite3.connect(filled / DATABASE, isolation_level=None)) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        with Store(filled, lambda _: other.execute("ROLLBACK") and None) as store:
+            assert store.find(ID) is not None
+
+
+def test_folder_that_is_removed_meanwhile_is_told(filled: Path) -> None:
+    with Store(filled) as store:
+        for path in filled.iterdir():
+            path.unlink()
+        filled.rmdir()
+        with pytest.raises(StoreError, match=str(filled)):
+            store.add(a_run(), OTHER)
+    filled.mkdir()
+
+
+def test_full_disk_leaves_the_runs_that_are_stored_and_nothing_half_written(filled: Path) -> None:
+    script = f"""
+import resource, sys
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+from test_store import Store, StoreError, a_run
+import numpy as np
+from dataclasses import replace
+store = Store(sys.argv[1])
+long = replace(a_run(), time=np.random.default_rng(0).random(100_000))
+for limit in (0, 100, 4096, 100_000):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    try:
+        store.add(long, "{OTHER}")
+    except StoreError as error:
+        print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(filled)], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stderr == ""
+    told = done.stdout.splitlines()
+    assert len(told) == 4
+    assert all(line.endswith("free some disk space, or name another folder") for line in told)
+    assert files(filled) == {DATABASE, f"{ID}.npz"}
+    with Store(filled) as store:
+        assert store.find(ID) is not None

@@ -1,0 +1,73 @@
+"""Ctrl-C in commands that take long: what is finished is printed, and the status is 130."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from calling import json_of, lines_of, written
+
+import sandbox.cli.check as checking
+import sandbox.games.artillery.miss as missing
+import sandbox.measure.compare.comparing as comparing
+import sandbox.measure.shots.study as studying
+
+
+def interrupt_at(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, call: int) -> None:
+    """Let a function of a module be interrupted at its n-th call."""
+    known: Callable[..., Any] = getattr(module, name)
+    calls = []
+
+    def interrupted(*given: Any, **named: Any) -> Any:
+        calls.append(name)
+        if len(calls) == call:
+            raise KeyboardInterrupt
+        return known(*given, **named)
+
+    monkeypatch.setattr(module, name, interrupted)
+
+
+def test_compare_keeps_the_engines_that_are_finished(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    interrupt_at(monkeypatch, comparing, "timed", 2)
+    status, document, err = json_of(capfd, "compare", "bounce")
+    assert (status, document["interrupted"], len(document["engines"])) == (130, True, 1)
+    assert err == ["interrupted: 1 run complete; the results are kept"]
+
+
+def test_compare_that_has_nothing_yet_is_interrupted(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    interrupt_at(monkeypatch, comparing, "timed", 1)
+    status, out, err = lines_of(capfd, "compare", "bounce")
+    assert (status, out, err[-1]) == (130, [], "interrupted")
+
+
+def test_miss_keeps_the_flights_that_are_finished(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    interrupt_at(monkeypatch, missing, "flown", 3)
+    status, document, err = json_of(capfd, "miss", "duel")
+    assert (status, document["interrupted"], len(document["rows"])) == (130, True, 2)
+    assert err == ["interrupted: 2 flights are complete and kept"]
+    interrupt_at(monkeypatch, missing, "flown", 4)
+    status, out, _ = lines_of(capfd, "miss", "duel")
+    assert status == 130
+    assert "pymunk" in out[-1]
+
+
+def test_check_keeps_the_scenes_that_are_finished(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scenes = [written(tmp_path, name=f"{k}.toml") for k in range(3)]
+    interrupt_at(monkeypatch, checking, "_checked", 2)
+    status, document, err = json_of(capfd, "check", *scenes, "--no-trial")
+    assert (status, [each["scene"] for each in document["scenes"]]) == (130, scenes[:1])
+    assert err == ["interrupted: 1 of 3 scenes were checked"]
+
+
+def test_shots_keeps_the_odds(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    interrupt_at(monkeypatch, studying, "sensitivity", 1)
+    status, document, err = json_of(capfd, "shots", "9-ball", "--count", "3", "--sensitivity")
+    assert (status, document["odds"]["count"], document["sensitivity"]) == (130, 3, None)
+    assert err == ["interrupted: the odds and all other completed results are kept"]

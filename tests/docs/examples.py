@@ -1,0 +1,231 @@
+"""Examples in the documentation: the fenced blocks of a Markdown page, and how each is run.
+
+A page's blocks run in order, in one folder that starts empty:
+
+- `python`: executed, in one namespace per page. A `text` block right after it holds what it prints.
+- `console`: lines that begin with `$ ` are commands, the lines below each are its output. Without such lines it prints
+  nothing.
+- `sh`: commands, a line each. They must succeed; what they print is not compared.
+- `toml`: a scene, or a part of one: no unknown keys.
+- anything else (`text`, `json` …) is not run.
+
+In outputs `…` or `...` stands for any text, at the end also for none, and white space counts as one space. A command
+that does not succeed says so: `$ sandbox run bad.toml  # exits with 2`. `sandbox play` and `sandbox replay` are parsed,
+not run.
+
+An HTML comment on the line above a block changes how it is treated:
+
+- `<!-- file: game.py -->`: the block is written to this file; a scene in it must load.
+- `<!-- faulty file: bad.toml -->`: the block is written to this file, whose faults are the point.
+- `<!-- slow -->`: the page takes longer than some 20 s, so that its test is marked slow.
+- `<!-- not run: REASON -->`: as with what needs a display, another machine or minutes.
+"""
+
+import contextlib
+import doctest
+import io
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import click
+from markdown_it import MarkdownIt
+
+import sandbox
+from sandbox.cli.main import cli
+
+ROOT = Path(__file__).parents[2]
+PAGES = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md")))
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+WINDOWS = ("play", "replay")
+EXIT = re.compile(r"\s+# exits with (\d+)$")
+COMPILING = re.compile(r"^compiling .*\n", re.MULTILINE)
+"""said once, where nothing is compiled yet"""
+
+
+@dataclass(frozen=True)
+class Example:
+    """A fenced block."""
+
+    page: Path
+    line: int
+    language: str
+    text: str
+    file: str | None
+    """name of the file that it is written to"""
+    faulty: bool
+    """that file has faults on purpose"""
+    slow: bool
+    skipped: bool
+    output: str | None
+    """what a `python` block prints, where that is stated"""
+
+    @property
+    def place(self) -> str:
+        """Page and line."""
+        page = self.page.relative_to(ROOT) if self.page.is_relative_to(ROOT) else self.page
+        return f"{page}:{self.line}"
+
+
+def examples(page: Path) -> list[Example]:
+    """Return the fenced blocks of a page."""
+    tokens = MarkdownIt().parse(page.read_text(encoding="utf-8"))
+    found: list[Example] = []
+    comment = ""
+    for previous, token in pairwise([None, *tokens]):
+        if token.type == "html_block":
+            comment = token.content
+            continue
+        if token.type != "fence":
+            if token.type not in ("list_item_open", "paragraph_close"):
+                comment = ""
+            continue
+        language = token.info.strip()
+        if language.startswith("{code-block}"):
+            language = language.removeprefix("{code-block}").strip()
+        if language == "text" and _is_python(previous):
+            before = found.pop()
+            found.append(replace(before, output=token.content))
+            continue
+        named = re.search(r"<!-- (?:faulty )?file: (\S+) -->", comment)
+        line = (token.map or [0])[0] + 1
+        found.append(
+            Example(
+                page,
+                line,
+                language,
+                token.content,
+                named[1] if named else None,
+                "<!-- faulty" in comment,
+                "<!-- slow -->" in comment,
+                "<!-- not run:" in comment,
+                None,
+            )
+        )
+        comment = ""
+    return found
+
+
+def processes(page: Path) -> int:
+    """Return the number of commands of a page that run in processes of their own."""
+    lines = [
+        line.removeprefix("$ ")
+        for example in examples(page)
+        if not example.skipped and example.file is None and example.language in ("console", "sh")
+        for line in example.text.replace("\\\n", " ").splitlines()
+        if example.language == "sh" or line.startswith("$ ")
+    ]
+    windows = {("sandbox", name) for name in WINDOWS}
+    return sum(bool(line.strip()) and tuple(line.split()[:2]) not in windows for line in lines)
+
+
+def _is_python(token: Any) -> bool:
+    return token is not None and token.type == "fence" and token.info.strip() == "python"
+
+
+def run_page(page: Path, folder: Path) -> Iterator[str]:
+    """Run the examples of a page in an empty folder; yield what is wrong."""
+    namespace: dict[str, Any] = {"__name__": "__main__"}
+    for example in examples(page):
+        if example.skipped:
+            continue
+        if example.file is not None:
+            target = folder / example.file
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(example.text, encoding="utf-8")
+            if target.suffix == ".toml" and "[[ball]" in example.text and not example.faulty:
+                yield from _unknown_keys(example)
+            continue
+        match example.language:
+            case "python":
+                yield from _python(example, namespace, folder)
+            case "console":
+                yield from _console(example, folder)
+            case "sh":
+                for line in example.text.replace("\\\n", " ").splitlines():
+                    yield from _command(example, line, None, folder)
+            case "toml":
+                yield from _unknown_keys(example)
+
+
+def _python(example: Example, namespace: dict[str, Any], folder: Path) -> Iterator[str]:
+    """Run a block as a part of one program; it is executed here, as it may pass objects on to the next block."""
+    printed = io.StringIO()
+    try:
+        with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
+            exec(compile("\n" * example.line + example.text, str(example.page), "exec"), namespace)
+    except Exception as error:  # noqa: BLE001, whatever an example raises is what is reported
+        yield f"{example.place}: {type(error).__name__}: {error}"
+        return
+    if example.output is not None and not _same(example.output, printed.getvalue()):
+        yield f"{example.place}: expected\n{example.output}\nprinted\n{printed.getvalue()}"
+
+
+def _console(example: Example, folder: Path) -> Iterator[str]:
+    command, output = None, ""
+    for line in [*example.text.replace("\\\n", " ").splitlines(), "$ "]:
+        if not line.startswith("$ "):
+            output += line + "\n"
+            continue
+        if command is not None:
+            yield from _command(example, command, output, folder)
+        command, output = line[2:], ""
+
+
+def _command(example: Example, line: str, output: str | None, folder: Path) -> Iterator[str]:
+    """Run a command with `sh`."""
+    if not line.strip() or line.lstrip().startswith("#"):
+        return
+    stated = EXIT.search(line)
+    status = int(stated[1]) if stated else 0
+    words = shlex.split(line, comments=True)
+    if len(words) > 1 and words[0] == "sandbox" and words[1] in WINDOWS:
+        yield from _parsed(example, words[1:])
+        return
+    here = {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "COLUMNS": "120", "SDL_VIDEODRIVER": "dummy"}
+    done = subprocess.run(
+        ["sh", "-ec", line],
+        cwd=folder,
+        env={**os.environ, **here},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=280,
+    )
+    if done.returncode != status:
+        yield f"{example.place}: {line}\nexited with {done.returncode}, not {status}\n{done.stderr[-2000:]}"
+    elif output is not None and not _same(output, printed := done.stdout + COMPILING.sub("", done.stderr)):
+        yield f"{example.place}: {line}\nexpected\n{output}\nprinted\n{printed}"
+
+
+def _parsed(example: Example, words: list[str]) -> Iterator[str]:
+    context = click.Context(cli)
+    command = cli.get_command(context, words[0])
+    assert command is not None
+    try:
+        command.make_context(words[0], words[1:])
+    except click.UsageError as error:
+        yield f"{example.place}: {' '.join(words)}: {error.format_message()}"
+
+
+def _same(expected: str, printed: str) -> bool:
+    """Compare as doctest does; `…` is `...`, and a line may end with any number of spaces."""
+    wanted = re.sub(r"\s+\.\.\.$", "...", expected.replace("…", "...").strip()) + "\n"  # a last `…` may be nothing
+    return doctest.OutputChecker().check_output(wanted, printed.strip() + "\n", FLAGS)
+
+
+def _unknown_keys(example: Example) -> Iterator[str]:
+    """Yield the keys of a scene, or of a part of one, that no scene has."""
+    try:
+        sandbox.loads(example.text, example.place)
+    except sandbox.SceneError as error:
+        for fault in error.faults:
+            if "unknown key" in fault.message or fault.line is None or example.file is not None:
+                yield str(fault)

@@ -1,0 +1,41 @@
+"""The code, the commands and the scenes of README and documentation run, and print what they show."""
+
+from pathlib import Path
+
+import pytest
+from examples import PAGES, ROOT, examples, processes, run_page
+
+MAX_PROCESSES = 1
+"""Commands of a page that the fast tests run; each takes a second or more."""
+
+
+def _parameters() -> list[object]:
+    return [
+        pytest.param(
+            page,
+            id=str(page.relative_to(ROOT)),
+            marks=[pytest.mark.slow] if _is_slow(page) else [],
+        )
+        for page in PAGES
+    ]
+
+
+def _is_slow(page: Path) -> bool:
+    return processes(page) > MAX_PROCESSES or any(each.slow for each in examples(page))
+
+
+@pytest.mark.timeout(1200)  # of a page with measurements on a busy machine
+@pytest.mark.parametrize("page", _parameters())
+def test_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
+    assert list(run_page(page, tmp_path)) == []
+
+
+def test_an_example_that_is_wrong_is_found(tmp_path: Path) -> None:
+    text = (
+        "```python\nprint(1)\n```\n```text\n2\n```\n\n```sh\nsandbox nonsense\n```\n\n"
+        "```console\n$ sandbox schema ball | head -1\nbox: …\n```\n\n"
+        "```console\n$ echo unexpected\n```\n\n```toml\n[world]\ngravty = [0, 0]\n```\n"
+    )
+    path = tmp_path / "wrong.md"
+    path.write_text(text, encoding="utf-8")
+    assert len(list(run_page(path, tmp_path))) == 5

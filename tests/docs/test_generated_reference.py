@@ -1,0 +1,82 @@
+"""Blocks of the reference that are generated from the code: all can be made, and together they are complete."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from sandbox.games.registry import RULES
+from sandbox.run_file import SHAPES
+from sandbox.scene.files.json_schema import schema
+from sandbox.trajectory import Trajectory
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = sorted(page for page in DOCS.rglob("*.md") if "```{generated}" in page.read_text(encoding="utf-8"))
+
+sys.path.insert(0, str(DOCS / "_ext"))
+generated = pytest.importorskip("generated", exc_type=ImportError)
+
+
+def page_of(name: str) -> str:
+    return str(generated.expand((DOCS / "reference" / name).read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_block_of_a_page_is_generated(page: Path) -> None:
+    assert "{generated}" not in generated.expand(page.read_text(encoding="utf-8"))
+
+
+def test_a_block_of_an_unknown_generator_is_an_error() -> None:
+    with pytest.raises(ValueError, match="no generator 'scenes'"):
+        generated.expand("```{generated} scenes\n```")
+
+
+def test_every_table_of_a_scene_has_a_heading_and_every_key_a_row() -> None:
+    page = page_of("scene-file.md")
+    for name, node in schema()["properties"].items():
+        if name not in ("title", "about"):
+            brackets = f"[[{name}]]" if node.get("type") == "array" else f"[{name}]"
+            assert f"\n### `{brackets}`\n" in page, name
+    for name, definition in schema()["$defs"].items():
+        for key in definition.get("properties", {}):
+            assert f"| `{key}`{{#key-" in page, f"{name}.{key}"
+
+
+def test_anchors_are_unique() -> None:
+    for name in ("scene-file.md", "python.md"):
+        anchors = re.findall(r"\{#([^}]+)\}", page_of(name)) + re.findall(r"^\((\S+)\)=$", page_of(name), re.MULTILINE)
+        assert len(anchors) == len(set(anchors))
+
+
+def test_numbers_with_a_dimension_have_a_unit() -> None:
+    rows = [line.split("|") for line in page_of("scene-file.md").splitlines() if "{#key-world-" in line]
+    units = {row[1].split("`")[1]: row[3].strip() for row in rows}
+    assert units["gravity"] == "m/s²"
+    assert units["linear_drag"] == "1/s"
+    assert units["duration"] == "s"
+
+
+def test_every_game_has_keys() -> None:
+    page = page_of("window-keys.md")
+    for game in RULES:
+        assert f"\n### {game.capitalize()}\n" in page
+
+
+def test_every_stored_array_is_described() -> None:
+    assert set(SHAPES) == set(Trajectory.__dataclass_fields__)
+
+
+def test_keys_that_lessons_and_first_steps_name_are_in_the_table_of_keys() -> None:
+    table = set(re.findall(r"`([^`]+)`", page_of("window-keys.md")))
+    texts = {
+        page: page.read_text(encoding="utf-8") for page in (*DOCS.glob("lessons/*.md"), *DOCS.glob("tutorial/1*.md"))
+    }
+    for page, text in texts.items():
+        named = re.findall(r"`([^`\n ]+)`,? (?:pauses|makes one step|goes one step|shows the|lists)", text)
+        named += re.findall(r"[Pp]ress `?([A-Z]|F\d+)`?\b", text)
+        named += re.findall(r"^\| `([^`]+)` \| (?:pause|one step)", text, re.MULTILINE)
+        assert "space bar" not in text, page.name
+        for key in named:
+            assert key in table, (page.name, key)
+    assert "`P` pauses" in texts[DOCS / "lessons" / "index.md"]

@@ -1,0 +1,159 @@
+"""docs/reference/json.md against what the commands print: no key undocumented, none that is never printed."""
+
+import json
+import re
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import sandbox
+from sandbox.cli.main import COMMANDS, call
+from sandbox.recording import Recording
+
+PAGE = (Path(__file__).parents[2] / "docs/reference/json.md").read_text(encoding="utf-8")
+NO_DOCUMENT = {"play", "replay", "schema"}
+"""commands without a document of their own"""
+
+BAD = "[world]\nduraton = 1\n"
+
+SAMPLES: dict[str, tuple[str, ...]] = {
+    "Faults": ("run bad.toml",),
+    "sandbox run": (
+        "run bounce --set world.duration=0.1 --ledger",
+        "run tunnel.toml --out damaged",
+        "run 9-ball --engine exact --set world.duration=0.1",
+        "run landing --seeds 2 --player none --set world.duration=0.2",
+        "run session.json",
+    ),
+    "sandbox check": ("check bounce", "check bullet", "check landing --no-trial", "check bad.toml"),
+    "sandbox compare": (
+        "compare tunnel.toml --engines pymunk,exact --why",
+        "compare tunnel.toml --engines pymunk,exact --minimise small.toml",
+        "compare tunnel.toml --engine pymunk --sweep solver.dt=0.01,0.005",
+    ),
+    "sandbox tradeoff": (
+        "tradeoff pendulum_90 --effort 0.01 --tolerance 1 --set world.duration=0.2",
+        "tradeoff tunnel.toml --effort 0.01 --tolerance 0.5",
+    ),
+    "sandbox extremes": ("extremes --quick --axes speed --engines pymunk --against against.json",),
+    "sandbox report": ("report tunnel.toml --effort 0 --engines exact --out page.html",),
+    "sandbox shots": ("shots 9-ball --count 20 --sensitivity --horizon --window '7:upper left pocket'",),
+    "sandbox miss": ("miss duel",),
+    "sandbox match": ("match straight-rail --players bot:0.5,bot:1 --turns 2",),
+    "sandbox export": ("export store --to run.csv", "export store --to run.png"),
+    "sandbox scenes": ("scenes",),
+    "sandbox engines": ("engines",),
+}
+"""By section of the page, the commands that together print all of its keys."""
+
+SLOW = {"sandbox compare", "sandbox tradeoff", "sandbox extremes", "sandbox report", "sandbox shots", "sandbox match"}
+
+TUNNEL = """
+world = { duration = 0.2 }
+solver = { dt = 0.01 }
+wall = [{ name = "wall", points = [[1.0, -1.0], [1.0, 1.0]], thickness = 0.01 }]
+
+[[ball]]
+name = "bullet"
+position = [0.0, 0.0]
+velocity = [20.0, 0.0]
+radius = 0.05
+restitution = 1.0
+"""
+
+
+@dataclass
+class Key:
+    """A documented key, and those below it."""
+
+    free: bool = False
+    """whether it may have keys that are not documented"""
+    printed: bool = False
+    below: "dict[str, Key]" = field(default_factory=dict)
+
+
+def documented(section: str) -> Key:
+    """Read the tables of a section."""
+    text = re.split(r"^## ", PAGE.split(f"\n## {section}\n")[1], maxsplit=1, flags=re.MULTILINE)[0]
+    root = Key()
+    for line in text.splitlines():
+        if not line.startswith("| `"):
+            continue
+        paths, kind = line.split("|")[1:3]
+        for path in re.findall(r"`([^`]+)`", paths):
+            key = root
+            for name in path.replace("[]", ".[]").split("."):
+                key = key.below.setdefault(name, Key())
+            key.free = bool(re.search(r"\bopen\b|settings|changes|any", kind))
+    return root
+
+
+def compared(printed: Any, key: Key, path: str = "") -> Iterator[str]:
+    """Yield what is printed and not documented; mark what is."""
+    key.printed = True
+    if isinstance(printed, dict):
+        for name, value in printed.items():
+            below = key.below.get(name) or key.below.get("NAME")
+            if below is not None:
+                yield from compared(value, below, f"{path}.{name}")
+            elif not key.free:
+                yield f"{path}.{name}"
+    elif isinstance(printed, list):
+        element = key.below.get("[]")
+        for value in printed:
+            if element is not None:
+                yield from compared(value, element, f"{path}[]")
+            elif isinstance(value, dict) and not key.free:
+                yield f"{path}[]"
+
+
+def never_printed(key: Key, path: str = "") -> Iterator[str]:
+    """Yield the documented keys that nothing has printed."""
+    for name, below in key.below.items():
+        if not below.printed and (name != "[]" or below.below):  # a list may be empty
+            yield f"{path}.{name}"
+        else:
+            yield from never_printed(below, f"{path}.{name}")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the files and the stores that samples name."""
+    monkeypatch.chdir(tmp_path)
+    Path("bad.toml").write_text(BAD)
+    Path("tunnel.toml").write_text(TUNNEL)
+    moved = {"axis": "speed", "engine": "pymunk", "setup": "pymunk", "limit": 50.0, "first_failure": 60.0}
+    Path("against.json").write_text(json.dumps({"limits": [moved]}))
+    scene = sandbox.loads(TUNNEL)
+    Recording(scene, "pymunk", scene.solver, (), duration=0.1).save("session.json")
+    for store in ("store", "damaged"):
+        call(["run", "tunnel.toml", "--out", store, "--quiet"])
+    (stored,) = Path("damaged").glob("*.npz")
+    stored.write_bytes(b"")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "section", [pytest.param(each, marks=pytest.mark.slow) if each in SLOW else each for each in SAMPLES]
+)
+def test_every_printed_key_is_documented_and_every_documented_key_is_printed(
+    section: str,
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    keys = documented(section)
+    for sample in SAMPLES[section]:
+        call([*shlex.split(sample), "--json"])
+        document = json.loads(capsys.readouterr().out)
+        if section == "Faults":
+            document = {"faults": document["faults"]}
+        assert list(compared(document, keys)) == [], sample
+    assert list(never_printed(keys)) == []
+
+
+def test_every_command_has_a_section() -> None:
+    assert {f"sandbox {name}" for name in COMMANDS} - {f"sandbox {name}" for name in NO_DOCUMENT} <= set(SAMPLES)

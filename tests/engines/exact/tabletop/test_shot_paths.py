@@ -1,0 +1,60 @@
+"""Where balls were on their ways: evaluated at any time, and points along them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sandbox.engines.exact.tabletop.shots import Table
+from sandbox.measure.run import run
+from sandbox.scene.description.surface import Stroke
+from sandbox.scene.files.load import load
+from sandbox.scene.scene import Scene
+
+CASES = Path(__file__).parent / "cases"
+
+
+def scene(name: str) -> Scene:
+    return load(CASES / f"{name}.toml")
+
+
+@pytest.mark.parametrize("name", ["draw", "swerve", "pot", "row", "three_cushions", "rattle"])
+def test_places_at_any_time_are_those_of_a_run(name: str) -> None:
+    played = scene(name)
+    frames = run(played, "exact")
+    outcome = Table(played).shoot(ways=True)
+    apart = np.abs(outcome.at(frames.time) - frames.position)
+    assert apart.max() < 1e-12  # m: the same parabolas, added up in another order
+
+
+def test_places_are_those_of_rest_after_the_end_and_in_any_order() -> None:
+    outcome = Table(scene("three_cushions")).shoot(ways=True)
+    end = outcome.duration
+    late, early, middle = outcome.at(np.array([end + 5.0, 0.0, end / 2.0]))
+    assert late == pytest.approx(outcome.position, abs=0.0)
+    assert early == pytest.approx(Table(scene("three_cushions")).position, abs=0.0)
+    assert middle == pytest.approx(outcome.at(np.array([end / 2.0]))[0], abs=0.0)
+
+
+def test_a_captured_ball_lies_at_its_pocket() -> None:
+    played = scene("pot")
+    outcome = Table(played).shoot(ways=True)
+    time = next(event.time for event in outcome.events if event.kind == "pocket" and event.ball == "object")
+    before, after = outcome.at(np.array([np.nextafter(time, 0.0), time]))[:, 1]
+    centre, radius = np.asarray(played.pockets[5].position), played.pockets[5].radius
+    assert np.hypot(*(before - centre)) == pytest.approx(radius, abs=1e-12)  # m: it comes in over the rim
+    assert after == pytest.approx(centre, abs=0.0)
+
+
+def test_ways_are_kept_from_the_first_shot_on() -> None:
+    table = Table(scene("nine_ball_break"))
+    stroke = Stroke(aim=1.57, speed=3.0)
+    first, second = table.shoot(stroke, ways=True), table.shoot(stroke, ways=True)
+    assert first.path is not None and second.path is not None
+    assert first.path.tobytes() == second.path.tobytes()
+    assert first.at(np.array([0.0]))[0] == pytest.approx(table.position, abs=0.0)
+
+
+def test_places_are_not_told_where_ways_were_not_kept() -> None:
+    with pytest.raises(ValueError, match="not recorded"):
+        Table(scene("draw")).shoot().at(np.array([1.0]))

@@ -1,0 +1,54 @@
+"""Shots on a floor against those of an independent simulator, stored in `cases`."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sandbox.engines.exact.tabletop.shot_result import ShotEvent, ShotResult
+from sandbox.engines.exact.tabletop.shots import Table
+from sandbox.measure.run import run
+from sandbox.scene.files.load import load
+
+CASES = Path(__file__).parent / "cases"
+NAMES = sorted(path.stem for path in CASES.glob("*.json"))
+ROUND = {"slide_roll": "rolls", "roll_spin": "spins", "roll_stop": "rests", "spin_stop": "rests", "slide_stop": "rests"}
+ROUND |= {"slide_spin": "spins", "ball_ball": "ball", "pocket": "pocket"}
+
+
+def case(name: str) -> dict[str, Any]:
+    return json.loads((CASES / f"{name}.json").read_text())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_positions_and_velocities_are_those_of_the_oracle(name: str) -> None:
+    stored, scene = case(name), load(CASES / f"{name}.toml")
+    trajectory = run(scene, "exact")
+    frames = stored["frames"]
+    # m: how well the stored shot is known, and no less than rounding after some twenty impacts
+    off = max(1e-9, 4.0 * stored["position_error"])
+    np.testing.assert_allclose(trajectory.position[frames], stored["position"], atol=off)
+    # m/s and rad/s: what such a place is worth within a second, and over a ball's radius
+    np.testing.assert_allclose(trajectory.velocity[frames], stored["velocity"], atol=10.0 * off)
+    np.testing.assert_allclose(trajectory.spin[frames], stored["spin"], atol=400.0 * off)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_events_are_those_of_the_oracle_in_order(name: str) -> None:
+    stored, scene = case(name), load(CASES / f"{name}.toml")
+    until = stored["trusted_until"]
+    outcome: ShotResult = Table(scene).shoot(until=until)
+    ours = [key(event) for event in outcome.events]
+    theirs = [(ROUND.get(e["kind"], "cushion"), tuple(e["names"]), e["time"]) for e in stored["events"]]
+    theirs = [each for each in theirs if each[2] <= until]
+    assert [each[:2] for each in ours] == [each[:2] for each in theirs]
+    # s: nothing here is slower at an event than some mm/s, and known to less than 1e-9 m
+    np.testing.assert_allclose([each[2] for each in ours], [each[2] for each in theirs], atol=1e-6)
+
+
+def key(event: ShotEvent) -> tuple[str, tuple[str, ...], float]:
+    kind = "cushion" if event.kind == "jaw" else event.kind
+    names = (event.ball,) if event.partner is None else (event.ball, event.partner)
+    return kind, names, event.time

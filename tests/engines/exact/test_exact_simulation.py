@@ -1,0 +1,304 @@
+"""The exact engine as a simulation: frames, contacts, actions, refusals, bounds."""
+
+import math
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from sandbox.action import ActionError, Force, Impulse, Move, Remove, SetParameter, Spawn
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal
+from sandbox.engines.exact.engine import ExactEngine
+from sandbox.engines.registry import start
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document
+
+G = 9.81
+
+MIXED = {
+    "world": {"gravity": [0.3, -G]},
+    "material": [{"name": "m", "restitution": 0.7, "friction": 0.3}],
+    "plane": [{"point": [0, -1], "normal": [0.1, 1], "material": "m"}],
+    "wall": [{"points": [[-3, 4], [-3, -0.4], [0, -0.2], [3, -1], [3, 4]], "thickness": 0.1, "material": "m"}],
+    "post": [{"position": [0.3, 1.0], "radius": 0.3, "material": "m"}],
+    "ball": [
+        {"position": [-1.0, 2.0], "velocity": [2, 0], "radius": 0.2, "mass": 2.0, "material": "m"},
+        {"position": [0.1, 2.0], "radius": 0.15, "angular_velocity": 20, "material": "m"},
+        {"position": [1.5, 1.0], "velocity": [-3, 1], "radius": 0.25, "material": "m"},
+        {"position": [-2.0, 1.0], "radius": 0.3, "fixed": True, "material": "m"},
+        {"position": [2.0, 3.0], "radius": 0.1, "collides": "fixed", "material": "m"},
+        {"position": [0.0, 3.0], "radius": 0.1, "collides": "none"},
+    ],
+}
+
+BOUNCE = {
+    "world": {"gravity": [0, -G]},
+    "plane": [{"point": [0, 0], "normal": [0, 1], "friction": 0.4}],
+    "ball": [{"position": [0, 1.5], "velocity": [1, 0], "radius": 0.5, "restitution": 0.5}],
+}
+
+
+def started(document, dt=0.01):
+    return ExactEngine().start(from_document({**document, "solver": {"dt": dt}}))
+
+
+def stepped(simulation, steps):
+    for _ in range(steps):
+        simulation.step()
+    return simulation
+
+
+@pytest.mark.parametrize("document", [MIXED, BOUNCE])
+def test_frames_do_not_depend_on_dt_bit_for_bit(document):
+    # 2⁻⁸ and 2⁻²: both reach 1.5 s without rounding.
+    fine, coarse = stepped(started(document, 2.0**-8), 384), stepped(started(document, 0.25), 6)
+    assert fine.time == coarse.time == 1.5
+    assert fine.state_hash() == coarse.state_hash()
+
+
+def test_an_action_takes_effect_alike_whatever_the_dt():
+    hashes = set()
+    for dt, steps in ((2.0**-8, 128), (0.25, 2)):
+        simulation = stepped(started(MIXED, dt), steps)
+        simulation.apply(Impulse(time=0.5, body="ball-1", impulse=(1.0, 2.0), angular=0.1))
+        hashes.add(stepped(simulation, 2 * steps).state_hash())
+    assert len(hashes) == 1
+
+
+@pytest.mark.parametrize("document", [MIXED, BOUNCE])
+def test_impulses_add_up_to_the_change_of_momentum(document):
+    simulation = started(document)
+    simulation.contacts()
+    contacts, frame = stepped(simulation, 200).contacts(), simulation.frame()
+    mass, gravity = simulation.bodies.mass[:, None], np.array(document["world"]["gravity"])
+    expected = mass * (simulation.bodies.velocity + gravity * simulation.time) * ~simulation.bodies.fixed[:, None]
+    got = mass * frame.velocity
+    for (first, second), impulse in zip(contacts.pair.tolist(), contacts.impulse, strict=True):
+        got[first] += impulse * (not simulation.bodies.fixed[first])
+        if second >= 0:
+            got[second] -= impulse * (not simulation.bodies.fixed[second])
+    assert got == pytest.approx(expected, abs=1e-12 * 2 * G * simulation.time)  # of the weight's impulse
+
+
+def test_asking_at_every_step_tells_the_same_as_asking_once():
+    whole, parts = started(MIXED), started(MIXED)
+    whole.contacts()
+    found = [parts.contacts()]
+    for _ in range(200):
+        whole.step()
+        parts.step()
+        found.append(parts.contacts())
+    once = whole.contacts()
+    summed = {}
+    for contacts in found:
+        for event in contacts:
+            key = event.time, event.pair, event.point
+            summed[key] = summed.get(key, 0) + np.array(event.impulse)
+    assert list(summed) == [(event.time, event.pair, event.point) for event in once]
+    for event, impulse in zip(once, summed.values(), strict=True):
+        assert impulse == pytest.approx(event.impulse, abs=1e-12)  # the order of up to 200 additions differs
+    assert whole.state_hash() == parts.state_hash()
+
+
+def test_first_call_tells_what_rests_now():
+    simulation = stepped(started(BOUNCE), 300)
+    contacts = simulation.contacts()
+    assert contacts.pair.tolist() == [[0, -1]]
+    assert contacts.time.tolist() == [3.0]
+    later = stepped(simulation, 100).contacts()
+    assert later.time.tolist() == [3.0]
+    assert later.impulse[0] == pytest.approx([0, -G], abs=1e-13)  # its weight for a second
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_touching_balls_in_line_pass_momentum_on(count):
+    row = [{"position": [0.2 * k, 0], "radius": 0.1, "restitution": 1} for k in range(5)]
+    hitting = {"velocity": [1, 0], "radius": 0.1, "restitution": 1}
+    row += [{"position": [-1.0 - 0.2 * k, 0], **hitting} for k in range(count)]
+    simulation = stepped(started({"ball": row}), 300)
+    speeds = np.sort(simulation.frame().velocity[:, 0])
+    assert speeds == pytest.approx([0.0] * 5 + [1.0] * count, abs=1e-14)  # k in, k out, to rounding
+
+
+@pytest.mark.parametrize("restitution", [1.0, 0.9, 0.3, 0.0])
+def test_a_symmetric_rack_breaks_without_a_hang_and_keeps_momentum(restitution):
+    rack = [
+        {"position": [0.1 * math.sqrt(3) * r * (1 + 1e-15), 0.2 * (k - r / 2)], "radius": 0.1}
+        for r in range(5)
+        for k in range(r + 1)
+    ]
+    balls = [{"position": [-1, 0], "velocity": [3, 0], "radius": 0.1}, *rack]
+    simulation = started({"ball": [{**ball, "restitution": restitution} for ball in balls]})
+    stepped(simulation, 300)
+    velocity = simulation.frame().velocity
+    assert velocity.sum(axis=0) == pytest.approx([3.0, 0.0], abs=3e-14)  # rounding of some hundred impacts
+    energy = float((velocity**2).sum())
+    assert energy == pytest.approx(9.0, rel=1e-13) if restitution == 1.0 else energy < 9.0
+    frame = simulation.frame().position
+    apart = np.hypot(*(frame[:, None] - frame[None]).transpose(2, 0, 1))[np.triu_indices(16, 1)]
+    assert apart.min() > 0.2 - 1e-12  # none in another, but for rounding
+
+
+def test_a_pile_finishes_or_is_given_up_with_a_reason():
+    wall = {"points": [[-1, 4], [-1, 0], [1, 0], [1, 4]], "restitution": 0.3, "friction": 0.3}
+    balls = [
+        {"position": [-0.8 + 0.3 * (k % 6) + 0.02 * (k // 6), 0.2 + 0.31 * (k // 6)], "radius": 0.1} for k in range(30)
+    ]
+    balls = [{**ball, "restitution": 0.5, "friction": 0.3} for ball in balls]
+    simulation = started({"world": {"gravity": [0, -G]}, "wall": [wall], "ball": balls}, dt=0.02)
+    try:
+        stepped(simulation, 10)
+    except Exhaustion as exhaustion:
+        assert "events within" in str(exhaustion)
+        assert "pymunk, reference" in str(exhaustion)
+        with pytest.raises(RuntimeError, match="has ended"):
+            simulation.step()
+    assert np.isfinite(simulation.frame().position).all()
+
+
+def test_a_pile_whose_events_come_too_fast_to_last_is_given_up_early(monkeypatch):
+    monkeypatch.setattr("sandbox.engines.exact.simulation.PER_SECOND", 20_000)  # few, so that no compiler is needed
+    monkeypatch.setattr("sandbox.engines.exact.simulation.PER_SECOND_AND_BALL", 1)
+    normals = {(0, 0): [0, 1], (-0.001, 0): [1, 0], (1.27, 0): [-1, 0]}
+    walls = [{"point": list(point), "normal": normal, "friction": 1.0} for point, normal in normals.items()]
+    places = [[0.056 + 0.105 * (k % 12), 0.05 + (0.1 + 1e-6) * (k // 12)] for k in range(120)]
+    balls = [{"position": place, "radius": 0.05, "restitution": 0.0, "friction": 1.0} for place in places]
+    simulation = started({"world": {"gravity": [0, -G]}, "plane": walls, "ball": balls}, dt=0.01)
+    with pytest.raises(Exhaustion, match=r"5,000 events within 0.0312 s where the limit is 20,000 per second"):
+        stepped(simulation, 100)
+    # Two batches of an eighth of the budget each, and no more than one before them that was still slow.
+    assert simulation.events < 10_000
+
+
+def test_what_is_too_fast_is_given_up(monkeypatch):
+    monkeypatch.setattr("sandbox.engines.exact.simulation.PER_SECOND", 20_000)
+    walls = [{"point": [0, 0], "normal": [1, 0]}, {"point": [0.3, 0], "normal": [-1, 0]}]
+    ball = {"position": [0.15, 0], "velocity": [1e9, 0], "radius": 0.1, "restitution": 1}
+    simulation = started({"plane": walls, "ball": [ball]}, dt=1.0)
+    with pytest.raises(Exhaustion, match=r"5,000 events within 0\.0312 s .*, last of 'ball-1' and 'plane-"):
+        simulation.step()
+
+
+def test_refusals_name_what_is_missing_and_who_could():
+    drag = from_document({**BOUNCE, "world": {"gravity": [0, -G], "linear_drag": 0.1}})
+    with pytest.raises(Refusal, match=r"exact refuses: it does not model drag; engines that can: .*pymunk"):
+        start(drag, "exact")
+    scene, engine = from_document(BOUNCE), ExactEngine()
+    for choice in (
+        {"integrator": "rk4"},
+        {"slop": 0.01},
+        {"stiffness": 1e3},
+        {"half_kick": True},
+        {"broad_phase": "grid"},
+    ):
+        (lack,) = engine.missing(scene, scene.solver.replace(**choice))
+        assert next(iter(choice)) in lack
+        assert "remove it" in lack
+    assert engine.missing(scene, scene.solver.replace(substeps=7, iterations=3)) == ()
+
+
+def test_overlaps_are_refused_and_touches_are_not():
+    def balls(gap, **more):
+        pair = [{"position": [0, 0], "radius": 0.5}, {"position": [1 + gap, 0], "radius": 0.5, **more}]
+        return from_document({"ball": pair})
+
+    engine = ExactEngine()
+    (lack,) = engine.missing(balls(-0.1), balls(0).solver)
+    assert lack == "'ball-1' and 'ball-2' overlap by 0.1 m, and it cannot separate overlapping bodies"
+    assert engine.missing(balls(-1e-10), balls(0).solver) == ()
+    assert engine.missing(balls(-0.1, collides="fixed"), balls(0).solver) == ()
+    sunk = from_document({**BOUNCE, "ball": [{"position": [0, 0.4], "radius": 0.5}]})
+    (lack,) = engine.missing(sunk, sunk.solver)
+    assert "'ball-1' and 'plane-1' overlap by 0.1 m" in lack
+
+
+def test_actions_that_it_cannot_do_change_nothing():
+    simulation = stepped(started(MIXED), 5)
+    before = simulation.state_hash()
+    for action, why in (
+        (Force(time=0, body="ball-1", force=(1.0, 0.0)), "pymunk and reference"),
+        (Move(time=0, body="ball-1", position=(0.3, 1.0)), "overlap"),
+        (Spawn(time=0, ball=Ball(position=(0.3, 1.0), radius=0.1)), "overlap"),
+        (SetParameter(time=0, path="world.linear_drag", value=0.1), "drag"),
+        (Remove(time=0, body="nobody"), "nobody"),
+    ):
+        with pytest.raises(ActionError, match=why):
+            simulation.apply(action)
+        assert simulation.state_hash() == before
+
+
+def test_gravity_turned_off_lets_a_ball_at_rest_be():
+    simulation = stepped(started(BOUNCE), 400)
+    rolling = simulation.frame().velocity[0].copy()
+    simulation.apply(SetParameter(time=4.0, path="world.gravity", value=[0.0, 1.0]))
+    frame = stepped(simulation, 100).frame()
+    assert frame.velocity[0] == pytest.approx([rolling[0], 1.0], abs=1e-15)  # it rises from the floor
+    assert frame.position[0, 1] == pytest.approx(1.0, abs=1e-14)
+
+
+def test_moved_spawned_and_removed_balls_meet_others_where_they_are():
+    balls = [{"position": [0, 0], "velocity": [1, 0], "radius": 0.5, "restitution": 1}]
+    simulation = started({"ball": balls})
+    simulation.apply(Spawn(time=0, ball=Ball(name="new", position=(2.0, 0.0), radius=0.5, restitution=1.0)))
+    stepped(simulation, 150)
+    assert simulation.frame().velocity[:, 0].tolist() == [0.0, 1.0]
+    assert simulation.frame().position[:, 0] == pytest.approx([1.0, 2.5], abs=1e-15)
+    simulation.apply(Move(time=1.5, body="ball-1", position=(5.0, 0.0)))
+    stepped(simulation, 200)
+    assert simulation.frame().velocity[:, 0].tolist() == [1.0, 0.0]
+    simulation.apply(Remove(time=3.5, body="new"))
+    frame = simulation.frame()
+    assert frame.present.tolist() == [True, False]
+    assert dict(simulation.retired) == {1: 3.5}
+
+
+def test_ball_that_leaves_the_bounds_is_retired_and_far_ones_end_the_run():
+    world = {"bounds": [[-2, -2], [2, 2]]}
+    simulation = stepped(
+        started({"world": world, "ball": [{"position": [0, 0], "velocity": [10, 0], "radius": 1}]}), 30
+    )
+    assert simulation.retired[0] == pytest.approx(0.21)  # the first frame beyond 0.2 s
+    away = started({"ball": [{"position": [1e16, 0], "velocity": [1e12, 0], "radius": 1}]}, dt=10)
+    with pytest.raises(Divergence):
+        for _ in range(10**5):
+            away.step()
+
+
+PROGRAM = """
+import json, sys
+from sandbox.engines.exact.engine import ExactEngine
+from sandbox.scene.files.load import from_document
+for document, steps in json.loads(sys.stdin.read()):
+    simulation = ExactEngine().start(from_document(document))
+    simulation.contacts()
+    for _ in range(steps):
+        simulation.step()
+    contacts = simulation.contacts()
+    print(simulation.state_hash(), contacts.time.tobytes().hex()[:4000], contacts.impulse.sum(axis=0).tolist())
+"""
+
+
+def test_compiled_and_plain_kernels_agree_bit_for_bit():
+    import json
+
+    random = np.random.default_rng(7)
+    gas = {
+        "wall": [{"points": [[0, 0], [4, 0], [4, 4], [0, 4]], "closed": True, "restitution": 1.0}],
+        "ball": [
+            {"position": [0.5 + k % 4, 0.5 + k // 4], "velocity": random.normal(size=2).tolist(), "radius": 0.25}
+            for k in range(16)
+        ],
+    }
+    incline = {**BOUNCE, "plane": [{"point": [0, 0], "normal": [0.5, 0.8660254037844386], "friction": 0.5}]}
+    cases = json.dumps([[BOUNCE, 300], [gas, 200], [incline, 200], [MIXED, 150]])
+    outputs = set()
+    for disabled in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM], input=cases, env=environment, capture_output=True, text=True, check=True
+        )
+        outputs.add(done.stdout)
+    assert len(outputs) == 1
+    assert len(outputs.pop().splitlines()) == 4

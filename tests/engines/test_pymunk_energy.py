@@ -1,0 +1,195 @@
+"""The account of pymunk: it closes to rounding, obeys the laws of what it names, and leaves no trace on the run."""
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import accounts
+import numpy as np
+import pytest
+
+import sandbox
+from sandbox.action import Force, Impulse, Move, Remove, SetParameter, Spawn
+from sandbox.engines.energy_ledger import Cause
+from sandbox.scene.files.load import from_document
+from sandbox.scene.scene import Scene
+
+SCENES = Path(__file__).parents[2] / "scenes"
+# Rounding of a few hundred sums, of energies that are up to 1e4 times those in motion
+kept = partial(accounts.kept, engine="pymunk", closes=1e-11)
+
+
+def document(gravity: float = -10.0, substeps: int = 1, **more: Any) -> Scene:
+    world = {"gravity": [0, gravity], "duration": 3.0, **more.pop("world", {})}
+    solver = {"dt": 0.01, "substeps": substeps, **more.pop("solver", {})}
+    return from_document({"world": world, "solver": solver, **more})
+
+
+def ball(name: str, x: float, y: float, **more: Any) -> dict[str, Any]:
+    return {"name": name, "position": [x, y], "radius": 0.1, "mass": 1.0, **more}
+
+
+FLOOR = {"point": [0, 0], "normal": [0, 1]}
+
+
+@pytest.mark.parametrize(
+    ("name", "steps"),
+    [
+        ("tutorial/fireworks", 60),
+        ("tutorial/spaceship", 60),
+        ("benchmark/two_balls", 150),
+        ("benchmark/newtons_cradle", 150),
+        ("benchmark/incline", 60),
+        ("benchmark/box_sticks", 60),
+        ("benchmark/box_slides", 60),
+        ("benchmark/slide_to_roll", 60),
+        ("benchmark/gas", 60),
+        ("benchmark/pile", 25),
+        ("benchmark/tower", 40),
+        ("benchmark/pendulum_90", 60),
+        ("benchmark/double_pendulum", 60),
+        ("benchmark/spring", 60),
+        ("benchmark/kepler", 60),
+        ("joints/bridge", 15),
+        ("joints/ragdoll_stairs", 15),
+        ("joints/cloth", 4),
+        ("particles/sparks", 15),
+    ],
+)
+def test_account_of_a_shipped_scene_closes(name: str, steps: int) -> None:
+    account = kept(sandbox.load(SCENES / f"{name}.toml"), steps)
+    assert all(np.isfinite(list(account.values())))
+
+
+@pytest.mark.parametrize(
+    "joints",
+    [
+        [{"kind": "rod", "anchors": [[0.3, 0.1], [-0.3, 0.0]]}],
+        [{"kind": "pivot", "at": [0.5, 0]}],
+        [{"kind": "slide", "least": 0.5, "most": 1.05}],
+        [{"kind": "groove", "groove": [[0, -1], [2, 1]], "anchor": [0.1, 0]}],
+        [{"kind": "rotary_limit", "least": -0.2, "most": 0.2}],
+        [{"kind": "gear", "ratio": 2.0}],
+        [{"kind": "pivot", "at": [0.5, 0]}, {"kind": "motor", "rate": 5.0, "max_torque": 3.0}],
+        [
+            {
+                "kind": "spring",
+                "anchors": [[0.3, 0.1], [-0.3, 0]],
+                "stiffness": 300.0,
+                "damping": 5.0,
+                "rest_length": 0.2,
+            }
+        ],
+        [{"kind": "rotary_spring", "stiffness": 30.0, "damping": 0.7, "rest_angle": 0.5}],
+    ],
+    ids=lambda joints: str(joints[-1]["kind"]),
+)
+def test_account_of_a_joint_in_wind_closes_and_each_cause_has_its_sign(joints: list[dict[str, Any]]) -> None:
+    box = {"size": [0.6, 0.3], "mass": 2.0, "collides": "none"}
+    boxes = [
+        {"name": "a", "position": [0, 0], "angular_velocity": 2.0, **box},
+        {"name": "b", "position": [1, 0.2], "velocity": [0, 1.0], "angular_velocity": -1.0, **box},
+    ]
+    held = [{"between": ["a", "b"], **joint} for joint in joints]
+    account = kept(document(box=boxes, joint=held, substeps=2, world={"linear_drag": 0.1, "wind": [1.0, 0.0]}), 60)
+    kind = joints[-1]["kind"]
+    assert account[Cause.DRAG] < 0.0
+    assert (account[Cause.DAMPING] < 0.0) == kind.endswith("spring")
+    assert (account[Cause.DRIVES] > 0.0) == (kind == "motor")
+    assert (account[Cause.JOINTS] < 0.0) == (not kind.endswith("spring"))
+
+
+def test_free_fall_gains_half_m_g_h_squared_in_each_substep() -> None:
+    account = kept(document(ball=[ball("a", 0, 5), ball("b", 1, 5, mass=2.0, collides="none")], plane=[FLOOR]), 50)
+    # Explicit Euler: the fall lags by g h²/2 in each of 50 substeps, for 1 kg in the space and 2 kg beside it.
+    assert account[Cause.INTEGRATOR] == pytest.approx(50 * 0.5 * 3.0 * (10.0 * 0.01) ** 2, rel=1e-12)  # rounding
+    assert all(energy == 0.0 for cause, energy in account.items() if cause != Cause.INTEGRATOR)
+
+
+def test_fall_that_starts_half_a_kick_ahead_gains_nothing() -> None:
+    balls = [ball("a", 0, 5), ball("b", 1, 5, collides="none")]
+    account = kept(document(ball=balls, plane=[FLOOR], solver={"half_kick": True}), 50, part=0.3)
+    # A substep of which only s is made is off by ½ m g² h² s (s − 1), which the interpolation costs.
+    assert account[Cause.INTEGRATOR] == pytest.approx(2 * 0.5 * 0.1**2 * 0.3 * (0.3 - 1.0), abs=1e-12)  # rounding
+
+
+def test_impact_takes_what_restitution_leaves_over() -> None:
+    e, m1, m2, v = 0.5, 1.0, 3.0, 4.0
+    balls = [ball("a", 0, 0, velocity=[v, 0], mass=m1), ball("b", 1, 0, mass=m2)]
+    balls = [{**each, "restitution": np.sqrt(e), "friction": 0.0} for each in balls]
+    account = kept(document(gravity=0.0, ball=balls), 60)
+    reduced = m1 * m2 / (m1 + m2)
+    assert account[Cause.RESTITUTION] == pytest.approx(-0.5 * reduced * (1 - e**2) * v**2, rel=1e-12)  # rounding
+    assert account[Cause.FRICTION] == 0.0
+
+
+def test_slide_takes_friction_times_weight_times_way() -> None:
+    scene = sandbox.load(SCENES / "benchmark/slide_to_stop.toml")
+    time = 120 * scene.solver.dt
+    account = kept(scene, 120)
+    way = 5.0 * time - 0.5 * (0.5 * 9.81) * time**2
+    mass = float(scene.bodies.mass[0])
+    # The box tips forward a little at first, into the slop, and its friction is not μ m g meanwhile.
+    assert account[Cause.FRICTION] == pytest.approx(-0.5 * mass * 9.81 * way, rel=5e-3)
+
+
+def test_box_at_rest_has_no_entries() -> None:
+    box = {"name": "a", "position": [0, 0.1], "size": [1.0, 0.2], "mass": 2.0}
+    scene = document(box=[box], plane=[FLOOR])
+    settled, later = kept(scene, 100), kept(scene, 200)
+    # Each substep's kick, of m g² h²/2 = 0.01 J, is taken back by the contact; 1 J in 1 s would be the integrator's.
+    assert all(later[cause] == pytest.approx(settled[cause], abs=1e-5) for cause in Cause)
+
+
+def test_elastic_gas_has_no_friction() -> None:
+    account = kept(sandbox.load(SCENES / "benchmark/gas.toml"), 100)
+    assert account[Cause.FRICTION] == 0.0
+    assert account[Cause.RESTITUTION] == pytest.approx(0.0, abs=1e-12 * 78.5)  # rounding, of the gas's energy
+
+
+ACTIONS: accounts.Timed = [
+    (5, Impulse(time=0, body="a", impulse=(1.0, 0.5), angular=0.1)),
+    (10, Force(time=0, body="b", force=(0.5, 0.0), torque=0.01)),
+    (20, Spawn(time=0, ball={"name": "n", "position": (0.5, 0.6), "radius": 0.1, "mass": 2.0, "velocity": (1.0, 2.0)})),
+    (30, Remove(time=0, body="c")),
+    (40, SetParameter(time=0, path="world.gravity", value=[1.0, -5.0])),
+    (50, Move(time=0, body="a", position=(5.0, 2.0))),
+    (60, SetParameter(time=0, path="world.quadratic_drag", value=0.2)),
+]
+
+
+@pytest.mark.parametrize("part", [None, 0.37])
+def test_account_goes_on_through_actions(part: float | None) -> None:
+    balls = [ball("a", 0, 0.5), ball("b", 1, 0.3, velocity=[-1, 0]), ball("c", 2, 3, collides="none")]
+    account = kept(document(ball=balls, plane=[FLOOR], substeps=2), 80, ACTIONS, part)
+    assert account[Cause.RETIRED] < 0.0
+    assert account[Cause.ACTIONS] != 0.0
+    assert account[Cause.DRIVES] != 0.0
+    assert account[Cause.DRAG] < 0.0
+
+
+def test_steady_force_works_along_the_way() -> None:
+    account = kept(document(gravity=0.0, ball=[ball("a", 0, 0)]), 50, [(0, Force(time=0, body="a", force=(2.0, 0.0)))])
+    assert account[Cause.DRIVES] == pytest.approx(0.5 * 1.0 * (2.0 * 0.5) ** 2, rel=1e-12)  # rounding of 50 sums
+
+
+def test_spring_that_breaks_parts_with_what_it_stored() -> None:
+    spring = {"kind": "spring", "between": ["a"], "stiffness": 100.0, "rest_length": 0.5, "strength": 12.0}
+    account = kept(document(ball=[ball("a", 0, -0.5)], joint=[spring]), 40)
+    # It breaks in the first substep in which it gives more than 12 N, and so stores more than 12²/2k = 0.72 J.
+    assert -0.85 < account[Cause.PARTED] < -0.72
+
+
+def test_contacts_that_part_and_meet_again_are_booked_once() -> None:
+    boxes = [
+        {
+            "name": f"b{k}",
+            "position": [0.3 * (k % 3), 0.5 + 0.35 * k],
+            "size": [0.3, 0.3],
+            "mass": 1.0,
+            "angle": 0.3 * k,
+        }
+        for k in range(9)
+    ]
+    # Munk2D starts a point that it still knows at its old impulse, and reports that once more.
+    kept(document(box=boxes, plane=[FLOOR], solver={"persistence": 8}), 120)

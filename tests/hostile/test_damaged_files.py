@@ -1,0 +1,43 @@
+"""Damaged files, bounded: files of every kind through the commands that read them, in isolated processes."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
+from fuzzing.damaged_files import KINDS, argument, file_cases
+from fuzzing.isolated import Case, Limits, run_cases
+
+
+def failures(cases: list[Case], workers: int = 1) -> list[str]:
+    found = run_cases(cases, Limits(), workers)
+    return [f"{case.about}: {outcome.group}\n{outcome.detail}" for case, outcome in found if outcome.failed]
+
+
+def test_a_damaged_file_is_determined_by_seed_and_number() -> None:
+    assert [argument(3, k) for k in range(20)] == [argument(3, k) for k in range(20)]
+    assert argument(3, 0) != argument(4, 0)
+
+
+def test_sound_files_are_read_by_every_command() -> None:
+    quick = {"plot", "other", "again", "png", "gif"}  # the others take seconds of compiling and drawing
+    cases = [
+        Case(
+            "fuzzing.damaged_files:read_damaged",
+            {"file": name, "damage": [], "commands": [each for each in kind.commands if each not in quick]},
+            name,
+        )
+        for name, kind in KINDS.items()
+    ]
+    assert failures(cases) == []
+
+
+@pytest.mark.slow
+def test_damaged_files_are_refused_or_made_again() -> None:
+    assert failures(list(file_cases(7, 25))) == []
+
+
+@pytest.mark.slow
+def test_many_damaged_files_are_refused_or_made_again() -> None:
+    assert failures(list(file_cases(8, 400)), workers=2) == []

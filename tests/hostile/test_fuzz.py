@@ -1,0 +1,74 @@
+"""Fuzzing, bounded: mutants of the shipped scenes on every engine, in isolated processes."""
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
+from fuzzing.isolated import Case, Limits, Outcome, run_cases
+from fuzzing.scene_mutants import argument, scene_cases
+
+SEED = 1
+"""The same mutants every time; `tools/fuzz.py` draws others by hand."""
+
+
+def outcomes(cases: Iterable[Case], limits: Limits | None = None) -> list[Outcome]:
+    return [outcome for _, outcome in run_cases(cases, limits or Limits(), workers=1)]
+
+
+def failures(cases: Iterable[Case]) -> list[str]:
+    found = run_cases(cases, Limits(), workers=1)
+    return [f"{case.about}: {outcome.group}\n{outcome.detail}" for case, outcome in found if outcome.failed]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)  # the first cases may wait for kernels to be compiled
+@pytest.mark.parametrize("part", range(2))
+def test_mutated_scenes_end_in_a_result_or_an_error_of_the_interface(part: int) -> None:
+    assert failures(scene_cases(SEED, 60, first=60 * part)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("part", range(4))
+def test_more_mutated_scenes_end_in_a_result_or_an_error_of_the_interface(part: int) -> None:
+    assert failures(scene_cases(SEED, 500, first=10_000 + 500 * part)) == []
+
+
+def test_a_mutant_is_determined_by_seed_and_number() -> None:
+    assert [argument(3, k) for k in range(30)] == [argument(3, k) for k in range(30)]
+    assert argument(3, 0) != argument(4, 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "what"),
+    [
+        ("passes", "ok", ""),
+        ("refuses", "refused", "ValueError"),
+        ("raises", "traceback", "ZeroDivisionError"),
+        ("violates", "violation", "sum"),
+        ("warns", "traceback", "UserWarning"),
+        ("aborts", "abort", "SIGABRT"),
+        ("loops", "hang", ""),
+        ("allocates", "memory", "MemoryError"),
+    ],
+)
+def test_outcome_of_a_case_says_how_it_ended(name: str, kind: str, what: str) -> None:
+    outcome = outcomes([Case(f"fuzzing.samples:{name}", 1)], Limits(cpu=1.0, memory=2**30))[0]
+    assert (outcome.kind, outcome.what) == (kind, what)
+
+
+def test_cases_after_one_that_died_are_run() -> None:
+    names = ("passes", "aborts", "passes", "raises", "refuses")
+    found = outcomes(Case(f"fuzzing.samples:{name}", 1) for name in names)
+    assert [outcome.kind for outcome in found] == ["ok", "abort", "ok", "traceback", "refused"]
+
+
+def test_closing_the_iterator_ends_the_workers() -> None:
+    found = run_cases(
+        (Case(f"fuzzing.samples:{name}", 1) for name in ("passes", "waits", "waits")), Limits(), workers=2
+    )
+    assert next(found)[1].kind == "ok"
+    found.close()  # type: ignore[attr-defined]

@@ -1,0 +1,156 @@
+"""Hostile values of every option and argument of every command: one bounded line and status 2, never a traceback."""
+
+import importlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+
+from sandbox.cli.main import COMMANDS, call
+
+LONG = 10**6
+"""Characters of a long value."""
+MANY = 10**5
+"""Names in a long list."""
+MAX_SAID = 2000
+"""Characters that a command may say of one hostile value."""
+MISSING = "no-such-scene"
+"""In place of a scene: the command is refused whatever else it is given, and so never works for long."""
+
+TEXTS = (
+    "", " ", "-", "--", "=", ",", ".", "\n", "a\nb", "\x1b[31m", "a\0b", "\udcff", "\u202e", "ü" * LONG, "a" * LONG,
+    "a b " * (LONG // 4), ",".join(["a"] * MANY), ",".join(f"a{k}" for k in range(MANY)), "." * LONG, ":" * LONG,
+    "'" * LONG, '"' * LONG, "[" * LONG, "x=" + "[" * LONG, "x=" + "{a=" * MANY, "x=" + "9" * LONG, "=" * LONG,
+    "x." * MANY + "y=1", "x[1]" * MANY + "=1", "solver.dt=" + ",".join(["1"] * MANY), "title=" + "\"," * MANY,
+    "solver.dt=0:1:" + "9" * 5000, "solver.dt=0:1:1000000000", "*=1", "*.*.*=1", "world=1", "ball.*=1",
+    "9" * 5000 + "x" + "9" * 5000, "1e400", "nan", "bot:" + "9" * LONG, ",".join(["bot"] * MANY),
+)  # fmt: skip
+NUMBERS = (
+    "", "x", "nan", "-nan", "inf", "-inf", "1e400", "-1e400", "-0", "-1", "0x10", "1_000", "9" * 60, "-" + "9" * 60,
+    "9" * 5000, "9" * LONG, "1" + "0" * 12, "1e9", "0." + "0" * LONG + "1", "٣", "½", "1\n2", "a\0b",
+)  # fmt: skip
+PATHS = (
+    "", "-", "x" * 256, "x" * 300 + ".png", "x/" * 3000, "x/" * 3000 + "y.html", "é" * 200, "a\nb", "a\0b",
+    "\udcff.png", "/dev/null", "/dev/null/x", "/dev/null/x.png", "/dev/zero", "/proc/x/y", "file", "file/x",
+    "file/x.png", "loop", "loop/x.svg", "broken", "broken/x.pdf", "folder", "folder.png", "no/such/folder.svg",
+    "a" * LONG,
+)  # fmt: skip
+
+
+def commands() -> dict[str, click.Command]:
+    """Return every command by name."""
+    return {name: importlib.import_module(f"sandbox.cli.{name}").command for name in COMMANDS}
+
+
+def values_for(parameter: click.Parameter) -> tuple[str, ...]:
+    """Return hostile values for the type of a parameter."""
+    if isinstance(parameter.type, click.types.IntParamType | click.types.FloatParamType):
+        return NUMBERS
+    if isinstance(parameter.type, click.Path) or parameter.name in ("targets", "minimise"):
+        return PATHS
+    if parameter.name == "table":  # the schema is made for each, which takes a second
+        return TEXTS[::5]
+    return TEXTS + PATHS if isinstance(parameter, click.Argument) else TEXTS
+
+
+def refused_anyway(name: str, command: click.Command) -> list[str]:
+    """Return arguments with which a command is refused, whatever its options are."""
+    if any(isinstance(parameter, click.Argument) for parameter in command.params) and name != "schema":
+        out = ["--out", "page.html"] if name == "report" else []
+        return [MISSING, *out]
+    return ["--axes", "none"] if name == "extremes" else []
+
+
+def options() -> Iterator[Any]:
+    """Yield each command with each of its parameters."""
+    for name, command in commands().items():
+        for parameter in command.params:
+            if not getattr(parameter, "is_flag", False):
+                yield pytest.param(name, command, parameter, id=f"{name} {parameter.name}")
+
+
+def spelled(value: str) -> str:
+    return f"{value[:20]}, {len(value)} long"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Stand in a folder with all sorts of files."""
+    (tmp_path / "file").write_text("")
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "broken").symlink_to(tmp_path / "nothing")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder.png").mkdir()
+    for suffix in ("png", "json"):
+        os.mkfifo(tmp_path / f"pipe.{suffix}")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(("name", "command", "parameter"), list(options()))
+def test_hostile_value_is_one_bounded_complaint(
+    name: str, command: click.Command, parameter: click.Parameter, capfd: pytest.CaptureFixture[str]
+) -> None:
+    base = refused_anyway(name, command)
+    for value in values_for(parameter):
+        if isinstance(parameter, click.Argument):
+            arguments = [name, *base[1:], "--", value]
+        else:
+            arguments = [name, f"{parameter.opts[0]}={value}", *base]
+        status = call(arguments)
+        err = capfd.readouterr().err
+        assert (status, spelled(value)) == (2, spelled(value))
+        assert err.strip(), spelled(value)
+        assert len(err) <= MAX_SAID, (spelled(value), len(err), err[:500])
+
+
+@pytest.mark.parametrize("command", list(commands().items()), ids=lambda item: item[0])
+def test_unknown_option_and_value_of_a_flag_are_refused(
+    command: tuple[str, click.Command], capfd: pytest.CaptureFixture[str]
+) -> None:
+    name, this = command
+    flags = [f"{each.opts[0]}={'x' * LONG}" for each in this.params if getattr(each, "is_flag", False)]
+    for option in (f"--{'x' * LONG}", f"-{'x' * MANY}", "--\n", *flags):
+        assert call([name, option, *refused_anyway(name, this)]) == 2, option[:20]
+        assert 0 < len(capfd.readouterr().err) <= MAX_SAID
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_hostile_command_is_refused(name: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert call([name]) == 2
+    assert 0 < len(capfd.readouterr().err) <= MAX_SAID
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        ("run bounce", "--out"), ("run bounce", "--plot"), ("compare bounce", "--out"), ("tradeoff bounce", "--out"),
+        ("compare bounce --force", "--minimise"), ("tradeoff bounce", "--plot"),
+        ("extremes", "--out"), ("extremes", "--against"), ("match 9-ball", "--out"), ("report bounce", "--out"),
+        ("play bounce", "--record"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize(
+    "path", ["x" * 300, "x" * 300 + ".png", "x/" * 3000 + "y.html", "/dev/null", "/dev/null/x.png", "file/x.svg"]
+)
+def test_path_that_cannot_be_used_is_refused_before_the_work(
+    command: str, option: str, path: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert call([*command.split(), option, path]) == 2
+    err = capfd.readouterr().err
+    assert err.startswith(option)
+    assert len(err) <= MAX_SAID
+
+
+@pytest.mark.parametrize(
+    "command", ["run bounce --plot", "tradeoff bounce --plot", "play bounce --record", "compare bounce --minimise"]
+)
+def test_pipe_or_device_is_not_replaced_by_a_file(
+    command: str, folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert call([*command.split(), "pipe.png"]) == 2
+    assert "not a file" in capfd.readouterr().err
+    assert (folder / "pipe.png").is_fifo()

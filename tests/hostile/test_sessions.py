@@ -1,0 +1,116 @@
+"""Sessions as any program may write them: what is wrong is told with its file and key, and a session may be empty."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sandbox.cli.main import call
+from sandbox.measure.replay import rerun
+from sandbox.play.running.session import Session
+from sandbox.recording import Recording
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import find
+
+Document = dict[str, Any]
+
+
+def document() -> Document:
+    """Return a session as its file holds it."""
+    scene = load(find("bounce"))
+    return dict(json.loads(Recording(scene, "pymunk", scene.solver, (), 0.1).to_json()))
+
+
+def switch(**what: Any) -> Callable[[Document], None]:
+    """Return what adds a switch action to a session."""
+    return lambda document: document["actions"].append({"kind": "switch", "time": 0.05, **what})
+
+
+def change(key: str, value: Any) -> Callable[[Document], None]:
+    """Return what changes a value of a session."""
+    return lambda document: document.__setitem__(key, value)
+
+
+WRONG = {
+    "no engine": (change("engine", ""), "engine: "),
+    "unknown engine": (change("engine", "box2d" * 10**5), "engine: "),
+    "engine of no text": (change("engine", 3), "`engine`"),
+    "switch to no engine": (switch(engine=""), "actions: 0.switch.engine"),
+    "switch to an unknown engine": (switch(engine="box2d"), "actions[0].engine"),
+    "switch to an unknown setting": (switch(settings={"self": 1}), "actions[0].settings.self"),
+    "switch to a wrong setting": (switch(settings={"dt": -1}), "actions[0].settings.dt"),
+    "setting of a long name": (change("settings", {"z" * 10**6: 1}), "settings.z"),
+    "unknown choice": (change("settings", {"integrator": "x" * 10**6}), "settings.integrator"),
+    "kind of action": (change("actions", [{"kind": "z" * 10**6, "time": 0}]), "actions: 0"),
+    "press": (change("presses", [["x" * 10**6, 1, 2]]), "`presses`"),
+    "format": (change("format", "y" * 10**6), "format"),
+    "duration": (change("duration", -1), "`duration`"),
+    "nan": (change("duration", float("nan")), "`duration`"),
+    "scene": (change("scene", {"world": {"duration": "x" * 10**6}}), "world.duration"),
+}
+
+
+@pytest.mark.parametrize(("spoil", "key"), WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize("command", [("run",), ("export", "--to", "x.csv"), ("replay",)], ids=lambda words: words[0])
+def test_wrong_session_is_told_with_file_and_key(
+    spoil: Callable[[Document], None],
+    key: str,
+    command: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    wrong = document()
+    spoil(wrong)
+    Path("s.json").write_text(json.dumps(wrong))
+    assert call([*command, "s.json"]) == 2
+    out, err = capfd.readouterr()
+    assert (out, len(err.splitlines())) == ("", 1)
+    assert err.startswith("s.json: ")
+    assert key in err
+    assert len(err) < 1000
+
+
+@pytest.mark.parametrize("command", ["play", "compare", "check", "tradeoff", "match", "miss", "shots"])
+def test_session_where_a_scene_is_wanted_is_told(
+    command: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps(document()))
+    assert call([command, str(file)]) == 2
+    assert "a recorded session, not a scene" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["[" * 10**5, '{"format": 1, "scene": ' + '{"a": ' * 10**5, "1" * 5000, '"\\ud800"'])
+def test_text_that_is_no_session_is_told(text: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "s.json"
+    file.write_text(text)
+    for command in (["run"], ["export", "--to", "x.csv"], ["replay"]):
+        assert call([*command, str(file)]) == 2
+        assert len(capfd.readouterr().err) < 1000
+
+
+@pytest.mark.parametrize("stated", [10.0, 0.0])
+def test_session_of_no_step_is_run_stored_and_exported(
+    stated: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    session = Session(load(find("bounce"))).recording()
+    assert session.duration == 0.0
+    file = tmp_path / "s.json"
+    session.save(file)
+    written = json.loads(file.read_text())
+    written["scene"].setdefault("world", {})["duration"] = stated
+    file.write_text(json.dumps(written))
+    assert rerun(Recording.load(file)).info["state_hash"] == session.state_hash
+    for _ in range(2):  # made, and found again
+        assert call(["run", str(file), "--out", str(tmp_path / "runs"), "--json"]) == 0
+        (row,) = json.loads(capfd.readouterr().out)["runs"]
+        assert (row["status"], row["steps"], row["replayed"]) == ("ok", 0, True)
+    (stored,) = (tmp_path / "runs").glob("*.npz")
+    for source in (file, stored):
+        assert call(["export", str(source), "--to", str(tmp_path / "x.csv"), "--to", str(tmp_path / "x.png")]) == 0
+    assert call(["run", str(file), "--set", "world.duration=0.02", "--json"]) == 0
+    assert json.loads(capfd.readouterr().out.splitlines()[-1])["runs"][0]["steps"] > 0

@@ -1,0 +1,145 @@
+"""Every kind of table that a scene can hold, each by the least document that has one, for bodies named `a` and `b`."""
+
+import copy
+from typing import Any
+
+Document = dict[str, Any]
+
+
+def _ball(name: str, x: float, **more: Any) -> Document:
+    return {"name": name, "position": [x, 3.0], "radius": 0.5, **more}
+
+
+def _box(name: str, x: float, **more: Any) -> Document:
+    return {"name": name, "position": [x, 3.0], "size": [1.0, 1.0], **more}
+
+
+BODIES: dict[str, Document] = {
+    "none": {},
+    "one": {"ball": [_ball("a", 0.0)]},
+    "one fixed": {"ball": [_ball("a", 0.0, fixed=True)]},
+    "all fixed": {"ball": [_ball("a", 0.0, fixed=True)], "box": [_box("b", 2.0, fixed=True)]},
+    "one of two fixed": {"ball": [_ball("a", 0.0)], "box": [_box("b", 2.0, fixed=True)]},
+    "two": {"ball": [_ball("a", 0.0), _ball("b", 2.0)]},
+    "alone": {"ball": [_ball("a", 0.0, collides="none"), _ball("b", 2.0, collides="none")]},
+}
+"""The bodies that a feature may speak of, or may have to do without."""
+
+_HINGE: Document = {"name": "d", "body": "a", "pivot": [0.2, 3.0], "stops": [0.0, 1.0]}
+_PLUNGER: Document = {"name": "d", "kind": "plunger", "body": "a", "direction": [0, 1], "travel": 1.0, "speed": 1.0}
+_ROPE: Document = {"name": "g", "start": [0.0, 6.0], "end": [2.0, 6.0]}
+_EMITTER: Document = {"name": "g", "position": [0, 5], "count": 3, "velocity_min": [-1, -1], "velocity_max": [1, 1]}
+_WALL: Document = {"name": "w", "points": [[-5.0, 2.4], [5.0, 2.4]]}
+_FLOOR: Document = {"sliding_friction": 0.2, "rolling_friction": 0.01}
+_STILL: Document = {"world": {"gravity": [0.0, 0.0]}}
+
+JOINTS: dict[str, Document] = {
+    "rod": {"length": 2.0},
+    "pivot": {"anchors": [[1.0, 0.0], [-1.0, 0.0]]},
+    "slide": {"least": 0.5, "most": 4.0},
+    "groove": {"groove": [[0, 0], [1, 0]]},
+    "rotary_limit": {"least": -1, "most": 1},
+    "motor": {"rate": 1.0},
+    "gear": {"ratio": 2.0},
+    "spring": {"stiffness": 10.0, "damping": 1.0},
+    "rotary_spring": {"stiffness": 10.0},
+}
+
+
+def _joint(kind: str, *between: str) -> Document:
+    apart = {"anchors": [[0.0, 0.0], [0.0, 1.0]]} if kind in ("rod", "slide", "spring") else {}
+    return {"name": "j", "kind": kind, "between": [*between], **apart, **JOINTS[kind]}
+
+
+FEATURES: dict[str, Document] = {
+    "nothing": {},
+    "attraction to a place": {"attraction": [{"toward": [0.0, 3.0], "strength": 1.0}]},
+    "attraction to a body": {"attraction": [{"toward": "a", "strength": 1.0}]},
+    "attractions": {"attraction": [{"toward": "a", "strength": 1.0}, {"toward": [1, 1], "strength": 1.0}]},
+    "thrust": {"thrust": [{"name": "t", "body": "a", "force": [1.0, 0.0]}]},
+    "thrusts": {
+        "thrust": [
+            {"name": "t", "body": "a", "force": [1.0, 0.0], "key": "up"},
+            {"name": "u", "body": "b", "force": [1.0, 0.0], "point": [0.1, 0.1]},
+        ]
+    },
+    "plane": {"plane": [{"point": [0, 0], "normal": [0, 1]}]},
+    "wall": {"wall": [{**_WALL, "points": [[-5, 1], [0, 0.5], [5, 1]], "restitution": 0.5}]},
+    "kicking wall": {"wall": [{**_WALL, "kick": {"speed": 2.0}}]},
+    "one-way wall": {"wall": [{**_WALL, "one_way": True}]},
+    "open wall": {"wall": [{**_WALL, "solid": False}]},
+    "post": {"post": [{"position": [0.0, 1.0], "radius": 0.2}]},
+    "zone": {"zone": [{"position": [0.0, 2.5], "radius": 2.0}]},
+    "holding zone": {"zone": [{"position": [0.0, 2.9], "radius": 1.0, "holds": True, "gravity": [1.0, 1.0]}]},
+    "layers": {
+        "zone": [{"position": [0, 2.9], "radius": 1.0, "to_layer": "ramp"}],
+        "wall": [{**_WALL, "layers": ["ramp"]}],
+    },
+    "bounds": {"world": {"bounds": [[-9.0, 2.9], [9.0, 9.0]]}},
+    "air": {"world": {"linear_drag": 0.5, "quadratic_drag": 0.5, "wind": [1.0, 0.0]}},
+    "materials": {
+        "material": [{"name": "m", "restitution": 0.5}, {"name": "n"}],
+        "pair": [{"between": ["m", "n"], "friction": 0.5}],
+        "plane": [{"point": [0, 0], "normal": [0, 1], "material": "m"}],
+    },
+    "floor": {**_STILL, "surface": _FLOOR, "wall": [{**_WALL, "height": 0.6}]},
+    "shot": {**_STILL, "surface": _FLOOR, "shot": [{"ball": "a", "speed": 1.0, "aim": [1.0, 0.0]}]},
+    "pockets": {**_STILL, "surface": _FLOOR, "pocket": [{"position": [0.1, 3.0], "radius": 0.9}]},
+    "pucks": {**_STILL, "surface": {"sliding_friction": 0.2, "bodies": "pucks", "curl": 0.5}},
+    "grid": {"grid": [{"name": "g", "origin": [-3, 5], "columns": 2, "spacing": [1, 1], "radius": 0.2}]},
+    "scatter": {"scatter": [{"name": "g", "lower": [-3, 5], "upper": [0, 8], "count": 2, "radius": 0.2}]},
+    "emitter": {"emitter": [{**_EMITTER, "lifetime": 0.03}]},
+    "attracted emitter": {"emitter": [_EMITTER], "attraction": [{"toward": "a", "strength": 1.0}]},
+    "stack": {"stack": [{"name": "g", "base": [-4.0, 0.0], "columns": 1, "rows": 2, "size": [1.0, 1.0]}]},
+    "rope": {"rope": [{**_ROPE, "links": 1}]},
+    "tied rope": {"rope": [{**_ROPE, "links": 1, "tie": {"start": "a", "end": "b"}}]},
+    "tied springs": {
+        "rope": [{**_ROPE, "links": 1, "kind": "springs", "stiffness": 9.0, "tie": {"start": "a", "end": "b"}}]
+    },
+    "tied planks": {"rope": [{**_ROPE, "links": 1, "kind": "planks", "tie": {"start": "a"}}]},
+    "cloth": {
+        "cloth": [
+            {
+                "name": "g",
+                "corner": [0, 9],
+                "columns": 2,
+                "rows": 2,
+                "spacing": [0.5, 0.5],
+                "stiffness": 9.0,
+                "bend": 1.0,
+            }
+        ]
+    },
+    "ragdoll": {"ragdoll": [{"name": "g", "position": [-3.0, 3.0], "height": 1.8}]},
+    "torque drive": {"drive": [{**_HINGE, "kind": "torque", "torque": 1.0}]},
+    "stroke drive": {"drive": [{**_HINGE, "kind": "stroke", "rate": 1.0}]},
+    "plunger drive": {"drive": [_PLUNGER]},
+    "driven in a zone": {"drive": [_PLUNGER], "zone": [{"position": [0.0, 2.9], "radius": 1.0, "holds": True}]},
+    "rope tied to a drive": {"drive": [_PLUNGER], "rope": [{**_ROPE, "links": 1, "tie": {"start": "a"}}]},
+    "springs tied to a drive": {
+        "drive": [_PLUNGER],
+        "rope": [{**_ROPE, "links": 2, "kind": "springs", "stiffness": 9.0, "tie": {"start": "a", "end": "b"}}],
+    },
+    "jointed in a zone": {
+        "joint": [{"kind": "spring", "between": ["a", "b"], "stiffness": 1.0}],
+        "zone": [{"position": [0.0, 2.9], "radius": 1.0, "holds": True}],
+    },
+    **{f"{kind} to the world": {"joint": [_joint(kind, "a")]} for kind in JOINTS},
+    **{f"{kind} between two": {"joint": [_joint(kind, "a", "b")]} for kind in JOINTS},
+    **{f"weak {kind}": {"joint": [{**_joint(kind, "a", "b"), "strength": 1e-9}]} for kind in JOINTS},
+}
+
+
+def document(bodies: str, feature: str) -> Document:
+    """Return a scene with some bodies, by their name in `BODIES`, and a feature."""
+    whole: Document = {"title": "t", "world": {"gravity": [0.0, -9.81]}, "solver": {"dt": 0.01}}
+    for part in (BODIES[bodies], FEATURES[feature]):
+        for key, value in copy.deepcopy(part).items():
+            whole[key] = (
+                {**whole[key], **value}
+                if key == "world"
+                else [*whole.get(key, []), *value]
+                if isinstance(value, list)
+                else value
+            )
+    return whole

@@ -1,0 +1,120 @@
+"""Tables of games in a scene: imported when they occur, and values as all others are."""
+
+import copy
+import pickle
+import subprocess
+import sys
+
+import pytest
+from pydantic import ValidationError
+
+from sandbox.games.artillery.terrain import Artillery, Terrain
+from sandbox.games.billiards.equipment import Billiards
+from sandbox.games.curling.match import CurlingMatch
+from sandbox.scene.description.game_tables import GAME_TABLES, PRESETS, game_table, lazy_table, table_of
+from sandbox.scene.description.play import Play
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import dumps, from_document, load, loads
+from sandbox.scene.files.presets import Preset
+from sandbox.scene.scene import Scene
+
+LOADED = """
+import sys
+from sandbox.scene.files.load import load
+scene = load(sys.argv[1])
+scene.bodies
+print(*sorted(name for name in sys.modules if name.startswith("sandbox.games.")))
+"""
+
+
+@pytest.mark.parametrize(
+    ("scene", "folders"),
+    [
+        ("tutorial/bounce", set()),
+        ("games/landing", {"names"}),
+        ("billiards/9-ball", {"billiards", "names"}),
+        ("pinball/classic", {"pinball", "names"}),
+        ("artillery/duel", {"artillery", "names"}),
+        ("games/curling", {"curling", "names"}),
+    ],
+)
+def test_scene_imports_only_the_games_of_its_tables(scene: str, folders: set[str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, scene], capture_output=True, text=True, check=True, timeout=120
+    )
+    modules = done.stdout.split()
+    assert {module.split(".")[2] for module in modules} == folders
+    assert not [module for module in modules if module.endswith(("rules", "bot", "hand", "registry"))]
+
+
+@pytest.mark.parametrize("heading", GAME_TABLES)
+def test_every_table_is_a_field_and_leads_to_its_model(heading: str) -> None:
+    within, _, key = heading.rpartition(".")
+    table, field = game_table(heading), (Play if within else Scene).model_fields[key]
+    lazy = lazy_table(field)
+    assert lazy is not None
+    assert lazy.model is table.model
+    assert isinstance(table, Preset) == (heading in PRESETS)
+    assert table.about
+
+
+def test_table_is_found_by_its_model() -> None:
+    scene = load("artillery/duel")
+    artillery, terrain = table_of(scene, Artillery), table_of(scene, Terrain)
+    assert artillery is not None
+    assert [player.name for player in artillery.players] == [box.name for box in scene.boxes]
+    assert terrain is not None
+    assert table_of(scene, Billiards) is None
+    assert table_of(scene.play, CurlingMatch) is None
+    assert table_of(load("games/curling").play, CurlingMatch) is not None
+
+
+@pytest.mark.parametrize("name", ["artillery/duel", "games/curling"])
+def test_scene_with_tables_is_a_value(name: str) -> None:
+    scene = load(name)
+    for copied in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene), scene.model_copy(deep=True)):
+        assert copied == scene
+        assert hash(copied) == hash(scene)
+    assert loads(dumps(scene)) == scene
+    assert from_document(to_document(scene)) == scene
+
+
+def test_keys_of_tables_keep_their_order_in_files() -> None:
+    document = to_document(load("artillery/duel"))
+    kept = [key for key in document if key in ("play", "terrain", "artillery", "wall", "box")]
+    assert kept == ["play", "terrain", "artillery", "wall", "box"]
+
+
+def test_scene_in_code_takes_tables_as_models_and_as_dicts() -> None:
+    scene = Scene(billiards={"table": "pool-9ft"})
+    assert table_of(scene, Billiards) == Billiards(table="pool-9ft")
+    assert scene == Scene(billiards=Billiards(table="pool-9ft")) != Scene()
+    assert table_of(scene.model_copy(update={"billiards": None}), Billiards) is None
+    with pytest.raises(ValidationError, match=r"billiards\.tabel"):
+        Scene(billiards={"tabel": "pool-9ft"})
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("[billiards]\ntabel = 'x'", "<scene>:2: billiards.tabel: unknown key; did you mean 'table'?"),
+        (
+            "[billiards]\ntable = 'pool-9ft'\ngap = 1.0",
+            "<scene>:3: billiards.gap: must be between 0 and 0.1, is 1",
+        ),
+        ("[terrain]\nbase = 1.0", "<scene>:1: terrain.width: is missing; this key is required"),
+        ("billiards = 3", "<scene>:1: billiards: must be a table, is 3"),
+        ("[play.curling]\nends = 0", "<scene>:2: play.curling.ends: must be between 1 and 20, is 0"),
+        (
+            "[pinball]\n[[pinball.slingshot]]\npoints = [[0.0, 0.0], [1.0, 0.0]]",
+            "<scene>:3: pinball.slingshot[0].points: must be 3 corners, the two ends of the kicking side and one "
+            "behind it; has 2",
+        ),
+        ("[pinball]\n[billiards]", "<scene>:1: pinball: cannot be combined with [billiards]; remove one of the two"),
+    ],
+)
+def test_fault_in_a_table_has_its_line_and_path(text: str, fault: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        loads(text)
+    assert fault in str(caught.value).splitlines()

@@ -1,0 +1,119 @@
+"""Round corners: arcs that touch their edges, chords that keep to their tolerance, lines beside lines."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from shapely import LineString
+
+from sandbox.scene.geometry.polyline import RoundingError, arc_at, beside, length_of, part_of, rounded
+
+SMALL = 1e-12  # m: rounding of lengths about 1 m, with room
+
+angles = st.floats(-2.8, 2.8).filter(lambda turn: abs(turn) > 0.05)
+radii = st.floats(0.005, 0.1)
+
+
+def bent(turn: float, radius: float) -> list[tuple[float, ...]]:
+    """Return a line along x that bends once, its edges long enough for the arc."""
+    edge = radius * math.tan(abs(turn) / 2.0) + 0.1
+    return [(-edge, 0.0), (0.0, 0.0, radius), (edge * math.cos(turn), edge * math.sin(turn))]
+
+
+@given(angles, radii)
+def test_arc_touches_both_edges_and_goes_over_into_them_without_a_kink(turn: float, radius: float) -> None:
+    arc = arc_at(bent(turn, radius), 1)
+    assert arc is not None
+    assert arc.turn == pytest.approx(turn, abs=SMALL)
+    (bx, by), (ex, ey), (cx, cy) = arc.at(0.0), arc.at(1.0), arc.centre
+    assert by == pytest.approx(0.0, abs=SMALL)  # it begins on the first edge
+    assert bx == pytest.approx(-arc.reach, abs=SMALL)
+    way = math.cos(turn), math.sin(turn)
+    assert ex * way[1] - ey * way[0] == pytest.approx(0.0, abs=SMALL)  # and ends on the second
+    assert ex * way[0] + ey * way[1] == pytest.approx(arc.reach, abs=SMALL)
+    # there its radius stands square to the edge
+    assert bx - cx == pytest.approx(0.0, abs=SMALL)
+    assert (ex - cx) * way[0] + (ey - cy) * way[1] == pytest.approx(0.0, abs=SMALL)
+
+
+@given(angles, radii, st.floats(1e-5, 1e-3))
+def test_no_chord_lies_farther_than_the_tolerance_from_its_arc_and_none_could_be_spared(
+    turn: float, radius: float, tolerance: float
+) -> None:
+    corners = bent(turn, radius)
+    arc = arc_at(corners, 1)
+    assert arc is not None
+    points = rounded(corners, tolerance=tolerance)[1:-1]
+    assert [math.dist(point, arc.centre) for point in points] == pytest.approx([radius] * len(points), abs=SMALL)
+    sagitta = [radius - math.dist(((a[0] + b[0]) / 2, (a[1] + b[1]) / 2), arc.centre) for a, b in pairwise(points)]
+    assert max(sagitta) <= tolerance * (1.0 + 1e-6) + SMALL
+    pieces = len(points) - 1
+    if pieces > 1:
+        wider = abs(turn) / (pieces - 1)
+        assert radius * (1.0 - math.cos(wider / 2.0)) > tolerance
+
+
+@given(angles, radii)
+def test_length_is_that_of_the_edges_and_the_arc(turn: float, radius: float) -> None:
+    corners, tolerance = bent(turn, radius), 1e-6
+    straight = sum(math.dist(a[:2], b[:2]) for a, b in pairwise(corners))
+    exact = straight - 2.0 * radius * math.tan(abs(turn) / 2.0) + radius * abs(turn)
+    # a chord is short of its arc by about 8/3 of its sagitta squared over its length, at most the sagitta each
+    assert length_of(rounded(corners, tolerance=tolerance)) == pytest.approx(exact, rel=1e-3)
+    assert length_of(rounded(corners, tolerance=tolerance)) <= exact + SMALL
+
+
+def test_rectangle_rounded_by_half_its_width_has_a_semicircular_arch() -> None:
+    points = np.asarray(rounded([(0.0, 0.0), (0.0, 1.0, 0.25), (0.5, 1.0, 0.25), (0.5, 0.0)]))
+    arch = points[points[:, 1] > 0.75 + SMALL]
+    assert np.hypot(*(arch - (0.25, 0.75)).T) == pytest.approx(np.full(len(arch), 0.25), abs=SMALL)
+    assert points[:, 1].max() == pytest.approx(1.0, abs=2e-5)  # the tolerance
+
+
+def test_corner_without_a_radius_stays_and_ends_are_not_rounded() -> None:
+    assert rounded([(0.0, 0.0, 0.3), (1.0, 0.0), (1.0, 1.0, 0.3)]) == ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
+
+
+def test_closed_line_is_rounded_at_every_corner() -> None:
+    points = rounded([(0.0, 0.0, 0.5), (1.0, 0.0, 0.5), (1.0, 1.0, 0.5), (0.0, 1.0, 0.5)], closed=True)
+    assert [math.dist(point, (0.5, 0.5)) for point in points] == pytest.approx([0.5] * len(points), abs=SMALL)
+    assert len(set(points)) == len(points)
+
+
+@pytest.mark.parametrize(
+    ("corners", "corner", "words"),
+    [
+        ([(0.0, 0.0), (0.1, 0.0, 0.2), (0.1, 1.0)], 1, "take 0.2 m of an edge that is 0.1 m long"),
+        ([(0.0, 0.0), (1.0, 0.0, 0.6), (1.0, 1.0, 0.6), (0.0, 1.0)], 1, "take 1.2 m"),
+        ([(0.0, 0.0), (1.0, 0.0, 0.1), (0.0, 0.0)], 1, "reversal"),
+        ([(0.0, 0.0), (0.0, 0.0, 0.1), (1.0, 0.0)], 1, "is at the same place as the next corner"),
+    ],
+)
+def test_what_cannot_be_rounded_is_told_by_its_corner(
+    corners: list[tuple[float, ...]], corner: int, words: str
+) -> None:
+    with pytest.raises(RoundingError, match=words) as caught:
+        rounded(corners)
+    assert caught.value.corner == corner
+
+
+@given(angles, st.floats(0.03, 0.1), st.floats(-0.02, 0.02))
+def test_line_beside_another_keeps_its_distance(turn: float, radius: float, distance: float) -> None:
+    assume(abs(distance) > 1e-4)
+    line = rounded(bent(turn, radius))
+    other = LineString(beside(line, distance))
+    # mitred vertices lie outside the offset arc by no more than the chords lie inside it
+    near = [other.distance(LineString([a, b]).centroid) for a, b in pairwise(line)]
+    assert near == pytest.approx([abs(distance)] * len(near), abs=1e-4)
+    assert beside(line, distance)[0][1] == pytest.approx(distance, abs=SMALL)  # positive is to the left
+
+
+@given(st.floats(0.0, 0.4), st.floats(0.5, 1.0))
+def test_part_of_a_line_has_the_length_between_its_ends(begin: float, end: float) -> None:
+    line = rounded([(0.0, 0.0), (0.6, 0.0, 0.1), (0.6, 0.6)])
+    part = part_of(line, begin, end)
+    assert length_of(part) == pytest.approx(end - begin, abs=1e-9)  # the sum of some dozen lengths
+    assert LineString(line).distance(LineString(part)) < SMALL

@@ -1,0 +1,375 @@
+"""Run files: a stored run is read whole and sound, or refused with the array or key that is wrong."""
+
+import dataclasses
+import io
+import json
+import math
+import struct
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sandbox import run_file
+from sandbox.action import Remove, Spawn
+from sandbox.measure.run import run, run_without_frames
+from sandbox.resource_limits import TooLargeError
+from sandbox.run_file import SHAPES, Info
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import loads
+from sandbox.trajectory import Trajectory
+
+SCENE = loads("""
+[world]
+gravity = [0.0, -10.0]
+duration = 0.5
+[[plane]]
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+[[ball]]
+name = "a"
+position = [0.0, 1.0]
+radius = 0.5
+[[ball]]
+name = "b"
+position = [3.0, 1.0]
+radius = 0.5
+[[joint]]
+kind = "rod"
+between = ["a", "b"]
+""")
+"""Two balls on a rod, which fall on a plane."""
+
+ACTIONS = (Spawn(time=0.1, ball=Ball(name="c", position=(9.0, 9.0), radius=1.0)), Remove(time=0.3, body="c"))
+
+Members = dict[str, bytes]
+
+
+@pytest.fixture(scope="module")
+def sound() -> Trajectory:
+    return run(SCENE, actions=ACTIONS, account=True)
+
+
+@pytest.fixture
+def path(sound: Trajectory, tmp_path: Path) -> Path:
+    return sound.save(tmp_path / "run.npz")
+
+
+def members_of(path: Path) -> Members:
+    with zipfile.ZipFile(path) as archive:
+        return {name.removesuffix(".npy"): archive.read(name) for name in archive.namelist()}
+
+
+def write(path: Path, members: Members) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(f"{name}.npy", content)
+
+
+def array(values: object, pickled: bool = False) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, np.asarray(values), allow_pickle=pickled)
+    return stream.getvalue()
+
+
+def header(shape: object, descr: str = "<f8") -> bytes:
+    """Return an array of which only the header is there."""
+    text = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(ValueError, match="is not a stored run") as caught:
+        Trajectory.load(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path} is not a stored run: ")
+    assert len(message) < 600
+    return message.removeprefix(f"{path} is not a stored run: ")
+
+
+def test_every_array_of_a_trajectory_has_a_shape() -> None:
+    assert {field.name for field in dataclasses.fields(Trajectory)} == set(SHAPES)
+
+
+def test_info_is_modelled_as_a_run_writes_it(sound: Trajectory) -> None:
+    assert set(sound.info) | {"game"} == set(Info.model_fields)
+
+
+def test_sound_run_is_read(path: Path, sound: Trajectory) -> None:
+    found = Trajectory.load(path)
+    assert found.info == sound.info
+    assert found.account.tobytes() == sound.account.tobytes()
+    assert found.names.tolist() == ["a", "b", "c"]
+    assert found.position.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("time", array([0.0, math.nan] + [0.5] * 49), "time: its times do not increase"),
+        ("time", array([0.0, math.inf] + [0.5] * 49), "time: its times do not increase"),
+        ("time", array(np.linspace(0.5, 0.0, 51)), "time: its times do not increase"),
+        ("time", array(np.linspace(-0.5, 0.0, 51)), "time: its times do not increase"),
+        ("time", array(np.linspace(0.0, 1e8, 51)), "after the scene's duration"),
+        ("time", array(np.linspace(0.0, 0.5, 52)), "position is 51 x 3 x 2 of float64, not 52 x 3 x 2 of float64"),
+        ("time", array(0.5), "time is one value of float64, not T of float64"),
+        ("time", array([]), "position is 51 x 3 x 2 of float64, not 0 x 3 x 2"),
+        ("time", array(np.zeros(51, np.float32)), "time is 51 of float32, not 51 of float64"),
+        ("time", array(np.zeros(51, ">f8")), "time is of"),
+        ("time", array(np.zeros(51, np.complex128)), "time is 51 of type c16"),
+        ("time", array([{}] * 51, pickled=True), "time is of type |O, not float64"),
+        ("time", array(np.zeros(51, [("x", "f8")])), "time is not an array of numbers or text"),
+        ("time", b"", "time is not an array"),
+        ("time", b"\x93NUMPY\x01\x00", "unpack"),
+        (
+            "time",
+            header("(1000000000000000,)"),
+            "time is 1000000000000000 of float64, 8,000,000",
+        ),
+        ("time", header("(-1,)"), "time is not an array of numbers or text"),
+        ("time", header("(" + "9" * 5000 + ",)"), "time is not an array of numbers or text"),
+        ("time", header("(" + "1, " * 20_000 + ")"), "time is not an array of numbers or text"),
+        ("time", header("(0,)", "<f8', 'descr': '<f8"), "time is not an array of numbers or text"),
+        ("names", header("(3,)", "<U999999999"), "names is 3 of text"),
+        (
+            "names",
+            header("(1000000000000000,)", "<U0"),
+            "not 51 x 1000000000000000 x 2 of float64",
+        ),
+        ("names", array([1.0, 2.0, 3.0]), "names is 3 of float64, not 3 of text"),
+        ("names", array(["a", "b", "a"]), "names: the bodies are not those"),
+        ("names", array(["b", "a", "c"]), "names: the bodies are not those"),
+        ("names", array(["a", "b", ""]), "names: a name is none"),
+        ("names", array(["a", "b", "\ud800"]), "names: a name is none"),
+        ("names", array(["a", "b", "c\n"]), "names: a name is none"),
+        (
+            "names",
+            array(np.array([97, 98, 2**31 - 1], "<u4").view("<U1")),
+            "invalid characters",
+        ),
+        ("contact_pair", array(np.zeros((0, 2))), "contact_pair is 0 x 2 of float64, not"),
+        ("missed_time", array([math.nan]), "missed_pair is 0 x 2 of int64, not 1 x 2 of int64"),
+        ("retired_time", array([math.nan, -1.0, math.nan]), "retired_time: a time is neither nan nor"),
+        ("retired_time", array([math.nan, math.inf, math.nan]), "retired_time: a time is neither nan nor"),
+        ("broken_time", array([math.nan, math.nan]), "broken_time has 2 joints, but info.scene 1"),
+        ("broken_time", array([math.inf]), "broken_time: a time is neither nan nor"),
+        ("energy", array(np.zeros(50)), "account is 51"),
+        ("account", array(np.zeros((51, 2))), "account has 2 causes"),
+        ("spin", array(np.zeros((51, 3))), "spin is 51 x 3 of float64, not 51 x 3 x 3"),
+        ("spin", header("(0, 1000000000000000, 3)"), "spin is 0 x 1000000000000000 x 3"),
+        ("layer", array(np.full((51, 3), 9)), "layer: a number is not one of the scene's 1 layers"),
+        ("layer", array(np.zeros((51, 3))), "layer is 51 x 3 of float64, not 51 x 3 of integers"),
+        ("info", array("{"), "info: Invalid JSON"),
+        ("info", array("[]"), "info: "),
+        ("info", array(""), "info: "),
+        ("info", array("\ud800"), "info"),
+        ("info", array("[" * 10_000), "info: Invalid JSON"),
+        ("info", array('{"a":' * 10_000 + "1" + "}" * 10_000), "info: Invalid JSON"),
+        ("info", array(["{}"]), "info is 1 of text, not one value of text"),
+        ("info", array(b"{}"), "info is one value of type S2, not one value of text"),
+        ("info", array(1.0), "info is one value of float64, not one value of text"),
+    ],
+)
+def test_damaged_array_is_refused(name: str, content: bytes, message: str, path: Path) -> None:
+    write(path, members_of(path) | {name: content})
+    assert message in refusal(path)
+
+
+@pytest.mark.parametrize("value", [-3, 3, -(2**63), 2**63 - 1])
+@pytest.mark.parametrize("column", [0, 1])
+def test_pair_of_what_the_scene_does_not_have_is_refused(
+    value: int, column: int, path: Path, sound: Trajectory
+) -> None:
+    pair = sound.contact_pair.copy()
+    pair[-1, column] = value
+    write(path, members_of(path) | {"contact_pair": array(pair)})
+    assert "contact_pair: refers to an object that the scene does not have" in refusal(path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"scene": None}, "info.scene: "),
+        ({"scene": []}, "info.scene: "),
+        ({"scene": "title"}, "info.scene: "),
+        ({"scene": {"ball": "a"}}, "info.scene: ball: "),
+        ({"scene": {"title": "other"}}, "names has 3 bodies, but info.scene 0"),
+        ({"engine": None}, "info.engine: "),
+        ({"engine": ""}, "info.engine: "),
+        ({"engine": "a\nb"}, "info.engine: "),
+        ({"settings": []}, "info.settings: "),
+        ({"settings": {"dt": "0.1"}}, "info.settings.dt: "),
+        ({"settings": {"none": 1}}, "info.settings.none: "),
+        ({"actions": None}, "info.actions: "),
+        ({"actions": [{"kind": "jump"}]}, "info.actions.0: "),
+        ({"actions": []}, "names has 3 bodies, but info.scene 2, and 0 were spawned"),
+        ({"seed": -1}, "info.seed: "),
+        ({"seed": 1.5}, "info.seed: "),
+        ({"seed": 10**400}, "info.seed: "),
+        ({"versions": []}, "info.versions: "),
+        ({"versions": {"python": 3}}, "info.versions.python: "),
+        ({"status": "fine"}, "info.status: "),
+        ({"status": "refused"}, "time has 51 frames of a run of 50 steps that is refused"),
+        ({"reason": 1}, "info.reason: "),
+        ({"steps": "50"}, "info.steps: "),
+        ({"steps": True}, "info.steps: "),
+        ({"steps": 3}, "time has 51 frames of a run of 3 steps"),
+        ({"seconds": None}, "info.seconds: "),
+        ({"seconds": math.nan}, "info.seconds: "),
+        ({"seconds": -1.0}, "info.seconds: "),
+        ({"work": {"pairs": math.inf}}, "info.work.pairs"),
+        ({"work": {"x" * 10_000: "many"}}, "info.work.x"),
+        ({"audited": 1}, "info.audited: "),
+        ({"energy_end": "much"}, "info.energy_end: "),
+        ({"energy_end": 10**400}, "info: an integer of 401 digits"),
+        ({"causes": ["a"]}, "account has"),
+        ({"game": []}, "info.game: "),
+        ({"game": {}}, "info.game.score: "),
+        ({"game": {"score": 10**400}}, "info.game.score"),
+        ({"game": {"score": 1, "presses": [[math.nan, "left", 1]]}}, "info.game.presses.0.0: "),
+        ({"game": {"score": 1, "presses": 1}}, "info.game.presses: "),
+        ({"game": {"score": 1, "lamps": [[0.0, "left"]]}}, "info.game.lamps.0.1: "),
+    ],
+)
+def test_info_that_no_run_writes_is_refused(
+    changes: dict[str, Any], message: str, path: Path, sound: Trajectory
+) -> None:
+    write(path, members_of(path) | {"info": array(json.dumps({**sound.info, **changes}))})
+    assert message in refusal(path)
+
+
+def test_info_that_lacks_a_key_is_refused_and_one_of_earlier_versions_is_not(path: Path, sound: Trajectory) -> None:
+    members, needed = members_of(path), []
+    for key in sound.info:
+        write(path, members | {"info": array(json.dumps({k: v for k, v in sound.info.items() if k != key}))})
+        if Info.model_fields[key].is_required():
+            needed.append(key)
+            assert refusal(path) == f"info.{key}: Field required"
+        elif key not in ("actions", "causes"):  # by which this run has one more body, and an account
+            assert Trajectory.load(path).info == {k: v for k, v in sound.info.items() if k != key}
+    assert {"scene", "engine", "settings", "seed", "status", "reason", "steps", "seconds"} <= set(needed)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_missing_array_is_named_but_what_earlier_versions_lack(name: str, path: Path) -> None:
+    members = members_of(path)
+    members.pop(name, None)
+    write(path, members)
+    if name not in run_file.OPTIONAL:
+        assert refusal(path) == f"it has no {name}"
+    elif name not in ("energy", "account"):  # one needs the other
+        assert len(Trajectory.load(path).time) == 51
+
+
+def swap(members: Members) -> Members:
+    return members | {"position": members["angle"], "angle": members["position"]}
+
+
+def rename(members: Members) -> Members:
+    return {name.upper(): content for name, content in members.items()}
+
+
+@pytest.mark.parametrize("change", [swap, rename])
+def test_members_under_other_names_are_refused(change: Callable[[Members], Members], path: Path) -> None:
+    write(path, change(members_of(path)))
+    refusal(path)
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name:UserWarning")
+def test_member_that_is_there_twice_is_refused(path: Path) -> None:
+    time = members_of(path)["time"]
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("time.npy", time)
+    assert refusal(path) == "it has time twice"
+
+
+def test_directory_of_many_members_is_not_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with zipfile.ZipFile(path, "a") as archive:
+        for number in range(2000):
+            archive.writestr(f"{number}.npy", b"")
+    monkeypatch.setattr(zipfile, "ZipFile", None)
+    with pytest.raises(ValueError, match=r"run\.npz is not a stored run: the directory of the archive"):
+        Trajectory.load(path)
+
+
+def test_directory_of_an_archive_beyond_4_gib_is_bounded_too(path: Path, sound: Trajectory) -> None:
+    content = path.read_bytes()
+    end = content[-22:]
+    size, offset = struct.unpack("<2L", end[12:20])
+    for stated in (size, 2**40):
+        record = struct.pack("<4sQ2H2L4Q", b"PK\6\6", 44, 45, 45, 0, 0, 1, 1, stated, offset)
+        locator = struct.pack("<4sLQL", b"PK\6\7", 0, len(content) - 22, 1)
+        path.write_bytes(content[:-22] + record + locator + end)
+        if stated == size:
+            assert Trajectory.load(path).info == sound.info
+        else:
+            with pytest.raises(ValueError, match="the directory of the archive"):
+                Trajectory.load(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"PK", b"PK\5\6" + bytes(17), b"PK\5\6" + bytes(17) + b"\1"])
+def test_archive_without_an_end_is_refused(content: bytes, path: Path) -> None:
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=r"run\.npz is not a stored run: the end of the archive"):
+        Trajectory.load(path)
+
+
+def test_method_of_compression_that_numpy_does_not_use_is_refused(path: Path) -> None:
+    members = members_of(path)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_LZMA) as archive:
+        for name, content in members.items():
+            archive.writestr(f"{name}.npy", content)
+    assert "compressed by another method" in refusal(path)
+
+
+def test_fortran_order_is_only_another_order(path: Path, sound: Trajectory) -> None:
+    write(path, members_of(path) | {"position": array(np.asfortranarray(sound.position))})
+    assert np.array_equal(Trajectory.load(path).position, sound.position, equal_nan=True)
+
+
+def test_arrays_that_do_not_fit_into_memory_are_not_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run_file, "free_memory", lambda: 1000)
+    with pytest.raises(TooLargeError, match=r"run\.npz: its arrays take .* GB, but .* can be used"):
+        Trajectory.load(path)
+
+
+def test_archive_made_to_expand_is_not_expanded(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    contacts = 400_000
+    pairs = np.zeros((contacts, 2))
+    names = ("contact_point", "contact_normal", "contact_impulse")
+    many = dict.fromkeys(names, array(pairs)) | {"contact_pair": array(pairs.astype(np.int64))}
+    write(path, members_of(path) | many | {"contact_time": array(pairs[:, 0])})
+    monkeypatch.setattr(run_file, "free_memory", lambda: 2**24)
+    assert path.stat().st_size < 2**18
+    with pytest.raises(TooLargeError, match="can be used"):
+        Trajectory.load(path)
+
+
+def test_more_contacts_than_a_run_records_are_not_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SANDBOX_MAX_CONTACTS", "0")
+    with pytest.raises(TooLargeError, match=r"run\.npz: its contacts are .* SANDBOX_MAX_CONTACTS="):
+        Trajectory.load(path)
+
+
+def test_info_beyond_the_size_of_a_session_is_not_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SANDBOX_MAX_SESSION_SIZE", "500")
+    with pytest.raises(TooLargeError, match=r"run\.npz: its info .* SANDBOX_MAX_SESSION_SIZE="):
+        Trajectory.load(path)
+
+
+def test_message_is_one_printable_line(path: Path, sound: Trajectory) -> None:
+    write(path, members_of(path) | {"info": array(json.dumps({**sound.info, "work": {"\x1b[31m\n": "x"}}))})
+    assert refusal(path).isprintable()
+
+
+def test_run_that_was_given_up_has_no_frames(tmp_path: Path) -> None:
+    given_up = run_without_frames(SCENE, "pymunk", SCENE.solver, (), "failed", "its process was killed")
+    assert not len(Trajectory.load(given_up.save(tmp_path / "run.npz")).time)
+
+
+def test_folder_is_no_damage(tmp_path: Path) -> None:
+    with pytest.raises(IsADirectoryError):
+        Trajectory.load(tmp_path)

@@ -1,0 +1,42 @@
+"""Films of runs without a player, drawn as `sandbox export` does."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import sandbox
+from sandbox.measure.run import run
+from sandbox.play.camera import Camera
+from sandbox.play.footage.film import NARROW, Film
+from sandbox.play.footage.still import offscreen
+from sandbox.scene.files.shipped_scenes import find
+
+from .files import image_of, save_gif
+
+SHARP = 2
+"""Pictures are drawn so many times larger, and averaged."""
+
+
+def film(
+    scene: str, size: tuple[int, int], until: float, *, engine: str = "pymunk", fps: float = 20.0, colours: int = 64
+) -> Callable[[Path], None]:
+    """Return what films a scene.
+
+    Args:
+        scene: its name.
+        size: of the film, px.
+        until: s of the run.
+        engine: its name.
+        fps: frames a second.
+        colours: of the palette.
+    """
+
+    def make(path: Path) -> None:
+        seen = Film(run(sandbox.load(find(scene), [f"world.duration={until}"]), engine, audit=False), scene)
+        large = size[0] * SHARP, size[1] * SHARP
+        surface, camera, frames = offscreen(large), Camera.fitting(seen.box, large), []
+        for k in range(round(until * fps) + 1):
+            seen.draw(surface, camera, k / fps, caption=size[0] >= NARROW)
+            frames.append(image_of(surface).reduce(SHARP))
+        save_gif(frames, path, fps, colours, 0.8)
+
+    return make

@@ -1,0 +1,188 @@
+"""The first picture of README: balls fall through pegs on three engines, and the error of each grows below."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+from PIL import Image
+
+import sandbox
+from sandbox.play.camera import Camera
+from sandbox.play.drawing.palette import BACKGROUND, FAINT, GREEN, LINE, ORANGE, PANEL, SKY, Colour, mixed
+from sandbox.play.drawing.picture import Picture
+from sandbox.play.drawing.text import write
+from sandbox.play.footage.film import Film
+from sandbox.play.footage.still import offscreen
+
+from .files import image_of, save_gif
+
+SIZE = (800, 470)
+SHARP = 2
+"""The picture is drawn so many times larger, and averaged."""
+FPS, HOLD = 25.0, 2.0
+"""pictures/s, and s for which the end is shown"""
+STEP = 1.0 / 60.0
+"""s, of the engines that have one"""
+TRAIL = 0.4
+"""of a ball's colour is in its trail"""
+LOWEST, HIGHEST = 1e-10, 10.0
+"""m, of the error's axis"""
+TICKS = ((1e-9, "1 nm"), (1e-6, "1 µm"), (1e-3, "1 mm"), (1.0, "1 m"))
+GAP, HEAD, CHART = 10, 48, 128
+"""px between the panels, above them for their titles, and of the chart below"""
+LEFT, RIGHT = 62, 112
+"""px beside the chart's axes for their labels"""
+
+WIDTH, HEIGHT, SEED = 5.0, 6.0, 14
+ROWS, FIRST_ROW, ROW_HEIGHT = 4, 1.9, 0.95
+
+
+class Run(NamedTuple):
+    """One engine's run, and its look."""
+
+    engine: str
+    about: str
+    colour: Colour
+    film: Film
+    error: np.ndarray[tuple[int], np.dtype[np.float64]]
+    """largest distance of a ball from the exact one in each frame, m; empty for the exact engine itself"""
+
+
+def scene(colour: str) -> str:
+    """Return the scene: three balls, eighteen pegs, five bins."""
+    random = np.random.default_rng(SEED)
+    walls = [("frame", [[0.0, HEIGHT + 2.0], [0.0, 0.0], [WIDTH, 0.0], [WIDTH, HEIGHT + 2.0]], 0.06)]
+    walls += [(f"divider {k}", [[float(k), 0.0], [float(k), 0.8]], 0.06) for k in range(1, int(WIDTH))]
+    lines = ['title = "Pegs"', "[world]", "gravity = [0.0, -9.81]", "duration = 5.0", "[solver]", f"dt = {STEP!r}"]
+    lines += ["[[material]]", 'name = "steel"', "[[pair]]", 'between = ["steel", "steel"]', "restitution = 0.7"]
+    for name, points, thickness in walls:
+        lines += [
+            "[[wall]]",
+            f'name = "{name}"',
+            f"points = {points}",
+            f"thickness = {thickness}",
+            'material = "steel"',
+        ]
+    for row in range(ROWS):
+        for column in range(5 - row % 2):
+            place = [0.5 + 0.5 * (row % 2) + column, FIRST_ROW + ROW_HEIGHT * row]
+            lines += ["[[post]]", f"position = {place}", "radius = 0.12", 'material = "steel"']
+    for number in range(3):
+        x = round(1.5 + number + random.uniform(-0.3, 0.3), 3)
+        lines += ["[[ball]]", f'name = "{number}"', f"position = [{x}, 5.6]", "radius = 0.16", 'material = "steel"']
+        lines += [f'colour = "{colour}"']
+    return "\n".join(lines)
+
+
+def make(path: Path) -> None:
+    """Make the film."""
+    runs = _runs()
+    end = runs[0].film.duration
+    frames = [_frame(runs, k / FPS) for k in range(round(end * FPS) + 1)]
+    save_gif(frames, path, FPS, 128, HOLD)
+
+
+def _runs() -> list[Run]:
+    """Run the scene on each engine."""
+    ways = (
+        ("pymunk", "dt 1/60 s", ORANGE, {}),
+        ("reference", "RK4, bisection, dt 1/60 s", SKY, {"integrator": "rk4", "detection": "bisect"}),
+        ("exact", "event by event, no time step: the truth", GREEN, {}),
+    )
+    exact = sandbox.run(sandbox.loads(scene("#ffffff")), engine="exact")
+    found = []
+    for engine, about, colour, settings in ways:
+        trajectory = sandbox.run(sandbox.loads(scene("#{:02x}{:02x}{:02x}".format(*colour))), engine=engine, **settings)
+        error = np.linalg.norm(trajectory.position - exact.position, axis=2).max(axis=1)
+        found.append(Run(engine, about, colour, Film(trajectory), error if engine != "exact" else error[:0]))
+    return found
+
+
+def _frame(runs: list[Run], time: float) -> Image.Image:
+    """Return one picture."""
+    surface = offscreen((SIZE[0] * SHARP, SIZE[1] * SHARP))
+    surface.fill(BACKGROUND)
+    truth = runs[-1].film.frame(time)
+    width = (SIZE[0] - 4 * GAP) // len(runs)
+    height = SIZE[1] - HEAD - CHART
+    for k, run in enumerate(runs):
+        left = GAP + k * (width + GAP)
+        place = pygame.Rect(left * SHARP, HEAD * SHARP, width * SHARP, height * SHARP)
+        write(surface, run.engine, (place.left, 7 * SHARP), 16 * SHARP, run.colour, bold=True)
+        write(surface, run.about, (place.left, 27 * SHARP), 12 * SHARP, FAINT)
+        _draw_panel(surface.subsurface(place), run, time, None if run.engine == "exact" else truth)
+    _draw_chart(surface, pygame.Rect(0, (HEAD + height) * SHARP, SIZE[0] * SHARP, CHART * SHARP), runs, time)
+    return image_of(surface).reduce(SHARP)
+
+
+def _draw_panel(surface: pygame.Surface, run: Run, time: float, truth: "sandbox.Frame | None") -> None:
+    """Draw a run at a time, and the exact balls as rings."""
+    camera = Camera.fitting(((-0.03, -0.03), (WIDTH + 0.03, HEIGHT)), surface.get_size(), margin=0.0)
+    part = offscreen(surface.get_size())
+    sight = run.film.sight(time, frozenset({"shapes"}), ghost=truth)
+    _PICTURES.setdefault(run.engine, Picture()).draw(part, camera, sight, unit=float(SHARP), scale=False)
+    _draw_trails(part, camera, run, time)
+    surface.blit(part, (0, 0))
+
+
+_PICTURES: dict[str, Picture] = {}
+
+
+def _draw_trails(surface: pygame.Surface, camera: Camera, run: Run, time: float) -> None:
+    """Draw the paths of the balls so far, up to their rims. They do not fade: only new pieces take room in the gif."""
+    moments = np.arange(0.0, time, STEP)
+    now = run.film.frame(time).position
+    past = np.asarray([run.film.frame(moment).position for moment in moments.tolist()]).reshape(-1, *now.shape)
+    shade = mixed(BACKGROUND, run.colour, TRAIL)
+    for ball, radius in enumerate(run.film.bodies.radius.tolist()):
+        places = camera.to_screen(past[:, ball]).tolist()
+        for k, (begin, finish) in enumerate(pairwise(places)):
+            if np.hypot(*(past[k : k + 2, ball] - now[ball]).T).min() > radius:
+                pygame.draw.line(surface, shade, begin, finish, 2 * SHARP)
+
+
+def _draw_chart(surface: pygame.Surface, area: pygame.Rect, runs: list[Run], time: float) -> None:
+    """Draw the errors up to a time."""
+    axes = pygame.Rect(area.left + LEFT * SHARP, area.top + 30 * SHARP, 0, 0)
+    axes.width, axes.height = area.width - (LEFT + RIGHT) * SHARP, area.height - 42 * SHARP
+    title = "error: largest distance of a ball from the exact solution (rings)"
+    write(surface, title, (GAP * SHARP, area.top + 9 * SHARP), 12 * SHARP, FAINT)
+    end = runs[0].film.duration
+
+    def place(moment: float, error: float) -> tuple[float, float]:
+        part = np.log(min(max(error, LOWEST), HIGHEST) / LOWEST) / np.log(HIGHEST / LOWEST)
+        return axes.left + axes.width * moment / end, axes.bottom - axes.height * float(part)
+
+    for value, text in TICKS:
+        y = place(0.0, value)[1]
+        pygame.draw.line(surface, PANEL, (axes.left, y), (axes.right, y), SHARP)
+        write(surface, text, (axes.left - 8 * SHARP, y), 11 * SHARP, FAINT, "midright")
+    pygame.draw.line(surface, LINE, axes.bottomleft, axes.bottomright, SHARP)
+    seconds = f"{time:.1f} s"
+    write(surface, seconds, (area.right - GAP * SHARP, area.top + 9 * SHARP), 12 * SHARP, FAINT, "topright", mono=True)
+    for run in runs:
+        if not len(run.error):
+            continue
+        moments = run.film.trajectory.time
+        until = int(np.searchsorted(moments, time, side="right"))
+        points = [place(t, e) for t, e in zip(moments[:until].tolist(), run.error[:until].tolist(), strict=True)][1:]
+        if not points:
+            continue
+        if len(points) > 1:
+            _draw_line(surface, points, run.colour)
+        x, y = points[-1]
+        pygame.draw.circle(surface, run.colour, (x, y), 4 * SHARP)
+        write(surface, _length(run.error[until - 1]), (x + 10 * SHARP, y), 13 * SHARP, run.colour, "midleft", bold=True)
+
+
+def _draw_line(surface: pygame.Surface, points: list[tuple[float, float]], colour: Colour) -> None:
+    pygame.draw.lines(surface, colour, False, points, 2 * SHARP)
+
+
+def _length(metres: float) -> str:
+    for size, unit in ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")):
+        if metres >= size:
+            return f"{metres / size:.1f} {unit}" if metres < 10.0 * size else f"{metres / size:.0f} {unit}"
+    return "< 1 nm"

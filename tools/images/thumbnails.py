@@ -1,0 +1,147 @@
+"""Thumbnails of the gallery: each shipped scene at a telling moment of a run on the engine that it is played on."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from PIL import Image, ImageChops
+
+import sandbox
+from sandbox.engines.registry import usual
+from sandbox.games.pinball.hand import PinballHand
+from sandbox.measure.play_out import play_out
+from sandbox.measure.run import run
+from sandbox.play.camera import Box, Camera
+from sandbox.play.drawing.palette import BACKGROUND
+from sandbox.play.drawing.picture import Picture
+from sandbox.play.footage.film import Film
+from sandbox.play.footage.still import offscreen
+from sandbox.play.framing import lies_down
+from sandbox.scene.files.shipped_scenes import find
+
+from .files import image_of, save_png
+
+SIZE = (360, 225)
+SHARP = 2
+"""The picture is drawn so many times larger, and averaged."""
+LINES = 1.8
+"""unit of lines: they are wider than in the window, as the picture is small"""
+FAINT = 0.35
+"""of the colours of earlier moments"""
+
+
+class Moment(NamedTuple):
+    """What a thumbnail shows."""
+
+    time: float
+    """s of the run"""
+    strobe: int = 0
+    """how many earlier moments are seen faintly, equally spaced from the start"""
+    trail: float = 0.0
+    """s, for how long back trails go"""
+    box: Box | None = None
+    """part of the world, m; None: where the run goes"""
+    player: str | None = None
+    """of a game with rules; None: it is left to itself"""
+
+
+MOMENTS = {
+    "benchmark/bounce_to_rest": Moment(2.05, strobe=8),
+    "benchmark/box_slides": Moment(1.6, strobe=2),
+    "benchmark/box_sticks": Moment(0.5),
+    "benchmark/break_shot": Moment(0.4, trail=0.4),
+    "benchmark/bullet": Moment(0.012, strobe=6, box=((0.72, -0.16), (1.24, 0.16))),
+    "benchmark/chain_of_20": Moment(1.0, strobe=4),
+    "benchmark/double_pendulum": Moment(4.0, trail=3.0),
+    "benchmark/elastic_ball": Moment(0.8, strobe=5),
+    "benchmark/gas": Moment(4.0),
+    "benchmark/heavy_on_light": Moment(2.0),
+    "benchmark/incline": Moment(1.6, strobe=4),
+    "benchmark/kepler": Moment(5.2, strobe=18),
+    "benchmark/newtons_cradle": Moment(0.4, strobe=2),
+    "benchmark/oblique": Moment(1.3, strobe=5),
+    "benchmark/pendulum_170": Moment(2.6, strobe=14),
+    "benchmark/pendulum_5": Moment(0.95, strobe=4, box=((-0.6, -1.12), (0.6, 0.06))),
+    "benchmark/pendulum_90": Moment(1.12, strobe=8),
+    "benchmark/pile": Moment(2.0),
+    "benchmark/projectile": Moment(2.9, trail=2.9),
+    "benchmark/pyramid": Moment(1.0),
+    "benchmark/rest_depth": Moment(0.5, box=((-0.2, -0.03), (0.2, 0.23))),
+    "benchmark/slide_to_roll": Moment(1.0, strobe=4),
+    "benchmark/slide_to_stop": Moment(1.1, strobe=3),
+    "benchmark/spring": Moment(1.0, strobe=2),
+    "benchmark/stiff_spring": Moment(0.2, strobe=4),
+    "benchmark/stiff_spring_beyond": Moment(0.04, strobe=3),
+    "benchmark/tower": Moment(1.0),
+    "benchmark/two_balls": Moment(0.75, strobe=3),
+    "billiards/8-ball": Moment(1.2),
+    "billiards/9-ball": Moment(1.0),
+    "billiards/bank": Moment(2.0, trail=2.0),
+    "billiards/half_ball": Moment(1.6, strobe=8),
+    "billiards/snooker": Moment(2.5),
+    "billiards/straight-rail": Moment(4.0, trail=4.0),
+    "billiards/stun_draw_follow": Moment(1.6, strobe=6),
+    "billiards/three-cushion": Moment(5.0, trail=5.0),
+    "billiards/throw": Moment(3.0, trail=3.0),
+    "games/curling": Moment(60.0, player="random"),
+    "games/landing": Moment(4.8, trail=4.8),
+    "games/rube_goldberg": Moment(6.0),
+    "joints/bridge": Moment(4.0),
+    "joints/cloth": Moment(4.0),
+    "joints/flipper": Moment(2.0, strobe=8),
+    "joints/hanging_chain": Moment(2.0),
+    "joints/ragdoll_stairs": Moment(1.1, strobe=2),
+    "joints/tearing_cloth": Moment(0.6),
+    "particles/fireworks_100k": Moment(0.8, box=((-36.0, -2.0), (36.0, 42.0))),
+    "particles/smoke": Moment(1.0, box=((-8.0, -3.5), (6.0, 5.25))),
+    "particles/sparks": Moment(0.6),
+    "pinball/classic": Moment(20.0, trail=1.5, player="skilled"),
+    "pinball/full": Moment(20.0, trail=1.5, player="skilled"),
+    "tutorial/ball": Moment(1.0, strobe=5),
+    "tutorial/bounce": Moment(1.7, strobe=8),
+    "tutorial/circle_half_plane": Moment(0.1),
+    "tutorial/fast_ball": Moment(0.1, strobe=4),
+    "tutorial/fireworks": Moment(1.4),
+    "tutorial/overpass": Moment(2.4, trail=2.4),
+    "tutorial/spaceship": Moment(4.8, trail=4.8),
+}
+"""Of each scene that a run can show; those of artillery are seen in the window."""
+LARGEST = 9_000
+"""bytes of a thumbnail"""
+
+
+def make(name: str, path: Path) -> None:
+    """Make the thumbnail of a scene, such as `tutorial/bounce`, with as many colours as the file has room for."""
+    save(thumbnail(name, MOMENTS[name]), path)
+
+
+def save(image: Image.Image, path: Path) -> None:
+    """Write a thumbnail with as many colours as the file has room for."""
+    for colours in (256, 128, 64, 32, 16, 8):
+        save_png(image, path, colours)
+        if path.stat().st_size <= LARGEST:
+            return
+
+
+def thumbnail(name: str, moment: Moment) -> Image.Image:
+    """Return the picture of a moment of a run."""
+    scene = sandbox.load(find(name), [f"world.duration={moment.time}"])
+    film = Film(_run(scene, moment), name)
+    size = SIZE[0] * SHARP, SIZE[1] * SHARP
+    camera = Camera.fitting(moment.box or film.box, size, turned=lies_down(scene, size))
+    overlays = frozenset({"shapes", *(("trails",) if moment.trail else ())})
+    picture, surface, shown = Picture(), offscreen(size), None
+    for k in range(moment.strobe + 1):
+        time = film.duration * (1.0 - k / max(moment.strobe, 1))
+        picture.draw(surface, camera, film.sight(time, overlays, moment.trail or 1.0), unit=LINES, scale=False)
+        image = image_of(surface)
+        faint = Image.blend(Image.new("RGB", size, BACKGROUND), image, FAINT)
+        shown = image if shown is None else ImageChops.lighter(shown, faint)
+    assert shown is not None
+    return shown.reduce(SHARP)
+
+
+def _run(scene: sandbox.Scene, moment: Moment) -> sandbox.Trajectory:
+    if moment.player is None:
+        return run(scene, usual(scene), audit=False)
+    player = PinballHand(scene.world.seed, 0.95) if moment.player == "skilled" else moment.player
+    return play_out(scene, player, usual(scene)).trajectory
