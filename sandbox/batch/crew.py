@@ -18,6 +18,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from time import monotonic, sleep
+from types import FrameType
 from typing import Any, Literal
 
 from sandbox.batch.outcome import execute, give_up
@@ -270,6 +271,22 @@ def _serve(pipe: Connection, making: Making) -> None:
         maker.close()
 
 
+def _raise_once() -> Callable[[int, FrameType | None], None]:
+    """Return a handler that raises KeyboardInterrupt for the first signal only.
+
+    The parent repeats its signal: a second exception would fall into the clean-up that the first one set off.
+    """
+    is_raised = False
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        nonlocal is_raised
+        if not is_raised:
+            is_raised = True
+            raise KeyboardInterrupt
+
+    return handle
+
+
 def _end_with_parent() -> None:
     """End this process once its parent has: interrupt its run, and where that does not help, exit."""
     parent = parent_process()
@@ -292,7 +309,7 @@ class _Maker:
     def make(self, job: Job) -> Message:
         """Make a run; the parent may interrupt it."""
         making = self._making
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, _raise_once())
         try:
             if making.store is not None and self._store is None:
                 self._store = Store(making.store, self._notice)

@@ -252,6 +252,16 @@ def test_interrupt_ends_workers_that_are_stopped(tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {"runs.sqlite"}
 
 
+def test_handler_of_a_worker_raises_for_the_first_signal_only() -> None:
+    before = signal.signal(signal.SIGINT, crew._raise_once())
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_workers_end_with_their_parent_in_the_middle_of_a_run(tmp_path: Path, number: signal.Signals) -> None:
