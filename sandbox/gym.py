@@ -27,8 +27,8 @@ from sandbox.action import ActionError
 from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import able, engine_named
+from sandbox.games.contract import HasObservation, Rules
 from sandbox.games.registry import required_rules
-from sandbox.games.rules import Gauged, Rules
 from sandbox.measure.episode import Episode
 from sandbox.measure.seeds import seeded
 from sandbox.recording import Recording
@@ -229,9 +229,9 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             return None
         episode = self._going()
         if self._canvas is None:
-            from sandbox.play.canvas import Canvas  # pygame is for who wants to see something
+            from sandbox.window.render.offscreen import OffscreenRenderer  # pygame is for who wants to see something
 
-            self._canvas = Canvas(SIZE)
+            self._canvas = OffscreenRenderer(SIZE)
         relay = episode.relay
         return self._canvas.picture(relay.scene, relay.bodies, episode.frame(), episode.rules, relay.throttles)
 
@@ -262,7 +262,7 @@ def _steps(every: int) -> int:
 
 
 def _gauges(rules: Rules) -> Sequence[tuple[str, float]]:
-    return rules.gauges() if isinstance(rules, Gauged) else ()
+    return rules.gauges() if isinstance(rules, HasObservation) else ()
 
 
 def _numbers(scene: Scene, names: Sequence[str] | None) -> list[int]:

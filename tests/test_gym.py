@@ -13,8 +13,8 @@ from toy_game import TOY, Toy
 
 from sandbox.engines.contract import Refusal
 from sandbox.games import registry
+from sandbox.games.contract import Control, UnsuitableSceneError
 from sandbox.games.registry import RULES
-from sandbox.games.rules import Control, UnfitError
 from sandbox.gym import GAMES, STATES, SandboxEnv
 from sandbox.measure.replay import rerun
 from sandbox.scene.files.load import load, loads
@@ -256,7 +256,7 @@ def test_environment_is_pickled_and_copied_before_an_episode() -> None:
 
 
 def test_what_cannot_be_played_is_told() -> None:
-    with pytest.raises(UnfitError, match="has no game with rules"):
+    with pytest.raises(UnsuitableSceneError, match="has no game with rules"):
         SandboxEnv("bounce")
     with pytest.raises(ValueError, match="no body is named 'shop'; bodies: ship"):
         SandboxEnv("landing", bodies=["shop"])

@@ -5,8 +5,8 @@ import random
 from collections.abc import Sequence
 
 from sandbox.action import Action, Impulse, Spawn
-from sandbox.games.referee import Referee
-from sandbox.games.rules import Control, Seen
+from sandbox.games.contract import Control, StepInfo
+from sandbox.games.session import GameSession
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads
@@ -58,7 +58,7 @@ class Toy:
             return ()
         return (Impulse(time=99.0, body="a", impulse=(0.0, 3.0 * self._aim)),) if value else ()
 
-    def look(self, seen: Seen) -> Sequence[Action]:
+    def look(self, seen: StepInfo) -> Sequence[Action]:
         self.score += sum(0.5 for action in seen.actions if isinstance(action, Impulse))
         acts: list[Action] = []
         if seen.time == 0.0:
@@ -87,5 +87,5 @@ def toy_scene(**world: float) -> Scene:
     return loads(TOY, overrides=[(f"world.{key}", value) for key, value in world.items()])
 
 
-def toy_game(scene: Scene) -> Referee:
-    return Referee(Toy(scene, scene.bodies))
+def toy_game(scene: Scene) -> GameSession:
+    return GameSession(Toy(scene, scene.bodies))

@@ -16,27 +16,27 @@ from workloads import timed
 
 import sandbox
 from sandbox.engines.registry import start
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import BACKGROUND, colour_of
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.framing import framing
-from sandbox.play.sight import Sight
 from sandbox.scene.scene import Scene
+from sandbox.window.camera import Camera
+from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.palette import BACKGROUND, colour_of
+from sandbox.window.render.renderer import Renderer
+from sandbox.window.view_bounds import view_bounds
 
 SIZE = (1280, 720)
 PICTURES = 20
 """Drawn for one timing."""
 
 
-def moment(which: Scene, steps: int) -> Sight:
+def moment(which: Scene, steps: int) -> Snapshot:
     """Return what a scene looks like after some steps."""
     simulation = start(which, "pymunk")
     for _ in range(steps):
         simulation.step()
-    return Sight(which, simulation.bodies, simulation.frame())
+    return Snapshot(which, simulation.bodies, simulation.frame())
 
 
-def fitting(sight: Sight) -> Camera:
+def fitting(sight: Snapshot) -> Camera:
     """Return a camera that shows all bodies."""
     low, high = sight.frame.position.min(0), sight.frame.position.max(0)
     return Camera.fitting(((float(low[0]), float(low[1])), (float(high[0]), float(high[1]))), SIZE)
@@ -52,7 +52,7 @@ def drawing(which: Scene, steps: int, antialias: bool) -> Callable[[], float]:
     """Time pictures of a scene after some steps."""
 
     def work() -> float:
-        sight, surface, picture = moment(which, steps), pygame.Surface(SIZE), Picture()
+        sight, surface, picture = moment(which, steps), pygame.Surface(SIZE), Renderer()
         camera = fitting(sight)
         return _each(lambda: picture.draw(surface, camera, sight, antialias=antialias))
 
@@ -94,18 +94,18 @@ def played(which: Scene, kept: bool) -> Callable[[], float]:
     """
     pictures = PICTURES if kept else 1  # which takes a second
     done = deque(sandbox.play_out(which, "random").recording.actions)
-    simulation, sights = sandbox.start(which), list[Sight]()
+    simulation, sights = sandbox.start(which), list[Snapshot]()
     while simulation.time < which.world.duration - which.solver.dt:
         while done and done[0].time <= simulation.time + which.solver.dt / 2.0:
             simulation.apply(done.popleft())
         simulation.step()
         if round(simulation.time / which.solver.dt) % 2:
-            sights.append(Sight(simulation.scene, simulation.bodies, simulation.frame()))
-    camera, surface, picture = Camera.fitting(framing(which), SIZE), pygame.Surface(SIZE), Picture()
+            sights.append(Snapshot(simulation.scene, simulation.bodies, simulation.frame()))
+    camera, surface, picture = Camera.fitting(view_bounds(which), SIZE), pygame.Surface(SIZE), Renderer()
 
     def draw() -> None:
         for sight in sights[-pictures:]:
-            (picture if kept else Picture()).draw(surface, camera, sight, antialias=True)
+            (picture if kept else Renderer()).draw(surface, camera, sight, antialias=True)
 
     return lambda: pictures / timed(draw)
 

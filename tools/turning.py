@@ -11,9 +11,9 @@ import numpy as np
 import pygame
 from workloads import timed
 
-from sandbox.play.stage import Stage
-from sandbox.play.window import Window
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
 
 TURNS = 30
 """Timed at once."""
@@ -29,8 +29,8 @@ def turns(scene: str, hand: bool) -> Callable[[], float]:
     """
 
     def work() -> float:
-        stage = Stage()
-        window = Window(stage)
+        stage = AppState()
+        window = App(stage)
         stage.open(find(scene))
         stage.paused = True
         window.turn(FRAME)
@@ -38,7 +38,7 @@ def turns(scene: str, hand: bool) -> Callable[[], float]:
         window.close()
         return statistics.median(found)
 
-    def turn(window: Window, k: int) -> float:
+    def turn(window: App, k: int) -> float:
         live = window.stage.live
         assert live is not None
         x, y = window.camera.to_screen(live.frame.position[0]).round().tolist()

@@ -17,11 +17,9 @@ from sandbox.batch.store import StoredRun
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import ENGINES
+from sandbox.games.billiards.controls import CUE_KEY_HELP
 from sandbox.games.registry import RULES, required_rules
 from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.play.cue_keys import TOLD
-from sandbox.play.hosting.control_keys import told
-from sandbox.play.instruments.manual import groups
 from sandbox.resource_limits import LIMITS
 from sandbox.run_file import KINDS, OPTIONAL, SHAPES
 from sandbox.scene.compile.demands import Demand
@@ -30,6 +28,8 @@ from sandbox.scene.description.fixed import MAX_LAYERS, MAX_ZONES
 from sandbox.scene.description.world import COMMON, Settings
 from sandbox.scene.validate.scene import MAX_SURFACES
 from sandbox.trajectory import Trajectory
+from sandbox.window.input.bindings import control_help
+from sandbox.window.ui.help import help_groups
 
 SCENES = {
     "artillery": "artillery/duel",
@@ -164,13 +164,13 @@ def fixed_limits() -> str:
 
 def window_keys() -> str:
     """Return the keys of the window by group, as its help lists them."""
-    parts = [f"### {group.title}\n\n{_keys(group.lines)}" for group in groups()]
+    parts = [f"### {group.title}\n\n{_keys(group.lines)}" for group in help_groups()]
     return "\n\n".join(parts)
 
 
 def cue_keys() -> str:
     """Return the keys at a billiard table."""
-    return _keys(TOLD)
+    return _keys(CUE_KEY_HELP)
 
 
 def game_keys() -> str:
@@ -178,7 +178,7 @@ def game_keys() -> str:
     parts = []
     for name in sorted(RULES):
         rules = required_rules(sandbox.load(SCENES[name]))
-        parts.append(f"### {name.capitalize()}\n\n{_keys(told(tuple(rules.controls)))}")
+        parts.append(f"### {name.capitalize()}\n\n{_keys(control_help(tuple(rules.controls)))}")
     return "\n\n".join(parts)
 
 

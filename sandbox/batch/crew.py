@@ -278,7 +278,7 @@ def _raise_once() -> Callable[[int, FrameType | None], None]:
     """
     is_raised = False
 
-    def handle(number: int, frame: FrameType | None) -> None:
+    def handle(_number: int, _frame: FrameType | None) -> None:
         nonlocal is_raised
         if not is_raised:
             is_raised = True

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sandbox.echo import short_count, short_repr, shorten
-from sandbox.games.player import Player
+from sandbox.games.players import PlayerSpec
 from sandbox.games.registry import has_rules
 from sandbox.measure.replay import read_session
 from sandbox.measure.seeds import same_chances
@@ -50,7 +50,7 @@ class Job:
     """It is a session that was played before."""
     state_hash: str | None = None
     """of the end of that session, where this run is to end alike: on its engine, with nothing set"""
-    player: Player | None = None
+    player: PlayerSpec | None = None
     """who plays the game of the scene, where it has one with rules"""
     score: float | None = None
     """of that session, where this run is to end alike"""
@@ -64,7 +64,7 @@ def plan(
     overrides: Sequence[Override] = (),
     sweeps: Sequence[str] = (),
     seeds: int | None = None,
-    player: Player | None = None,
+    player: PlayerSpec | None = None,
     told: Told | None = None,
 ) -> list[Job]:
     """Lay out every run, in order: scene by scene, the last sweep changing fastest, then seeds, then engines.
@@ -98,7 +98,7 @@ def plan(
         recorded = _is_recording(path)
         known: Recording | None = None
         for point in points:
-            found: list[tuple[Recording, Player | None, tuple[tuple[str, Any], ...]]] = []
+            found: list[tuple[Recording, PlayerSpec | None, tuple[tuple[str, Any], ...]]] = []
             alike = 1
             for seed in seeding:
                 where = (*point, *(() if seed is None else (("world.seed", seed),)))
@@ -199,7 +199,7 @@ def _read(path: str, known: Recording | None, overrides: Sequence[Override]) -> 
     return replace(known, scene=from_session(document, path, overrides))
 
 
-def _player(session: Recording, path: str, player: Player | None) -> Player | None:
+def _player(session: Recording, path: str, player: PlayerSpec | None) -> PlayerSpec | None:
     """Return who plays; none where there is no game with rules.
 
     Raises:
@@ -207,7 +207,7 @@ def _player(session: Recording, path: str, player: Player | None) -> Player | No
     """
     if not has_rules(session.scene):
         return None
-    plays = Player.of(session) if _is_recording(path) else player or Player()
+    plays = PlayerSpec.of(session) if _is_recording(path) else player or PlayerSpec()
     plays.bout(session.scene, path)
     return plays
 

@@ -20,7 +20,7 @@ from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from sandbox.play.footage.film import Film
+    from sandbox.window.capture.film import RecordedRun
 
 
 @click.command(name="export")
@@ -142,13 +142,13 @@ def _trajectory(run: str, source: Trajectory | Recording, told: "Told") -> tuple
     if isinstance(source, Trajectory):
         return 0, source
     from sandbox.engines.registry import UnknownEngineError
-    from sandbox.games.rules import UnfitError
+    from sandbox.games.contract import UnsuitableSceneError
     from sandbox.measure.recorder import TooLargeError
     from sandbox.measure.replay import rerun
 
     try:
         trajectory = rerun(source, audit=False, progress=told(f"running {run}"))
-    except (UnknownEngineError, TooLargeError, UnfitError) as error:
+    except (UnknownEngineError, TooLargeError, UnsuitableSceneError) as error:
         raise SceneError([Fault(run, None, "", str(error))]) from None
     if trajectory.status == "ok" or not len(trajectory.time):
         return 0, trajectory
@@ -162,7 +162,7 @@ def _export(run: str, options: Options, trajectory: Trajectory, files: list[dict
     Raises:
         SceneError: one cannot be written, or the run is damaged.
     """
-    film: Film | None = None
+    film: RecordedRun | None = None
     for target in options.targets:
         path = Path(target)
         kind = path.suffix.lower()
@@ -211,22 +211,22 @@ def _between(run: Trajectory, options: Options) -> Trajectory:
     return replace(run, **states, **touches)
 
 
-def _film(run: str, trajectory: Trajectory) -> "Film":
+def _film(run: str, trajectory: Trajectory) -> "RecordedRun":
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # standard output is for what was asked
-    from sandbox.play.footage.film import Film
+    from sandbox.window.capture.film import RecordedRun
 
-    return Film(trajectory, run)
+    return RecordedRun(trajectory, run)
 
 
-def _shoot(options: Options, film: "Film", path: Path, progress: Progress | None) -> int:
-    from sandbox.play.footage.filming import Shot, shoot
-    from sandbox.play.footage.outfile import CaptureError
+def _shoot(options: Options, film: "RecordedRun", path: Path, progress: Progress | None) -> int:
+    from sandbox.window.capture.export import ExportOptions, export_images
+    from sandbox.window.capture.image_files import CaptureError
 
     still = path.suffix.lower() == ".png"
     last = film.duration if options.until is None else min(options.until, film.duration)
     if still and options.at is not None:
         last = min(options.at, film.duration)
-    shot = Shot(
+    shot = ExportOptions(
         start=min(options.start or 0.0, last),
         end=last,
         size=options.picture_size,
@@ -235,7 +235,7 @@ def _shoot(options: Options, film: "Film", path: Path, progress: Progress | None
         overlays=frozenset({"shapes", *options.overlays}),
     )
     try:
-        return shoot(film, shot, path, progress)
+        return export_images(film, shot, path, progress)
     except CaptureError as error:
         raise SceneError([Fault("--to", None, "", f"{path}: {error}")]) from None
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from sandbox.cli.output import reasons_against
 from sandbox.echo import MAX_NAMED, short_repr, shorten
-from sandbox.play.sight import OVERLAYS
 from sandbox.scene.errors import Fault, SceneError
+from sandbox.window.playback.snapshot import OVERLAYS
 
 TABLES = (".csv", ".parquet")
 FILMS = (".gif", ".mp4")
@@ -97,9 +97,9 @@ def check_times(options: Options, end: float | None) -> None:
 
 def _most_pictures(options: Options) -> int | None:
     if ".gif" in options.suffixes:
-        from sandbox.play.footage.limits import MOST_GIF_PICTURES
+        from sandbox.window.capture.recorder import MAX_GIF_FRAMES
 
-        return MOST_GIF_PICTURES
+        return MAX_GIF_FRAMES
     return MOST_PICTURES if ".mp4" in options.suffixes else None
 
 
@@ -124,7 +124,7 @@ def _of_targets(options: Options) -> list[tuple[str, str]]:
 
         found += [] if can_write_parquet() else [("--to", NEEDS_PARQUET)]
     if ".mp4" in options.suffixes:
-        from sandbox.play.footage.limits import NEEDS_VIDEO, can_make_mp4
+        from sandbox.window.capture.recorder import NEEDS_VIDEO, can_make_mp4
 
         found += [] if can_make_mp4() else [("--to", NEEDS_VIDEO)]
     return found
@@ -179,14 +179,14 @@ def _of_values(options: Options) -> list[tuple[str, str]]:
 
 
 def _of_rate(options: Options) -> list[tuple[str, str]]:
-    from sandbox.play.footage.limits import FASTEST_GIF
+    from sandbox.window.capture.recorder import MAX_GIF_RATE
 
     if options.fps is None:
         return []
     if not 0.01 <= options.fps <= FASTEST:
         return [("--fps", f"is {options.fps:g}; it must be between 0.01 and {FASTEST:g} frames per second")]
-    if ".gif" in options.suffixes and options.fps > FASTEST_GIF:
-        return [("--fps", f"is {options.fps:g}; a gif shows at most {FASTEST_GIF:g} frames per second")]
+    if ".gif" in options.suffixes and options.fps > MAX_GIF_RATE:
+        return [("--fps", f"is {options.fps:g}; a gif shows at most {MAX_GIF_RATE:g} frames per second")]
     return []
 
 

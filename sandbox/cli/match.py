@@ -15,11 +15,11 @@ from sandbox.cli.telling import telling
 from sandbox.echo import MAX_NAMED, shorten
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import UnknownEngineError, able, engine_named
-from sandbox.games.billiards.bot.named import bots_in
-from sandbox.games.billiards.frame import MAX_TURNS, Frame, Turn, play
+from sandbox.games.billiards.bot import parse_bots
+from sandbox.games.billiards.headless import MAX_TURNS, FrameRecord, FrameTurn, play_frame
 from sandbox.games.billiards.match import Match
-from sandbox.games.billiards.rules.happening import GameError
-from sandbox.games.billiards.rules.registry import RULES
+from sandbox.games.billiards.rules.base import GameError
+from sandbox.games.billiards.rules.registry import RULESETS
 from sandbox.interrupt import heeded
 from sandbox.measure.told import Told
 from sandbox.scene.errors import Fault
@@ -32,7 +32,7 @@ TABLES = "8-ball, 9-ball, snooker, three-cushion, …"
 
 @click.command(name="match")
 @click.argument("scene")
-@click.option("--game", metavar="NAME", help=f"{', '.join(RULES)}; default: the game of the scene")
+@click.option("--game", metavar="NAME", help=f"{', '.join(RULESETS)}; default: the game of the scene")
 @click.option(
     "--players",
     default="bot,bot",
@@ -107,7 +107,7 @@ def command(
         faults.append(Fault("--time-limit", None, "", "is not a number; it must be greater than 0"))
     count = 2
     with gathering(faults, "--players", (GameError,)):
-        count = len(bots_in(players))
+        count = len(parse_bots(players))
     found: list[Scene] = []
     terms: dict[str, Any] = ({} if distance is None else {"distance": distance}) | ({"misses": True} if misses else {})
     with gathering(faults):
@@ -138,9 +138,9 @@ def command(
             table = load(path, (*overrides, ("world.seed", begin + k)))
             # The first shot goes round: who sits at seat 0 of a frame breaks.
             seats = [(k + seat) % count for seat in range(count)]
-            bots = bots_in(players, begin + k)
+            bots = parse_bots(players, begin + k)
             with telling(quiet or as_json) as told:
-                frame = heeded()(play)(
+                frame = heeded()(play_frame)(
                     Match.begin(table, game, count, **terms),
                     [bots[seat] for seat in seats],
                     engine,
@@ -183,11 +183,11 @@ def command(
     return status
 
 
-def _progress(told: Told, number: int, frames: int, seats: list[int]) -> Callable[[Turn, Match], None]:
+def _progress(told: Told, number: int, frames: int, seats: list[int]) -> Callable[[FrameTurn, Match], None]:
     """Return what says after each turn how far a frame is."""
     done = 0
 
-    def after(_: Turn, match: Match) -> None:
+    def after(_: FrameTurn, match: Match) -> None:
         nonlocal done
         done += 1
         told(f"frame {number:,} of {frames:,}: {plural(done, 'turn')}, {_scores(match, seats)}")
@@ -200,7 +200,7 @@ def _scores(match: Match, seats: list[int]) -> str:
     return " : ".join(str(match.state.scores[seats.index(who)]) for who in range(len(seats)))
 
 
-def _told(number: int, frame: Frame, seats: list[int], names: list[str]) -> str:
+def _told(number: int, frame: FrameRecord, seats: list[int], names: list[str]) -> str:
     """Return the line of a frame; scores are in the order in which the players are named."""
     state = frame.match.state
     ends = "no winner" if frame.unfinished is None else "abandoned"

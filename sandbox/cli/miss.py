@@ -14,7 +14,7 @@ from sandbox.scene.files.load import load
 from sandbox.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from sandbox.games.artillery.miss import Table as MissTable
+    from sandbox.games.artillery.landing_error import LandingErrorTable as MissTable
 
 
 class Figure(click.FloatRange):
@@ -56,12 +56,15 @@ def command(
 
     Gravity, drag and wind are those of SCENE, a file or the name of a shipped scene.
     """
-    from sandbox.games.artillery.miss import STEPS, miss_table  # the engines, which help needs none of
+    from sandbox.games.artillery.landing_error import (  # the engines, which help needs none of
+        STEPS,
+        landing_error_table,
+    )
 
     try:
         read = load(path_of(scene), overrides)
         with telling(as_json) as told:
-            found = miss_table(read.world, speed, math.radians(angle), dts or STEPS, told)
+            found = landing_error_table(read.world, speed, math.radians(angle), dts or STEPS, told)
     except SceneError as error:
         return refused(error.faults, as_json, scene=scene)
     except ValueError as error:
@@ -85,7 +88,7 @@ def _print(name: str, scene: Scene, found: "MissTable", shot: str) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from sandbox.games.artillery.shot import length
+    from sandbox.games.artillery.shells import length_text
 
     world = scene.world
     air = f"drag {world.linear_drag:g} 1/s and {world.quadratic_drag:g} 1/m, wind {world.wind[0]:g} m/s"
@@ -99,7 +102,7 @@ def _print(name: str, scene: Scene, found: "MissTable", shot: str) -> None:
         table.add_column(f"dt {dt:.4g} s", justify="right", no_wrap=True)
     for engine, integrator in dict.fromkeys((row.engine, row.integrator) for row in found.rows):
         those = {row.dt: row.off for row in found.rows if (row.engine, row.integrator) == (engine, integrator)}
-        cells = [f"{'+' if those[dt] >= 0 else '−'}{length(abs(those[dt]))}" for dt in dts if dt in those]
+        cells = [f"{'+' if those[dt] >= 0 else '−'}{length_text(abs(those[dt]))}" for dt in dts if dt in those]
         table.add_row(engine, integrator or "", *(cell if cell[1:2] != "l" else cell[1:] for cell in cells))
     console = Console(width=None if sys.stdout.isatty() else WIDE)
     console.print(table)

@@ -47,7 +47,7 @@ def command(scene: str | None, engine: str | None, overrides: tuple[str, ...], *
     if faults:
         return refused(faults)
 
-    from sandbox.play.stage import Stage
+    from sandbox.window.app_state import AppState
 
-    stage = Stage(engine, overrides)
+    stage = AppState(engine, overrides)
     return show_stage(stage, lambda: path is None or stage.open(path), **window, pick=path is None)

@@ -17,8 +17,8 @@ from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from sandbox.play.running.live import Live
-    from sandbox.play.running.stored import Stored
+    from sandbox.window.playback.live import LiveView
+    from sandbox.window.playback.recorded import RecordedView
 
 
 @click.command(name="replay")
@@ -39,7 +39,7 @@ def command(run: str, engine: str | None, **window: Any) -> int:
     source: Trajectory | Recording | None = None
     with gathering(faults):
         source = read_run(find_run(run), run)
-    show: Live | Stored | None = None
+    show: LiveView | RecordedView | None = None
     if source is not None and not faults:
         if isinstance(source, Trajectory) and not len(source.time):
             click.echo(f"{run}: {source.status}: {source.reason}; the run has no frames to show", err=True)
@@ -53,9 +53,9 @@ def command(run: str, engine: str | None, **window: Any) -> int:
     if source is None or show is None:
         return refused(faults)
 
-    from sandbox.play.stage import Stage
+    from sandbox.window.app_state import AppState
 
-    stage, first, known = Stage(show.engine), show, source
+    stage, first, known = AppState(show.engine), show, source
     return show_stage(
         stage,
         lambda: stage.put_on(first, None, first.scene, again=lambda: _shown(known, engine)),
@@ -63,44 +63,44 @@ def command(run: str, engine: str | None, **window: Any) -> int:
     )
 
 
-def _shown(source: Trajectory | Recording, engine: str | None) -> "Live | Stored":
+def _shown(source: Trajectory | Recording, engine: str | None) -> "LiveView | RecordedView":
     return _computed(source, engine) if engine or isinstance(source, Recording) else _stored(source)
 
 
-def _stored(run: Trajectory) -> "Stored":
+def _stored(run: Trajectory) -> "RecordedView":
     """Return a stored run to be looked at."""
-    from sandbox.play.footage.film import Film
-    from sandbox.play.running.stored import Stored
+    from sandbox.window.capture.film import RecordedRun
+    from sandbox.window.playback.recorded import RecordedView
 
-    return Stored(Film(run))
+    return RecordedView(RecordedRun(run))
 
 
-def _computed(source: Trajectory | Recording, engine: str | None) -> "Live":
+def _computed(source: Trajectory | Recording, engine: str | None) -> "LiveView":
     """Return a session that does again what was done; a stored run is seen beside it.
 
     Raises:
         UnknownEngineError: the session is of an engine that is not here.
         Refusal: the engine cannot run it.
     """
-    from sandbox.games.referee import Referee
     from sandbox.games.registry import fitting_rules
-    from sandbox.play.footage.film import Film
-    from sandbox.play.running.live import Live
-    from sandbox.play.running.session import Session
+    from sandbox.games.session import GameSession
+    from sandbox.window.capture.film import RecordedRun
+    from sandbox.window.playback.live import LiveView
+    from sandbox.window.playback.session import Session
 
     film = None
     if isinstance(source, Recording):
         session = source if engine is None else source.on(engine)
     else:
-        film = Film(source)
+        film = RecordedRun(source)
         session = _session_of(source, film.scene, film.duration)
         if engine is not None and engine != session.engine:
             session = session.on(engine)
         session = replace(session, settings=_fitting(session.settings, session.scene, session.engine))
     rules = fitting_rules(session.scene, "<run>")
-    game = None if rules is None else Referee(rules, session.presses)
+    game = None if rules is None else GameSession(rules, session.presses)
     played = Session(session.scene, session.engine, session.settings, session.actions, game, session.duration)
-    return Live(played, film, until=session.duration)
+    return LiveView(played, film, until=session.duration)
 
 
 def _session_of(run: Trajectory, scene: Scene, duration: float) -> Recording:

@@ -24,7 +24,7 @@ from sandbox.cli.table import Row, print_runs
 from sandbox.cli.telling import telling
 from sandbox.echo import short_repr
 from sandbox.engines.registry import able
-from sandbox.games.player import Player
+from sandbox.games.players import PlayerSpec
 from sandbox.measure.recorder import TooLargeError, require_memory
 from sandbox.measure.seeds import same_chances
 from sandbox.scene.errors import Fault, SceneError
@@ -119,9 +119,9 @@ def command(
             parse_sweep(sweep)
             sound.append(sweep)
     faults += repeated_keys(overrides, sound, seeds)
-    plays: Player | None = None
+    plays: PlayerSpec | None = None
     with gathering(faults):
-        plays = None if player is None else Player.named(player)
+        plays = None if player is None else PlayerSpec.named(player)
     jobs: list[Job] = []
     with gathering(faults, "--sweep", (AddressError,)), telling(quiet or as_json) as told:
         jobs = plan(found, names, overrides, sound, seeds, plays, told)

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from sandbox.cli.table import Row
-from sandbox.games.scores import SHARES, Scores
+from sandbox.games.scores import QUANTILES, Scores
 
 BAR = 40
 """characters, the longest bar"""
@@ -37,7 +37,7 @@ def print_scores(rows: Sequence[dict[str, Any]]) -> None:
         click.echo(f"\nscores of {row['scene']}, {row['engine']}{swept}: {row['count']} games, player {row['player']}")
         click.echo(f"  mean {_score(row['mean'])} ± {_score(row['deviation'])} per game")
         names = {0.0: "least", 0.5: "median", 1.0: "most"}
-        told = (f"{names.get(share, f'{share:.0%}')} {_score(row['quantiles'][f'{share:g}'])}" for share in SHARES)
+        told = (f"{names.get(share, f'{share:.0%}')} {_score(row['quantiles'][f'{share:g}'])}" for share in QUANTILES)
         click.echo(f"  {' · '.join(told)}")
         _print_histogram(row["histogram"]["edges"], row["histogram"]["counts"])
 

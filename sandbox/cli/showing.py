@@ -10,11 +10,11 @@ from sandbox.cli.output import reasons_against
 from sandbox.cli.reading import refused
 from sandbox.cli.streams import OutputError
 from sandbox.echo import MAX_NAMED, short_repr, shorten
-from sandbox.play.sight import OVERLAYS
 from sandbox.scene.errors import Fault
+from sandbox.window.playback.snapshot import OVERLAYS
 
 if TYPE_CHECKING:
-    from sandbox.play.stage import Stage
+    from sandbox.window.app_state import AppState
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 LARGEST = 16384
@@ -70,7 +70,7 @@ def window_options(command: Command) -> Command:
 
 
 def show_stage(
-    stage: "Stage",
+    stage: "AppState",
     begin: Callable[[], object],
     *,
     size: tuple[int, int] | None,
@@ -94,8 +94,8 @@ def show_stage(
         record: where the session is saved at the end.
         pick: begin with the picker.
     """
-    from sandbox.play.screen import NoDisplayError
-    from sandbox.play.window import Window
+    from sandbox.window.app import App
+    from sandbox.window.display import NoDisplayError
 
     reasons = [] if record is None else reasons_against(record)
     if reasons:
@@ -110,7 +110,7 @@ def show_stage(
             failures.append(error)
 
     try:
-        window = Window(stage, size=size, film=f".{film}", say=say)
+        window = App(stage, size=size, film=f".{film}", say=say)
     except NoDisplayError as error:
         click.echo(f"{error}; `sandbox run` and `sandbox export` work without a display", err=True)
         return 1
@@ -131,7 +131,7 @@ def show_stage(
         window.close()
 
 
-def _saved(stage: "Stage", record: Path) -> bool:
+def _saved(stage: "AppState", record: Path) -> bool:
     """Save the session that is on, and say so; return whether that could be done."""
     if stage.live is None:
         click.echo(f"--record: {record}: there is no session to save", err=True)

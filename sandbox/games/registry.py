@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from sandbox.games.contract import Rules, UnsuitableSceneError
 from sandbox.games.curling.rules import Curling
-from sandbox.games.landing import Landing
+from sandbox.games.landing.rules import Landing
 from sandbox.games.names import GAMES, registered_games
-from sandbox.games.pinball.pinball import Pinball
-from sandbox.games.rules import Rules, UnfitError
+from sandbox.games.pinball.rules import Pinball
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.errors import Fault, Lines, SceneError
 from sandbox.scene.scene import Scene
@@ -45,7 +45,7 @@ def _rules_named(game: str | None) -> Callable[[Scene, Bodies], Rules] | None:
     try:
         rules: Callable[[Scene, Bodies], Rules] = entry.load()
     except (ImportError, AttributeError) as error:
-        raise UnfitError(f"the game {game!r} cannot be imported from {entry.value}: {error}") from error
+        raise UnsuitableSceneError(f"the game {game!r} cannot be imported from {entry.value}: {error}") from error
     return rules
 
 
@@ -86,7 +86,7 @@ def required_rules(scene: Scene) -> Rules:
     """
     rules = rules_of(scene)
     if rules is None:
-        raise UnfitError(f"the scene {scene.title!r} has no game with rules: state [play] game")
+        raise UnsuitableSceneError(f"the scene {scene.title!r} has no game with rules: state [play] game")
     return rules
 
 
@@ -98,7 +98,7 @@ def fitting_rules(scene: Scene, file: str) -> Rules | None:
     """
     try:
         return rules_of(scene)
-    except UnfitError as error:
+    except UnsuitableSceneError as error:
         try:
             line = Lines(Path(file).read_text(encoding="utf-8")).find(("play", "game"))
         except (OSError, ValueError):  # it was read from elsewhere, or is a session

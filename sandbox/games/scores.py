@@ -9,9 +9,9 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 
-SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """of games, whose scores are no more than the quantiles"""
-MOST_BINS = 10
+MAX_BINS = 10
 """and up to two more, as bins begin and end at round figures, not at the least and the most score"""
 
 
@@ -45,7 +45,7 @@ class Scores:
             count=len(values),
             mean=float(values.mean()),
             deviation=float(values.std(ddof=1)) if len(values) > 1 else 0.0,
-            quantiles=tuple(np.quantile(values, SHARES).tolist()),
+            quantiles=tuple(np.quantile(values, QUANTILES).tolist()),
             edges=tuple(edges.tolist()),
             counts=tuple(counts.tolist()),
         )
@@ -56,7 +56,7 @@ class Scores:
             "count": self.count,
             "mean": self.mean,
             "deviation": self.deviation,
-            "quantiles": {f"{share:g}": value for share, value in zip(SHARES, self.quantiles, strict=True)},
+            "quantiles": {f"{share:g}": value for share, value in zip(QUANTILES, self.quantiles, strict=True)},
             "histogram": {"edges": list(self.edges), "counts": list(self.counts)},
         }
 
@@ -67,8 +67,8 @@ def _edges(scores: FloatArray) -> list[float]:
     Where all scores are whole numbers, no bin lies between two of these.
     """
     least, most = float(scores.min()), float(scores.max())
-    width = 10.0 ** math.floor(math.log10(max(most - least, 1.0) / MOST_BINS))
-    width *= next(times for times in (1.0, 2.0, 5.0, 10.0) if most - least <= width * times * MOST_BINS)
+    width = 10.0 ** math.floor(math.log10(max(most - least, 1.0) / MAX_BINS))
+    width *= next(times for times in (1.0, 2.0, 5.0, 10.0) if most - least <= width * times * MAX_BINS)
     if (scores == np.round(scores)).all():
         width = max(width, 1.0)
     first, last = math.floor(least / width), math.floor(most / width) + 1

@@ -10,7 +10,7 @@ import numpy as np
 
 from sandbox.action import Action, ActionError
 from sandbox.engines.contract import Divergence, Exhaustion, Simulation
-from sandbox.games.bout import Bout
+from sandbox.games.session import HeadlessGame
 from sandbox.measure.recorder import Recorder
 from sandbox.measure.schedule import ROUNDING, Stretch
 from sandbox.trajectory import Contacts, Frame
@@ -42,7 +42,7 @@ class End(NamedTuple):
 class _Doing:
     """What is done between steps: the actions that were given, and a game's."""
 
-    def __init__(self, simulation: Simulation, actions: Sequence[Action], bout: Bout | None) -> None:
+    def __init__(self, simulation: Simulation, actions: Sequence[Action], bout: HeadlessGame | None) -> None:
         self._simulation, self._actions, self._bout = simulation, actions, bout
         self._due = 0
         self.next = -math.inf
@@ -101,7 +101,7 @@ def drive(
     actions: Sequence[Action],
     recorder: Recorder,
     progress: Progress | None = None,
-    bout: Bout | None = None,
+    bout: HeadlessGame | None = None,
     watch: Watch | None = None,
 ) -> End:
     """Step to the end.

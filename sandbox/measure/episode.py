@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from sandbox.action import Action
 from sandbox.engines.switching import SwitchableSimulation, start
-from sandbox.games.referee import Referee
+from sandbox.games.contract import Control, Rules
 from sandbox.games.registry import required_rules
-from sandbox.games.rules import Control, Rules
+from sandbox.games.session import GameSession
 from sandbox.recording import Recording
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
@@ -23,7 +23,7 @@ class Episode:
             Refusal: the engine lacks something that the scene needs.
         """
         self.scene, self.engine = scene, engine
-        self._referee = Referee(required_rules(scene))
+        self._referee = GameSession(required_rules(scene))
         self.relay: SwitchableSimulation = start(scene, engine)
         """what runs"""
         self.relay.contacts()

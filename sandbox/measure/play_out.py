@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from sandbox.action import actions_from_json
-from sandbox.games.bout import Bout
-from sandbox.games.player import Player
+from sandbox.games.contract import Policy, Press
+from sandbox.games.players import PlayerSpec
 from sandbox.games.registry import required_rules
-from sandbox.games.rules import Policy, Press
+from sandbox.games.session import HeadlessGame
 from sandbox.measure.run import Progress, run
 from sandbox.recording import Recording
 from sandbox.scene.scene import Scene
@@ -55,7 +55,11 @@ def play_out(
         TooLargeError: the frames would not fit into memory.
     """
     rules = required_rules(scene)
-    bout = Player.named(player).bout(scene) if isinstance(player, str) else Bout(rules, player, type(player).__name__)
+    bout = (
+        PlayerSpec.named(player).bout(scene)
+        if isinstance(player, str)
+        else HeadlessGame(rules, player, type(player).__name__)
+    )
     assert bout is not None
     trajectory = run(scene, engine, audit=audit, progress=progress, bout=bout, **settings)
     return Played(bout.score, bout.over, _recording(scene, engine, trajectory, bout.presses, settings), trajectory)

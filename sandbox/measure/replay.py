@@ -6,9 +6,9 @@ from pydantic import ValidationError
 
 from sandbox.action import Switch
 from sandbox.engines.registry import UnknownEngineError, engine_named
-from sandbox.games.bout import Bout
-from sandbox.games.player import RECORDED
+from sandbox.games.players import RECORDED
 from sandbox.games.registry import rules_of
+from sandbox.games.session import HeadlessGame
 from sandbox.measure.run import Progress, run
 from sandbox.recording import Recording
 from sandbox.scene.errors import Fault, SceneError
@@ -77,6 +77,6 @@ def rerun(
         actions=chosen.actions,
         audit=audit,
         progress=progress,
-        bout=None if rules is None else Bout(rules, None, RECORDED, chosen.presses),
+        bout=None if rules is None else HeadlessGame(rules, None, RECORDED, chosen.presses),
         **chosen.settings.model_dump(),
     )

@@ -16,7 +16,7 @@ from sandbox.engines.contract import Refusal, Simulation
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import engine_named
 from sandbox.engines.switching import start
-from sandbox.games.bout import Bout
+from sandbox.games.session import HeadlessGame
 from sandbox.interrupt import heeded
 from sandbox.measure.audit import Audit
 from sandbox.measure.drive import Progress, Watch, drive
@@ -47,7 +47,7 @@ def run(
     audit: bool = True,
     account: bool = False,
     progress: Progress | None = None,
-    bout: Bout | None = None,
+    bout: HeadlessGame | None = None,
     watch: Watch | None = None,
     **settings: Any,
 ) -> Trajectory:

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
-DISPLAY = ("cli", "play", "report")
+DISPLAY = ("cli", "window", "report")
 """Subpackages that show results and do not change them: the digest leaves them out."""
 
 

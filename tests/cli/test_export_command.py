@@ -18,16 +18,16 @@ from PIL import Image
 from sandbox.action import Impulse, Spawn
 from sandbox.cli.main import call
 from sandbox.measure.run import run
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import SKY
-from sandbox.play.footage import limits
-from sandbox.play.footage.film import Film
 from sandbox.recording import Recording
 from sandbox.report import tables
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
+from sandbox.window.camera import Camera
+from sandbox.window.capture import recorder as limits
+from sandbox.window.capture.film import RecordedRun
+from sandbox.window.render.palette import SKY
 
 SCENE = loads(DROP)
 SMALL = ("--size", "160x90")
@@ -99,7 +99,7 @@ def test_gif_shows_the_ball_where_the_run_has_it(
     assert (status, document["files"]) == (0, [{"path": str(target), "format": "gif", "frames": 10}])
     frames, shown = gif_frames(target)
     assert (len(frames), sum(shown)) == (10, 500)
-    film = Film(Trajectory.load(stored / f"{id_in(stored)}.npz"))
+    film = RecordedRun(Trajectory.load(stored / f"{id_in(stored)}.npz"))
     camera = Camera.fitting(film.box, (160, 90))
     for k, frame in enumerate(frames):
         x, y = camera.to_screen(film.frame(k / 20).position[0])
@@ -141,7 +141,7 @@ def test_mp4_decodes_to_the_same_pictures(stored: Path, tmp_path: Path, capfd: p
 
 
 def test_png_shows_the_end_or_another_moment(stored: Path, tmp_path: Path) -> None:
-    film = Film(Trajectory.load(stored / f"{id_in(stored)}.npz"))
+    film = RecordedRun(Trajectory.load(stored / f"{id_in(stored)}.npz"))
     camera = Camera.fitting(film.box, (160, 90))
     for words, moment in (((), 0.5), (("--at", "0"), 0.0), (("--at", "0.25"), 0.25)):
         target = tmp_path / "a.png"

@@ -7,7 +7,7 @@ import pytest
 from calling import json_of, lines_of, written
 
 import sandbox.cli.check as checking
-import sandbox.games.artillery.miss as missing
+import sandbox.games.artillery.landing_error as missing
 import sandbox.measure.compare.comparing as comparing
 import sandbox.measure.shots.study as studying
 

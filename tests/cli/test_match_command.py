@@ -11,7 +11,7 @@ from calling import json_of, lines_of
 
 from sandbox.cli.main import call
 from sandbox.engines.contract import Divergence, Exhaustion
-from sandbox.games.billiards.frame import Frame, NoRestError, play
+from sandbox.games.billiards.headless import FrameRecord, NoRestError, play_frame
 from sandbox.games.billiards.match import Match
 
 QUICK = ("match", "straight-rail", "--distance", "2", "--players", "bot:0.9,bot:0.8")
@@ -58,7 +58,7 @@ def test_misses_are_of_snooker(capfd: pytest.CaptureFixture[str]) -> None:
 def test_snooker_is_played_with_the_miss(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     states = []
 
-    def ended(match: Match, *_: object, **__: object) -> Frame:
+    def ended(match: Match, *_: object, **__: object) -> FrameRecord:
         states.append(match.state)
         raise KeyboardInterrupt
 
@@ -94,7 +94,7 @@ def test_shot_without_an_end_gives_the_frame_up(
     def failing(_: object) -> None:
         raise error
 
-    monkeypatch.setattr("sandbox.games.billiards.frame.roll_out", failing)
+    monkeypatch.setattr("sandbox.games.billiards.headless.run_until_rest", failing)
     status, document, (line,) = json_of(capfd, *QUICK)
     assert (status, document["unfinished"]) == (1, 1)
     assert str(error) in document["frames"][0]["unfinished"]
@@ -119,10 +119,10 @@ def test_interrupt_keeps_the_frames_that_are_finished(
 ) -> None:
     frames = []
 
-    def interrupted(*given: Any, **named: Any) -> Frame:
+    def interrupted(*given: Any, **named: Any) -> FrameRecord:
         if frames:
             raise KeyboardInterrupt
-        frames.append(play(*given, **named))
+        frames.append(play_frame(*given, **named))
         return frames[0]
 
     monkeypatch.setattr("sandbox.cli.match.play", interrupted)

@@ -10,12 +10,12 @@ from sandbox.cli.replay import _shown
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
-from sandbox.play.running import live as live_module
-from sandbox.play.running.live import Live
-from sandbox.play.running.session import Session
-from sandbox.play.stage import Stage
 from sandbox.recording import Recording
 from sandbox.scene.files.load import loads
+from sandbox.window.app_state import AppState
+from sandbox.window.playback import live as live_module
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.session import Session
 
 SCENE = loads(DROP)
 KICK = Impulse(time=0.1, body="a", impulse=(1.0, 0.0))
@@ -28,8 +28,8 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(live_module, name, 1e9)
 
 
-def live(show: object) -> Live:
-    assert isinstance(show, Live)
+def live(show: object) -> LiveView:
+    assert isinstance(show, LiveView)
     return show
 
 
@@ -55,7 +55,7 @@ def test_restart_of_a_replay_plays_what_was_recorded_again() -> None:
     session = Session(SCENE, actions=(KICK,))
     session.advance(30, None)
     source = session.recording()
-    stage, first = Stage(source.engine), live(_shown(source, None))
+    stage, first = AppState(source.engine), live(_shown(source, None))
     stage.put_on(first, None, first.scene, again=lambda: _shown(source, None))
     stage.paused = True
     for _ in range(2):
@@ -74,7 +74,7 @@ def test_restart_of_a_replay_plays_what_was_recorded_again() -> None:
 
 def test_restart_keeps_the_stored_ghost() -> None:
     source = run(SCENE, "pymunk", actions=(KICK,))
-    stage, first = Stage(), live(_shown(source, "reference"))
+    stage, first = AppState(), live(_shown(source, "reference"))
     stage.put_on(first, None, first.scene, again=lambda: _shown(source, "reference"))
     stage.restart()
     again = live(stage.show)

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import pytest
 
 from sandbox.engines.registry import able
-from sandbox.games.landing import (
+from sandbox.games.contract import Press, Rules, StepInfo, UnsuitableSceneError
+from sandbox.games.landing.rules import (
     DOWN,
     ELSEWHERE,
     FASTER,
@@ -17,8 +18,7 @@ from sandbox.games.landing import (
     TANK,
     Landing,
 )
-from sandbox.games.policies import Script
-from sandbox.games.rules import Press, Rules, Seen, UnfitError
+from sandbox.games.players import ScriptedInput
 from sandbox.measure.play_out import Played, play_out
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
@@ -60,7 +60,7 @@ key = "up"
 class Autopilot:
     """Comes down on the pad by what the score panel's figures tell: it knows the rules, and no engine."""
 
-    def decide(self, seen: Seen, rules: Rules) -> Sequence[tuple[str, float]]:
+    def decide(self, seen: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
         assert isinstance(rules, Landing)
         ship, frame = rules._ship, seen.frame
         x, _ = frame.position[ship].tolist()
@@ -118,7 +118,7 @@ def test_slow_touch_is_a_landing_and_fuel_counts() -> None:
     game = play_out(flat(1.0 + height), "none")
     assert (game.over, game.score) == (LANDED, FOR_LANDING + FOR_FUEL)
     burnt = 0.5  # s of an engine at a tenth, which hardly slows it: 5 m/s² · 0.1 · 0.5 s of TANK m/s
-    spent = play_out(flat(1.0 + height), Script([Press(0.0, "engine", 0.1), Press(burnt, "engine", 0.0)]))
+    spent = play_out(flat(1.0 + height), ScriptedInput([Press(0.0, "engine", 0.1), Press(burnt, "engine", 0.0)]))
     assert spent.over == LANDED
     # A step more or less: the rules see a throttle at the end of the first step that it acts in.
     assert spent.score == pytest.approx(FOR_LANDING + FOR_FUEL * (1.0 - 5.0 * 0.1 * burnt / TANK), abs=1.0)
@@ -131,7 +131,7 @@ def test_tilted_touch_is_a_crash() -> None:
 
 
 def test_empty_tank_stops_the_engine() -> None:
-    game = play_out(flat(200.0), Script([Press(0.0, "engine", 1.0)]))
+    game = play_out(flat(200.0), ScriptedInput([Press(0.0, "engine", 1.0)]))
     stop = game.recording.actions[-1]
     assert stop.kind == "throttle"
     assert stop.level == 0.0
@@ -144,7 +144,7 @@ def test_empty_tank_stops_the_engine() -> None:
 
 
 def test_who_flies_away_is_lost() -> None:
-    game = play_out(SCENE, Script([Press(0.0, "engine", 1.0)]))
+    game = play_out(SCENE, ScriptedInput([Press(0.0, "engine", 1.0)]))
     assert game.over == "lost in space"
     assert game.score <= FOR_A_CRASH
 
@@ -162,7 +162,7 @@ def test_scene_that_lacks_something_is_refused(lacks: str) -> None:
     if lacks != 'name = "ship"':
         text = text.replace('body = "box-1"', 'body = "ship"')
     scene = loads(text)
-    with pytest.raises(UnfitError, match="landing needs a body 'ship', a fixed element 'pad', and a thrust"):
+    with pytest.raises(UnsuitableSceneError, match="landing needs a body 'ship', a fixed element 'pad', and a thrust"):
         Landing(scene, scene.bodies)
 
 
@@ -171,7 +171,7 @@ def test_panel_tells_what_would_be_a_crash() -> None:
     from sandbox.engines.switching import start
 
     relay = start(SCENE)
-    rules.look(Seen(0.0, relay.frame(), relay.contacts(), ()))
+    rules.look(StepInfo(0.0, relay.frame(), relay.contacts(), ()))
     lines = dict(rules.lines())
     assert lines["fuel"] == "100 %"
     assert lines["sideways"] == "+5.0 m/s !"

@@ -5,7 +5,7 @@ import json
 import pytest
 from toy_game import Toy, toy_scene
 
-from sandbox.games.lighting import APART, Lighting, Lightings
+from sandbox.games.session import MIN_LAMP_INTERVAL, LampLog, LampState
 
 STEP = 0.01
 
@@ -24,21 +24,21 @@ class Lamped(Toy):
 def test_lamps_are_those_that_were_lit_at_each_look() -> None:
     scene = toy_scene()
     rules = Lamped(scene, scene.bodies)
-    lighting, lit = Lighting(rules), {}
+    lighting, lit = LampState(rules), {}
     for k in range(200):
         rules.now = frozenset({"a", "b"} if k % 40 < 20 else {"c"} if k % 80 < 60 else ())
         lighting.look(k * STEP)
         lit[k * STEP] = rules.now
-    kept = Lightings.of(json.loads(json.dumps(lighting.told())))
+    kept = LampLog.of(json.loads(json.dumps(lighting.told())))
     assert all(kept.at(time) == those for time, those in lit.items())  # they change only when it looks
     assert kept.at(-1.0) == frozenset()
-    assert rules.asked == pytest.approx(200 * STEP / APART, abs=1)
+    assert rules.asked == pytest.approx(200 * STEP / MIN_LAMP_INTERVAL, abs=1)
     assert len(lighting.told()) == 10  # they change every 20 steps, and no line is written where nothing has changed
 
 
 def test_game_without_lamps_tells_none() -> None:
     scene = toy_scene()
-    lighting = Lighting(Toy(scene, scene.bodies))
+    lighting = LampState(Toy(scene, scene.bodies))
     lighting.look(0.0)
     assert lighting.told() == []
 
@@ -46,4 +46,4 @@ def test_game_without_lamps_tells_none() -> None:
 @pytest.mark.parametrize("told", [[1.0], [[1.0]], [["x", []]], 5, [[1.0, 2.0]]])
 def test_what_is_no_lamps_is_refused(told: list[object]) -> None:
     with pytest.raises(ValueError, match="invalid lamp record"):
-        Lightings.of(told)
+        LampLog.of(told)

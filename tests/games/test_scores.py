@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.games.scores import MOST_BINS, SHARES, Scores
+from sandbox.games.scores import MAX_BINS, QUANTILES, Scores
 
 SCORES = st.lists(st.one_of(st.integers(-1000, 10_000_000), st.floats(-1e6, 1e6)), min_size=1, max_size=60)
 
@@ -18,14 +18,14 @@ def test_figures_are_those_of_the_sample(scores: list[float]) -> None:
     assert found.quantiles[0] == min(scores)
     assert found.quantiles[-1] == max(scores)
     assert list(found.quantiles) == sorted(found.quantiles)
-    assert found.quantiles[SHARES.index(0.5)] == pytest.approx(np.median(scores), rel=1e-12, abs=1e-9)
+    assert found.quantiles[QUANTILES.index(0.5)] == pytest.approx(np.median(scores), rel=1e-12, abs=1e-9)
 
 
 @given(scores=SCORES)
 def test_bins_hold_all_scores_and_are_round(scores: list[float]) -> None:
     found = Scores.of(scores)
     assert len(found.edges) == len(found.counts) + 1
-    assert len(found.counts) <= MOST_BINS + 2  # the least and the most score may fall just into bins of their own
+    assert len(found.counts) <= MAX_BINS + 2  # the least and the most score may fall just into bins of their own
     assert found.edges[0] <= min(scores)
     assert max(scores) <= found.edges[-1] * (1.0 + 1e-12) + 1e-9  # rounding of an edge
     width = found.edges[1] - found.edges[0]

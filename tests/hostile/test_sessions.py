@@ -9,10 +9,10 @@ import pytest
 
 from sandbox.cli.main import call
 from sandbox.measure.replay import rerun
-from sandbox.play.running.session import Session
 from sandbox.recording import Recording
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.playback.session import Session
 
 Document = dict[str, Any]
 

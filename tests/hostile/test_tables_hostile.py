@@ -14,9 +14,9 @@ from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.contract import Divergence
 from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.measure.replay import rerun
-from sandbox.play.running.session import Session
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
+from sandbox.window.playback.session import Session
 
 STEPS = 40
 LAYERS = (["ground"], ["ramp"], ["ground", "ramp"])

@@ -9,13 +9,13 @@ from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.measure.replay import rerun
-from sandbox.play.running.session import Session
 from sandbox.recording import Recording
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find, shipped
 from sandbox.scene.scene import Scene
+from sandbox.window.playback.session import Session
 
 LONG = 1000.0
 """s; far longer than any scene runs by itself"""

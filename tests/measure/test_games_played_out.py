@@ -11,9 +11,9 @@ from toy_game import TOY, Toy, toy_scene
 from sandbox.action import Impulse
 from sandbox.engines.registry import ENGINES, start
 from sandbox.games import registry
-from sandbox.games.bout import Bout
-from sandbox.games.policies import POLICIES, Chance, Script
-from sandbox.games.rules import Press, Seen, UnfitError
+from sandbox.games.contract import Press, StepInfo, UnsuitableSceneError
+from sandbox.games.players import POLICIES, RandomInput, ScriptedInput
+from sandbox.games.session import HeadlessGame
 from sandbox.measure.play_out import play_out
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
@@ -95,7 +95,7 @@ def test_run_ends_with_the_game(monkeypatch: pytest.MonkeyPatch, every: int) -> 
 
 
 def test_game_whose_duration_is_no_multiple_of_a_step() -> None:
-    game = play_out(toy_scene(duration=0.505), Script([Press(0.1, "kick", 1.0)]))
+    game = play_out(toy_scene(duration=0.505), ScriptedInput([Press(0.1, "kick", 1.0)]))
     assert game.trajectory.time[-1] == 0.505
     assert rerun(game.recording, audit=False).info["state_hash"] == game.recording.state_hash
 
@@ -104,7 +104,7 @@ def test_actions_that_are_given_are_the_players() -> None:
     scene = toy_scene()
     rules = Toy(scene, scene.bodies)
     given = Impulse(time=0.05, body="a", impulse=(0.0, 1.0))
-    bout = Bout(rules, POLICIES["none"](scene), "none")
+    bout = HeadlessGame(rules, POLICIES["none"](scene), "none")
     told = run(scene, actions=[given], bout=bout, audit=False)
     bounces = int(dict(rules.lines())["bounces"])
     assert bout.score == bounces + 0.5
@@ -112,13 +112,15 @@ def test_actions_that_are_given_are_the_players() -> None:
 
 
 def test_rules_that_ask_for_the_impossible_end_the_run() -> None:
-    game = play_out(loads(TOY.replace('name = "a"', 'name = "a"\nfixed = true')), Script([Press(0.1, "kick", 1.0)]))
+    game = play_out(
+        loads(TOY.replace('name = "a"', 'name = "a"\nfixed = true')), ScriptedInput([Press(0.1, "kick", 1.0)])
+    )
     assert game.trajectory.status == "failed"
     assert "'a'" in (game.trajectory.reason or "")
 
 
 def test_script_presses_before_the_step_of_its_time() -> None:
-    game = play_out(toy_scene(), Script([Press(0.105, "kick", 1.0), Press(0.0, "aim", 1.0)]))
+    game = play_out(toy_scene(), ScriptedInput([Press(0.105, "kick", 1.0), Press(0.0, "aim", 1.0)]))
     aim, kick = game.recording.presses
     assert (aim.time, kick.control) == (0.0, "kick")
     assert kick.time == pytest.approx(0.11, abs=1e-12)  # rounding
@@ -131,10 +133,10 @@ def test_random_player_presses_at_its_rates() -> None:
     scene, counts = toy_scene(), []
     frame = start(scene, "pymunk").frame()
     for seed in range(60):
-        rules, policy = Toy(scene, scene.bodies), Chance(seed)
+        rules, policy = Toy(scene, scene.bodies), RandomInput(seed)
         pressed: dict[str, list[float]] = {"kick": [], "aim": []}
         for step in range(2000):
-            for name, value in policy.decide(Seen(0.01 * step, frame, Contacts.none(), ()), rules):
+            for name, value in policy.decide(StepInfo(0.01 * step, frame, Contacts.none(), ()), rules):
                 pressed[name].append(value)
         for values in pressed.values():
             assert all(value == 0.0 for value in values[1::2])
@@ -149,10 +151,10 @@ def test_random_player_presses_at_its_rates() -> None:
 def test_copied_policies_go_on_alike() -> None:
     scene = toy_scene()
     frame = start(scene, "pymunk").frame()
-    rules, policy = Toy(scene, scene.bodies), Chance(1)
+    rules, policy = Toy(scene, scene.bodies), RandomInput(1)
 
-    def decide(which: Chance, begin: int) -> list[Any]:
-        seen = (Seen(0.01 * step, frame, Contacts.none(), ()) for step in range(begin, begin + 500))
+    def decide(which: RandomInput, begin: int) -> list[Any]:
+        seen = (StepInfo(0.01 * step, frame, Contacts.none(), ()) for step in range(begin, begin + 500))
         return [which.decide(each, rules) for each in seen]
 
     decide(policy, 0)
@@ -162,7 +164,7 @@ def test_copied_policies_go_on_alike() -> None:
 
 def test_scene_without_a_game_is_not_played() -> None:
     scene = loads(TOY.replace('game = "landing"', ""))
-    with pytest.raises(UnfitError, match="has no game with rules"):
+    with pytest.raises(UnsuitableSceneError, match="has no game with rules"):
         play_out(scene)
     assert "game" not in run(scene, audit=False).info
 

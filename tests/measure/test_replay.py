@@ -21,11 +21,11 @@ from sandbox.action import (
 )
 from sandbox.engines.registry import ENGINES, UnknownEngineError
 from sandbox.measure.replay import rerun
-from sandbox.play.running.session import Session
 from sandbox.recording import Recording
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
 from sandbox.scene.scene import Scene
+from sandbox.window.playback.session import Session
 
 SCENE = from_document(
     {

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sandbox.play.camera import Camera
-from sandbox.play.framing import lies_down
 from sandbox.scene.files.load import loads
+from sandbox.window.camera import Camera
+from sandbox.window.view_bounds import should_rotate
 
 CAMERA = Camera((0.6, 1.3), 200.0, (640, 400), turned=True)
 TABLE = loads('title = "t"\n[billiards]\ntable = "pool-7ft"\n[billiards.place]\ncue = [0.5, 0.5]\n')
@@ -60,6 +60,6 @@ def test_fitting_leaves_the_head_free_where_there_is_room(head: int, turned: boo
 
 
 def test_tables_lie_down_in_wide_pictures_alone() -> None:
-    assert lies_down(TABLE, (800, 500))
-    assert not lies_down(TABLE, (500, 800))
-    assert not lies_down(loads('title = "t"\n[[ball]]\nposition = [0.0, 0.0]\nradius = 1.0\n'), (800, 500))
+    assert should_rotate(TABLE, (800, 500))
+    assert not should_rotate(TABLE, (500, 800))
+    assert not should_rotate(loads('title = "t"\n[[ball]]\nposition = [0.0, 0.0]\nradius = 1.0\n'), (800, 500))

@@ -4,10 +4,10 @@ import pygame
 import pytest
 
 from sandbox.action import Drive, Throttle
-from sandbox.play.claims import KEYS, claims, held
-from sandbox.play.hands import Hands
 from sandbox.scene.description.forces import DriveKey, ThrustKey
 from sandbox.scene.files.load import from_document
+from sandbox.window.input.bindings import KEYS, held, key_bindings
+from sandbox.window.input.body_tools import BodyTools
 
 BOX = {"name": "rod", "position": [0.0, 0.0], "size": [1.0, 1.0]}
 PLUNGER = {"kind": "plunger", "body": "rod", "direction": [0.0, 1.0], "travel": 1.0, "speed": 1.0}
@@ -30,7 +30,7 @@ def test_every_key_that_a_scene_may_name_is_a_key_of_the_window():
 @pytest.mark.parametrize("key", KEYS)
 def test_key_that_is_held_is_level_1(key):
     scene = from_document({"box": [BOX], "drive": [{**PLUNGER, "key": key}]})
-    claimed, live = claims(scene, Hands()), Told()
+    claimed, live = key_bindings(scene, BodyTools()), Told()
     claimed.deeds[KEYS[key]](live)
     claimed.releases[KEYS[key]](live)
     assert live.actions == [Drive(time=0.0, drive="drive-1", level=level) for level in (1.0, 0.0)]
@@ -43,6 +43,6 @@ def test_thrust_and_drive_on_one_key_both_act():
     thrust = {"name": "main", "body": "ship", "force": [1.0, 0.0], "key": "up"}
     scene = from_document({"box": [BOX, ship], "thrust": [thrust], "drive": [{**PLUNGER, "key": "up"}]})
     live = Told()
-    claims(scene, Hands()).deeds[pygame.K_UP](live)
+    key_bindings(scene, BodyTools()).deeds[pygame.K_UP](live)
     assert [type(action) for action in live.actions] == [Throttle, Drive]
     assert len([*held(scene)]) == 2

@@ -9,10 +9,10 @@ import pytest
 from pressing import key, key_up, press, release
 from windowed import turned, window_on
 
-from sandbox.play.camera import Camera
-from sandbox.play.stage import Stage
-from sandbox.play.window import Window
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.camera import Camera
 
 LEAVING = """
 title = "Leaving"
@@ -38,32 +38,32 @@ F, HOME = pygame.K_f, pygame.K_HOME
 
 
 @pytest.fixture
-def window(tmp_path: Path) -> Iterator[Window]:
+def window(tmp_path: Path) -> Iterator[App]:
     with window_on(LEAVING, tmp_path) as opened:
         pygame.event.clear()  # those of its opening
         yield opened
 
 
-def seen(window: Window) -> list[bool]:
+def seen(window: App) -> list[bool]:
     """Return which bodies are in the part of the picture that nothing covers."""
     assert window.stage.show is not None
     free = window.desk.free
     return [free.collidepoint(place) for place in window.camera.to_screen(window.stage.show.drawn.position).tolist()]
 
 
-def strike(window: Window, code: int) -> None:
+def strike(window: App, code: int) -> None:
     turned(window, key(code), key_up(code), elapsed=0.0)
 
 
 @pytest.mark.parametrize("elapsed", [0.01, 0.1])
-def test_all_that_moves_stays_in_the_picture(window: Window, elapsed: float) -> None:
+def test_all_that_moves_stays_in_the_picture(window: App, elapsed: float) -> None:
     strike(window, F)
     for _ in range(round(4.0 / elapsed)):  # they are 40 m apart then, and have fallen 80 m
         turned(window, elapsed=elapsed)
         assert all(seen(window))
 
 
-def test_picked_body_stays_in_the_picture_at_the_same_scale(window: Window) -> None:
+def test_picked_body_stays_in_the_picture_at_the_same_scale(window: App) -> None:
     x, y = window.camera.to_screen(np.zeros(2)).tolist()
     turned(window, press(x, y), release(x, y), elapsed=0.0)
     strike(window, F)
@@ -78,7 +78,7 @@ def test_picked_body_stays_in_the_picture_at_the_same_scale(window: Window) -> N
     assert window.at_home
 
 
-def test_that_nothing_is_in_sight_is_said_until_something_is(window: Window) -> None:
+def test_that_nothing_is_in_sight_is_said_until_something_is(window: App) -> None:
     home = window.camera
     for _ in range(40):
         turned(window, elapsed=0.1)
@@ -93,7 +93,7 @@ def test_that_nothing_is_in_sight_is_said_until_something_is(window: Window) -> 
 
 
 def test_spent_fireworks_say_that_space_launches_them(tmp_path: Path) -> None:
-    window = Window(Stage(), size=(640, 480), folder=tmp_path, say=lambda _: None)
+    window = App(AppState(), size=(640, 480), folder=tmp_path, say=lambda _: None)
     try:
         assert window.stage.open(find("fireworks"))
         window.camera = Camera((1e6, 0.0), 10.0, (640, 480))
@@ -105,7 +105,7 @@ def test_spent_fireworks_say_that_space_launches_them(tmp_path: Path) -> None:
 
 
 def test_ship_that_a_key_drives_is_followed_from_the_start(tmp_path: Path) -> None:
-    window = Window(Stage(), size=(640, 480), folder=tmp_path, say=lambda _: None)
+    window = App(AppState(), size=(640, 480), folder=tmp_path, say=lambda _: None)
     try:
         assert window.stage.open(find("spaceship"))
         pygame.event.clear()
@@ -121,7 +121,7 @@ def test_ship_that_a_key_drives_is_followed_from_the_start(tmp_path: Path) -> No
         window.close()
 
 
-def test_full_screen_and_back(window: Window) -> None:
+def test_full_screen_and_back(window: App) -> None:
     turned(window, elapsed=0.0)
     size = window.surface.get_size()
     strike(window, pygame.K_F11)

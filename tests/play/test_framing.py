@@ -10,14 +10,14 @@ from strategies import scenes
 
 from sandbox.engines.registry import start, usual
 from sandbox.measure.run import run
-from sandbox.play.camera import Camera
-from sandbox.play.framing import framing, look_ahead
-from sandbox.play.picking import overlapping, picked
-from sandbox.play.running.trails import LENGTH, MOST, Trails
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find, shipped
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
+from sandbox.window.camera import Camera
+from sandbox.window.hit_test import overlapping_bodies, pick_body
+from sandbox.window.playback.history import MAX_TRAIL_POINTS, TRAIL_LENGTH, Trails
+from sandbox.window.view_bounds import predict_bounds, view_bounds
 
 SHIPPED = [each.name for each in shipped()]
 VIEWED = {each.name for each in shipped() if (play := load(each.path).play).view is not None or play.area is not None}
@@ -42,7 +42,7 @@ def scene_of(*balls: dict[str, Any], **document: Any) -> Scene:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_bodies_of_shipped_scenes_are_in_sight_at_the_start(name: str) -> None:
     scene = load(find(name))
-    low, high = map(np.asarray, framing(scene))
+    low, high = map(np.asarray, view_bounds(scene))
     assert (low < high).all()
     inside = ((scene.bodies.position >= low) & (scene.bodies.position <= high)).all(axis=1)
     assert inside.mean() >= (1.0 if len(inside) <= 1000 else 0.97)  # of many, 0.5 % at each of four sides need not be
@@ -53,7 +53,7 @@ def test_bodies_of_shipped_scenes_stay_in_the_first_view(name: str) -> None:
     """For all of its duration, as far as 4,000 steps and 60,000 body-steps go; only one that diverges leaves."""
     scene = load(find(name))
     engine = usual(scene)
-    camera = Camera.fitting(framing(scene, look_ahead(scene, engine)), (1000, 600))
+    camera = Camera.fitting(view_bounds(scene, predict_bounds(scene, engine)), (1000, 600))
     (left, bottom), (right, top) = camera.box
     moving = np.flatnonzero(~scene.bodies.fixed)
     steps = min(round(scene.world.duration / scene.solver.dt), 4_000, 60_000 // len(moving))
@@ -75,24 +75,24 @@ def test_bodies_of_shipped_scenes_stay_in_the_first_view(name: str) -> None:
 
 def test_look_ahead_is_the_same_each_time_and_bounded_by_work() -> None:
     scene = load(find("double_pendulum"))
-    assert look_ahead(scene, "pymunk") == look_ahead(scene, "pymunk")
+    assert predict_bounds(scene, "pymunk") == predict_bounds(scene, "pymunk")
     longer = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 1e6})})
-    box = look_ahead(longer, "pymunk")
+    box = predict_bounds(longer, "pymunk")
     assert box is not None
     assert box[0][0] == pytest.approx(-2.0, abs=0.1)  # both arms stretched out
 
 
 def test_what_flies_off_does_not_make_the_view_endless() -> None:
     scene = scene_of(ball("a", 0, 0, velocity=[1000, 0]), ball("b", 1, 5), world={"duration": 100.0})
-    box = look_ahead(scene, "pymunk")
+    box = predict_bounds(scene, "pymunk")
     assert box is not None
-    low, high = framing(scene)
+    low, high = view_bounds(scene)
     assert box[1][0] - box[0][0] <= 20.0 * max(high[0] - low[0], high[1] - low[1])  # FAR
 
 
 def test_free_flight_is_in_sight_to_its_end() -> None:
     scene = scene_of(ball("a", 0, 0, velocity=[3, 10]), world={"gravity": [0, -9.81], "duration": 2.0})
-    low, high = framing(scene)
+    low, high = view_bounds(scene)
     position = run(scene, "exact").position[:, 0]
     assert low[0] <= position[:, 0].min()
     assert high[0] >= position[:, 0].max()
@@ -105,16 +105,18 @@ def test_flight_behind_a_plane_or_out_of_bounds_does_not_count() -> None:
         {"plane": [{"point": [0, 0], "normal": [0, 1]}], "world": {"gravity": [0, -9.81], "duration": 100.0}},
         {"world": {"gravity": [0, -9.81], "duration": 100.0, "bounds": [[-5, -5], [5, 5]]}},
     ):
-        low, high = framing(scene_of(ball("a", 0, 4), **more))
+        low, high = view_bounds(scene_of(ball("a", 0, 4), **more))
         assert -6.0 <= low[1] < high[1] <= 6.0
 
 
 def test_frame_ends_below_what_bodies_fall_on() -> None:
     ground = [{"points": [[-20, -1], [20, -1], [20, 0], [-20, 0]], "fixed": True}]
     world = {"gravity": [0, -9.81], "duration": 100.0}
-    low, high = framing(scene_of(ball("a", 0, 4), polygon=ground, world=world))
+    low, high = view_bounds(scene_of(ball("a", 0, 4), polygon=ground, world=world))
     assert (low, high) == ((-20.0, -1.0), (20.0, 5.0))
-    low, high = framing(scene_of(ball("a", 0, 4), ball("b", 0, -4), polygon=ground, world={**world, "duration": 1.0}))
+    low, high = view_bounds(
+        scene_of(ball("a", 0, 4), ball("b", 0, -4), polygon=ground, world={**world, "duration": 1.0})
+    )
     assert low[1] == pytest.approx(-4 - 9.81 / 2 - 1, rel=1e-12)  # rounding; b starts below the ground
 
 
@@ -122,21 +124,21 @@ def test_orbit_is_in_sight_and_its_tangent_is_not() -> None:
     """From the perihelion at 0.5 m of an ellipse whose aphelion is at 1.5 m."""
     sun = [{"toward": [1, 0], "strength": 1}]
     planet = ball("a", 1.5, 0, 0.01, velocity=[0, 3**0.5])
-    low, high = framing(scene_of(planet, attraction=sun, world={"duration": 100.0}))
+    low, high = view_bounds(scene_of(planet, attraction=sun, world={"duration": 100.0}))
     assert (*low, *high) == pytest.approx((-0.5, -1.5, 2.5, 1.5), rel=1e-9)  # rounding
 
 
 def test_what_attracts_in_a_body_or_drives_away_has_a_frame() -> None:
     for strength, toward in ((-1.0, [0, 0]), (1.0, "a"), (1e30, [0, 0])):
         scene = scene_of(ball("a", 0, 0), ball("b", 3, 0), attraction=[{"toward": toward, "strength": strength}])
-        low, high = framing(scene)
+        low, high = view_bounds(scene)
         assert np.isfinite((*low, *high)).all()
         assert low[0] <= -1.0 < 4.0 <= high[0]
 
 
 def test_fixed_things_next_to_the_bodies_are_in_sight_whole_and_others_are_not() -> None:
     walls = [{"points": [[5.1, 0], [9, 2]]}, {"points": [[-6.5, 0], [-9, 2]]}]
-    low, high = framing(scene_of(ball("a", -4, 0), ball("b", 4, 0), wall=walls))
+    low, high = view_bounds(scene_of(ball("a", -4, 0), ball("b", 4, 0), wall=walls))
     assert (*low, *high) == (-5.0, -1.0, 9.0, 2.0)
 
 
@@ -157,7 +159,7 @@ ODD: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", ODD)
 def test_odd_scenes_have_a_finite_frame(name: str) -> None:
-    (x0, y0), (x1, y1) = framing(from_document(ODD[name]))
+    (x0, y0), (x1, y1) = view_bounds(from_document(ODD[name]))
     assert all(map(math.isfinite, (x0, y0, x1, y1)))
     assert x0 <= x1
     assert y0 <= y1
@@ -166,7 +168,7 @@ def test_odd_scenes_have_a_finite_frame(name: str) -> None:
 
 @given(scenes())
 def test_any_scene_has_a_finite_frame(scene: Scene) -> None:
-    (x0, y0), (x1, y1) = framing(scene)
+    (x0, y0), (x1, y1) = view_bounds(scene)
     assert all(map(math.isfinite, (x0, y0, x1, y1)))
     assert x0 <= x1
     assert y0 <= y1
@@ -177,11 +179,11 @@ def test_picked_is_who_lies_under_the_hand() -> None:
     scene = scene_of(ball("a", 0, 0), ball("b", 3, 0, 0.5), ball("c", 0.5, 0, 0.2))
     frame = frame_of(scene)
     for place, number in (((-0.5, 0.0), 0), ((0.0, 0.0), 0), ((0.5, 0.1), 2), ((3.4, 0.0), 1), ((3.6, 0.0), None)):
-        assert picked(scene.bodies, frame, place) == number
-    assert picked(scene.bodies, frame, (3.6, 0.0), reach=0.2) == 1
-    assert picked(scene.bodies, frame, (math.nan, 0.0)) is None
+        assert pick_body(scene.bodies, frame, place) == number
+    assert pick_body(scene.bodies, frame, (3.6, 0.0), reach=0.2) == 1
+    assert pick_body(scene.bodies, frame, (math.nan, 0.0)) is None
     empty = from_document({"title": "t"})
-    assert picked(empty.bodies, frame_of(empty), (0.0, 0.0), reach=9.0) is None
+    assert pick_body(empty.bodies, frame_of(empty), (0.0, 0.0), reach=9.0) is None
 
 
 def test_who_is_gone_or_has_not_come_is_not_picked() -> None:
@@ -189,10 +191,10 @@ def test_who_is_gone_or_has_not_come_is_not_picked() -> None:
     frame = frame_of(scene)
     present = np.asarray([False, True])
     gone = Frame(0.0, frame.position, frame.velocity, frame.angle, frame.angular_velocity, present)
-    assert picked(scene.bodies, gone, (0.0, 0.0)) is None
+    assert pick_body(scene.bodies, gone, (0.0, 0.0)) is None
     early = Frame(0.0, *(a[:1] for a in (frame.position, frame.velocity, frame.angle, frame.angular_velocity)),
                   np.ones(1, np.bool_))  # fmt: skip
-    assert picked(scene.bodies, early, (5.0, 0.0)) is None
+    assert pick_body(scene.bodies, early, (5.0, 0.0)) is None
 
 
 @pytest.mark.parametrize(
@@ -201,7 +203,7 @@ def test_who_is_gone_or_has_not_come_is_not_picked() -> None:
 )
 def test_circle_overlaps_the_half_plane_as_the_tutorial_has_it(height: float, over: bool) -> None:
     scene = load(find("circle_half_plane"), [("ball.circle.position", [0.0, height])])
-    assert overlapping(scene, scene.bodies, frame_of(scene)).tolist() == [over]
+    assert overlapping_bodies(scene, scene.bodies, frame_of(scene)).tolist() == [over]
 
 
 def test_overlaps_with_walls_posts_and_one_another() -> None:
@@ -209,11 +211,11 @@ def test_overlaps_with_walls_posts_and_one_another() -> None:
         ball("a", 0, 0), ball("b", 1.9, 0), ball("c", 10, 0), ball("d", 20, 0), ball("e", 30, 0), ball("f", 32, 0),
         wall=[{"points": [[9, 1.05], [11, 1.05]], "thickness": 0.2}], post=[{"position": [20, 1.5], "radius": 0.6}],
     )  # fmt: skip
-    assert overlapping(scene, scene.bodies, frame_of(scene)).tolist() == [True, True, True, True, False, False]
+    assert overlapping_bodies(scene, scene.bodies, frame_of(scene)).tolist() == [True, True, True, True, False, False]
     frame = frame_of(scene)
     present = np.asarray([False, True, True, True, True, True])
     gone = Frame(0.0, frame.position, frame.velocity, frame.angle, frame.angular_velocity, present)
-    assert overlapping(scene, scene.bodies, gone).tolist() == [False, False, True, True, False, False]
+    assert overlapping_bodies(scene, scene.bodies, gone).tolist() == [False, False, True, True, False, False]
 
 
 def test_overlaps_of_many_are_those_of_few() -> None:
@@ -227,7 +229,7 @@ def test_overlaps_of_many_are_those_of_few() -> None:
     position = frame.position.copy()
     position[0] = np.nan
     frame = Frame(0.0, position, frame.velocity, frame.angle, frame.angular_velocity, frame.present)
-    found = overlapping(scene, scene.bodies, frame)
+    found = overlapping_bodies(scene, scene.bodies, frame)
     gap = np.hypot(*(position[:, None] - position[None]).transpose(2, 0, 1)) + 9.0 * np.eye(len(position))
     assert found.tolist() == (gap < 2.0).any(axis=1).tolist()
     assert 0 < found.sum() < len(found)
@@ -237,12 +239,12 @@ def test_trails_are_the_last_places_of_those_who_are_there() -> None:
     trails = Trails()
     assert trails.pieces() == ()
     scene = scene_of(ball("a", 0, 0), ball("b", 5, 0))
-    for k in range(LENGTH + 50):
+    for k in range(TRAIL_LENGTH + 50):
         trails.keep(frame_of(scene, float(k)))
     (piece,) = trails.pieces()
-    assert piece.shape == (LENGTH, 2, 2)
+    assert piece.shape == (TRAIL_LENGTH, 2, 2)
     trails.keep(frame_of(scene_of(ball("a", 0, 0), ball("b", 5, 0), ball("c", 9, 0)), 1e3))
-    assert [piece.shape for piece in trails.pieces()] == [(LENGTH - 1, 2, 2), (1, 3, 2)]
+    assert [piece.shape for piece in trails.pieces()] == [(TRAIL_LENGTH - 1, 2, 2), (1, 3, 2)]
     trails.keep(frame_of(scene, 10.0))  # back in time
     assert [piece.shape for piece in trails.pieces()] == [(1, 2, 2)]
     trails.keep(frame_of(scene_of(ball("a", 1, 0), ball("b", 5, 0)), 10.0))  # the same time again
@@ -253,11 +255,14 @@ def test_trails_are_the_last_places_of_those_who_are_there() -> None:
 
 
 def test_of_too_many_bodies_none_leaves_a_trail() -> None:
-    trails, many = Trails(), np.zeros((MOST + 1, 2))
-    one = np.zeros(MOST + 1)
-    trails.keep(Frame(0.0, many, many, one, one, np.ones(MOST + 1, np.bool_)))
+    trails, many = Trails(), np.zeros((MAX_TRAIL_POINTS + 1, 2))
+    one = np.zeros(MAX_TRAIL_POINTS + 1)
+    trails.keep(Frame(0.0, many, many, one, one, np.ones(MAX_TRAIL_POINTS + 1, np.bool_)))
     assert trails.pieces() == ()
 
 
 def test_scene_may_state_what_is_seen_at_first() -> None:
-    assert framing(scene_of(ball("a", 0, 4), play={"view": [[-3.0, -1.0], [5.0, 2.0]]})) == ((-3.0, -1.0), (5.0, 2.0))
+    assert view_bounds(scene_of(ball("a", 0, 4), play={"view": [[-3.0, -1.0], [5.0, 2.0]]})) == (
+        (-3.0, -1.0),
+        (5.0, 2.0),
+    )

@@ -12,16 +12,16 @@ from windowed import turned, window_on
 from sandbox.action import Action, ActionError, Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.replay import rerun
-from sandbox.play.hands import Hands, count_changes
-from sandbox.play.knobs import Knobs
-from sandbox.play.knobs import turned as turned_knob
-from sandbox.play.picking import overlapping
-from sandbox.play.running.live import Live
-from sandbox.play.running.session import Session
-from sandbox.play.window import Window
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.app import App
+from sandbox.window.hit_test import overlapping_bodies
+from sandbox.window.input.body_tools import BodyTools, count_changes
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.parameters import SessionParameters
+from sandbox.window.playback.parameters import turned as turned_knob
+from sandbox.window.playback.session import Session
 
 REST = """
 title = "Rest"
@@ -36,14 +36,14 @@ B, R, ESCAPE = pygame.K_b, pygame.K_r, pygame.K_ESCAPE
 
 
 @pytest.fixture
-def window(tmp_path: Path) -> Iterator[Window]:
+def window(tmp_path: Path) -> Iterator[App]:
     with window_on(REST, tmp_path) as opened:
         pygame.event.clear()  # those of its opening
         turned(opened, move(100, 300))
         yield opened
 
 
-def strike(window: Window, code: int, mod: int = 0) -> None:
+def strike(window: App, code: int, mod: int = 0) -> None:
     turned(window, key(code, mod), key_up(code))
 
 
@@ -65,7 +65,7 @@ def test_changes_are_counted_as_a_person_would() -> None:
 
 
 @pytest.mark.parametrize("code", [R, ESCAPE, pygame.K_LEFTBRACKET])
-def test_key_that_would_lose_a_body_asks_first(window: Window, code: int) -> None:
+def test_key_that_would_lose_a_body_asks_first(window: App, code: int) -> None:
     strike(window, B)
     live = window.stage.live
     strike(window, code)
@@ -78,7 +78,7 @@ def test_key_that_would_lose_a_body_asks_first(window: Window, code: int) -> Non
     assert window.stage.question is None
 
 
-def test_cross_asks_once(window: Window) -> None:
+def test_cross_asks_once(window: App) -> None:
     strike(window, B)
     turned(window, pygame.event.Event(pygame.QUIT))
     assert window.leaving is None
@@ -86,7 +86,7 @@ def test_cross_asks_once(window: Window) -> None:
     assert window.leaving == 0
 
 
-def test_any_other_key_takes_the_question_back(window: Window) -> None:
+def test_any_other_key_takes_the_question_back(window: App) -> None:
     strike(window, B)
     strike(window, R)
     strike(window, pygame.K_p)
@@ -96,20 +96,20 @@ def test_any_other_key_takes_the_question_back(window: Window) -> None:
 
 
 @pytest.mark.parametrize("code", [R, ESCAPE])
-def test_nothing_is_asked_where_nothing_is_lost(window: Window, code: int) -> None:
+def test_nothing_is_asked_where_nothing_is_lost(window: App, code: int) -> None:
     live = window.stage.live
     strike(window, code)
     assert window.leaving == 0 or window.stage.live is not live
 
 
-def test_nothing_is_asked_once_the_session_is_saved(window: Window) -> None:
+def test_nothing_is_asked_once_the_session_is_saved(window: App) -> None:
     strike(window, B)
     strike(window, pygame.K_s, pygame.KMOD_CTRL)
     strike(window, ESCAPE)
     assert window.leaving == 0
 
 
-def test_restart_keeps_values_and_so_does_not_ask_for_them(window: Window) -> None:
+def test_restart_keeps_values_and_so_does_not_ask_for_them(window: App) -> None:
     window.commands._turn("gravity", -3.0, True)
     turned(window)
     live = window.stage.live
@@ -121,7 +121,7 @@ def test_restart_keeps_values_and_so_does_not_ask_for_them(window: Window) -> No
     assert window.stage.question is not None
 
 
-def test_undo_brings_back_what_a_restart_has_lost(window: Window) -> None:
+def test_undo_brings_back_what_a_restart_has_lost(window: App) -> None:
     strike(window, B)
     strike(window, R)
     strike(window, R)
@@ -132,7 +132,7 @@ def test_undo_brings_back_what_a_restart_has_lost(window: Window) -> None:
     assert len(window.stage.live.bodies) == 2
 
 
-def test_what_undo_brings_back_is_unsaved_and_undo_exchanges_the_two(window: Window) -> None:
+def test_what_undo_brings_back_is_unsaved_and_undo_exchanges_the_two(window: App) -> None:
     def bodies() -> int:
         assert window.stage.live is not None
         window.stage.live.arrive()
@@ -156,7 +156,7 @@ def test_what_undo_brings_back_is_unsaved_and_undo_exchanges_the_two(window: Win
         assert bodies() == expected
 
 
-def test_undo_brings_back_what_was_replaced_at_an_earlier_moment(window: Window) -> None:
+def test_undo_brings_back_what_was_replaced_at_an_earlier_moment(window: App) -> None:
     for _ in range(4):
         live = turned(window)
     end, whole = live.step_number, live.session.recording()
@@ -172,7 +172,7 @@ def test_undo_brings_back_what_was_replaced_at_an_earlier_moment(window: Window)
     assert window.stage.live.session.recording().state_hash == whole.state_hash
 
 
-def test_picker_asks_before_another_scene_takes_the_place(window: Window) -> None:
+def test_picker_asks_before_another_scene_takes_the_place(window: App) -> None:
     strike(window, B)
     live = window.stage.live
     strike(window, pygame.K_o, pygame.KMOD_CTRL)
@@ -187,26 +187,26 @@ def test_picker_asks_before_another_scene_takes_the_place(window: Window) -> Non
 @pytest.mark.parametrize("box", [False, True], ids=["ball", "box"])
 @pytest.mark.parametrize("name", ["bounce", "pyramid", "rube_goldberg", "bridge"])
 def test_new_bodies_overlap_nothing_wherever_they_are_put(name: str, box: bool) -> None:
-    live, hands, rng = Live(Session(load(find(name)))), Hands(), np.random.default_rng(1)
-    before = overlapping(live.scene, live.bodies, live.frame).sum()
+    live, hands, rng = LiveView(Session(load(find(name)))), BodyTools(), np.random.default_rng(1)
+    before = overlapping_bodies(live.scene, live.bodies, live.frame).sum()
     low, high = live.frame.position.min(axis=0) - 0.5, live.frame.position.max(axis=0) + 0.5
     for x, y in rng.uniform(low, high, (20, 2)).tolist():
         hands.add(live, (x, y), 5.0, box=box)
     assert len(live.bodies) >= 20
-    assert overlapping(live.scene, live.bodies, live.frame).sum() <= before  # those of the file may
+    assert overlapping_bodies(live.scene, live.bodies, live.frame).sum() <= before  # those of the file may
     live.close()
 
 
 def test_new_body_goes_where_it_is_pointed_if_there_is_room_and_is_refused_in_a_full_place() -> None:
     full = [{"position": [0.0, 0.0], "radius": 0.9}]
-    live = Live(Session(from_document({"ball": full})))
-    hands = Hands()
+    live = LiveView(Session(from_document({"ball": full})))
+    hands = BodyTools()
     hands.add(live, (5.0, 5.0), 1.0)
     assert live.frame.position[-1] == pytest.approx((5.0, 5.0), abs=0.0)
     hands.add(live, (0.1, 0.0), 1.0)
     assert np.hypot(*live.frame.position[-1]) >= 1.8
     live.close()
-    ground = Live(Session(from_document({"plane": [{"point": [0, 0], "normal": [0, 1]}]})))
+    ground = LiveView(Session(from_document({"plane": [{"point": [0, 0], "normal": [0, 1]}]})))
     with pytest.raises(ActionError, match="no room"):
         hands.add(ground, (0.0, -100.0), 40.0)  # a ball of 1 m, 100 m below the ground
     ground.close()
@@ -222,14 +222,16 @@ def test_knob_sets_the_surface_of_a_body_added_by_hand(engine: str, key: str, va
             "ball": [{"name": "a", "position": [0, 2], "radius": 0.5, "restitution": 1.0}],
         }
     )
-    live = Live(Session(scene, engine))
-    Hands().add(live, (5.0, 2.0), 1.0)
-    knob = next(each for each in Knobs().of(live, scene, 1) if each.key == key)
+    live = LiveView(Session(scene, engine))
+    BodyTools().add(live, (5.0, 2.0), 1.0)
+    knob = next(each for each in SessionParameters().of(live, scene, 1) if each.key == key)
     assert knob.enabled
     for action in turned_knob(live, key, value, 1):
         live.act(action)
-    assert next(each for each in Knobs().of(live, scene, 1) if each.key == key).value == value
-    assert next(each for each in Knobs().of(live, scene, 0) if each.key == key).value == (key == "restitution")
+    assert next(each for each in SessionParameters().of(live, scene, 1) if each.key == key).value == value
+    assert next(each for each in SessionParameters().of(live, scene, 0) if each.key == key).value == (
+        key == "restitution"
+    )
     live.session.advance(100)  # 1 s: it has fallen 1.5 m at 5.5 m/s, and come up again
     if key == "restitution":
         up = live.session.frame.velocity[:, 1]

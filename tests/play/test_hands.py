@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from sandbox.action import ActionError, Impulse, Move, Pull, Remove, Spawn
-from sandbox.play.hands import Hands
-from sandbox.play.picking import overlapping
-from sandbox.play.running.live import Live
-from sandbox.play.running.session import Session
 from sandbox.scene.files.load import from_document
+from sandbox.window.hit_test import overlapping_bodies
+from sandbox.window.input.body_tools import BodyTools
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.session import Session
 
 DOCUMENT: dict[str, Any] = {
     "material": [{"name": "rubber", "restitution": 0.5, "friction": 0.25}],
@@ -22,18 +22,18 @@ DOCUMENT: dict[str, Any] = {
 }
 
 
-def live(engine: str = "pymunk", **more: Any) -> Live:
-    return Live(Session(from_document({**DOCUMENT, **more}), engine))
+def live(engine: str = "pymunk", **more: Any) -> LiveView:
+    return LiveView(Session(from_document({**DOCUMENT, **more}), engine))
 
 
-def grasp(hands: Hands, live: Live, place: tuple[float, float], reach: float, paused: bool) -> bool:
+def grasp(hands: BodyTools, live: LiveView, place: tuple[float, float], reach: float, paused: bool) -> bool:
     """Pick the body at a place and take hold of it, as a drag does."""
     found = hands.look(live, place, reach)
     hands.hold(live, paused)
     return found
 
 
-def passed(live: Live, steps: int) -> Live:
+def passed(live: LiveView, steps: int) -> LiveView:
     for _ in range(steps):
         live.step()
     return live
@@ -41,7 +41,7 @@ def passed(live: Live, steps: int) -> Live:
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
 def test_body_dragged_while_paused_is_exactly_under_the_hand(engine: str) -> None:
-    show, hands = passed(live(engine), 3), Hands()
+    show, hands = passed(live(engine), 3), BodyTools()
     assert grasp(hands, show, (0.25, -0.125), 0.0, paused=True)
     assert (hands.picked, hands.holding) == (0, True)
     for place in ((1.25, 0.875), (-3.0, 2.0), (0.5, 0.5)):
@@ -57,7 +57,7 @@ def test_body_dragged_while_paused_is_exactly_under_the_hand(engine: str) -> Non
 @pytest.mark.parametrize("paused", [True, False])
 def test_driven_body_is_left_to_its_key(paused: bool) -> None:
     drive = {"kind": "stroke", "body": "a", "pivot": [0, 0], "stops": [0.0, 1.0], "rate": 1.0}
-    show, hands = live(drive=[drive]), Hands()
+    show, hands = live(drive=[drive]), BodyTools()
     with pytest.raises(ActionError, match=r"^a cannot be dragged; its key moves it"):
         grasp(hands, show, (0.25, 0.0), 0.0, paused)
     assert not hands.holding
@@ -66,7 +66,7 @@ def test_driven_body_is_left_to_its_key(paused: bool) -> None:
 
 
 def test_fixed_body_can_be_moved_while_paused_and_not_pulled() -> None:
-    show, hands = live(), Hands()
+    show, hands = live(), BodyTools()
     assert grasp(hands, show, (5.0, 0.0), 0.0, paused=True)
     hands.drag(show, (5.0, 3.0))
     hands.let_go(show)
@@ -82,7 +82,7 @@ def test_fixed_body_can_be_moved_while_paused_and_not_pulled() -> None:
 @pytest.mark.parametrize("paused", [True, False])
 def test_body_that_went_on_is_held_where_it_was_looked_at(paused: bool) -> None:
     """It flies and turns between the press and the first motion of the mouse."""
-    show, hands = live(), Hands()
+    show, hands = live(), BodyTools()
     show.act(Impulse(time=0.0, body="a", impulse=(8.0, 0.0)))
     grasp(hands, show, (0.0, 0.25), 0.0, paused=False)
     hands.drag(show, (9.0, 3.0))
@@ -106,7 +106,7 @@ def test_body_that_went_on_is_held_where_it_was_looked_at(paused: bool) -> None:
 
 
 def test_pulled_body_comes_under_the_hand_and_flies_on_when_let_go() -> None:
-    show, hands = live(), Hands()
+    show, hands = live(), BodyTools()
     grasp(hands, show, (0.0, 0.25), 0.0, paused=False)
     assert hands.holding
     hands.drag(show, (2.0, 0.25))
@@ -127,7 +127,7 @@ def test_pulled_body_comes_under_the_hand_and_flies_on_when_let_go() -> None:
 
 
 def test_nothing_is_grasped_where_there_is_nothing() -> None:
-    show, hands = live(), Hands()
+    show, hands = live(), BodyTools()
     hands.picked = 2
     assert not grasp(hands, show, (0.0, 9.0), 0.1, paused=False)
     assert hands.picked is None
@@ -144,7 +144,7 @@ def test_nothing_is_grasped_where_there_is_nothing() -> None:
 @pytest.mark.parametrize(("number", "place", "speed"), [(0, (0.0, 0.0), 1.0), (2, (9.0, 0.0), 0.1)])
 def test_nudge_adds_exactly_its_impulse(number: int, place: tuple[float, float], speed: float) -> None:
     """1 m/s, or ten radii a second of a small body."""
-    show, hands = live(), Hands()
+    show, hands = live(), BodyTools()
     grasp(hands, show, place, 0.0, paused=True)
     for k in (1, 2):
         hands.nudge(show)
@@ -157,7 +157,7 @@ def test_nudge_adds_exactly_its_impulse(number: int, place: tuple[float, float],
 
 
 def test_new_ball_is_like_the_picked_one_or_like_the_first() -> None:
-    show, hands = live(), Hands()
+    show, hands = live(), BodyTools()
     hands.add(show, (0.0, 9.0), 10.0)
     hands.picked = 2
     hands.add(show, (3.0, 9.0), 10.0)
@@ -173,22 +173,22 @@ def test_new_ball_is_like_the_picked_one_or_like_the_first() -> None:
 
 
 def test_new_ball_of_an_empty_scene_suits_the_view() -> None:
-    show = Live(Session(from_document({"title": "t"})))
-    Hands().add(show, (1.0, 2.0), 20.0)
+    show = LiveView(Session(from_document({"title": "t"})))
+    BodyTools().add(show, (1.0, 2.0), 20.0)
     assert show.bodies.radius.tolist() == [0.5]
-    Hands().add(show, (5.0, 2.0), 0.0)  # the smallest radius there may be, or that of the first
+    BodyTools().add(show, (5.0, 2.0), 0.0)  # the smallest radius there may be, or that of the first
     assert len(show.bodies) == 2
 
 
 def test_new_ball_that_would_overlap_is_put_beside_so_that_exact_takes_it() -> None:
-    show, hands = live("exact"), Hands()
+    show, hands = live("exact"), BodyTools()
     hands.add(show, (0.2, 0.0), 10.0)
     assert len(show.bodies) == 4
-    assert not overlapping(show.scene, show.bodies, show.frame)[-1]
+    assert not overlapping_bodies(show.scene, show.bodies, show.frame)[-1]
 
 
 def test_removed_body_is_gone_and_no_longer_picked_or_held() -> None:
-    show, hands = live(), Hands()
+    show, hands = live(), BodyTools()
     grasp(hands, show, (0.0, 0.0), 0.0, paused=False)
     passed(show, 2)
     hands.remove(show)
@@ -201,7 +201,7 @@ def test_removed_body_is_gone_and_no_longer_picked_or_held() -> None:
 
 
 def test_body_that_was_removed_elsewhere_can_be_let_go() -> None:
-    show, hands = live(), Hands()
+    show, hands = live(), BodyTools()
     grasp(hands, show, (0.0, 0.0), 0.0, paused=False)
     show.act(Remove(time=0.0, body="a"))
     assert hands.line(show) is None
@@ -213,7 +213,7 @@ def test_body_that_was_removed_elsewhere_can_be_let_go() -> None:
 
 def test_picked_body_that_has_not_come_yet_is_none() -> None:
     """The session goes back to before it was added."""
-    show, hands = passed(live(), 3), Hands()
+    show, hands = passed(live(), 3), BodyTools()
     hands.add(show, (0.0, 9.0), 10.0)
     hands.picked = 3
     assert hands.picked_of(show) == 3
@@ -231,7 +231,7 @@ def test_picked_body_that_has_not_come_yet_is_none() -> None:
 
 
 def test_arrows_put_a_body_elsewhere_at_rest() -> None:
-    show, hands = live(), Hands()
+    show, hands = live(), BodyTools()
     show.act(Impulse(time=0.0, body="a", impulse=(1.0, 0.0)))
     hands.shift(show, "a", (0.0, 0.5))
     hands.shift(show, "a", (-0.5, 0.0))
@@ -244,9 +244,9 @@ def test_arrows_put_a_body_elsewhere_at_rest() -> None:
 def test_names_of_any_kind_can_be_held() -> None:
     names = ["a.b", 'say "hi"', "it's", "0", "*"]
     balls = [{"name": name, "position": [3.0 * k, 0.0], "radius": 1} for k, name in enumerate(names)]
-    show = Live(Session(from_document({"ball": balls})))
+    show = LiveView(Session(from_document({"ball": balls})))
     for k in range(len(names)):
-        hands = Hands()
+        hands = BodyTools()
         grasp(hands, show, (3.0 * k, 0.0), 0.0, paused=True)
         hands.drag(show, (3.0 * k, 5.0))
         hands.nudge(show)

@@ -4,8 +4,8 @@ import pygame
 import pytest
 from pressing import FOCUS_LOST, key, key_up
 
-from sandbox.play.keys import BINDINGS, GLOBAL, Command, Keyboard, command_for
-from sandbox.play.sight import OVERLAYS
+from sandbox.window.input.keymap import BINDINGS, GLOBAL, Command, Keyboard, command_for
+from sandbox.window.playback.snapshot import OVERLAYS
 
 CTRL = pygame.KMOD_LCTRL
 PLAIN = {

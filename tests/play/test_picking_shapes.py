@@ -8,20 +8,27 @@ import pygame
 import pytest
 
 from sandbox.action import Spawn
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.touches import touches
-from sandbox.play.drawing.view import View
-from sandbox.play.facts import facts
-from sandbox.play.framing import framing
-from sandbox.play.hands import Hands
-from sandbox.play.hulls import Hull, area_of, hull_distance, meeting, rounded
-from sandbox.play.picking import overlapping, picked
-from sandbox.play.running.live import Live
-from sandbox.play.running.session import Session
-from sandbox.play.sight import Sight
 from sandbox.scene.files.load import from_document
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
+from sandbox.window.camera import Camera
+from sandbox.window.hit_test import (
+    Hull,
+    area_of,
+    hull_distance,
+    hulls_overlap,
+    overlapping_bodies,
+    pick_body,
+    rounded_hull,
+)
+from sandbox.window.input.body_tools import BodyTools
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.session import Session
+from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.vectors import contact_points
+from sandbox.window.ui.status import body_facts
+from sandbox.window.view_bounds import view_bounds
 
 
 def scene(**tables: Any) -> Scene:
@@ -46,27 +53,27 @@ HAMMER = scene(body=[{"position": [0, 0], "box": [{"size": [4, 0.5]}, {"size": [
     ("place", "found"), [((2.5, 2.5), 0), ((2.0, -2.0), None), ((0.0, 0.3), 0), ((0.0, 0.4), None)]
 )
 def test_a_body_is_picked_within_its_outline_alone(place: tuple[float, float], found: int | None) -> None:
-    assert picked(BEAM.bodies, start(BEAM), place) == found
+    assert pick_body(BEAM.bodies, start(BEAM), place) == found
 
 
 def test_reach_is_counted_from_the_outline() -> None:
     frame = start(BEAM)
     beside = 0.25 * math.sqrt(2.0) + 0.1 * math.sqrt(2.0)  # 0.1 m off the upper side
-    assert picked(BEAM.bodies, frame, (0.0, beside), 0.09) is None
-    assert picked(BEAM.bodies, frame, (0.0, beside), 0.11) == 0
+    assert pick_body(BEAM.bodies, frame, (0.0, beside), 0.09) is None
+    assert pick_body(BEAM.bodies, frame, (0.0, beside), 0.11) == 0
 
 
 def test_every_piece_of_a_body_can_be_picked() -> None:
     frame = start(HAMMER)
     for place in ((-1.9, 0.0), (2.4, 1.4), (1.6, -1.4)):
-        assert picked(HAMMER.bodies, frame, place) == 0
-    assert picked(HAMMER.bodies, frame, (0.0, 1.0)) is None
+        assert pick_body(HAMMER.bodies, frame, place) == 0
+    assert pick_body(HAMMER.bodies, frame, (0.0, 1.0)) is None
 
 
 def test_a_ball_on_a_box_is_picked_rather_than_the_box_about_it() -> None:
     which = scene(ball=[{"position": [0, 1.25], "radius": 0.25}], box=[box(0, 0, 9, 2)])
-    assert picked(which.bodies, start(which), (0.0, 1.2)) == 0
-    assert picked(which.bodies, start(which), (4.0, 0.9)) == 1
+    assert pick_body(which.bodies, start(which), (0.0, 1.2)) == 0
+    assert pick_body(which.bodies, start(which), (4.0, 0.9)) == 1
 
 
 @pytest.mark.parametrize(
@@ -87,7 +94,7 @@ def test_a_ball_on_a_box_is_picked_rather_than_the_box_about_it() -> None:
 )
 def test_overlap_is_that_of_outlines(tables: dict[str, Any], expected: list[bool]) -> None:
     which = scene(**tables)
-    assert overlapping(which, which.bodies, start(which)).tolist() == expected
+    assert overlapping_bodies(which, which.bodies, start(which)).tolist() == expected
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
@@ -97,7 +104,7 @@ def test_distance_is_that_from_a_finely_drawn_outline(count: int, radius: float)
         radius = 1e-9
     angles = np.arange(count) * 2.0 * math.pi / max(count, 3) + 0.2
     hull = Hull(np.column_stack((np.cos(angles), np.sin(angles))), radius)
-    outline = rounded(hull, 200)
+    outline = rounded_hull(hull, 200)
     if count == 2 and radius == 0.0:
         outline = hull.corners
     share = np.linspace(0.0, 1.0, 200)[:, None, None]
@@ -117,25 +124,25 @@ def test_area_of_hulls() -> None:
 
 def test_boxes_meet_in_the_middle_of_what_touches() -> None:
     unit = np.asarray([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-    gap, place = meeting(Hull(unit, 0.0), Hull(unit + np.asarray((1.0, 2.5)), 0.0), 1e-6)
+    gap, place = hulls_overlap(Hull(unit, 0.0), Hull(unit + np.asarray((1.0, 2.5)), 0.0), 1e-6)
     assert gap == pytest.approx(0.5, abs=1e-12)  # rounding
     assert place.tolist() == pytest.approx([0.5, 1.25], abs=1e-12)  # rounding
-    gap, _ = meeting(Hull(unit, 0.0), Hull(np.asarray([(0.0, 3.0)]), 1.5))
+    gap, _ = hulls_overlap(Hull(unit, 0.0), Hull(np.asarray([(0.0, 3.0)]), 1.5))
     assert gap == pytest.approx(0.5, abs=1e-12)  # rounding
 
 
 def test_facts_tell_size_mass_and_moment_of_a_box() -> None:
     which = scene(box=[box(0, 0, 4, 2, mass=6.0)])
-    lines = facts(which.bodies, start(which), Contacts.none(), 0)
+    lines = body_facts(which.bodies, start(which), Contacts.none(), 0)
     assert any("6" in line and "4" in line and "×" in line and "2" in line for line in lines)
     assert any(line.startswith("I 10") for line in lines)  # m (w² + h²) / 12
 
 
-def live(**tables: Any) -> Live:
-    return Live(Session(scene(**tables), "pymunk"))
+def live(**tables: Any) -> LiveView:
+    return LiveView(Session(scene(**tables), "pymunk"))
 
 
-def added(show: Live, hands: Hands, *, box: bool) -> Any:
+def added(show: LiveView, hands: BodyTools, *, box: bool) -> Any:
     hands.add(show, (20.0, 20.0), 10.0, box=box)
     action = show.session.actions[-1]
     assert isinstance(action, Spawn)
@@ -143,7 +150,7 @@ def added(show: Live, hands: Hands, *, box: bool) -> Any:
 
 
 def test_a_box_is_added_like_the_picked_one() -> None:
-    show, hands = live(box=[box(0, 0, 4, 2, density=3.0, friction=0.25)]), Hands()
+    show, hands = live(box=[box(0, 0, 4, 2, density=3.0, friction=0.25)]), BodyTools()
     made = added(show, hands, box=True).box
     assert (made.size, made.density, made.friction) == ((4.0, 2.0), 3.0, 0.25)
     assert len(show.bodies) == 2
@@ -154,7 +161,7 @@ def test_what_is_like_a_body_of_another_shape_has_its_area_and_mass(as_box: bool
     other: dict[str, Any] = {"ball": [{"position": [0, 0], "radius": 1.0, "mass": 7.0}]}
     if not as_box:
         other = {"box": [box(0, 0, math.pi, 1.0, mass=7.0)]}
-    show, hands = live(**other), Hands()
+    show, hands = live(**other), BodyTools()
     action = added(show, hands, box=as_box)
     if as_box:
         assert action.box.size == pytest.approx((math.sqrt(math.pi),) * 2, rel=1e-12)  # rounding
@@ -169,7 +176,7 @@ GRAVITY = {"gravity": [0.0, -9.81]}
 def test_a_pendulum_is_framed_with_its_nail_and_its_swing() -> None:
     joint = {"kind": "rod", "between": ["bob"], "anchors": [[0, 0], [0, 0]]}
     which = scene(ball=[{"name": "bob", "position": [3, -4], "radius": 0.5}], joint=[joint], world=GRAVITY)
-    (left, bottom), (right, top) = framing(which)
+    (left, bottom), (right, top) = view_bounds(which)
     assert (left, bottom, right, top) == pytest.approx((-3.5, -5.5, 3.5, 0.0), abs=1e-9)  # rounding
 
 
@@ -177,7 +184,7 @@ def test_what_is_joined_but_not_to_the_world_is_framed_in_its_flight() -> None:
     joint = {"kind": "rod", "between": ["a", "b"]}
     balls = [{"name": name, "position": [x, 0], "radius": 0.5, "velocity": [4, 0]} for name, x in (("a", 0), ("b", 2))]
     loose, held = (
-        framing(scene(ball=balls, joint=joints, world={"gravity": [0.0, 0.0], "duration": 2.0}))
+        view_bounds(scene(ball=balls, joint=joints, world={"gravity": [0.0, 0.0], "duration": 2.0}))
         for joints in ([joint], [joint, {"kind": "pivot", "between": ["a"], "at": [0, 0]}])
     )
     assert loose[1][0] == pytest.approx(2.0 + 8.0 + 0.5, abs=1e-9)  # rounding
@@ -187,7 +194,7 @@ def test_what_is_joined_but_not_to_the_world_is_framed_in_its_flight() -> None:
 def test_nails_far_away_are_not_framed() -> None:
     joint = {"kind": "spring", "between": ["bob"], "anchors": [[0, 0], [0, 1e6]], "stiffness": 1.0}
     which = scene(ball=[{"name": "bob", "position": [0, 0], "radius": 0.5}], joint=[joint], world=GRAVITY)
-    assert framing(which)[1][1] == pytest.approx(0.5, abs=1e-9)  # rounding
+    assert view_bounds(which)[1][1] == pytest.approx(0.5, abs=1e-9)  # rounding
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3])
@@ -198,9 +205,9 @@ def test_a_contact_of_a_box_is_shown_where_the_box_is_now(angle: float) -> None:
     )
     camera = Camera((0.0, 0.0), 10.0, (100, 100))
     nobody = np.empty(0, np.int64)
-    sight = Sight(which, which.bodies, start(which), contacts=stale)
-    view = View(pygame.Surface((100, 100)), camera, sight, 1.0, True, nobody, *(np.empty((0, 2)),) * 3)
-    (place,), _ = touches(view)
+    sight = Snapshot(which, which.bodies, start(which), contacts=stale)
+    view = DrawContext(pygame.Surface((100, 100)), camera, sight, 1.0, True, nobody, *(np.empty((0, 2)),) * 3)
+    (place,), _ = contact_points(view)
     corners = [(5 + x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle)) for x, y in ((-2, -1), (2, -1))]
     lowest = min(corners, key=lambda corner: corner[1])[0] if angle else 5.0
     assert place[0] == pytest.approx(lowest, abs=1e-9)  # rounding

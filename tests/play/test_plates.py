@@ -9,14 +9,14 @@ import pygame
 import pytest
 
 from sandbox.games.artillery.rules import ArtilleryRules
-from sandbox.play.framing import framing
-from sandbox.play.instruments import score_panel
-from sandbox.play.instruments.plates import largest_room
-from sandbox.play.sight import OVERLAYS
-from sandbox.play.stage import Stage
-from sandbox.play.window import Window
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find, shipped
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.playback.snapshot import OVERLAYS
+from sandbox.window.render.text import largest_area
+from sandbox.window.ui import score_panel
+from sandbox.window.view_bounds import view_bounds
 
 SIZES = [(400, 300, 1.0), (800, 600, 1.0), (1024, 700, 1.0), (1280, 720, 1.0), (1920, 1080, 1.0), (1280, 720, 2.0)]
 """Width and height, px, and by how much letters and widgets are larger."""
@@ -29,22 +29,22 @@ FIELD_SCENES = [
 """Tables and games: their files state the view, or what plays there."""
 
 
-def overlaps(window: Window) -> list[str]:
+def overlaps(window: App) -> list[str]:
     """Return the pairs of plates that lie over each other."""
     plates = window.desk.plates.items()
     return [f"{a}{p} {b}{q}" for (a, p), (b, q) in combinations(plates, 2) if p.colliderect(q)]
 
 
-def opened(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Window:
+def opened(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> App:
     # What is laid out does not depend on what flies where: the look ahead is left out.
-    monkeypatch.setattr("sandbox.play.stage.look_ahead", lambda *_: None)
-    window = Window(Stage(), size=(1280, 720), folder=folder, say=lambda _: None)
+    monkeypatch.setattr("sandbox.window.app_state.look_ahead", lambda *_: None)
+    window = App(AppState(), size=(1280, 720), folder=folder, say=lambda _: None)
     assert window.stage.open(find(name))
     pygame.event.clear()
     return window
 
 
-def resize(window: Window, width: int, height: int, unit: float) -> None:
+def resize(window: App, width: int, height: int, unit: float) -> None:
     window.desk.unit = unit
     surface = pygame.display.set_mode((width, height), pygame.RESIZABLE)
     pygame.event.clear()
@@ -81,7 +81,7 @@ def test_plates_leave_the_field_free(name: str, tmp_path: Path, monkeypatch: pyt
         assert scene is not None
         for width, height, unit in SIZES[1:]:  # at 400 × 300 there is room for either alone
             resize(window, width, height, unit)
-            corners = window.camera.to_screen(np.asarray(framing(scene)))
+            corners = window.camera.to_screen(np.asarray(view_bounds(scene)))
             (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
             field = pygame.Rect(math.ceil(left), math.ceil(top), int(right - left), int(bottom - top))
             covering = {k: r for k, r in window.desk.plates.items() if not k.startswith(("message", "rate", "inset"))}
@@ -100,7 +100,7 @@ def test_last_shot_is_told_whole_beside_four_tanks(tmp_path: Path, monkeypatch: 
         resize(window, 1024, 700, 1.0)
         assert window.stage.host is not None
         assert window.stage.show is not None
-        laid = score_panel.laid(window.stage.host.shown().board, window.desk.free, 300, 1.0)
+        laid = score_panel.layout_score(window.stage.host.shown().board, window.desk.free, 300, 1.0)
         texts = [text for cells, _ in laid.rows for _, text in cells]
         assert told in texts
         assert len(laid.rows) <= 4
@@ -110,7 +110,7 @@ def test_last_shot_is_told_whole_beside_four_tanks(tmp_path: Path, monkeypatch: 
 
 def test_largest_room_lies_beside_what_is_taken() -> None:
     free = pygame.Rect(0, 0, 100, 80)
-    assert largest_room((1, 1), free, []) == free
-    assert largest_room((1, 1), free, [pygame.Rect(0, 0, 30, 20)]) == pygame.Rect(30, 0, 70, 80)
-    assert largest_room((2, 1), free, [pygame.Rect(0, 0, 30, 20)]) == pygame.Rect(0, 20, 100, 60)
-    assert largest_room((1, 1), free, [free]) == free  # nothing is left: it is not minded
+    assert largest_area((1, 1), free, []) == free
+    assert largest_area((1, 1), free, [pygame.Rect(0, 0, 30, 20)]) == pygame.Rect(30, 0, 70, 80)
+    assert largest_area((2, 1), free, [pygame.Rect(0, 0, 30, 20)]) == pygame.Rect(0, 20, 100, 60)
+    assert largest_area((1, 1), free, [free]) == free  # nothing is left: it is not minded

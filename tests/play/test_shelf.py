@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sandbox.play import messages as module
-from sandbox.play.facts import facts, told
-from sandbox.play.messages import MOST, Messages
-from sandbox.play.shelf import beside, neighbour, to_pick
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import from_document
 from sandbox.scene.files.shipped_scenes import shipped
 from sandbox.trajectory import Contacts, Frame
+from sandbox.window import messages as module
+from sandbox.window.app_state import neighbouring_scene, scenes_beside, scenes_to_pick
+from sandbox.window.messages import MAX_MESSAGES, Messages
+from sandbox.window.ui.status import body_facts, settings_text
 
 
 @pytest.fixture
@@ -25,44 +25,44 @@ def folder(tmp_path: Path) -> Path:
 def test_walk_goes_round_the_files_beside_the_one_that_is_open(folder: Path) -> None:
     here, seen = folder / "b.toml", []
     for _ in range(4):
-        next_one = neighbour(here, 1)
+        next_one = neighbouring_scene(here, 1)
         assert next_one is not None
         here = next_one
         seen.append(here.name)
     assert seen == ["c.toml", "a.toml", "b.toml", "c.toml"]
-    assert neighbour(folder / "a.toml", -1) == folder / "c.toml"
+    assert neighbouring_scene(folder / "a.toml", -1) == folder / "c.toml"
 
 
 def test_walk_knows_a_file_by_any_of_its_paths(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    found = neighbour(Path("a.toml"), 1)
+    found = neighbouring_scene(Path("a.toml"), 1)
     assert found is not None
     assert found.resolve() == (folder / "b.toml").resolve()
     (folder / "link.toml").symlink_to(folder / "a.toml")
-    assert neighbour(folder / "link.toml", 1) is not None
+    assert neighbouring_scene(folder / "link.toml", 1) is not None
 
 
 def test_file_of_another_kind_or_that_is_gone_is_walked_from(folder: Path) -> None:
     for here in (folder / "notes.txt", folder / "gone.toml"):
-        assert beside(here)[0] == here
-        assert neighbour(here, 1) == folder / "a.toml"
-        assert neighbour(here, -1) == folder / "c.toml"
+        assert scenes_beside(here)[0] == here
+        assert neighbouring_scene(here, 1) == folder / "a.toml"
+        assert neighbouring_scene(here, -1) == folder / "c.toml"
     lonely = folder / "no such folder" / "x.toml"
-    assert neighbour(lonely, 1) == lonely
+    assert neighbouring_scene(lonely, 1) == lonely
 
 
 def test_without_a_file_the_shipped_scenes_are_walked() -> None:
     files = [each.path for each in shipped()]
-    assert list(beside(None)) == files
-    assert neighbour(None, 1) == files[0]
-    assert neighbour(None, -1) == files[-1]
+    assert list(scenes_beside(None)) == files
+    assert neighbouring_scene(None, 1) == files[0]
+    assert neighbouring_scene(None, -1) == files[-1]
 
 
 def test_picker_offers_what_is_beside_and_what_ships_each_once(folder: Path) -> None:
-    offered = to_pick(folder / "a.toml")
+    offered = scenes_to_pick(folder / "a.toml")
     assert [name for name, _ in offered[:3]] == [f"{folder.name}/{stem}" for stem in "abc"]
-    assert offered[3:] == to_pick(None) == [(each.name, each.path) for each in shipped()]
-    assert to_pick(shipped()[0].path) == to_pick(None)
+    assert offered[3:] == scenes_to_pick(None) == [(each.name, each.path) for each in shipped()]
+    assert scenes_to_pick(shipped()[0].path) == scenes_to_pick(None)
 
 
 def test_messages_last_their_time_and_are_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,7 +82,7 @@ def test_messages_last_their_time_and_are_told_once(monkeypatch: pytest.MonkeyPa
     assert messages.shown() == ()
     for k in range(9):
         messages.tell(str(k))
-    assert [text for _, text in messages.shown()] == ["4", "5", "6", "7", "8"][-MOST:]
+    assert [text for _, text in messages.shown()] == ["4", "5", "6", "7", "8"][-MAX_MESSAGES:]
 
 
 def test_facts_of_a_body_are_its_figures() -> None:
@@ -99,19 +99,22 @@ def test_facts_of_a_body_are_its_figures() -> None:
     frame = Frame(0.0, *(array.copy() for array in state), np.ones(2, np.bool_))
     pair = np.asarray([[0, -1], [0, 1], [1, -1]])
     contacts = Contacts(np.zeros(3), pair, *(np.zeros((3, 2)) for _ in range(3)))
-    lines = facts(bodies, frame, contacts, 0)
+    lines = body_facts(bodies, frame, contacts, 0)
     assert lines[0] == "cue"
     assert any(line.startswith("|v| 5") for line in lines)
     assert any(line.startswith("E kin 25") for line in lines)
     assert lines[-1] == "2 contacts"
-    assert "fixed" in facts(bodies, frame, Contacts.none(), 1)
+    assert "fixed" in body_facts(bodies, frame, Contacts.none(), 1)
     gone = Frame(0.0, *(array.copy() for array in state), np.zeros(2, np.bool_))
-    assert facts(bodies, gone, contacts, 0) == ("cue", "removed")
-    assert facts(bodies, frame, contacts, 2) == ()
+    assert body_facts(bodies, gone, contacts, 0) == ("cue", "removed")
+    assert body_facts(bodies, frame, contacts, 2) == ()
 
 
 def test_settings_are_told_in_a_few_words() -> None:
-    assert told(Settings(dt=0.01)) == "dt 10.0 ms"
-    words = told(Settings(dt=0.01, substeps=2, integrator="rk4", detection="swept", response="penalty"))
+    assert settings_text(Settings(dt=0.01)) == "dt 10.0 ms"
+    words = settings_text(Settings(dt=0.01, substeps=2, integrator="rk4", detection="swept", response="penalty"))
     assert words == "dt 10.0 ms · 2 × 10 · rk4 · swept · penalty"
-    assert told(Settings(integrator="rk4", detection="discrete", response="impulse")) == "dt 10.0 ms · 1 × 10 · rk4"
+    assert (
+        settings_text(Settings(integrator="rk4", detection="discrete", response="impulse"))
+        == "dt 10.0 ms · 1 × 10 · rk4"
+    )

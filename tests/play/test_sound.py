@@ -10,12 +10,24 @@ import numpy as np
 import pygame
 import pytest
 
-from sandbox.play import sound
-from sandbox.play.chime import HIGHEST, LOWEST, RATE, SECONDS, STEPS, chime, pitch_of
-from sandbox.play.sound import A_CALL, SILENT, Sounds, loudness, volume
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
+from sandbox.window import sound
+from sandbox.window.sound import (
+    A_CALL,
+    HIGHEST,
+    LOWEST,
+    RATE,
+    SECONDS,
+    SILENT,
+    STEPS,
+    Sounds,
+    impact_pitch,
+    impact_sound,
+    loudness,
+    volume,
+)
 
 PITCHES = [float(LOWEST * (HIGHEST / LOWEST) ** (k / (STEPS - 1))) for k in range(STEPS)]
 
@@ -54,7 +66,7 @@ def sounds() -> Iterator[Sounds]:
 
 @pytest.mark.parametrize("pitch", PITCHES)
 def test_spectrum_peaks_at_the_pitch(pitch: float) -> None:
-    samples = chime(pitch)
+    samples = impact_sound(pitch)
     spectrum = np.abs(np.fft.rfft(samples))
     peak = float(spectrum.argmax()) * RATE / len(samples)
     assert abs(peak - pitch) <= 1.0 / SECONDS  # Hz, one line of this spectrum
@@ -62,7 +74,7 @@ def test_spectrum_peaks_at_the_pitch(pitch: float) -> None:
 
 @pytest.mark.parametrize("pitch", PITCHES[::9])
 def test_samples_use_the_scale_and_stay_within(pitch: float) -> None:
-    samples = chime(pitch)
+    samples = impact_sound(pitch)
     assert samples.dtype == np.int16
     assert len(samples) == int(SECONDS * RATE)
     assert int(np.abs(samples.astype(int)).max()) == round(0.6 * 32767)
@@ -71,23 +83,23 @@ def test_samples_use_the_scale_and_stay_within(pitch: float) -> None:
 
 @pytest.mark.parametrize("pitch", PITCHES)
 def test_envelope_decays(pitch: float) -> None:
-    parts = np.abs(chime(pitch).astype(float)).reshape(10, -1).max(axis=1)
+    parts = np.abs(impact_sound(pitch).astype(float)).reshape(10, -1).max(axis=1)
     audible = parts[parts > 30]  # of 32,767: below, rounding to integers is what is seen
     assert (np.diff(audible) < 0).all()
     assert parts[-1] < 0.01 * parts[0]  # 40 dB
 
 
 def test_larger_bodies_sound_lower_and_all_can_be_heard() -> None:
-    pitches = [pitch_of(radius) for radius in (1e-9, 0.01, 0.028575, 0.1, 0.5, 2.0, 1e9)]
+    pitches = [impact_pitch(radius) for radius in (1e-9, 0.01, 0.028575, 0.1, 0.5, 2.0, 1e9)]
     assert pitches == sorted(pitches, reverse=True)
     assert all(higher > lower for higher, lower in pairwise(pitches[1:6]))
     assert (pitches[0], pitches[-1]) == (pytest.approx(HIGHEST), pytest.approx(LOWEST))
-    assert pitch_of(0.5) == pytest.approx(220.0, rel=0.06)  # half a whole tone, to which pitches are rounded
-    assert len({pitch_of(radius) for radius in np.geomspace(1e-9, 1e9, 4000)}) == STEPS
+    assert impact_pitch(0.5) == pytest.approx(220.0, rel=0.06)  # half a whole tone, to which pitches are rounded
+    assert len({impact_pitch(radius) for radius in np.geomspace(1e-9, 1e9, 4000)}) == STEPS
 
 
 def test_same_pitch_is_the_same_sound() -> None:
-    assert np.array_equal(chime(440.0), chime(440.0))
+    assert np.array_equal(impact_sound(440.0), impact_sound(440.0))
 
 
 def test_loudness_is_of_the_lighter_body_that_moves() -> None:

@@ -8,15 +8,15 @@ import pytest
 from sandbox.action import SetParameter, Switch
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.run import run
-from sandbox.play.footage.film import Film
-from sandbox.play.knobs import Knobs, turned
-from sandbox.play.running import live as live_module
-from sandbox.play.running.live import Live
-from sandbox.play.running.session import Session
-from sandbox.play.running.stored import Stored
-from sandbox.play.stage import Stage
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.app_state import AppState
+from sandbox.window.capture.film import RecordedRun
+from sandbox.window.playback import live as live_module
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.parameters import SessionParameters, turned
+from sandbox.window.playback.recorded import RecordedView
+from sandbox.window.playback.session import Session
 
 GOOD = """
 title = "{name}"
@@ -63,18 +63,18 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def opened(path: Path, engine: str = "pymunk", **more: Any) -> Stage:
-    stage = Stage(engine, **more)
+def opened(path: Path, engine: str = "pymunk", **more: Any) -> AppState:
+    stage = AppState(engine, **more)
     assert stage.open(path)
     return stage
 
 
-def live(stage: Stage) -> Live:
+def live(stage: AppState) -> LiveView:
     assert stage.live is not None
     return stage.live
 
 
-def told(stage: Stage, level: str) -> str:
+def told(stage: AppState, level: str) -> str:
     return "\n".join(text for each, text in stage.messages.shown() if each == level)
 
 
@@ -104,7 +104,7 @@ def test_file_that_is_gone_or_is_a_folder_is_a_fault(folder: Path) -> None:
     stage.reload()
     assert len(stage.faults) == 1
     assert not stage.open(folder)
-    assert not Stage().open(folder / "none.toml")
+    assert not AppState().open(folder / "none.toml")
     assert live(stage).scene.title == "a"
 
 
@@ -198,8 +198,8 @@ def test_engine_that_was_asked_for_comes_back_after_a_scene_that_it_refuses(fold
 
 
 def test_stored_run_pauses_at_its_end_and_starts_over_from_there() -> None:
-    stage = Stage()
-    show = Stored(Film(run(load(find("bounce")), "pymunk", dt=0.01)))
+    stage = AppState()
+    show = RecordedView(RecordedRun(run(load(find("bounce")), "pymunk", dt=0.01)))
     stage.put_on(show, None, show.scene)
     for _ in range(200):
         stage.go_on(0.05)
@@ -295,8 +295,8 @@ def test_what_cannot_be_done_is_a_message(folder: Path) -> None:
 
 def test_stored_run_refuses_every_change_with_a_message() -> None:
     scene = load(find("bounce"))
-    stage = Stage()
-    show = Stored(Film(run(scene, "pymunk", dt=0.01)))
+    stage = AppState()
+    show = RecordedView(RecordedRun(run(scene, "pymunk", dt=0.01)))
     stage.put_on(show, None, scene)
     before = show.frame
     assert stage.hands.look(show, (0.0, 5.5), 0.0)  # one may look
@@ -331,7 +331,7 @@ def test_stored_run_refuses_every_change_with_a_message() -> None:
 
 
 def test_empty_stage_does_nothing_and_says_so() -> None:
-    stage = Stage("exact")
+    stage = AppState("exact")
     stage.go_on(1.0)
     for deed in (stage.step, stage.back, stage.slower, stage.faster, stage.restart, stage.next_engine, stage.close):
         deed()
@@ -357,14 +357,14 @@ def test_step_and_back_pause(folder: Path) -> None:
 # Knobs.
 
 
-def knob(live: Live, key: str, picked: int | None = None) -> Any:
-    (found,) = [each for each in Knobs().of(live, live.scene, picked) if each.key == key]
+def knob(live: LiveView, key: str, picked: int | None = None) -> Any:
+    (found,) = [each for each in SessionParameters().of(live, live.scene, picked) if each.key == key]
     return found
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_knobs_show_what_is(engine: str, folder: Path) -> None:
-    show = Live(Session(load(folder / "a.toml"), engine))
+    show = LiveView(Session(load(folder / "a.toml"), engine))
     assert knob(show, "gravity").value == -9.81
     assert knob(show, "dt").value == 0.01
     assert knob(show, "engine").value == engine
@@ -387,13 +387,13 @@ def test_knob_of_one_ball_turns_that_ball_whatever_it_is_called(names: list[str]
     balls = [{"name": name, "position": [3.0 * k, 0.0], "radius": 1} for k, name in enumerate(names)]
     scene = from_document({"ball": [*balls, {"position": [9.0, 0.0], "radius": 1}]})
     for picked in range(3):
-        show = Live(Session(scene))
+        show = LiveView(Session(scene))
         for action in turned(show, "friction", 0.5, picked):
             assert isinstance(action, SetParameter)
             show.act(action)
         assert [each.friction for each in show.scene.balls] == [0.5 if k == picked else None for k in range(3)]
         assert knob(show, "friction", picked).value == 0.5
-    show = Live(Session(scene))
+    show = LiveView(Session(scene))
     for action in turned(show, "restitution", 0.5, None):
         show.act(action)
     assert [each.restitution for each in show.scene.balls] == [0.5] * 3
@@ -406,18 +406,18 @@ def test_knob_of_a_generators_ball_turns_all_of_that_generator() -> None:
             "grid": [{"origin": [5 * k, 9], "columns": 2, "spacing": [2.5, 2.5], "radius": 1} for k in range(2)],
         }
     )
-    show = Live(Session(scene))
+    show = LiveView(Session(scene))
     for action in turned(show, "restitution", 0.5, 4):
         show.act(action)
     assert [each.restitution for each in show.scene.movers] == [None, None, 0.5]
 
 
 def test_knobs_of_a_scene_without_balls_or_of_a_ball_that_has_not_come_are_harmless() -> None:
-    show = Live(Session(from_document({"title": "t"})))
+    show = LiveView(Session(from_document({"title": "t"})))
     assert not knob(show, "restitution").enabled
     assert turned(show, "restitution", 0.5, None) == []
     assert not knob(show, "friction", 7).enabled
-    show = Live(Session(from_document({"ball": [{"position": [0, 0], "radius": 1}]})))
+    show = LiveView(Session(from_document({"ball": [{"position": [0, 0], "radius": 1}]})))
     assert knob(show, "friction", 7).label == "friction"
 
 
@@ -426,6 +426,6 @@ def test_default_is_the_files(folder: Path) -> None:
     stage.turn("restitution", 0.75)
     stage.turn("gravity", 3.0)
     assert stage.file is not None
-    knobs = {each.key: each for each in Knobs().of(live(stage), stage.file, None)}
+    knobs = {each.key: each for each in SessionParameters().of(live(stage), stage.file, None)}
     assert (knobs["restitution"].value, knobs["restitution"].default) == (0.75, 0.25)
     assert (knobs["gravity"].value, knobs["gravity"].default) == (3.0, -9.81)

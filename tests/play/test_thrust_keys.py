@@ -9,8 +9,8 @@ from pressing import FOCUS_LOST, key, key_up
 from windowed import turned, window_on
 
 from sandbox.action import Throttle
-from sandbox.play.running.live import Live
-from sandbox.play.window import Window
+from sandbox.window.app import App
+from sandbox.window.playback.live import LiveView
 
 SHIP = """
 title = "Ship"
@@ -37,16 +37,16 @@ UP, RIGHT = pygame.K_UP, pygame.K_RIGHT
 
 
 @pytest.fixture
-def window(tmp_path: Path) -> Iterator[Window]:
+def window(tmp_path: Path) -> Iterator[App]:
     with window_on(SHIP, tmp_path) as opened:
         yield opened
 
 
-def rising(live: Live) -> float:
+def rising(live: LiveView) -> float:
     return float(live.frame.velocity[0, 1])
 
 
-def test_thrust_fires_while_its_key_is_held(window: Window) -> None:
+def test_thrust_fires_while_its_key_is_held(window: App) -> None:
     assert rising(turned(window)) == 0.0
     live = turned(window, key(UP), elapsed=0.1)
     assert rising(live) == pytest.approx(0.2, abs=0.021)  # 10 steps of 0.02, one more or less by the pace
@@ -59,13 +59,13 @@ def test_thrust_fires_while_its_key_is_held(window: Window) -> None:
 
 
 @pytest.mark.parametrize("hides", [FOCUS_LOST])
-def test_thrust_ends_where_the_release_would_go_elsewhere(window: Window, hides: pygame.event.Event) -> None:
+def test_thrust_ends_where_the_release_would_go_elsewhere(window: App, hides: pygame.event.Event) -> None:
     turned(window, key(UP))
     coasting = rising(turned(window, hides))
     assert rising(turned(window, elapsed=0.2)) == pytest.approx(coasting, abs=1e-12)
 
 
-def test_two_keys_fire_two_thrusts_and_one_of_them_turns_the_ship(window: Window) -> None:
+def test_two_keys_fire_two_thrusts_and_one_of_them_turns_the_ship(window: App) -> None:
     live = turned(window, key(UP), key(RIGHT), elapsed=0.2)
     assert rising(live) > 0.1
     assert float(live.frame.angular_velocity[0]) < -0.1
@@ -75,5 +75,5 @@ def test_two_keys_fire_two_thrusts_and_one_of_them_turns_the_ship(window: Window
     assert float(live.frame.angular_velocity[0]) < turning
 
 
-def test_keys_are_told_as_what_they_fire(window: Window) -> None:
+def test_keys_are_told_as_what_they_fire(window: App) -> None:
     assert window.desk.claims(window.stage).told == (("Up", "fire main"), ("Right", "fire thrust-2"))

@@ -12,14 +12,14 @@ import pytest
 from pressing import FOCUS_LOST, key, key_up, move, press, release
 
 from sandbox.action import SetParameter, Spawn
-from sandbox.play.drawing.palette import SKY, WARNING, Colour
-from sandbox.play.keys import Command
-from sandbox.play.messages import Messages
-from sandbox.play.running.live import Live
-from sandbox.play.running.stored import Stored
-from sandbox.play.screen import NoDisplayError, open_screen
-from sandbox.play.stage import Stage
-from sandbox.play.window import Window
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.display import NoDisplayError, open_screen
+from sandbox.window.input.keymap import Command
+from sandbox.window.messages import Messages
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.recorded import RecordedView
+from sandbox.window.render.palette import SKY, WARNING, Colour
 
 SIZE = (900, 600)
 PICTURE = pygame.Rect(0, 165, 630, 235)
@@ -55,7 +55,7 @@ relaunch = "spark"
 """
 BALL, THERE = (-1.0, 0.0), (1.2, 0.2)
 
-Open = Callable[[str], Window]
+Open = Callable[[str], App]
 
 
 @pytest.fixture
@@ -67,14 +67,14 @@ def said() -> list[str]:
 @pytest.fixture
 def opened(tmp_path: Path, said: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
     """Open a window on a scene. However slow the machine is, no picture gives up steps for it."""
-    monkeypatch.setattr("sandbox.play.running.live.LEAST", math.inf)
-    monkeypatch.setattr("sandbox.play.running.live.MOST", math.inf)
-    windows: list[Window] = []
+    monkeypatch.setattr("sandbox.window.playback.live.LEAST", math.inf)
+    monkeypatch.setattr("sandbox.window.playback.live.MOST", math.inf)
+    windows: list[App] = []
 
-    def open_on(text: str) -> Window:
+    def open_on(text: str) -> App:
         path = tmp_path / "room.toml"
         path.write_text(text, encoding="utf-8")
-        window = Window(Stage(), size=SIZE, folder=tmp_path, say=said.append)
+        window = App(AppState(), size=SIZE, folder=tmp_path, say=said.append)
         windows.append(window)
         assert window.stage.open(path)
         pygame.event.clear()  # those of its opening
@@ -86,19 +86,19 @@ def opened(tmp_path: Path, said: list[str], monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.fixture
-def window(opened: Open) -> Window:
+def window(opened: Open) -> App:
     """A window on a ball at rest."""
     return opened(ROOM)
 
 
-def turn(window: Window, *events: pygame.event.Event, elapsed: float = 0.0) -> None:
+def turn(window: App, *events: pygame.event.Event, elapsed: float = 0.0) -> None:
     """Post events, and let the window make one turn."""
     for event in events:
         pygame.event.post(event)
     window.turn(elapsed)
 
 
-def live(window: Window) -> Live:
+def live(window: App) -> LiveView:
     assert window.stage.live is not None
     return window.stage.live
 
@@ -112,22 +112,22 @@ def places(
     return np.asarray(np.argwhere(found) + np.asarray(box.topleft))
 
 
-def ball_seen(window: Window) -> tuple[float, float]:
+def ball_seen(window: App) -> tuple[float, float]:
     x, y = (places(window.surface, SKY, PICTURE).mean(axis=0) + 0.5).tolist()
     return x, y
 
 
-def on_screen(window: Window, place: tuple[float, float]) -> tuple[float, float]:
+def on_screen(window: App, place: tuple[float, float]) -> tuple[float, float]:
     x, y = window.camera.to_screen(np.asarray(place)).tolist()
     return x, y
 
 
-def paused(window: Window) -> bool:
+def paused(window: App) -> bool:
     """Tell whether PAUSED stands there in red."""
     return len(places(window.surface, WARNING, HUD)) > 60
 
 
-def test_key_is_seen_in_the_picture_of_the_same_turn(window: Window) -> None:
+def test_key_is_seen_in_the_picture_of_the_same_turn(window: App) -> None:
     turn(window)
     assert not paused(window)
     turn(window, key(pygame.K_p), key_up(pygame.K_p))
@@ -137,7 +137,7 @@ def test_key_is_seen_in_the_picture_of_the_same_turn(window: Window) -> None:
     assert not paused(window)
 
 
-def test_ball_moved_while_paused_is_seen_there_in_the_same_turn(window: Window) -> None:
+def test_ball_moved_while_paused_is_seen_there_in_the_same_turn(window: App) -> None:
     window.stage.paused = True
     turn(window)
     here, there = on_screen(window, BALL), on_screen(window, THERE)
@@ -149,7 +149,7 @@ def test_ball_moved_while_paused_is_seen_there_in_the_same_turn(window: Window) 
     assert live(window).step_number == 0
 
 
-def test_pull_moves_the_ball_in_the_same_turn(window: Window) -> None:
+def test_pull_moves_the_ball_in_the_same_turn(window: App) -> None:
     turn(window)
     before = live(window).frame.position[0, 0]
     turn(window, press(*on_screen(window, BALL)), move(*on_screen(window, THERE), held=True), elapsed=2 * DT)
@@ -157,7 +157,7 @@ def test_pull_moves_the_ball_in_the_same_turn(window: Window) -> None:
     assert [action.kind for action in live(window).session.actions] == ["pull", "pull"]
 
 
-def test_pull_ends_when_the_window_loses_the_keyboard(window: Window) -> None:
+def test_pull_ends_when_the_window_loses_the_keyboard(window: App) -> None:
     turn(window, press(*on_screen(window, BALL)), move(*on_screen(window, THERE), held=True), elapsed=DT)
     assert window.stage.hands.holding
     turn(window, FOCUS_LOST)
@@ -166,7 +166,7 @@ def test_pull_ends_when_the_window_loses_the_keyboard(window: Window) -> None:
 
 
 @pytest.mark.parametrize("stopped", [True, False])
-def test_click_with_a_trembling_hand_only_picks(window: Window, stopped: bool) -> None:
+def test_click_with_a_trembling_hand_only_picks(window: App, stopped: bool) -> None:
     turn(window, elapsed=3 * DT)
     window.stage.paused = stopped
     end, (x, y) = live(window).end, on_screen(window, BALL)
@@ -179,7 +179,7 @@ def test_click_with_a_trembling_hand_only_picks(window: Window, stopped: bool) -
     assert live(window).end >= end
 
 
-def test_drag_takes_the_body_where_it_was_pressed(window: Window) -> None:
+def test_drag_takes_the_body_where_it_was_pressed(window: App) -> None:
     window.stage.paused = True
     (x, y), (right, down) = on_screen(window, BALL), on_screen(window, THERE)
     turn(window, press(x + 10, y), move(x + 13, y, held=True))
@@ -187,7 +187,7 @@ def test_drag_takes_the_body_where_it_was_pressed(window: Window) -> None:
     assert live(window).frame.position[0] == pytest.approx(THERE, abs=1.5 / window.camera.scale)  # rounding to pixels
 
 
-def test_many_motions_of_a_turn_are_one_action(window: Window) -> None:
+def test_many_motions_of_a_turn_are_one_action(window: App) -> None:
     window.stage.paused = True
     (x, y), (right, down) = on_screen(window, BALL), on_screen(window, THERE)
     turn(window, press(x, y), *(move(x + k, y, held=True) for k in range(1, 60)), move(right, down, held=True))
@@ -197,7 +197,7 @@ def test_many_motions_of_a_turn_are_one_action(window: Window) -> None:
     assert live(window).frame.position[0, 0] == pytest.approx(BALL[0] + 50 / window.camera.scale, abs=0.02)  # 2 pixels
 
 
-def test_many_motions_of_a_knob_are_one_action_before_the_next_command(window: Window) -> None:
+def test_many_motions_of_a_knob_are_one_action_before_the_next_command(window: App) -> None:
     turn(window)
     change = window.desk.panel.on_change
     for value in (1.0, 2.0, -4.0):
@@ -210,7 +210,7 @@ def test_many_motions_of_a_knob_are_one_action_before_the_next_command(window: W
 
 
 @pytest.mark.parametrize("code", [pygame.K_o, pygame.K_F1])
-def test_all_that_is_held_is_let_go_before_something_hides_it(window: Window, code: int) -> None:
+def test_all_that_is_held_is_let_go_before_something_hides_it(window: App, code: int) -> None:
     turn(window, press(*on_screen(window, BALL)), move(*on_screen(window, THERE), held=True), press(5, 300, 3))
     assert window.stage.hands.holding
     turn(window, key(code, pygame.KMOD_CTRL if code == pygame.K_o else 0))
@@ -223,7 +223,7 @@ def test_all_that_is_held_is_let_go_before_something_hides_it(window: Window, co
     assert window.camera == home
 
 
-def test_nothing_hides_the_timeline_while_it_is_held(window: Window) -> None:
+def test_nothing_hides_the_timeline_while_it_is_held(window: App) -> None:
     turn(window, elapsed=0.08)
     turn(window)
     bar = window.surface.get_height() - window.desk.foot // 2
@@ -240,7 +240,7 @@ def test_nothing_hides_the_timeline_while_it_is_held(window: Window) -> None:
     assert live(window).step_number == step
 
 
-def test_release_reaches_the_mouse_while_the_timeline_is_held(window: Window) -> None:
+def test_release_reaches_the_mouse_while_the_timeline_is_held(window: App) -> None:
     turn(window, elapsed=0.05)
     bar = window.surface.get_height() - window.desk.foot // 2
     turn(window, press(300, 300, 2), press(200, bar), release(200, bar, 2), release(200, bar))
@@ -264,12 +264,12 @@ def test_claimed_keys_are_told_once_and_only_arrows_repeat(opened: Open) -> None
 
 
 @pytest.mark.parametrize("code", [pygame.K_n, pygame.K_DELETE])
-def test_key_for_a_picked_body_says_that_none_is(window: Window, code: int) -> None:
+def test_key_for_a_picked_body_says_that_none_is(window: App, code: int) -> None:
     turn(window, key(code))
     assert window.stage.messages.shown() == (("warning", "select a body first: click it"),)
 
 
-def test_faults_are_closed_by_a_click_on_them_or_by_escape(window: Window) -> None:
+def test_faults_are_closed_by_a_click_on_them_or_by_escape(window: App) -> None:
     for event in (press(*window.surface.get_rect().move(-130, 0).center), key(pygame.K_ESCAPE)):
         window.stage.faults = ("room.toml:3: ball: wrong",)
         turn(window)
@@ -282,7 +282,7 @@ def test_faults_are_closed_by_a_click_on_them_or_by_escape(window: Window) -> No
     assert window.leaving == 0
 
 
-def test_end_is_told_until_one_goes_back(window: Window) -> None:
+def test_end_is_told_until_one_goes_back(window: App) -> None:
     turn(window, elapsed=0.05)
     session = live(window).session
     session.ended = "at 0.05 s: it broke"
@@ -291,7 +291,7 @@ def test_end_is_told_until_one_goes_back(window: Window) -> None:
     assert window.desk.status(window.stage, 60.0, None).ended is None
 
 
-def test_press_and_release_within_one_turn_pull_nothing(window: Window) -> None:
+def test_press_and_release_within_one_turn_pull_nothing(window: App) -> None:
     here = on_screen(window, BALL)
     turn(window, press(*here), release(*here), elapsed=DT)
     assert not window.stage.hands.holding
@@ -300,19 +300,19 @@ def test_press_and_release_within_one_turn_pull_nothing(window: Window) -> None:
 
 
 @pytest.mark.parametrize("pictures", [1, 3, 7])
-def test_steps_follow_from_time_and_not_from_pictures(window: Window, pictures: int) -> None:
+def test_steps_follow_from_time_and_not_from_pictures(window: App, pictures: int) -> None:
     for _ in range(pictures):
         turn(window, elapsed=0.07 / pictures)
     # 0.07 / 3 three times may fall short of 7 steps by rounding
     assert live(window).step_number in ((7,) if pictures == 1 else (6, 7))
 
 
-def test_time_the_machine_lost_is_not_caught_up_with(window: Window) -> None:
+def test_time_the_machine_lost_is_not_caught_up_with(window: App) -> None:
     turn(window, elapsed=1000.0)
     assert live(window).step_number == round(0.1 / DT)
 
 
-def test_step_keys_make_one_step_each_however_many_come_in_a_turn(window: Window) -> None:
+def test_step_keys_make_one_step_each_however_many_come_in_a_turn(window: App) -> None:
     strokes = [event for _ in range(5) for event in (key(pygame.K_o), key_up(pygame.K_o))]
     turn(window, *strokes, elapsed=1.0)
     assert live(window).step_number == 5
@@ -342,7 +342,7 @@ def test_picture_of_a_pause_is_the_state_that_is_told(opened: Open) -> None:
     assert ball_seen(window) == pytest.approx(on_screen(window, (x, y)), abs=1.0)  # a pixel; a step is 28
 
 
-def test_held_key_pauses_once(window: Window) -> None:
+def test_held_key_pauses_once(window: App) -> None:
     turn(window, key(pygame.K_p))
     for _ in range(4):
         turn(window, key(pygame.K_p))
@@ -351,7 +351,7 @@ def test_held_key_pauses_once(window: Window) -> None:
     assert not window.stage.paused
 
 
-def test_camera_stays_where_it_was_put_and_home_brings_it_back(window: Window) -> None:
+def test_camera_stays_where_it_was_put_and_home_brings_it_back(window: App) -> None:
     home = window.camera
     turn(
         window,
@@ -380,7 +380,7 @@ def test_home_once_more_finds_the_bodies_where_they_are_now(opened: Open) -> Non
     assert away.camera == home
 
 
-def test_ball_is_added_under_the_mouse_or_before_it_came_in_the_middle(window: Window) -> None:
+def test_ball_is_added_under_the_mouse_or_before_it_came_in_the_middle(window: App) -> None:
     beside = (1.2, 1.0)  # of the first one
     for place, told in ((window.camera.centre, ()), (beside, (move(*on_screen(window, beside)),))):
         turn(window, *told, key(pygame.K_b, unicode="b"), key_up(pygame.K_b))
@@ -389,7 +389,7 @@ def test_ball_is_added_under_the_mouse_or_before_it_came_in_the_middle(window: W
         assert spawn.ball.position == pytest.approx(place, abs=1.0 / window.camera.scale)  # a pixel
 
 
-def test_resized_window_is_drawn_whole(window: Window) -> None:
+def test_resized_window_is_drawn_whole(window: App) -> None:
     for size in ((200, 150), (1, 1), (1500, 400), SIZE):
         pygame.display.set_mode(size, pygame.RESIZABLE)
         turn(window, pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
@@ -397,7 +397,7 @@ def test_resized_window_is_drawn_whole(window: Window) -> None:
     assert ball_seen(window) == pytest.approx(on_screen(window, BALL), abs=1.0)  # a pixel
 
 
-def test_files_are_told_in_the_window_and_on_the_terminal(window: Window, said: list[str], tmp_path: Path) -> None:
+def test_files_are_told_in_the_window_and_on_the_terminal(window: App, said: list[str], tmp_path: Path) -> None:
     turn(window)
     turn(window, key(pygame.K_p, pygame.KMOD_CTRL), key_up(pygame.K_p))
     path = tmp_path / "sandbox-room-1.png"
@@ -408,10 +408,10 @@ def test_files_are_told_in_the_window_and_on_the_terminal(window: Window, said: 
 
 def test_window_of_a_stored_run_tells_what_cannot_be_done(opened: Open, tmp_path: Path) -> None:
     import sandbox
-    from sandbox.play.footage.film import Film
+    from sandbox.window.capture.film import RecordedRun
 
     window = opened(ROOM)
-    show = Stored(Film(sandbox.run(sandbox.load(tmp_path / "room.toml"))))
+    show = RecordedView(RecordedRun(sandbox.run(sandbox.load(tmp_path / "room.toml"))))
     window.stage.put_on(show, None, show.scene)
     show.scrub(show.end)
     assert window.desk.status(window.stage, 60.0, None).ended == "end of the run"
@@ -423,7 +423,7 @@ def test_window_of_a_stored_run_tells_what_cannot_be_done(opened: Open, tmp_path
     assert window.stage.show is show
 
 
-def test_quit_and_escape_end_the_loop(window: Window) -> None:
+def test_quit_and_escape_end_the_loop(window: App) -> None:
     pygame.event.post(pygame.event.Event(pygame.QUIT))
     assert window.run() == 0
     window.leaving = None
@@ -433,7 +433,7 @@ def test_quit_and_escape_end_the_loop(window: Window) -> None:
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 0)])
 def test_signal_ends_the_loop_and_leaves_others_handlers_alone(
-    window: Window, number: signal.Signals, status: int
+    window: App, number: signal.Signals, status: int
 ) -> None:
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     draw = window.draw
@@ -456,7 +456,7 @@ def test_no_display_is_told(monkeypatch: pytest.MonkeyPatch, capfd: pytest.Captu
     assert capfd.readouterr().err == ""
 
 
-def test_wait_while_the_picture_is_locked(window: Window) -> None:
+def test_wait_while_the_picture_is_locked(window: App) -> None:
     """A kernel that draws may have to be compiled while it holds the pixels; saying so needs them too."""
     window.turn(0.0)
     before = pygame.surfarray.array3d(window.surface)

@@ -9,9 +9,9 @@ import pytest
 from pressing import key
 
 from sandbox.games.high_scores import HighScores, opened
-from sandbox.play.hosting.honours import Entering
-from sandbox.play.stage import Stage
-from sandbox.play.window import Window
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.ui.high_score_dialog import HighScoreEntry
 
 ROOM = """
 title = {title}
@@ -30,11 +30,11 @@ ODD = ["\0", "\x1b[31mred", "a\nb", "\u202eright to left", "👩‍👩‍👧" 
 
 
 @pytest.fixture
-def window(tmp_path: Path) -> Iterator[Window]:
+def window(tmp_path: Path) -> Iterator[App]:
     """A window that writes into a folder of its own; what it prints is in `window.said`."""
     (tmp_path / "out").mkdir()
     said: list[str] = []
-    window = Window(Stage(), size=(900, 600), folder=tmp_path / "out", say=said.append)
+    window = App(AppState(), size=(900, 600), folder=tmp_path / "out", say=said.append)
     window.said = said
     yield window
     window.close()
@@ -47,18 +47,18 @@ def room(folder: Path, title: str = "Room", name: str = "a") -> Path:
     return path
 
 
-def post(window: Window, *events: pygame.event.Event) -> None:
+def post(window: App, *events: pygame.event.Event) -> None:
     for event in events:
         pygame.event.post(event)
     window.turn(0.02)
 
 
-def control(window: Window, code: int) -> None:
+def control(window: App, code: int) -> None:
     post(window, key(code, mod=pygame.KMOD_CTRL), pygame.event.Event(pygame.KEYUP, key=code, mod=0, unicode=""))
 
 
 @pytest.mark.parametrize("text", ODD)
-def test_any_title_and_name_are_shown_and_saved_under_a_plain_name(window: Window, tmp_path: Path, text: str) -> None:
+def test_any_title_and_name_are_shown_and_saved_under_a_plain_name(window: App, tmp_path: Path, text: str) -> None:
     name = text if text.isprintable() else "a"
     assert window.stage.open(room(tmp_path, text, name))
     window.desk.overlays |= {"names"}
@@ -70,7 +70,7 @@ def test_any_title_and_name_are_shown_and_saved_under_a_plain_name(window: Windo
 
 
 @pytest.mark.parametrize("typed", ["x" * 500, "\0\x1b\ud800\u200b", "👩\U0010ffff\u202e", "../../etc", "%s{}\\"])
-def test_any_letters_can_be_typed_for_a_scene(window: Window, tmp_path: Path, typed: str) -> None:
+def test_any_letters_can_be_typed_for_a_scene(window: App, tmp_path: Path, typed: str) -> None:
     window.stage.open(room(tmp_path))
     control(window, pygame.K_o)
     for letter in typed:
@@ -81,7 +81,7 @@ def test_any_letters_can_be_typed_for_a_scene(window: Window, tmp_path: Path, ty
 
 
 @pytest.mark.parametrize("is_file", [False, True], ids=["gone", "a file"])
-def test_folder_that_cannot_be_written_is_told(window: Window, tmp_path: Path, is_file: bool) -> None:
+def test_folder_that_cannot_be_written_is_told(window: App, tmp_path: Path, is_file: bool) -> None:
     window.stage.open(room(tmp_path))
     (tmp_path / "out").rmdir()
     if is_file:
@@ -93,7 +93,7 @@ def test_folder_that_cannot_be_written_is_told(window: Window, tmp_path: Path, i
 
 
 @pytest.mark.parametrize("notches", [1e9, -1e9, 10_000, -10_000])
-def test_wheel_that_spins_wildly_only_zooms(window: Window, tmp_path: Path, notches: float) -> None:
+def test_wheel_that_spins_wildly_only_zooms(window: App, tmp_path: Path, notches: float) -> None:
     window.stage.open(room(tmp_path))
     turned = {"x": 0, "y": int(notches), "precise_y": float(notches), "flipped": False}
     post(window, pygame.event.Event(pygame.MOUSEWHEEL, **turned))
@@ -103,7 +103,7 @@ def test_wheel_that_spins_wildly_only_zooms(window: Window, tmp_path: Path, notc
 
 @pytest.mark.parametrize("what", [pygame.DROPFILE, pygame.DROPTEXT])
 @pytest.mark.parametrize("dropped", ["/", "../x", "\0", "x" * 10_000])
-def test_what_is_dropped_on_the_window_does_nothing(window: Window, tmp_path: Path, what: int, dropped: str) -> None:
+def test_what_is_dropped_on_the_window_does_nothing(window: App, tmp_path: Path, what: int, dropped: str) -> None:
     window.stage.open(room(tmp_path))
     show = window.stage.show
     post(window, pygame.event.Event(what, file=dropped, text=dropped))
@@ -128,7 +128,7 @@ def test_high_scores_list_ten_however_many_a_file_has(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("typed", ["é\0../👩", "\ud800\n", "xyzzy" * 100])
 def test_initials_are_three_plain_letters_whatever_is_typed(tmp_path: Path, typed: str) -> None:
-    entering = Entering(HighScores(tmp_path / "scores.json"), "t", 12, 1)
+    entering = HighScoreEntry(HighScores(tmp_path / "scores.json"), "t", 12, 1)
     for letter in ("a", *typed):
         entering.type(letter)
     entering.keep()

@@ -10,13 +10,13 @@ import pytest
 from pressing import key, key_up, move, press, release
 
 from sandbox.action import Move, Strike
-from sandbox.games.billiards.equipment import INCH
 from sandbox.games.billiards.rules.snooker import SnookerState
-from sandbox.play.billiards.game import Game
-from sandbox.play.instruments.manual import groups
-from sandbox.play.stage import Stage
-from sandbox.play.window import Window
+from sandbox.games.billiards.table_game import BilliardsGame
+from sandbox.games.billiards.tables import INCH
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.ui.help import help_groups
 
 SIZE = (1000, 620)
 TURN = 1.0 / 60.0
@@ -33,10 +33,10 @@ speed = 4.0
 
 
 @pytest.fixture
-def window(tmp_path: Path) -> Iterator[Window]:
+def window(tmp_path: Path) -> Iterator[App]:
     path = tmp_path / "table.toml"
     path.write_text(TABLE, encoding="utf-8")
-    opened = Window(Stage(), size=SIZE, folder=tmp_path, say=lambda _: None)
+    opened = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
     assert opened.stage.open(path)
     pygame.event.clear()
     opened.turn(TURN)
@@ -44,23 +44,23 @@ def window(tmp_path: Path) -> Iterator[Window]:
     opened.close()
 
 
-def game_in(window: Window) -> Game:
+def game_in(window: App) -> BilliardsGame:
     assert window.stage.game is not None
     return window.stage.game
 
 
-def do(window: Window, *events: pygame.event.Event) -> None:
+def do(window: App, *events: pygame.event.Event) -> None:
     for event in events:
         window.take(event)
     window.turn(TURN)
 
 
-def at(window: Window, x: float, y: float) -> tuple[float, float]:
+def at(window: App, x: float, y: float) -> tuple[float, float]:
     across, down = window.camera.to_screen(np.array([x, y])).tolist()
     return across, down
 
 
-def roll_out(window: Window) -> None:
+def roll_out(window: App) -> None:
     game = game_in(window)
     window.turn(TURN)
     for _ in range(5000):
@@ -71,7 +71,7 @@ def roll_out(window: Window) -> None:
     raise AssertionError("the balls never rest")
 
 
-def test_table_is_played_on_the_exact_engine_and_lies_down(window: Window) -> None:
+def test_table_is_played_on_the_exact_engine_and_lies_down(window: App) -> None:
     assert window.stage.engine == "exact"
     assert window.camera.turned
     corners = window.camera.to_screen(np.array([[0.0, 0.0], [39.0 * INCH, 78.0 * INCH]]))
@@ -79,16 +79,16 @@ def test_table_is_played_on_the_exact_engine_and_lies_down(window: Window) -> No
     assert corners[:, 0].max() < SIZE[0] - window.desk.panel.width
 
 
-def test_help_lists_the_keys_of_the_table(window: Window) -> None:
+def test_help_lists_the_keys_of_the_table(window: App) -> None:
     told = dict(window.desk.claims(window.stage).told)
     for label in ("S (hold)", "E (hold)", "X (hold)", "Space", "G", "Z"):
         assert label in told
-    named = dict(groups(window.desk.claims(window.stage).told))
+    named = dict(help_groups(window.desk.claims(window.stage).told))
     assert ("Space", "shoot") in named["This scene"]
     assert any(keys == "P" for keys, _ in named["Time"])  # Space is the table's
 
 
-def test_mouse_aims_and_space_shoots(window: Window) -> None:
+def test_mouse_aims_and_space_shoots(window: App) -> None:
     game = game_in(window)
     x, y = game.position[game.ball]
     do(window, move(*at(window, x + 0.2, y + 0.3)))
@@ -100,7 +100,7 @@ def test_mouse_aims_and_space_shoots(window: Window) -> None:
     assert not window.stage.paused
 
 
-def test_e_sets_english_and_leaves_the_engine(window: Window) -> None:
+def test_e_sets_english_and_leaves_the_engine(window: App) -> None:
     game = game_in(window)
     before = game.cue.aim
     do(window, move(400, 300), key(pygame.K_e))
@@ -115,7 +115,7 @@ def test_e_sets_english_and_leaves_the_engine(window: Window) -> None:
     assert game.cue.aim != before
 
 
-def test_x_and_arrows_set_the_power(window: Window) -> None:
+def test_x_and_arrows_set_the_power(window: App) -> None:
     game = game_in(window)
     before = game.cue.power
     do(window, move(400, 300), key(pygame.K_x), move(400, 290), key_up(pygame.K_x))
@@ -125,7 +125,7 @@ def test_x_and_arrows_set_the_power(window: Window) -> None:
     assert game.cue.power < now
 
 
-def test_dial_and_power_can_be_clicked(window: Window) -> None:
+def test_dial_and_power_can_be_clicked(window: App) -> None:
     game = game_in(window)
     window.draw()
     (_, tip), (_, power) = window.desk.tools._rects()
@@ -136,7 +136,7 @@ def test_dial_and_power_can_be_clicked(window: Window) -> None:
     assert game.strokes == 0
 
 
-def test_g_and_a_click_put_the_ball_in_hand_down(window: Window) -> None:
+def test_g_and_a_click_put_the_ball_in_hand_down(window: App) -> None:
     game = game_in(window)
     do(window, key(pygame.K_g), move(*at(window, 0.3, 0.25)))
     do(window, press(*at(window, 0.3, 0.25)), release(*at(window, 0.3, 0.25)))
@@ -146,7 +146,7 @@ def test_g_and_a_click_put_the_ball_in_hand_down(window: Window) -> None:
     assert game.strokes == 0
 
 
-def test_foul_is_said_and_z_takes_the_stroke_back(window: Window) -> None:
+def test_foul_is_said_and_z_takes_the_stroke_back(window: App) -> None:
     game = game_in(window)
     x, y = game.position[game.ball]
     do(window, move(*at(window, x, y - 0.3)), key(pygame.K_DOWN))
@@ -163,7 +163,7 @@ def test_foul_is_said_and_z_takes_the_stroke_back(window: Window) -> None:
     assert game.position[game.ball] == (x, y)
 
 
-def test_stroke_works_while_paused_and_goes_on_by_steps(window: Window) -> None:
+def test_stroke_works_while_paused_and_goes_on_by_steps(window: App) -> None:
     game = game_in(window)
     do(window, key(pygame.K_p), key(pygame.K_SPACE))
     assert game.strokes == 1
@@ -172,7 +172,7 @@ def test_stroke_works_while_paused_and_goes_on_by_steps(window: Window) -> None:
     assert game.live.session.time == pytest.approx(0.01, abs=1e-12)
 
 
-def test_players_are_chosen_in_the_panel(window: Window) -> None:
+def test_players_are_chosen_in_the_panel(window: App) -> None:
     do(window, key(pygame.K_SPACE))
     window.stage.turn("players", "you vs bot")
     game = game_in(window)
@@ -182,7 +182,7 @@ def test_players_are_chosen_in_the_panel(window: Window) -> None:
     assert game_in(window).match.state.players == 1
 
 
-def test_snooker_may_be_played_with_the_miss(window: Window) -> None:
+def test_snooker_may_be_played_with_the_miss(window: App) -> None:
     assert window.stage.open(find("snooker"))
     for value, misses in (("on", True), ("off", False)):
         window.stage.turn("misses", value)
@@ -191,14 +191,14 @@ def test_snooker_may_be_played_with_the_miss(window: Window) -> None:
         assert state.misses is misses
 
 
-def test_window_without_room_draws_the_table_all_the_same(window: Window) -> None:
+def test_window_without_room_draws_the_table_all_the_same(window: App) -> None:
     for size in ((320, 240), (200, 900), (1600, 400)):
         window.resize(pygame.Surface(size))
         window.draw()
         do(window, move(5, 5), press(5, 5), release(5, 5))
 
 
-def test_restart_begins_the_game_anew(window: Window) -> None:
+def test_restart_begins_the_game_anew(window: App) -> None:
     do(window, key(pygame.K_SPACE))
     before = game_in(window)
     do(window, key(pygame.K_r))
@@ -207,7 +207,7 @@ def test_restart_begins_the_game_anew(window: Window) -> None:
     assert (game_in(window).cue.aim, game_in(window).cue.speed) == (1.5708, 4.0)
 
 
-def test_balls_of_a_game_are_moved_by_the_cue_alone(window: Window) -> None:
+def test_balls_of_a_game_are_moved_by_the_cue_alone(window: App) -> None:
     game = game_in(window)
     x, y = game.position[game.live.bodies.names.index("1")]
     start, end = at(window, x, y), at(window, x - 0.2, y)

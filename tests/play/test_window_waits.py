@@ -10,10 +10,10 @@ from pressing import FOCUS_LOST, key, key_up, press
 from windowed import turned, window_on
 
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
-from sandbox.play.stage import Stage
-from sandbox.play.window import Window
-from sandbox.play.worker import Worker
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.worker import Worker
 
 MOVING = """
 title = "Moving"
@@ -29,20 +29,20 @@ FOCUS_GAINED = pygame.event.Event(pygame.WINDOWFOCUSGAINED)
 
 
 @pytest.fixture
-def window(tmp_path: Path) -> Iterator[Window]:
+def window(tmp_path: Path) -> Iterator[App]:
     with window_on(MOVING, tmp_path) as opened:
         pygame.event.clear()  # those of its opening
         yield opened
 
 
 @pytest.fixture
-def game(tmp_path: Path) -> Iterator[Callable[[str], Window]]:
+def game(tmp_path: Path) -> Iterator[Callable[[str], App]]:
     """Opens a shipped scene."""
-    opened: list[Window] = []
+    opened: list[App] = []
 
-    def play(name: str) -> Window:
-        stage = Stage()
-        window = Window(stage, size=(640, 480), folder=tmp_path, say=lambda _: None)
+    def play(name: str) -> App:
+        stage = AppState()
+        window = App(stage, size=(640, 480), folder=tmp_path, say=lambda _: None)
         opened.append(window)
         assert stage.open(find(name))
         pygame.event.clear()
@@ -53,7 +53,7 @@ def game(tmp_path: Path) -> Iterator[Callable[[str], Window]]:
         each.close()
 
 
-def steps(window: Window) -> int:
+def steps(window: App) -> int:
     """Let the window make three turns; return how many steps were made."""
     assert window.stage.show is not None
     before = window.stage.show.step_number
@@ -73,7 +73,7 @@ def steps(window: Window) -> int:
     ids=["help", "picker", "focus"],
 )
 def test_time_stands_still_behind_what_hides_the_scene(
-    window: Window, hides: pygame.event.Event, shows: pygame.event.Event, paused: bool
+    window: App, hides: pygame.event.Event, shows: pygame.event.Event, paused: bool
 ) -> None:
     window.stage.paused = paused
     assert (steps(window) > 0) is not paused
@@ -85,7 +85,7 @@ def test_time_stands_still_behind_what_hides_the_scene(
 
 
 @pytest.mark.parametrize("name", ["landing", "pinball/classic"])
-def test_real_time_game_waits_for_space(game: Callable[[str], Window], name: str) -> None:
+def test_real_time_game_waits_for_space(game: Callable[[str], App], name: str) -> None:
     window = game(name)
     assert steps(window) == 0
     turned(window, key(pygame.K_UP), key(pygame.K_LSHIFT), key_up(pygame.K_UP), key_up(pygame.K_LSHIFT))
@@ -98,11 +98,11 @@ def test_real_time_game_waits_for_space(game: Callable[[str], Window], name: str
 
 
 @pytest.mark.parametrize("name", ["duel", "bounce"])
-def test_other_scenes_run_at_once(game: Callable[[str], Window], name: str) -> None:
+def test_other_scenes_run_at_once(game: Callable[[str], App], name: str) -> None:
     assert steps(game(name)) > 0
 
 
-def test_step_begins_a_game_paused(game: Callable[[str], Window]) -> None:
+def test_step_begins_a_game_paused(game: Callable[[str], App]) -> None:
     window = game("landing")
     live = turned(window, key(pygame.K_o), key_up(pygame.K_o))
     assert live.step_number == 1
@@ -110,7 +110,7 @@ def test_step_begins_a_game_paused(game: Callable[[str], Window]) -> None:
     assert not window.stage.waits_for_start
 
 
-def compile_for(window: Window, *meanwhile: pygame.event.Event) -> None:
+def compile_for(window: App, *meanwhile: pygame.event.Event) -> None:
     """Let the next job of the stage compile until so many events have been taken out of the queue."""
 
     def job() -> None:
@@ -124,7 +124,7 @@ def compile_for(window: Window, *meanwhile: pygame.event.Event) -> None:
     window.stage.compute(job)
 
 
-def test_presses_while_compiling_are_dropped_and_releases_are_not(window: Window) -> None:
+def test_presses_while_compiling_are_dropped_and_releases_are_not(window: App) -> None:
     turned(window)
     compile_for(window, key(pygame.K_p), press(100, 100), key_up(pygame.K_q))
     kept = {event.type for event in pygame.event.get()}
@@ -135,13 +135,13 @@ def test_presses_while_compiling_are_dropped_and_releases_are_not(window: Window
 
 
 @pytest.mark.parametrize("event", [key(pygame.K_ESCAPE), pygame.event.Event(pygame.QUIT)], ids=["escape", "cross"])
-def test_window_closes_while_something_compiles(window: Window, event: pygame.event.Event) -> None:
+def test_window_closes_while_something_compiles(window: App, event: pygame.event.Event) -> None:
     turned(window)
     compile_for(window, event)
     assert window.leaving == 0
 
 
-def test_scene_is_seen_while_its_session_is_being_started(window: Window, tmp_path: Path) -> None:
+def test_scene_is_seen_while_its_session_is_being_started(window: App, tmp_path: Path) -> None:
     seen: list[int] = []
     drawn = window.desk.draw_wait
 

@@ -8,9 +8,9 @@ import sys
 import pytest
 from pydantic import ValidationError
 
-from sandbox.games.artillery.terrain import Artillery, Terrain
-from sandbox.games.billiards.equipment import Billiards
-from sandbox.games.curling.match import CurlingMatch
+from sandbox.games.artillery.scene import Artillery, Terrain
+from sandbox.games.billiards.tables import Billiards
+from sandbox.games.curling.scene import CurlingMatch
 from sandbox.scene.description.game_tables import GAME_TABLES, PRESETS, game_table, lazy_table, table_of
 from sandbox.scene.description.play import Play
 from sandbox.scene.errors import SceneError

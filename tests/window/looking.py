@@ -7,10 +7,10 @@ import numpy as np
 import pygame
 from driving import SIZE, Shot
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import WARNING, Colour
-from sandbox.play.stage import Stage
-from sandbox.play.window import Window
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.camera import Camera
+from sandbox.window.render.palette import WARNING, Colour
 
 NEAR = 6
 """How far a channel may be from its colour: shading and antialiasing change what is beside an edge by more."""
@@ -34,8 +34,8 @@ class Laid(NamedTuple):
 
 def laid_out(path: Path) -> Laid:
     """Return where a window of the usual size has its widgets and its camera, from one without a display."""
-    stage = Stage()
-    window = Window(stage, size=SIZE, say=lambda _: None)
+    stage = AppState()
+    window = App(stage, size=SIZE, say=lambda _: None)
     try:
         assert stage.open(path)
         window.turn(0.0)

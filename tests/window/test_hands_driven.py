@@ -10,9 +10,9 @@ from xclient import XClient
 
 from sandbox.action import Launch, Move, Pull, SetParameter, Spawn
 from sandbox.measure.replay import rerun
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import GREEN, SKY, VERMILION
 from sandbox.recording import Recording
+from sandbox.window.camera import Camera
+from sandbox.window.render.palette import GREEN, SKY, VERMILION
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

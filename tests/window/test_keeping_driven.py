@@ -11,8 +11,8 @@ from PIL import Image
 from rooms import MOVING, written
 
 from sandbox.measure.replay import rerun
-from sandbox.play.drawing.palette import WARNING
 from sandbox.recording import Recording
+from sandbox.window.render.palette import WARNING
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

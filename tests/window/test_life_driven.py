@@ -11,7 +11,7 @@ from rooms import AT_REST, LEAVING, MOVING, written
 from xclient import XClient
 
 from sandbox.cli.main import call
-from sandbox.play.drawing.palette import ORANGE, WARNING
+from sandbox.window.render.palette import ORANGE, WARNING
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ from driving import Driven, Play
 from looking import count, laid_out, middle, on_screen
 
 from sandbox.measure.replay import rerun
-from sandbox.play.drawing.palette import hex_colour
 from sandbox.recording import Recording
 from sandbox.scene.description.forces import Drive
 from sandbox.scene.files.load import load
+from sandbox.window.render.palette import hex_colour
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

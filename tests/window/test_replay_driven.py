@@ -9,29 +9,29 @@ from looking import count, middle, near, on_screen, paused
 from rooms import FALLING, MOVING, written
 
 import sandbox
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import INK, SKY
-from sandbox.play.footage.film import Film
-from sandbox.play.framing import framing
-from sandbox.play.instruments.panel import WIDTH
-from sandbox.play.instruments.timeline import HEIGHT, Timeline
+from sandbox.window.camera import Camera
+from sandbox.window.capture.film import RecordedRun
+from sandbox.window.render.palette import INK, SKY
+from sandbox.window.ui.panel import PANEL_WIDTH
+from sandbox.window.ui.timeline import HEIGHT, Timeline
+from sandbox.window.view_bounds import view_bounds
 
-AREA = pygame.Rect(0, SIZE[1] - HEIGHT, SIZE[0] - WIDTH, HEIGHT)
+AREA = pygame.Rect(0, SIZE[1] - HEIGHT, SIZE[0] - PANEL_WIDTH, HEIGHT)
 WITHIN = 2.0  # px: the mean over the pixels of a disc whose rim is antialiased
 
 
-def stored(folder: Path, text: str) -> Film:
+def stored(folder: Path, text: str) -> RecordedRun:
     """Run a scene, store the run as `run.npz`, and return it as it is shown."""
     run = sandbox.run(sandbox.load(written(folder, text)))
     run.save(folder / "run.npz")
-    return Film(run)
+    return RecordedRun(run)
 
 
-def seen_by(film: Film) -> Camera:
-    return Camera.fitting(framing(film.scene), SIZE, inset=WIDTH, foot=HEIGHT)
+def seen_by(film: RecordedRun) -> Camera:
+    return Camera.fitting(view_bounds(film.scene), SIZE, inset=PANEL_WIDTH, foot=HEIGHT)
 
 
-def ball_at(window: Driven, film: Film, time: float) -> None:
+def ball_at(window: Driven, film: RecordedRun, time: float) -> None:
     """Wait until the ball is seen where it was at a time, s."""
     x, y = film.frame(time).position[0].tolist()
     place = on_screen(seen_by(film), (x, y))

@@ -7,7 +7,7 @@ from driving import Play
 from looking import ARENA, ENGINE_ROW, PICTURE, at, count, differ, laid_out, on_screen, paused
 from rooms import AT_REST, FALLING, MOVING, RESTING, written
 
-from sandbox.play.drawing.palette import BACKGROUND, INK, SKY, WARNING
+from sandbox.window.render.palette import BACKGROUND, INK, SKY, WARNING
 
 
 def test_brackets_walk_the_scenes_beside_and_keep_the_pause(drive: Play, tmp_path: Path) -> None:

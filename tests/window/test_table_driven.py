@@ -10,7 +10,7 @@ from rooms import written
 
 from sandbox.action import Move, Strike
 from sandbox.measure.replay import rerun
-from sandbox.play.camera import Camera
+from sandbox.window.camera import Camera
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

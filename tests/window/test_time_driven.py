@@ -7,7 +7,7 @@ from driving import Play
 from looking import ARENA, HUD, STEP_ROW, differ, laid_out, middle, near, on_screen, paused
 from rooms import AT_REST, MOVING, written
 
-from sandbox.play.drawing.palette import SKY
+from sandbox.window.render.palette import SKY
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

@@ -8,10 +8,10 @@ from driving import SIZE, Driven, Play, Shot
 from looking import count, differ, laid_out, middle, near, on_screen, paused
 from rooms import AT_REST, RESTING, written
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import PANEL, SKY
-from sandbox.play.mouse import NOTCH
-from sandbox.play.sight import OVERLAYS
+from sandbox.window.camera import Camera
+from sandbox.window.mouse import NOTCH
+from sandbox.window.playback.snapshot import OVERLAYS
+from sandbox.window.render.palette import PANEL, SKY
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

@@ -274,14 +274,14 @@ def _shown(*words: str) -> Callable[[str, str], int]:
     """Return a command that opens a window without a display, and closes it after a few frames."""
 
     def show(_: str, path: str) -> int:
-        from sandbox.play.window import Window
+        from sandbox.window.app import App
 
-        def few_frames(window: Window) -> int:
+        def few_frames(window: App) -> int:
             for elapsed in (0.0, 0.05, 1.0):
                 window.turn(elapsed)
             return window.leaving or 0
 
-        with mock.patch.object(Window, "run", few_frames), mock.patch.dict(os.environ, DUMMY):
+        with mock.patch.object(App, "run", few_frames), mock.patch.dict(os.environ, DUMMY):
             return _called(words[0], path, *words[1:])[0]
 
     return show

@@ -22,9 +22,9 @@ from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES, UnknownEngineError, able
 from sandbox.engines.switching import SwitchableSimulation
-from sandbox.games.referee import Referee
+from sandbox.games.contract import UnsuitableSceneError
 from sandbox.games.registry import rules_of
-from sandbox.games.rules import UnfitError
+from sandbox.games.session import GameSession
 from sandbox.measure.compare import compare
 from sandbox.measure.forecast import FAILED, forecast, largest_safe_dt, notes
 from sandbox.measure.ledger import ledger_of
@@ -32,7 +32,6 @@ from sandbox.measure.play_out import play_out
 from sandbox.measure.recorder import TooLargeError
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
-from sandbox.play.running.session import Session
 from sandbox.recording import Recording
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.demands import bill
@@ -40,6 +39,7 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, loads
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame, Trajectory
+from sandbox.window.playback.session import Session
 
 MAX_MESSAGE = 4000  # characters of one fault or error
 BUDGET = 0.5  # s of CPU time after which the steps of one run are ended
@@ -47,7 +47,7 @@ COMPILE_TIME = 30  # s of CPU time that compiling one kernel may take beside
 COMPILE_CLOCK.on_begin = lambda _: extend_cpu_limit(COMPILE_TIME)
 EXPECTED = (
     SceneError, ValidationError, ActionError, Refusal, Divergence, Exhaustion, TooLargeError, UnknownEngineError,
-    UnfitError,
+    UnsuitableSceneError,
 )  # fmt: skip
 """The errors of the interface."""
 
@@ -306,7 +306,7 @@ def _played(scene: Scene, acts: tuple[Action, ...], steps: int, engine: str | No
 
 def _session(scene: Scene, acts: tuple[Action, ...], steps: int, engine: str) -> Session:
     rules = rules_of(scene)
-    session = Session(scene, engine, game=None if rules is None else Referee(rules))
+    session = Session(scene, engine, game=None if rules is None else GameSession(rules))
     session.relay.patience = 2.0
     due, began = list(acts), time.process_time()
     controls = () if rules is None else rules.controls

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import sandbox
 from sandbox.measure.run import run
-from sandbox.play.camera import Camera
-from sandbox.play.footage.film import NARROW, Film
-from sandbox.play.footage.still import offscreen
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.camera import Camera
+from sandbox.window.capture.film import NARROW, RecordedRun
+from sandbox.window.capture.image_files import offscreen
 
 from .files import image_of, save_gif
 
@@ -31,7 +31,7 @@ def film(
     """
 
     def make(path: Path) -> None:
-        seen = Film(run(sandbox.load(find(scene), [f"world.duration={until}"]), engine, audit=False), scene)
+        seen = RecordedRun(run(sandbox.load(find(scene), [f"world.duration={until}"]), engine, audit=False), scene)
         large = size[0] * SHARP, size[1] * SHARP
         surface, camera, frames = offscreen(large), Camera.fitting(seen.box, large), []
         for k in range(round(until * fps) + 1):

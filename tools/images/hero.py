@@ -9,12 +9,12 @@ import pygame
 from PIL import Image
 
 import sandbox
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import BACKGROUND, FAINT, GREEN, LINE, ORANGE, PANEL, SKY, Colour, mixed
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.drawing.text import write
-from sandbox.play.footage.film import Film
-from sandbox.play.footage.still import offscreen
+from sandbox.window.camera import Camera
+from sandbox.window.capture.film import RecordedRun
+from sandbox.window.capture.image_files import offscreen
+from sandbox.window.render.palette import BACKGROUND, FAINT, GREEN, LINE, ORANGE, PANEL, SKY, Colour, mix_colours
+from sandbox.window.render.renderer import Renderer
+from sandbox.window.render.text import draw_text
 
 from .files import image_of, save_gif
 
@@ -45,7 +45,7 @@ class Run(NamedTuple):
     engine: str
     about: str
     colour: Colour
-    film: Film
+    film: RecordedRun
     error: np.ndarray[tuple[int], np.dtype[np.float64]]
     """largest distance of a ball from the exact one in each frame, m; empty for the exact engine itself"""
 
@@ -96,7 +96,7 @@ def _runs() -> list[Run]:
     for engine, about, colour, settings in ways:
         trajectory = sandbox.run(sandbox.loads(scene("#{:02x}{:02x}{:02x}".format(*colour))), engine=engine, **settings)
         error = np.linalg.norm(trajectory.position - exact.position, axis=2).max(axis=1)
-        found.append(Run(engine, about, colour, Film(trajectory), error if engine != "exact" else error[:0]))
+        found.append(Run(engine, about, colour, RecordedRun(trajectory), error if engine != "exact" else error[:0]))
     return found
 
 
@@ -110,8 +110,8 @@ def _frame(runs: list[Run], time: float) -> Image.Image:
     for k, run in enumerate(runs):
         left = GAP + k * (width + GAP)
         place = pygame.Rect(left * SHARP, HEAD * SHARP, width * SHARP, height * SHARP)
-        write(surface, run.engine, (place.left, 7 * SHARP), 16 * SHARP, run.colour, bold=True)
-        write(surface, run.about, (place.left, 27 * SHARP), 12 * SHARP, FAINT)
+        draw_text(surface, run.engine, (place.left, 7 * SHARP), 16 * SHARP, run.colour, bold=True)
+        draw_text(surface, run.about, (place.left, 27 * SHARP), 12 * SHARP, FAINT)
         _draw_panel(surface.subsurface(place), run, time, None if run.engine == "exact" else truth)
     _draw_chart(surface, pygame.Rect(0, (HEAD + height) * SHARP, SIZE[0] * SHARP, CHART * SHARP), runs, time)
     return image_of(surface).reduce(SHARP)
@@ -122,12 +122,12 @@ def _draw_panel(surface: pygame.Surface, run: Run, time: float, truth: "sandbox.
     camera = Camera.fitting(((-0.03, -0.03), (WIDTH + 0.03, HEIGHT)), surface.get_size(), margin=0.0)
     part = offscreen(surface.get_size())
     sight = run.film.sight(time, frozenset({"shapes"}), ghost=truth)
-    _PICTURES.setdefault(run.engine, Picture()).draw(part, camera, sight, unit=float(SHARP), scale=False)
+    _PICTURES.setdefault(run.engine, Renderer()).draw(part, camera, sight, unit=float(SHARP), scale=False)
     _draw_trails(part, camera, run, time)
     surface.blit(part, (0, 0))
 
 
-_PICTURES: dict[str, Picture] = {}
+_PICTURES: dict[str, Renderer] = {}
 
 
 def _draw_trails(surface: pygame.Surface, camera: Camera, run: Run, time: float) -> None:
@@ -135,7 +135,7 @@ def _draw_trails(surface: pygame.Surface, camera: Camera, run: Run, time: float)
     moments = np.arange(0.0, time, STEP)
     now = run.film.frame(time).position
     past = np.asarray([run.film.frame(moment).position for moment in moments.tolist()]).reshape(-1, *now.shape)
-    shade = mixed(BACKGROUND, run.colour, TRAIL)
+    shade = mix_colours(BACKGROUND, run.colour, TRAIL)
     for ball, radius in enumerate(run.film.bodies.radius.tolist()):
         places = camera.to_screen(past[:, ball]).tolist()
         for k, (begin, finish) in enumerate(pairwise(places)):
@@ -148,7 +148,7 @@ def _draw_chart(surface: pygame.Surface, area: pygame.Rect, runs: list[Run], tim
     axes = pygame.Rect(area.left + LEFT * SHARP, area.top + 30 * SHARP, 0, 0)
     axes.width, axes.height = area.width - (LEFT + RIGHT) * SHARP, area.height - 42 * SHARP
     title = "error: largest distance of a ball from the exact solution (rings)"
-    write(surface, title, (GAP * SHARP, area.top + 9 * SHARP), 12 * SHARP, FAINT)
+    draw_text(surface, title, (GAP * SHARP, area.top + 9 * SHARP), 12 * SHARP, FAINT)
     end = runs[0].film.duration
 
     def place(moment: float, error: float) -> tuple[float, float]:
@@ -158,10 +158,12 @@ def _draw_chart(surface: pygame.Surface, area: pygame.Rect, runs: list[Run], tim
     for value, text in TICKS:
         y = place(0.0, value)[1]
         pygame.draw.line(surface, PANEL, (axes.left, y), (axes.right, y), SHARP)
-        write(surface, text, (axes.left - 8 * SHARP, y), 11 * SHARP, FAINT, "midright")
+        draw_text(surface, text, (axes.left - 8 * SHARP, y), 11 * SHARP, FAINT, "midright")
     pygame.draw.line(surface, LINE, axes.bottomleft, axes.bottomright, SHARP)
     seconds = f"{time:.1f} s"
-    write(surface, seconds, (area.right - GAP * SHARP, area.top + 9 * SHARP), 12 * SHARP, FAINT, "topright", mono=True)
+    draw_text(
+        surface, seconds, (area.right - GAP * SHARP, area.top + 9 * SHARP), 12 * SHARP, FAINT, "topright", mono=True
+    )
     for run in runs:
         if not len(run.error):
             continue
@@ -174,7 +176,9 @@ def _draw_chart(surface: pygame.Surface, area: pygame.Rect, runs: list[Run], tim
             _draw_line(surface, points, run.colour)
         x, y = points[-1]
         pygame.draw.circle(surface, run.colour, (x, y), 4 * SHARP)
-        write(surface, _length(run.error[until - 1]), (x + 10 * SHARP, y), 13 * SHARP, run.colour, "midleft", bold=True)
+        draw_text(
+            surface, _length(run.error[until - 1]), (x + 10 * SHARP, y), 13 * SHARP, run.colour, "midleft", bold=True
+        )
 
 
 def _draw_line(surface: pygame.Surface, points: list[tuple[float, float]], colour: Colour) -> None:

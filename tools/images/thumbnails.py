@@ -7,16 +7,16 @@ from PIL import Image, ImageChops
 
 import sandbox
 from sandbox.engines.registry import usual
-from sandbox.games.pinball.hand import PinballHand
+from sandbox.games.pinball.bot import PinballBot
 from sandbox.measure.play_out import play_out
 from sandbox.measure.run import run
-from sandbox.play.camera import Box, Camera
-from sandbox.play.drawing.palette import BACKGROUND
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.footage.film import Film
-from sandbox.play.footage.still import offscreen
-from sandbox.play.framing import lies_down
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.camera import Box, Camera
+from sandbox.window.capture.film import RecordedRun
+from sandbox.window.capture.image_files import offscreen
+from sandbox.window.render.palette import BACKGROUND
+from sandbox.window.render.renderer import Renderer
+from sandbox.window.view_bounds import should_rotate
 
 from .files import image_of, save_png
 
@@ -125,11 +125,11 @@ def save(image: Image.Image, path: Path) -> None:
 def thumbnail(name: str, moment: Moment) -> Image.Image:
     """Return the picture of a moment of a run."""
     scene = sandbox.load(find(name), [f"world.duration={moment.time}"])
-    film = Film(_run(scene, moment), name)
+    film = RecordedRun(_run(scene, moment), name)
     size = SIZE[0] * SHARP, SIZE[1] * SHARP
-    camera = Camera.fitting(moment.box or film.box, size, turned=lies_down(scene, size))
+    camera = Camera.fitting(moment.box or film.box, size, turned=should_rotate(scene, size))
     overlays = frozenset({"shapes", *(("trails",) if moment.trail else ())})
-    picture, surface, shown = Picture(), offscreen(size), None
+    picture, surface, shown = Renderer(), offscreen(size), None
     for k in range(moment.strobe + 1):
         time = film.duration * (1.0 - k / max(moment.strobe, 1))
         picture.draw(surface, camera, film.sight(time, overlays, moment.trail or 1.0), unit=LINES, scale=False)
@@ -143,5 +143,5 @@ def thumbnail(name: str, moment: Moment) -> Image.Image:
 def _run(scene: sandbox.Scene, moment: Moment) -> sandbox.Trajectory:
     if moment.player is None:
         return run(scene, usual(scene), audit=False)
-    player = PinballHand(scene.world.seed, 0.95) if moment.player == "skilled" else moment.player
+    player = PinballBot(scene.world.seed, 0.95) if moment.player == "skilled" else moment.player
     return play_out(scene, player, usual(scene)).trajectory

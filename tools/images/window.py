@@ -8,15 +8,15 @@ import pygame
 from PIL import Image
 
 import sandbox
-from sandbox.games.billiards.bot.bot import Bot
-from sandbox.games.pinball.hand import PinballHand
-from sandbox.games.rules import Seen
-from sandbox.play.framing import framing
-from sandbox.play.messages import Messages
-from sandbox.play.running import companions
-from sandbox.play.stage import Stage
-from sandbox.play.window import Window
+from sandbox.games.billiards.bot import BilliardsBot
+from sandbox.games.contract import StepInfo
+from sandbox.games.pinball.bot import PinballBot
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.messages import Messages
+from sandbox.window.playback import diagnostics as companions
+from sandbox.window.view_bounds import view_bounds
 
 from .files import image_of, save_gif, save_png
 from .thumbnails import SIZE as THUMBNAIL
@@ -48,20 +48,20 @@ FLIGHT = (
 """s, controls and values of a landing"""
 
 
-companions.PATIENCE = 600.0
+companions.CATCH_UP_TIME = 600.0
 """s: a ghost appears on a busy machine too"""
 
 
-def _open(scene: str, size: tuple[int, int], *overrides: str) -> Window:
-    stage = Stage(overrides=list(overrides))
-    opened = Window(stage, size=size)
+def _open(scene: str, size: tuple[int, int], *overrides: str) -> App:
+    stage = AppState(overrides=list(overrides))
+    opened = App(stage, size=size)
     stage.open(find(scene))
     opened.turn(FRAME)
     stage.messages = Messages()
     return opened
 
 
-def _close(opened: Window, path: Path, colours: int = COLOURS) -> None:
+def _close(opened: App, path: Path, colours: int = COLOURS) -> None:
     image = image_of(opened.surface)
     opened.close()
     save_png(image, path, colours)
@@ -97,7 +97,7 @@ def artillery_thumbnail(scene: str) -> Callable[[Path], None]:
     return make
 
 
-def _duel(scene: str, size: tuple[int, int]) -> Window:
+def _duel(scene: str, size: tuple[int, int]) -> App:
     opened = _open(scene, size)
     opened.desk.panel.visible = False
     opened.home()
@@ -140,10 +140,10 @@ def pinball(path: Path) -> None:
     assert live is not None
     assert host is not None
     live.company.show_trust(False)
-    player = PinballHand(live.scene.world.seed, SKILL)
-    (_, bottom), (_, top) = framing(live.scene)
+    player = PinballBot(live.scene.world.seed, SKILL)
+    (_, bottom), (_, top) = view_bounds(live.scene)
     while live.frame.time < LIT or not _plays(live.frame, (bottom + top) / 2.0):
-        for control, value in player.decide(Seen(live.frame.time, live.frame, live.contacts, ()), host.rules):
+        for control, value in player.decide(StepInfo(live.frame.time, live.frame, live.contacts, ()), host.rules):
             host.hold("player", control, value)
         opened.turn(FRAME)
     _close(opened, path)
@@ -165,7 +165,7 @@ def table(path: Path) -> None:
     opened.turn(FRAME)
     while not game.waits:
         opened.turn(FRAME)
-    plan = Bot(1.0, 1).intend(game.match).stroke
+    plan = BilliardsBot(1.0, 1).intend(game.match).stroke
     game.cue.aim, game.cue.speed = plan.aim, plan.speed
     game.cue.tip_at(plan.side, plan.height)
     opened.stage.messages = Messages()

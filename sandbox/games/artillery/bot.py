@@ -1,77 +1,80 @@
-"""Bot: whom it shoots at, with what, and how well. It errs by its skill, at random from the scene's seed."""
+"""Hand: a player of artillery at the keys, who aims as a bot does and brings the gun there by holding and tapping."""
 
 import math
+from collections.abc import Sequence
 
-import numpy as np
-
-from sandbox.games.artillery.aim import Aim, Range, Search
-from sandbox.games.artillery.field import Field
-from sandbox.games.artillery.tanks import Tank, Tanks
-from sandbox.games.artillery.weapons import WEAPONS
-from sandbox.scene.description.world import World
+from sandbox.games.artillery.battlefield import Tank
+from sandbox.games.artillery.bot_planner import BotPlanner
+from sandbox.games.artillery.rules import PER_SECOND, POWER, TURN, ArtilleryRules
+from sandbox.games.artillery.targeting import FiringSolution
+from sandbox.games.contract import Rules, StepInfo, UnsuitableSceneError, checked_skill
 from sandbox.scene.random_streams import Stream, draws
 
-ANGLE_ERROR, SPEED_ERROR = math.radians(6.0), 0.08
-"""Standard deviations of angle, rad, and speed, as a share of it, of who has no skill at all."""
-NEAR = 0.2
-"""of the crater's radius: a shot that comes down as near to the target as this is as good as any"""
-BIG = 0.5
-"""the chance of a shot that costs, where there is money for it"""
-WORK = 6_000
-"""of the search for a shot, at each look of the rules: 1 to 4 ms, so that a window stays smooth, and some 80 looks"""
+NEAR = 12.0
+"""Taps, from which on a key is no longer held but tapped."""
 
 
-def chances(seed: int, turn: int) -> np.random.Generator:
-    """Return the chances of a turn, which are those of no other."""
-    return draws(Stream.SHELL, seed, turn)
+class ArtilleryBot:
+    """Plays for whoever's turn it is and who is no bot. Other games than artillery it cannot play."""
 
+    def __init__(self, seed: int, skill: float = 0.8) -> None:
+        """Sit down.
 
-def choose(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tuple[Tank, int]:
-    """Return whom to shoot at, the weakest, of equals the nearest; and the number of the weapon."""
-    others = [tank for tank in tanks.alive if tank is not shooter]
-    target = min(others, key=lambda tank: (tank.health, math.dist(tank.place, shooter.place)))
-    able = [k for k, weapon in enumerate(WEAPONS) if weapon.kind == "shell" and 0 < weapon.cost <= shooter.money]
-    big = bool(random.uniform() < BIG)
-    return target, able[-1] if able and big and target.health > WEAPONS[0].damage else 0
-
-
-class Thought:
-    """A bot's thought about its turn, by and by. A copy goes on by itself."""
-
-    def __init__(
-        self, world: World, field: Field, shooter: Tank, random: np.random.Generator, skill: float | None = None
-    ) -> None:
-        """Choose a target and a weapon, and begin to look for the shot.
-
-        Args:
-            world: with the wind of the turn.
-            field: as it lies.
-            shooter: who thinks.
-            random: the chances of the turn.
-            skill: 0 to 1; by default that of the shooter, who is a bot.
+        Raises:
+            ValueError: the skill is not from 0 to 1.
         """
-        target, self.weapon = choose(field.tanks, shooter, random)
-        self._full = field.artillery.speed
-        self._lack = 1.0 - ((shooter.player.bot or 0.0) if skill is None else skill)
-        self._errors = random.standard_normal(2).tolist()
-        self._search = Search(
-            Range(
-                world=world,
-                muzzle=field.tanks.muzzle(shooter),
-                ground=field.ground,
-                edges=field.artillery.edges,
-                full=self._full,
-                at=target.place[0],
-                near=NEAR * WEAPONS[self.weapon].radius,
-            )
-        )
+        self.skill = checked_skill(skill)
+        self._seed, self._turn, self._time = seed, 0, 0.0
+        self._thought: BotPlanner | None = None
+        self._down: set[str] = set()
 
-    def go_on(self, work: int = WORK) -> Aim | None:
-        """Think on, for so much work; return the shot once there is one: the best, but for the bot's error."""
-        aim = self._search.go_on(work)
-        if aim is None:
-            return None
-        turned, faster = self._errors
-        angle = min(max(aim.angle + self._lack * ANGLE_ERROR * turned, 0.0), math.pi)
-        speed = min(max(aim.speed * (1.0 + self._lack * SPEED_ERROR * faster), 0.0), self._full)
-        return aim._replace(angle=angle, speed=speed)
+    def decide(self, seen: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
+        """Return the controls that are pressed and let go of now.
+
+        Raises:
+            UnfitError: the rules are those of another game.
+        """
+        if not isinstance(rules, ArtilleryRules):
+            raise UnsuitableSceneError("this player only plays artillery")
+        step, self._time = seen.time - self._time, seen.time
+        wanted: set[str] = set()
+        if rules.phase == "aim" and rules.shooter.player.bot is None:
+            aim = self._thought_of(rules)
+            if aim is not None:
+                wanted = self._wanted(rules, aim, step)
+        changed = [(name, 0.0) for name in sorted(self._down - wanted)]
+        changed += [(name, 1.0) for name in sorted(wanted - self._down)]
+        self._down = wanted
+        return changed
+
+    def _thought_of(self, rules: ArtilleryRules) -> FiringSolution | None:
+        """Think on about this turn; return the shot once there is one."""
+        if self._thought is None or self._turn != rules.turn:
+            random = draws(Stream.AIM, self._seed, rules.turn)
+            self._thought = BotPlanner(rules.world, rules.field, rules.shooter, random, self.skill)
+            self._turn = rules.turn
+        return self._thought.go_on()
+
+    def _wanted(self, rules: ArtilleryRules, aim: FiringSolution, step: float) -> set[str]:
+        """Return the keys that are to be down now; a key is tapped by being up every other time."""
+        tank, found = rules.shooter, set[str]()
+        assert self._thought is not None
+        if tank.weapon != self._thought.weapon:
+            found |= {"weapon"} - self._down
+        lacks = self._lacks(rules, tank, aim)
+        for (lack, tap, rate), (more, less) in zip(lacks, (("left", "right"), ("up", "down")), strict=True):
+            key = more if lack > 0.0 else less
+            if abs(lack) > 0.5 * (tap + rate * step) and (key not in self._down or abs(lack) > NEAR * tap):
+                found.add(key)
+        if not found and not self._down:
+            found.add("fire")
+        return found
+
+    @staticmethod
+    def _lacks(rules: ArtilleryRules, tank: Tank, aim: FiringSolution) -> tuple[tuple[float, float, float], ...]:
+        """Return by how much angle and power are to grow, and by how much they do by a tap, and a second."""
+        power = aim.speed / rules.artillery.speed
+        return (
+            (min(max(aim.angle, 0.0), math.pi) - tank.angle, TURN, PER_SECOND[0]),
+            (power - tank.power, POWER, PER_SECOND[1]),
+        )

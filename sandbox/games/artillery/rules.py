@@ -1,4 +1,7 @@
-"""Artillery's rules: turns of aiming, flying and settling, until one tank is left."""
+"""Artillery's rules: turns of aiming, flying and settling, until one tank is left.
+
+Gunner: how keys set a gun. A tap moves it a little, a key that is held moves it on, faster after a while.
+"""
 
 import math
 from collections.abc import Sequence
@@ -7,17 +10,93 @@ from typing import Literal
 import numpy as np
 
 from sandbox.action import Action, SetParameter
-from sandbox.games.artillery.aim import Aim
-from sandbox.games.artillery.barrage import Barrage
-from sandbox.games.artillery.bot import Thought, chances
-from sandbox.games.artillery.field import PAUSE, Field
-from sandbox.games.artillery.gunner import CONTROLS, Gunner
-from sandbox.games.artillery.shot import Shot
-from sandbox.games.artillery.tanks import Tank
-from sandbox.games.artillery.weapons import WEAPONS
-from sandbox.games.rules import Control, Seen
+from sandbox.games.artillery.battlefield import PAUSE, WEAPONS, Battlefield, Tank
+from sandbox.games.artillery.bot_planner import BotPlanner, hit_probabilities
+from sandbox.games.artillery.shells import ArtilleryShot, Projectiles
+from sandbox.games.artillery.targeting import FiringSolution
+from sandbox.games.contract import Control, StepInfo
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.scene import Scene
+
+CONTROLS = (
+    Control("left", "turn the barrel left", ("left",), pad="left -leftx"),
+    Control("right", "turn the barrel right", ("right",), pad="right +leftx"),
+    Control("up", "more power", ("up",), pad="up -lefty"),
+    Control("down", "less power", ("down",), pad="down +lefty"),
+    Control("weapon", "next affordable weapon", ("w",), pad="x"),
+    Control("fire", "fire", ("space",), pad="a"),
+)
+
+TURN, POWER = math.radians(0.1), 0.001
+"""rad and share of full speed, by a tap"""
+SLOW, FAST = 1.0, 8.0
+"""how many times 5° or 5 % a second, at first and later"""
+LATER = 0.6
+"""s"""
+PER_SECOND = math.radians(5.0), 0.05
+BRING = math.radians(90.0), 1.0
+"""rad/s and shares of full speed a second, by which a bot sets its gun"""
+LEAST = 0.02
+"""of full speed"""
+
+
+class GunControls:
+    """Which keys are held, and for how long."""
+
+    def __init__(self) -> None:
+        self._held: dict[str, float] = {}
+
+    def press(self, name: str, value: float) -> None:
+        """Take note of a key that goes down, or up."""
+        if value > 0.0:
+            self._held[name] = 0.0
+        else:
+            self._held.pop(name, None)
+
+    def touch(self, name: str, tank: Tank) -> None:
+        """Do what a tap does."""
+        match name:
+            case "left" | "right":
+                set_gun(tank, TURN if name == "left" else -TURN, 0.0)
+            case "up" | "down":
+                set_gun(tank, 0.0, POWER if name == "up" else -POWER)
+            case "weapon":
+                count = len(WEAPONS)
+                nexts = ((tank.weapon + k) % count for k in range(1, count + 1))
+                tank.weapon = next(k for k in nexts if WEAPONS[k].cost <= tank.money)
+
+    def hold(self, tank: Tank, time: float) -> None:
+        """Go on with what is held, for a time, s."""
+        for name in self._held:
+            self._held[name] += time
+        turn, power = (self._way(more, less) for more, less in (("left", "right"), ("up", "down")))
+        set_gun(tank, turn * PER_SECOND[0] * time, power * PER_SECOND[1] * time)
+
+    def _way(self, more: str, less: str) -> float:
+        return sum(
+            sign * (SLOW if self._held[name] < LATER else FAST)
+            for name, sign in ((more, 1.0), (less, -1.0))
+            if name in self._held
+        )
+
+    @staticmethod
+    def bring(tank: Tank, angle: float, power: float, time: float) -> bool:
+        """Bring a gun nearer to where it is to be, for a time, s; tell whether it is there."""
+        turn, more = angle - tank.angle, power - tank.power
+        there = abs(turn) <= BRING[0] * time and abs(more) <= BRING[1] * time
+        if there:
+            tank.angle, tank.power = angle, power
+        else:
+            tank.angle += math.copysign(min(abs(turn), BRING[0] * time), turn)
+            tank.power += math.copysign(min(abs(more), BRING[1] * time), more)
+        return there
+
+
+def set_gun(tank: Tank, turn: float, more: float) -> None:
+    """Turn a barrel, rad, and change its power, within what a gun can do."""
+    tank.angle = min(max(tank.angle + turn, 0.0), math.pi)
+    tank.power = min(max(tank.power + more, LEAST), 1.0)
+
 
 HEIGHTS = 33
 """of the ground, evenly from side to side, that gauges tell"""
@@ -38,18 +117,18 @@ class ArtilleryRules:
         Raises:
             UnfitError: the scene has no players, or no ground.
         """
-        self.field = Field(scene, bodies)
+        self.field = Battlefield(scene, bodies)
         self.artillery = self.field.artillery
-        self.barrage = Barrage(self.field)
+        self.barrage = Projectiles(self.field)
         self.world = scene.world
         """with the wind of the turn"""
         self.turn = 0
         """counted from 1, of all players together"""
         self.phase: Phase = "begin"
-        self._gunner = Gunner()
+        self._gunner = GunControls()
         self._time, self._since, self._number = 0.0, 0.0, 0
-        self._thought: Thought | None = None  # of a bot whose turn it is
-        self._aim: Aim | None = None
+        self._thought: BotPlanner | None = None  # of a bot whose turn it is
+        self._aim: FiringSolution | None = None
         self._over: str | None = None
 
     @property
@@ -80,7 +159,7 @@ class ArtilleryRules:
         return self._thought is not None and self._aim is None
 
     @property
-    def shots(self) -> list[Shot]:
+    def shots(self) -> list[ArtilleryShot]:
         """What all shots came to."""
         return self.barrage.shots
 
@@ -105,7 +184,7 @@ class ArtilleryRules:
             self.field.cues.append("click")
         return ()
 
-    def look(self, seen: Seen) -> Sequence[Action]:
+    def look(self, seen: StepInfo) -> Sequence[Action]:
         """Go on with the turn: aim as long as keys are held, follow what flies, wait until all is still."""
         passed, self._time = seen.time - self._time, seen.time
         self._breathe(seen.actions)
@@ -197,7 +276,7 @@ class ArtilleryRules:
         most = self.artillery.wind
         if not most:
             return []
-        wind = (float(chances(self.world.seed, 2 * self.turn).uniform(-most, most)), 0.0)
+        wind = (float(hit_probabilities(self.world.seed, 2 * self.turn).uniform(-most, most)), 0.0)
         self.world = self.world.model_copy(update={"wind": wind})
         return [SetParameter(time=self._time, path="world.wind", value=list(wind))]
 
@@ -213,7 +292,9 @@ class ArtilleryRules:
             self._gunner.hold(tank, passed)
             return []
         if self._thought is None:
-            self._thought = Thought(self.world, self.field, tank, chances(self.world.seed, 2 * self.turn + 1))
+            self._thought = BotPlanner(
+                self.world, self.field, tank, hit_probabilities(self.world.seed, 2 * self.turn + 1)
+            )
             tank.weapon = self._thought.weapon
         if self._aim is None:
             self._aim = self._thought.go_on()

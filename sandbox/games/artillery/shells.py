@@ -3,25 +3,33 @@
 A shell meets nothing in the engine. Where it strikes is read off its way, which between two frames is the cubic through
 both states: so an engine lets no shell through thin ground, whatever the step, and what a landing misses by is the
 integrator's error and nothing else.
+
+Shot: what a shot came to, and by how much the flight that was computed missed the exact one.
+
+Barrage: the shells of a turn, from the muzzle to where each goes off.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.action import Action, Move, Remove, Spawn
 from sandbox.arrays import FloatArray
-from sandbox.games.artillery.flight import Landing, crossing, past, strike
-from sandbox.games.artillery.ground import Ground
-from sandbox.games.artillery.roots import bracketed
-from sandbox.games.artillery.tanks import Tank
-from sandbox.games.artillery.terrain import Edges
-from sandbox.games.artillery.weapons import Weapon
+from sandbox.games.artillery.ballistics import Landing, bracketed_root, crossing, first_strike, landing, times_past
+from sandbox.games.artillery.battlefield import FRAGMENTS, LIFT, SPREAD, Battlefield, Tank, Weapon
+from sandbox.games.artillery.scene import Edges
+from sandbox.games.artillery.terrain import Ground
+from sandbox.games.contract import StepInfo
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.description.world import World
 
-RADIUS = 0.25
+SHELL_RADIUS = 0.25
 """m"""
-MASS = 10.0
+SHELL_MASS = 10.0
 """kg"""
 
 
@@ -52,7 +60,7 @@ class Shell:
     """s, since when it hardly rolls on"""
 
 
-class Step:
+class FlightSegment:
     """The way of a shell between two frames: the cubic through both states (Hermite)."""
 
     def __init__(self, start: tuple[FloatArray, FloatArray], end: tuple[FloatArray, FloatArray], time: float) -> None:
@@ -74,7 +82,7 @@ class Step:
     def meets(self, ground: Ground, discs: FloatArray, until: float) -> tuple[float, int | None] | None:
         """Return when it enters the ground or strikes a disc, as a share of the time up to `until`, and which disc."""
         a, b = self._start[0], self.at(until)
-        found, struck = crossing(ground, a, b), strike(discs, a, b)
+        found, struck = crossing(ground, a, b), first_strike(discs, a, b)
         if struck is not None and (found is None or struck[0] < found.here):
             disc = discs[struck[1]]
             share = self._root(lambda s: math.dist(self.at(s), disc[:2]) - float(disc[2]), 0.0, struck[0] * until)
@@ -94,7 +102,7 @@ class Step:
         high = here if high is None else high
         for until in (high, min(high + 0.05, 1.0)):
             if low < until and f(low) > 0.0 >= f(until):
-                return bracketed(f, low, until, 1e-12)
+                return bracketed_root(f, low, until, 1e-12)
         return here
 
 
@@ -104,4 +112,255 @@ def returned(
     """Return place and velocity of a shell beyond a side as it goes on within; none where it is not, or may leave."""
     if edges == "open" or 0.0 <= place[0] <= ground.width:
         return None
-    return past(place, velocity, 1 if place[0] > 0.0 else -1, ground.width, edges)
+    return times_past(place, velocity, 1 if place[0] > 0.0 else -1, ground.width, edges)
+
+
+class ArtilleryShot(NamedTuple):
+    """A shot that has come down, or left."""
+
+    shooter: str
+    weapon: str
+    place: Point | None
+    """where it came down, m; none where it left for good"""
+    exact: Point | None
+    """where the exact flight comes down, m"""
+    flown: float
+    """s"""
+    time: float = 0.0
+    """s, when it came down, or was seen to have left"""
+    disturbed: bool = False
+    """Air or gravity became others on its way: no one flight is the exact one."""
+
+    @property
+    def off(self) -> float | None:
+        """How far the two are apart, m; none unless both come down."""
+        return None if self.place is None or self.exact is None else math.dist(self.place, self.exact)
+
+    @property
+    def told(self) -> str:
+        """In words: where along x it came down, and how far from the exact solution along x and y."""
+        return self.brief if self.place is None else f"landed at {self.brief}"
+
+    @property
+    def brief(self) -> str:
+        """The same in fewer words."""
+        landed = "out of bounds" if self.place is None else f"{self.place[0]:.2f} m"
+        if self.disturbed:
+            return f"{landed}; wind or gravity changed during the flight"
+        if self.exact is None:
+            return landed if self.place is None else f"{landed}, exact solution out of bounds"
+        exact = f"{landed}, exact solution {self.exact[0]:.2f} m"
+        if self.place is None:
+            return exact
+        across, up = (length_text(abs(a - b)) for a, b in zip(self.place, self.exact, strict=True))
+        return f"{exact} (Δx {across}" + (")" if up == NOTHING else f", Δy {up})")
+
+
+NOTHING = "less than 1 nm"
+
+
+def length_text(metres: float) -> str:
+    """Return a length in words that has three digits."""
+    for least, factor, unit in ((1.0, 1.0, "m"), (1e-3, 1e3, "mm"), (1e-6, 1e6, "µm"), (1e-9, 1e9, "nm")):
+        if metres >= least:
+            return f"{f'{metres * factor:#.3g}'.rstrip('.')} {unit}" if metres < 100.0 else f"{metres:.0f} m"
+    return NOTHING
+
+
+ROLLER = 0.5
+"""m, the radius of what rolls"""
+HARDLY = 0.5
+"""m/s: what rolls more slowly for as many seconds goes off"""
+ROLLS = 8.0
+"""s, at most"""
+
+
+class Projectiles:
+    """What flies and rolls."""
+
+    def __init__(self, field: Battlefield) -> None:
+        self._field, self._edges = field, field.artillery.edges
+        self.shells: list[Shell] = []
+        self.shots: list[ArtilleryShot] = []
+        """that have come down, or left, in the whole game"""
+        self.ways: dict[str, list[tuple[float, float]]] = {}
+        """m, where each shell of the last shot has been"""
+        self._fired = 0
+
+    def fire(self, time: float, world: World, tank: Tank, weapon: Weapon, speed: float) -> list[Action]:
+        """Fire from a tank at a time, s, in the air of a world, at a speed, m/s."""
+        field = self._field
+        place = field.tanks.muzzle(tank).at(np.array([tank.angle]))[0]
+        velocity = speed * np.array([math.cos(tank.angle), math.sin(tank.angle)])
+        field.cues.append("fire")
+        field.blasts.clear()
+        self.ways.clear()
+        action = self._shell(time, tank, weapon, place, velocity)
+        exact = landing(world, place, velocity, field.ground, self._edges, field.tanks.discs)
+        self.shells[-1].exact = exact
+        return [action]
+
+    def know(self, seen: StepInfo) -> None:
+        """Find the numbers of the shells that have been spawned since: the last bodies, in the order of the actions."""
+        new = [shell for shell in self.shells if shell.number is None]
+        if not new:
+            return
+        own = {shell.name for shell in new}
+        spawned = [action.single.name for action in seen.actions if isinstance(action, Spawn)]
+        others = sum(name not in own for name in spawned)
+        first = len(seen.frame.position) - len(new) - others
+        for k, shell in enumerate(new):  # what the rules spawn stands before what a hand does
+            shell.number = first + k
+
+    def disturb(self) -> None:
+        """Note that what flies now does so in another air than it was fired in."""
+        for shell in self.shells:
+            shell.exact, shell.disturbed = None, True
+
+    def follow(self, seen: StepInfo, passed: float) -> list[Action]:
+        """Look where all shells have gone since the last frame, a time before, s."""
+        actions: list[Action] = []
+        for shell in [*self.shells]:
+            number = shell.number
+            if number is None:
+                continue
+            if not seen.frame.present[number]:  # who leaves the world's bounds is retired
+                self._gone(shell, seen.time)
+                continue
+            before = shell.place, shell.velocity
+            shell.place, shell.velocity = seen.frame.position[number].copy(), seen.frame.velocity[number].copy()
+            if shell.rolling is not None:
+                actions += self._roll(shell, seen.time)
+            else:
+                actions += self._fly(shell, before, seen.time, passed)
+            x, y = shell.place.tolist()
+            self.ways[shell.name].append((x, y))
+        return actions
+
+    def _fly(self, shell: Shell, before: tuple[FloatArray, FloatArray], time: float, passed: float) -> list[Action]:
+        """Let a shell go on from the last frame to this."""
+        field, place = self._field, shell.place
+        step = FlightSegment(before, (place, shell.velocity), passed)
+        beyond = returned(place, shell.velocity, field.ground, self._edges)
+        until = 1.0
+        if beyond is not None:
+            wall = field.ground.width if place[0] > 0.0 else 0.0
+            until = min(max(float((wall - before[0][0]) / (place[0] - before[0][0])), 0.0), 1.0)
+        found = step.meets(field.ground, field.tanks.discs, until)
+        if found is not None:
+            return self._come_down(shell, step, *found, time, passed)
+        if shell.weapon.kind == "cluster" and shell.whole and before[1][1] > 0.0 >= shell.velocity[1]:
+            return self._split(shell, time)
+        if beyond is not None:
+            shell.place, shell.velocity = beyond
+            (x, y), (vx, vy) = (each.tolist() for each in beyond)
+            return [Move(time=time, body=shell.name, position=(x, y), velocity=(vx, vy))]
+        if place[1] < -1.0 and not 0.0 <= place[0] <= field.ground.width:
+            return self._left(shell, time)
+        return []
+
+    def _come_down(
+        self, shell: Shell, step: FlightSegment, share: float, struck: int | None, time: float, passed: float
+    ) -> list[Action]:
+        """Let a shell go off where it came down at a share of the last step, or begin to roll there."""
+        x, y = step.at(share).tolist()
+        shell.place = np.array([x, y])
+        self._tell(shell, (x, y), time - (1.0 - share) * passed)
+        if shell.weapon.kind != "roller" or struck is not None:
+            return self._go_off(shell, (x, y), time)
+        ground = self._field.ground
+        low, high = max(x - 0.5, 0.0), min(x + 0.5, ground.width)
+        along = np.array([high - low, float(ground.surface(high) - ground.surface(low))])
+        along /= np.hypot(*along)
+        place = np.array([x, y]) + (ROLLER + LIFT) * np.array([-along[1], along[0]])
+        velocity = float(step.velocity(share) @ along) * along
+        self.shells.remove(shell)
+        rolling = self._shell(time, shell.shooter, shell.weapon, place, velocity, rolls=True)
+        return [Remove(time=time, body=shell.name), rolling]
+
+    def _roll(self, shell: Shell, time: float) -> list[Action]:
+        """Let what rolls go off where it meets a tank, comes to rest, or has rolled for too long."""
+        assert shell.rolling is not None
+        discs = self._field.tanks.discs
+        near = np.hypot(*(discs[:, :2] - shell.place).T) <= discs[:, 2] + ROLLER
+        if float(np.hypot(*shell.velocity)) > HARDLY:
+            shell.slow = None
+        elif shell.slow is None:
+            shell.slow = time
+        still = shell.slow is not None and time - shell.slow >= HARDLY
+        if near.any() or still or time - shell.rolling > ROLLS:
+            x, y = shell.place.tolist()
+            return self._go_off(shell, (x, y - ROLLER), time)
+        if 0.0 <= shell.place[0] <= self._field.ground.width:
+            return []
+        return self._left(shell, time) if self._edges == "open" else self._roll_past(shell, time)
+
+    def _roll_past(self, shell: Shell, time: float) -> list[Action]:
+        """Let what has rolled past a side roll on within; it goes off where the ground there stands higher."""
+        ground = self._field.ground
+        beyond = returned(shell.place, shell.velocity, ground, self._edges)
+        assert beyond is not None
+        (x, y), (vx, vy) = (each.tolist() for each in beyond)
+        surface = float(ground.surface(x))
+        if y < surface:
+            return self._go_off(shell, (x, y), time)
+        place = x, max(y, surface + ROLLER)
+        shell.place, shell.velocity = np.array(place), beyond[1]
+        return [Move(time=time, body=shell.name, position=place, velocity=(vx, vy))]
+
+    def _split(self, shell: Shell, time: float) -> list[Action]:
+        """Let a cluster come apart: its momentum stays, the fragments fly on beside each other."""
+        self.shells.remove(shell)
+        actions: list[Action] = [Remove(time=time, body=shell.name)]
+        for k in range(FRAGMENTS):
+            aside = np.array([SPREAD * (k - 0.5 * (FRAGMENTS - 1)), 0.0])
+            actions.append(self._shell(time, shell.shooter, shell.weapon, shell.place, shell.velocity + aside))
+            self.shells[-1].whole = False
+        self._field.cues.append("split")
+        return actions
+
+    def _go_off(self, shell: Shell, place: tuple[float, float], time: float) -> list[Action]:
+        self.shells.remove(shell)
+        return [
+            Remove(time=time, body=shell.name),
+            *self._field.blast(time, shell.shooter, place, shell.weapon),
+        ]
+
+    def _left(self, shell: Shell, time: float) -> list[Action]:
+        self._gone(shell, time)
+        return [Remove(time=time, body=shell.name)]
+
+    def _gone(self, shell: Shell, time: float) -> None:
+        self.shells.remove(shell)
+        self._tell(shell, None, time)
+
+    def _tell(self, shell: Shell, place: tuple[float, float] | None, time: float) -> None:
+        """Note what a shot came to, if it is one that was fired and came down by itself."""
+        if shell.whole and shell.rolling is None:
+            exact = None if shell.exact is None else shell.exact.place
+            flown = time - shell.fired
+            self.shots.append(
+                ArtilleryShot(shell.shooter.name, shell.weapon.name, place, exact, flown, time, shell.disturbed)
+            )
+
+    def _shell(
+        self, time: float, tank: Tank, weapon: Weapon, place: FloatArray, velocity: FloatArray, rolls: bool = False
+    ) -> Spawn:
+        self._fired += 1
+        shell = Shell(f"shell {self._fired}", tank, weapon, place, velocity, fired=time)
+        shell.rolling = time if rolls else None
+        self.shells.append(shell)
+        (x, y), (vx, vy) = place.tolist(), velocity.tolist()
+        self.ways[shell.name] = [(x, y)]
+        ball = Ball(
+            name=shell.name,
+            position=(x, y),
+            velocity=(vx, vy),
+            radius=ROLLER if rolls else SHELL_RADIUS,
+            mass=SHELL_MASS,
+            collides="fixed" if rolls else "none",
+            friction=0.3,
+            restitution=0.2,
+            colour="#f2e6c8",
+        )
+        return Spawn(time=time, ball=ball)

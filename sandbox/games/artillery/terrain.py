@@ -1,82 +1,102 @@
-"""`[terrain]` and `[artillery]` of a scene file."""
+"""Ground: columns of dirt, out of which circles are taken and on which dirt falls. Nothing of it gets lost.
 
-from typing import Annotated, Literal
+All heights are whole numbers of `QUANTUM`, so that every sum here is exact: after a crater the columns' sum is the sum
+before less what was taken out, bit for bit.
+"""
 
-from pydantic import Field
+import math
+from typing import NamedTuple
 
-from sandbox.scene.description.base import Colour, Friction, HasMaterial, Mass, Name, Part
+import numpy as np
 
-MAX_COLUMNS = 5_000
-
-Level = Annotated[float, Field(ge=0, le=1e6)]
-"""A height above the ground's foot, m"""
-
-Edges = Literal["open", "rubber", "wrap"]
-"""What becomes of a shell at the sides of the ground: it leaves, it is thrown back, or it comes in on the far side."""
+from sandbox.arrays import FloatArray
+from sandbox.games.artillery.scene import QUANTUM, course_of
+from sandbox.scene.description.base import Point
 
 
-class Terrain(HasMaterial):
-    """Ground from 0 to `width`, made of columns of equal width: a wall through the centres of their tops.
+class LooseDirt(NamedTuple):
+    """Dirt that hangs in the air once a circle below it is gone, and falls."""
 
-    Without `heights`, midpoint displacement makes random hills from the seed of the scene.
-    """
-
-    width: Annotated[float, Field(gt=0, le=1e6)]
+    column: int
+    bottom: float
+    """m, of where it hung"""
+    top: float
     """m"""
-    columns: Annotated[int, Field(ge=2, le=MAX_COLUMNS)] = 300
-    """number of columns of the ground"""
-    base: Level = 10.0
-    """height of the lowest column, m"""
-    height: Level = 40.0
-    """height of the highest column above the lowest, m"""
-    roughness: Annotated[float, Field(ge=0, le=1)] = 0.3
-    """0 for smooth hills to 1 for jagged ones: each octave has 2^(roughness − 1) times the amplitude of the one
-    before"""
-    heights: Annotated[tuple[Level, ...], Field(min_length=2, max_length=MAX_COLUMNS)] | None = None
-    """height of each column, m; replaces columns, base, height and roughness"""
-    laid: Annotated[int, Field(ge=0, lt=2**63)] | None = None
-    """seed from which the wall `terrain` was generated, in expanded scenes only; setting another seed generates new
-    hills"""
+    drop: float
+    """m, that it falls"""
 
 
-class Player(Part):
-    """A player with a tank."""
+class Crater(NamedTuple):
+    """What a blast did to ground."""
 
-    name: Name
-    """name of the player, and of the box that represents the tank"""
-    position: Annotated[float, Field(ge=-1e6, le=1e6)]
-    """position of the tank along the ground, m; the ground under it is levelled"""
-    bot: Annotated[float, Field(ge=0, le=1)] | None = None
-    """skill of a computer player, 1 for perfect aim; without it, a person plays"""
-    colour: Colour | None = None
-    """colour of the tank, `#rrggbb`"""
+    ground: "Ground"
+    """after the loose dirt has fallen"""
+    removed: FloatArray
+    """(N,) m, of each column"""
+    loose: tuple[LooseDirt, ...]
 
 
-class Artillery(Part):
-    """Players on a terrain who take turns to shoot at each other.
+class Ground:
+    """N columns of one width, from 0 to `width`, each solid from 0 to its height."""
 
-    The ground is the wall `terrain`; the tanks are boxes with the names of the players. Boxes with these names that the
-    scene already has are kept.
-    """
+    def __init__(self, heights: FloatArray, width: float) -> None:
+        """Take heights (N,), m, that are whole numbers of the quantum, and a width, m."""
+        self.heights, self.width = heights, width
+        self.each = width / len(heights)
+        self.middles = (np.arange(len(heights)) + 0.5) * self.each
+        """(N,) m"""
+        self.kinks = np.concatenate(([0.0], self.middles, [width]))
+        """(N + 2,) m, where the surface may bend, and where it ends"""
 
-    players: Annotated[tuple[Player, ...], Field(min_length=2, max_length=10, alias="player")]
-    """players in the order of their turns"""
-    edges: Edges = "open"
-    """behaviour of a shell at the left and right end of the ground: it flies on, reappears at the other end, or hits
-    a wall"""
-    wind: Annotated[float, Field(ge=0, le=100)] = 0.0
-    """largest wind, m/s: each turn has a new random wind between −wind and wind; 0 keeps the wind of [world]"""
-    speed: Annotated[float, Field(gt=0, le=1e4)] = 60.0
-    """m/s, of a shell at full power"""
-    rounds: Annotated[int, Field(ge=1, le=1000)] = 20
-    """largest number of turns of each player"""
-    money: Annotated[int, Field(ge=0, le=10**9)] = 1000
-    """money of each player at the start"""
-    tank: tuple[Annotated[float, Field(gt=0, le=1e3)], Annotated[float, Field(gt=0, le=1e3)]] = (3.0, 1.5)
-    """width and height of a tank, m"""
-    mass: Mass = 1000.0
-    """mass of a tank, kg"""
-    friction: Friction = 1.0
-    """friction of a tank"""
-    tracer: bool = False
-    """show the predicted path of a shot"""
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The course of the wall that is its surface, m."""
+        return course_of(self.heights.tolist(), self.width)
+
+    def surface(self, x: FloatArray | float) -> FloatArray:
+        """Return the heights of the surface at places, m; beside the ground there is none, −inf."""
+        return np.interp(x, self.middles, self.heights) + np.where(
+            (np.asarray(x) < 0.0) | (np.asarray(x) > self.width), -np.inf, 0.0
+        )
+
+    def under(self, x: float, half: float) -> float:
+        """Return the highest that the surface is within `half` of a place, m: what stands there stands on it."""
+        inner = self.heights[np.abs(self.middles - x) <= half]
+        ends = self.surface(np.clip(np.array([x - half, x + half]), 0.0, self.width))
+        return float(max(inner.max(initial=-math.inf), ends.max()))
+
+    def without(self, centre: Point, radius: float) -> Crater:
+        """Take a circle out: of each column the chord through its middle, as far as it is solid; the rest settles.
+
+        The area so taken differs from the circle's by what a sum of chords does from their integral, which for a
+        whole circle falls as (column / radius)^1.5.
+        """
+        half = self._chords(centre[0], radius)
+        low = np.clip(_whole(centre[1] - half), 0.0, self.heights)
+        high = np.clip(_whole(centre[1] + half), 0.0, self.heights)
+        removed = np.where(half > 0.0, high - low, 0.0)
+        hanging = np.flatnonzero((removed > 0.0) & (high < self.heights))
+        loose = tuple(LooseDirt(k, float(high[k]), float(self.heights[k]), float(removed[k])) for k in hanging.tolist())
+        return Crater(Ground(self.heights - removed, self.width), removed, loose)
+
+    def with_heap(self, centre: Point, radius: float) -> Crater:
+        """Let a disc of dirt fall: onto each column as much as the disc's chord over it. `removed` is negative."""
+        half = self._chords(centre[0], radius)
+        added = _whole(2.0 * half)
+        bottom = np.maximum(_whole(centre[1] - half), self.heights)
+        falling = np.flatnonzero(added > 0.0)
+        loose = tuple(
+            LooseDirt(k, float(bottom[k]), float(bottom[k] + added[k]), float(bottom[k] - self.heights[k]))
+            for k in falling.tolist()
+        )
+        return Crater(Ground(self.heights + added, self.width), -added, loose)
+
+    def _chords(self, x: float, radius: float) -> FloatArray:
+        """Return half the chord that a circle at x has in each column's middle, (N,) m."""
+        square = radius * radius - (self.middles - x) ** 2
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+
+
+def _whole(height: FloatArray) -> FloatArray:
+    """Return heights rounded to the quantum."""
+    return np.asarray(np.round(height / QUANTUM) * QUANTUM)

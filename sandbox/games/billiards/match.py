@@ -1,4 +1,7 @@
-"""Match: a game on a table, as a frozen value: rules, turn, score, and where every ball lies."""
+"""Match: a game on a table, as a frozen value: rules, turn, score, and where every ball lies.
+
+Needs: what a table must have for a game.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -9,22 +12,58 @@ import numpy as np
 
 from sandbox.action import Move, Strike
 from sandbox.arrays import FloatArray
-from sandbox.games.billiards.layout import TOUCH, Disc, Layout
-from sandbox.games.billiards.lying import lie_of
-from sandbox.games.billiards.needs import require
-from sandbox.games.billiards.placing import nearest, refusal, spread
-from sandbox.games.billiards.rules.call import Call, Choices, Decision
-from sandbox.games.billiards.rules.happening import GameError, Happening
-from sandbox.games.billiards.rules.registry import rules_named
-from sandbox.games.billiards.rules.rules import Rules
-from sandbox.games.billiards.rules.state import State
-from sandbox.games.billiards.rules.verdict import Lie, Verdict
-from sandbox.games.billiards.telling import happenings_of, touching_pairs
-from sandbox.games.billiards.upkeep import racked, respotted, ways
+from sandbox.games.billiards.placement import nearest, placement_refusal, spread
+from sandbox.games.billiards.referee import (
+    collision_free_moves,
+    rerack_moves,
+    respot_moves,
+    shot_events,
+    situation_of,
+    touching_pairs,
+)
+from sandbox.games.billiards.rules.base import (
+    Decision,
+    GameError,
+    Ruleset,
+    RulesState,
+    ShotCall,
+    ShotChoices,
+    ShotEvent,
+    ShotResult,
+    Situation,
+)
+from sandbox.games.billiards.rules.registry import ruleset_named
+from sandbox.games.billiards.table_geometry import TOUCH, PlacedDisc, TableGeometry
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Stroke
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts
+
+SPOTS = {"8-ball": ("head", "foot"), "9-ball": ("head", "foot"), "carom": ("head", "centre", "foot")}
+"""What a table needs for a rack; for snooker, the colours' own."""
+
+COLOURS = ("yellow", "green", "brown", "blue", "pink", "black")
+
+
+def require_suitable_table(layout: TableGeometry, rules: Ruleset[Any], state: RulesState) -> None:
+    """Refuse a table on which a game cannot be played.
+
+    Raises:
+        GameError: with all that is wrong.
+    """
+    wanted = {*state.table, *(rules.cue_balls if rules.name != "free" else (rules.cue_ball(state),))}
+    missing, idle = sorted(wanted - set(layout.names)), sorted(set(layout.names) - wanted)
+    spots = [name for name in SPOTS.get(rules.rack, COLOURS) if name not in layout.spots and rules.name != "free"]
+    wrong = [
+        *([f"no ball {', '.join(missing)}"] if missing else []),
+        *([f"the game does not use {', '.join(idle)}"] if idle else []),
+        *([f"no spot {', '.join(spots)}; state a [[play.spot]]"] if spots else []),
+        *(["it is no billiard table, as it has no [surface]"] if layout.scene.surface is None else []),
+        *(["no pockets"] if not layout.pockets and rules.name in ("8-ball", "9-ball", "snooker") else []),
+        *(["carom has no pockets"] if layout.pockets and rules.rack == "carom" else []),
+    ]
+    if wrong:
+        raise GameError(f"{rules.name} cannot be played on this table: {'; '.join(wrong)}")
 
 
 @dataclass(frozen=True)
@@ -34,16 +73,16 @@ class Match:
     What a method leads to is another match; `moves` tells what that asks for at the table.
     """
 
-    layout: Layout = field(repr=False, compare=False)
-    rules: Rules[Any] = field(repr=False)
-    state: State
+    layout: TableGeometry = field(repr=False, compare=False)
+    rules: Ruleset[Any] = field(repr=False)
+    state: RulesState
     position: tuple[Point, ...] = field(repr=False)
     """of every body, by number, m; a ball that is down lies in its pocket"""
     before: tuple[Point, ...] | None = field(default=None, repr=False)
     """the positions before the last shot, to which a miss can be taken back"""
     shots: int = 0
     """how many were played"""
-    verdict: Verdict[Any] | None = field(default=None, repr=False, compare=False)
+    verdict: ShotResult[Any] | None = field(default=None, repr=False, compare=False)
     """of what led here: fouls, points, messages"""
 
     @classmethod
@@ -59,7 +98,7 @@ class Match:
         Raises:
             GameError: there is no such game, or it cannot be played on this table.
         """
-        rules, layout = rules_named(game or scene.play.game or "free"), Layout.of(scene)
+        rules, layout = ruleset_named(game or scene.play.game or "free"), TableGeometry.of(scene)
         if rules.name == "free" and "balls" not in terms and layout.names:
             cue = "cue" if "cue" in layout.number else layout.names[0]
             terms = {"cue": cue, "balls": tuple(name for name in layout.names if name != cue), **terms}
@@ -67,7 +106,7 @@ class Match:
             state = rules.start(players, **terms)
         except TypeError:
             raise GameError(f"{rules.name} takes no {', '.join(terms)}") from None
-        require(layout, rules, state)
+        require_suitable_table(layout, rules, state)
         return cls(layout, rules, state, layout.start)._in_hand()
 
     @property
@@ -96,7 +135,7 @@ class Match:
         return self.rules.legal_targets(self.state)
 
     @property
-    def choices(self) -> Choices:
+    def choices(self) -> ShotChoices:
         """What may be decided and called before the next shot."""
         return self.rules.choices(self.state)
 
@@ -106,7 +145,7 @@ class Match:
         return () if self.verdict is None else self.verdict.messages
 
     @property
-    def on_table(self) -> dict[str, Disc]:
+    def on_table(self) -> dict[str, PlacedDisc]:
         """The balls that are not down, the cue ball too."""
         here = {*self.state.table, self.cue}
         return {
@@ -117,7 +156,7 @@ class Match:
         """Return why the cue ball may not be put somewhere, m; None where it may."""
         if self.state.in_hand is None:
             return "the cue ball is not in hand"
-        return refusal(self.layout, self.state.in_hand, at, self._cue_radius, self._others)
+        return placement_refusal(self.layout, self.state.in_hand, at, self._cue_radius, self._others)
 
     def nearest(self, at: Point) -> Point:
         """Return the place nearest to a point, m, where the cue ball may be put.
@@ -161,11 +200,13 @@ class Match:
             raise GameError("the frame is over")
         return Strike(time=time, ball=self.cue, **stroke.model_dump(exclude_defaults=True))
 
-    def happenings(self, contacts: Contacts, began: float = 0.0) -> tuple[Happening, ...]:
+    def happenings(self, contacts: Contacts, began: float = 0.0) -> tuple[ShotEvent, ...]:
         """Return what the rules see of a shot from here, of its contacts, from any engine, and when it began, s."""
-        return happenings_of(self.layout, contacts, began, self.against, self.cue)
+        return shot_events(self.layout, contacts, began, self.against, self.cue)
 
-    def played(self, contacts: Contacts, position: FloatArray, call: Call | None = None, began: float = 0.0) -> Self:
+    def played(
+        self, contacts: Contacts, position: FloatArray, call: ShotCall | None = None, began: float = 0.0
+    ) -> Self:
         """Return what a shot has led to, once every ball is at rest.
 
         Args:
@@ -178,7 +219,7 @@ class Match:
             GameError: the frame is over, or the call could not be made.
         """
         happenings, stayed = self.happenings(contacts, began), self._stayed_behind(contacts, began)
-        verdict = self.rules.judge(self.state, call or Call(), happenings, stayed)
+        verdict = self.rules.judge(self.state, call or ShotCall(), happenings, stayed)
         rest = tuple((x, y) for x, y in position.tolist())
         after = replace(self, position=rest, before=self.position, shots=self.shots + 1)
         return after._done(verdict)
@@ -195,7 +236,7 @@ class Match:
         now = [(x, y) for x, y in position.tolist()]
         return tuple(
             Move(time=time, body=self.layout.names[k], position=at, velocity=(0.0, 0.0))
-            for k, at in ways(self.layout, now, self.position)
+            for k, at in collision_free_moves(self.layout, now, self.position)
         )
 
     def document(self) -> dict[str, Any]:
@@ -216,7 +257,7 @@ class Match:
             GameError: it is none.
         """
         try:
-            rules, layout = rules_named(plain["game"]), Layout.of(scene)
+            rules, layout = ruleset_named(plain["game"]), TableGeometry.of(scene)
             state = rules.restored(plain["state"])
             position, before, shots = plain["position"], plain["before"], int(plain["shots"])
             placed = _points(position, layout)
@@ -234,7 +275,7 @@ class Match:
         return self.layout.radius[self.layout.number[self.cue]]
 
     @property
-    def _others(self) -> list[Disc]:
+    def _others(self) -> list[PlacedDisc]:
         cue = self.cue
         return [disc for name, disc in self.on_table.items() if name != cue]
 
@@ -268,17 +309,17 @@ class Match:
             position[self.layout.number[name]] = at
         return tuple(position)
 
-    def _done(self, verdict: Verdict[Any]) -> Self:
+    def _done(self, verdict: ShotResult[Any]) -> Self:
         """Return the match once all is done at the table that a verdict asks for, and the lie is looked at."""
         position = self.position
         if verdict.rerack:
-            position = racked(self.layout, self.rules, verdict.state)
+            position = rerack_moves(self.layout, self.rules, verdict.state)
         elif verdict.restore and self.before is not None:
             position = self.before
         after = replace(self, state=verdict.state, position=position)
         if verdict.respot:
             here = [after.layout.number[name] for name in after.on_table]
-            after = replace(after, position=respotted(after.layout, verdict.respot, position, here))
+            after = replace(after, position=respot_moves(after.layout, verdict.respot, position, here))
         after = after._in_hand()
         if after.over:
             return replace(after, verdict=verdict)
@@ -296,13 +337,13 @@ class Match:
             at = self.layout.start[self.layout.number[self.cue]]
         return replace(self, position=self._with({self.cue: self.nearest(at)}))
 
-    def _lie(self) -> Lie:
+    def _lie(self) -> Situation:
         """Return how the balls lie for the one to shoot."""
         cue = self.cue
         others = {name: disc for name, disc in self.on_table.items() if name != cue}
-        return lie_of(self._cues(), others, self.targets, self.state.in_hand is not None)
+        return situation_of(self._cues(), others, self.targets, self.state.in_hand is not None)
 
-    def _cues(self) -> Iterator[Disc]:
+    def _cues(self) -> Iterator[PlacedDisc]:
         """Yield where the cue ball lies; where it is in hand, then also all over where it may be put."""
         radius, place = self._cue_radius, self.state.in_hand
         yield (*self.position[self.layout.number[self.cue]], radius)
@@ -310,7 +351,7 @@ class Match:
             yield from ((x, y, radius) for x, y in spread(self.layout, place, radius, self._others))
 
 
-def _points(plain: Any, layout: Layout) -> tuple[Point, ...]:
+def _points(plain: Any, layout: TableGeometry) -> tuple[Point, ...]:
     points = tuple((float(x), float(y)) for x, y in plain)
     if len(points) != len(layout.names):
         raise ValueError(f"expected {len(layout.names)} positions, one a body, but got {len(points)}")

@@ -5,24 +5,87 @@ meets nothing: it stands on the tee line where the skip holds it, and stones are
 from that line, so the broom is held beside the place that is meant.
 
 Not modelled: stones that are touched by people, time clocks, and the measuring of ends that are nearly even.
+
+Score: how a match stands, end by end. The hammer, the last stone of an end, goes to the team that did not score.
 """
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from sandbox.action import Action, Impulse, Move, SetParameter
-from sandbox.games.curling.count import PROTECTED, beyond, counted, guards, short
+from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
+from sandbox.games.curling.bot import CurlingBot
 from sandbox.games.curling.delivery import Delivery, Ice
-from sandbox.games.curling.match import CurlingMatch
-from sandbox.games.curling.score import Score
-from sandbox.games.curling.sheet import RELEASE, STONES, TEAMS, WIDTH, gone, stone, waiting
-from sandbox.games.curling.team import Team
-from sandbox.games.rules import Control, Seen, UnfitError
+from sandbox.games.curling.scene import CurlingMatch
+from sandbox.games.curling.sheet import (
+    PROTECTED,
+    RELEASE,
+    STONES,
+    TEAMS,
+    WIDTH,
+    end_score,
+    in_free_guard_zone,
+    is_hogged,
+    is_out_of_play,
+    parked_position,
+    removed_position,
+    stone_name,
+)
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.game_tables import table_of
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
+
+
+class CurlingScore(NamedTuple):
+    """How a match stands."""
+
+    ends: int
+    """that are to be played; more where it is even then"""
+    points: tuple[int, int] = (0, 0)
+    played: int = 0
+    """ends"""
+    hammer: int = 1
+    """the team that throws last in the present end"""
+    thrown: int = 0
+    """stones of the present end"""
+
+    @property
+    def team(self) -> int:
+        """Whose turn it is: the team without the hammer begins."""
+        return (1 - self.hammer + self.thrown) % 2
+
+    @property
+    def number(self) -> int:
+        """Which of its stones that team throws, from 0."""
+        return self.thrown // 2
+
+    @property
+    def full(self) -> bool:
+        """Whether all stones of the end have been thrown."""
+        return self.thrown == 2 * STONES
+
+    @property
+    def over(self) -> str | None:
+        """Why the match is over; None while it goes on."""
+        red, yellow = self.points
+        if self.played < self.ends or red == yellow:
+            return None
+        return f"{TEAMS[yellow > red]} wins {max(red, yellow)} : {min(red, yellow)}"
+
+    def after_stone(self) -> "CurlingScore":
+        """Return the score after one more stone."""
+        return self._replace(thrown=self.thrown + 1)
+
+    def after_end(self, team: int | None, points: int) -> "CurlingScore":
+        """Return the score after an end that a team has won, or nobody."""
+        red, yellow = self.points
+        total = (red + points * (team == 0), yellow + points * (team == 1))
+        hammer = self.hammer if team is None else 1 - team
+        return self._replace(points=total, played=self.played + 1, hammer=hammer, thrown=0)
+
 
 BROOM = "broom"
 SIDEWAYS, HARDER = 0.5, 2.5
@@ -59,19 +122,19 @@ class Curling:
             UnfitError: the scene has no ice, or lacks stones or the broom.
         """
         floor, match = scene.surface, table_of(scene.play, CurlingMatch) or CurlingMatch()
-        self._names = [stone(team, k) for team in (0, 1) for k in range(STONES)]
+        self._names = [stone_name(team, k) for team in (0, 1) for k in range(STONES)]
         lacking = [name for name in (*self._names, BROOM) if name not in bodies.names]
         if floor is None or floor.bodies != "pucks" or not floor.sliding_friction or lacking:
-            raise UnfitError(
+            raise UnsuitableSceneError(
                 'curling needs a [surface] with bodies = "pucks" and a sliding_friction, the bodies red-1 … red-8 and '
                 f"yellow-1 … yellow-8, and a {BROOM!r}" + (f"; missing: {', '.join(lacking)}" if lacking else "")
             )
         self._numbers = [bodies.names.index(name) for name in self._names]
         self._moment = [float(bodies.moment[number]) for number in self._numbers]
         self._floor, self._ice = floor, Ice.of(floor)
-        self._teams = [Team(team, self._ice, match.error, scene.world.seed) for team in (0, 1)]
+        self._teams = [CurlingBot(team, self._ice, match.error, scene.world.seed) for team in (0, 1)]
         self._people = match.people
-        self._score = Score(match.ends)
+        self._score = CurlingScore(match.ends)
         self._places: dict[int, Point] = {}  # of the stones that are in play, by their places in `_names`
         self._before: dict[int, Point] = {}  # as they lay before the last delivery
         self._hits: set[tuple[int, int]] = set()  # pairs of stones that met since the delivery
@@ -120,7 +183,7 @@ class Curling:
             return self._let_go(Delivery(speed, heading, self._turn))
         return ()
 
-    def look(self, seen: Seen) -> Sequence[Action]:
+    def look(self, seen: StepInfo) -> Sequence[Action]:
         """Follow the stones, take out what is out of play, count ends, and bring the next stone."""
         elapsed, self._time, self._frame = seen.time - self._time, seen.time, seen.frame
         if self._running:
@@ -133,12 +196,12 @@ class Curling:
             return self._choose()
         return self._let_go(self._meant) if seen.time - self._since >= THINKS else ()
 
-    def _next(self, seen: Seen) -> Sequence[Action]:
+    def _next(self, seen: StepInfo) -> Sequence[Action]:
         """Bring the next stone to where it is let go; at the beginning of an end, all others to where they wait."""
         moves: list[Action] = []
         if self._score.thrown == 0:
             self._places, self._deemed = {}, set()
-            moves = [self._put(k, waiting(*divmod(k, STONES))) for k in range(2 * STONES)]
+            moves = [self._put(k, parked_position(*divmod(k, STONES))) for k in range(2 * STONES)]
         moves.append(self._put(self._current, (RELEASE, 0.0)))
         self._ready, self._meant, self._since, self._weight = True, None, seen.time, 0.0
         self._cues.append("next")
@@ -177,21 +240,21 @@ class Curling:
             *sweeps,
         )
 
-    def _follow(self, seen: Seen, elapsed: float) -> Sequence[Action]:
+    def _follow(self, seen: StepInfo, elapsed: float) -> Sequence[Action]:
         """See where the stones are, take out who leaves, and judge the shot once all rest."""
         frame, moves = seen.frame, list[Action]()
         self._hear(seen, elapsed)
         for k in tuple(self._places):
             x, y = frame.position[self._numbers[k]].tolist()
             self._places[k] = (x, y)
-            if beyond((x, y)):
+            if is_out_of_play((x, y)):
                 del self._places[k]
-                moves.append(self._put(k, gone(*divmod(k, STONES))))
+                moves.append(self._put(k, removed_position(*divmod(k, STONES))))
                 self._cues.append("gone")
         moving = [k for k in self._places if frame.velocity[self._numbers[k]].any()]
         return moves if moving else [*moves, *self._judge(seen)]
 
-    def _hear(self, seen: Seen, elapsed: float) -> None:
+    def _hear(self, seen: StepInfo, elapsed: float) -> None:
         """Note which stones have struck each other."""
         stones = {number: k for k, number in enumerate(self._numbers)}
         pairs = seen.contacts.pair[seen.contacts.time > self._time - elapsed].tolist()  # others only touch on
@@ -200,24 +263,24 @@ class Curling:
             self._hits |= new
             self._cues.append("hit")
 
-    def _judge(self, seen: Seen) -> Sequence[Action]:
+    def _judge(self, seen: StepInfo) -> Sequence[Action]:
         """Judge a shot that has come to rest: hog line, free guard zone; and the end, where that was its last."""
         moves: list[Action] = []
         current, places = self._current, self._places
-        if current in places and short(places[current]) and not self._hits:
+        if current in places and is_hogged(places[current]) and not self._hits:
             del places[current]
-            moves.append(self._put(current, gone(*divmod(current, STONES))))
+            moves.append(self._put(current, removed_position(*divmod(current, STONES))))
             self._told = "stone removed: short of the hog line"
-        zone = {k for k, place in self._before.items() if guards(place)} | self._deemed
+        zone = {k for k, place in self._before.items() if in_free_guard_zone(place)} | self._deemed
         theirs = [k for k in zone if k // STONES != self._score.team]
         if self._score.thrown < PROTECTED and any(k not in places for k in theirs):
             moves += [self._put(k, place) for k, place in self._before.items()]
-            moves.append(self._put(current, gone(*divmod(current, STONES))))
+            moves.append(self._put(current, removed_position(*divmod(current, STONES))))
             self._places = dict(self._before)
             self._told = "free guard zone: stones replaced"
         else:
             met = {k for pair in self._hits if not zone.isdisjoint(pair) for k in pair}
-            self._deemed = {k for k in met | self._deemed if k in places and short(places[k])}
+            self._deemed = {k for k in met | self._deemed if k in places and is_hogged(places[k])}
         if "sweep" in self._held:
             moves += self._sweep(False)
         self._running, self._since = False, seen.time
@@ -227,7 +290,7 @@ class Curling:
         return moves
 
     def _count(self) -> None:
-        team, points = counted([(k // STONES, place) for k, place in self._places.items()])
+        team, points = end_score([(k // STONES, place) for k, place in self._places.items()])
         self._score = self._score.after_end(team, points)
         self._told = "blank end" if team is None else f"{TEAMS[team]} scores {points}"
         self._cues.append("score" if points else "blank")

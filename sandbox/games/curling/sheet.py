@@ -4,9 +4,14 @@ The origin is the tee that is played to, x the way of the stones. Measures are t
 Curling, of sheet and stones: length 45.720 m, width at most 5.000 m; from the tee line to the hog line 6.401 m and to
 the back line 1.829 m, tee lines 34.747 m apart, so that hog lines are 21.945 m apart; rings of 12, 8 and 4 feet and a
 button; stones of at most 19.96 kg and a circumference of at most 91.44 cm.
+
+Count: which stones are in play, which are guards, and what an end is worth, by the places of stones alone.
+
+Source: World Curling, The Rules of Curling, on stones in play, the free guard zone and scoring.
 """
 
 import math
+from collections.abc import Sequence
 
 from sandbox.scene.description.base import Point
 
@@ -26,20 +31,68 @@ STONES = 8
 _PITCH = 2.0 * STONE + 0.05
 
 
-def stone(team: int, number: int) -> str:
+def stone_name(team: int, number: int) -> str:
     """Return the name of a team's stone, counted from 0."""
     return f"{TEAMS[team]}-{number + 1}"
 
 
-def waiting(team: int, number: int) -> Point:
+def parked_position(team: int, number: int) -> Point:
     """Return where a stone lies until it is thrown, beside the sheet, m: red to the left of the way."""
     return RELEASE + (STONES - number) * _PITCH, _aside(team)
 
 
-def gone(team: int, number: int) -> Point:
+def removed_position(team: int, number: int) -> Point:
     """Return where a stone lies that is out of play, m."""
     return BACK + 3.2 - (STONES - number) * _PITCH, _aside(team)
 
 
 def _aside(team: int) -> float:
     return (1.0 if team == 0 else -1.0) * (0.5 * WIDTH + 0.45)
+
+
+PROTECTED = 5
+"""Deliveries of an end in which no guard of the other team may be put out of play."""
+
+
+def is_out_of_play(place: Point) -> bool:
+    """Tell whether a stone is out of play wherever it goes on to: it touches a side line, or is wholly past the back.
+
+    Args:
+        place: of its centre, m.
+    """
+    x, y = place
+    return abs(y) + STONE >= 0.5 * WIDTH or x - STONE > BACK
+
+
+def is_hogged(place: Point) -> bool:
+    """Tell whether a stone that rests has not come wholly past the hog line."""
+    return place[0] - STONE <= -HOG
+
+
+def in_house(place: Point) -> bool:
+    """Tell whether a stone touches the house."""
+    return math.hypot(*place) - STONE <= RINGS[0]
+
+
+def in_free_guard_zone(place: Point) -> bool:
+    """Tell whether a stone that rests lies in the free guard zone: before the tee line, and not in the house."""
+    return not is_hogged(place) and place[0] + STONE < 0.0 and not in_house(place)
+
+
+def end_score(stones: Sequence[tuple[int, Point]]) -> tuple[int | None, int]:
+    """Return who scores in an end, and how much: a blank end is nobody's.
+
+    The team with the stone nearest to the tee counts each of its stones that touches the house and is nearer than the
+    best of the other team. Two that are equally near, to the last bit, leave an end blank, as stones do that no
+    measure can tell apart.
+
+    Args:
+        stones: team and centre, m, of each stone in play.
+    """
+    near = sorted((math.hypot(*place), team) for team, place in stones if in_house(place))
+    if not near:
+        return None, 0
+    best = near[0][1]
+    other = next((distance for distance, team in near if team != best), math.inf)
+    points = sum(team == best and distance < other for distance, team in near)
+    return (best, points) if points else (None, 0)

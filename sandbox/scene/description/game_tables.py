@@ -19,11 +19,11 @@ from pydantic_core import CoreSchema, core_schema
 from sandbox.scene.description.base import Part
 
 GAME_TABLES = {
-    "billiards": "sandbox.games.billiards.preset:BILLIARDS",
-    "pinball": "sandbox.games.pinball.preset:PINBALL",
-    "terrain": "sandbox.games.artillery.preset:TERRAIN",
-    "artillery": "sandbox.games.artillery.preset:ARTILLERY",
-    "play.curling": "sandbox.games.curling.match:MATCH",
+    "billiards": "sandbox.games.billiards.scene:BILLIARDS",
+    "pinball": "sandbox.games.pinball.scene:PINBALL",
+    "terrain": "sandbox.games.artillery.scene:TERRAIN",
+    "artillery": "sandbox.games.artillery.scene:ARTILLERY",
+    "play.curling": "sandbox.games.curling.scene:MATCH",
 }
 """Tables by heading: `module:name` of each, a `GameTable`. Presets expand in this order."""
 
@@ -121,6 +121,6 @@ def table_of(part: Part, model: type[Model]) -> Model | None:
 
     Args:
         part: a scene, or its `play`.
-        model: of the table, such as `sandbox.games.artillery.terrain.Artillery`.
+        model: of the table, such as `sandbox.games.artillery.scene.Artillery`.
     """
     return next((value for value in vars(part).values() if isinstance(value, model)), None)

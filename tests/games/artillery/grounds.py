@@ -6,9 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from sandbox.arrays import FloatArray
-from sandbox.games.artillery.ground import Ground
-from sandbox.games.artillery.landscape import heights_of, levelled, settled
-from sandbox.games.artillery.terrain import Terrain
+from sandbox.games.artillery.scene import Terrain, heights_of, levelled, settled
+from sandbox.games.artillery.terrain import Ground
 from sandbox.scene.description.world import World
 
 G = 9.81

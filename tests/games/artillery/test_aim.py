@@ -10,13 +10,11 @@ from grounds import hills, world
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.games.artillery.aim import Aim, Range, Search
-from sandbox.games.artillery.bot import ANGLE_ERROR, Thought, chances, choose
-from sandbox.games.artillery.field import Field
-from sandbox.games.artillery.flight import landing
-from sandbox.games.artillery.tanks import Muzzle
-from sandbox.games.artillery.terrain import Edges
-from sandbox.games.artillery.weapons import WEAPONS
+from sandbox.games.artillery.ballistics import landing
+from sandbox.games.artillery.battlefield import WEAPONS, Battlefield, Muzzle
+from sandbox.games.artillery.bot_planner import ANGLE_ERROR, BotPlanner, choose_shot, hit_probabilities
+from sandbox.games.artillery.scene import Edges
+from sandbox.games.artillery.targeting import AimSolver, FiringSolution, TargetingProblem
 from sandbox.scene.files.load import loads
 
 AIRS = [(0.0, 0.0), (0.06, 0.0), (0.0, 0.002)]
@@ -55,7 +53,7 @@ def hits(
     ground, air = hills(seed, roughness, (a, b)), world(*drags, wind)
     here, there = (b, a) if back else (a, b)
     muzzle = Muzzle((here, ground.under(here, 1.5) + 0.75), 2.25)
-    aim = Search(Range(air, muzzle, ground, edges, 75.0, there, 0.2 * RADIUS)).all()
+    aim = AimSolver(TargetingProblem(air, muzzle, ground, edges, 75.0, there, 0.2 * RADIUS)).all()
     velocity = aim.speed * np.array([math.cos(aim.angle), math.sin(aim.angle)])
     found = landing(air, muzzle.at(np.array([aim.angle]))[0], velocity, ground, edges)
     assert found is not None
@@ -81,18 +79,18 @@ position = 240.0
 """
 
 
-def laid_out(bot: float) -> Field:
+def laid_out(bot: float) -> Battlefield:
     scene = loads(DUEL, overrides=[f"artillery.player.0.bot={bot}"])
-    field = Field(scene, scene.bodies)
+    field = Battlefield(scene, scene.bodies)
     for tank in field.tanks.every:
         x, y = scene.bodies.position[tank.number].tolist()
         tank.place = (x, y)
     return field
 
 
-def thought_of(turn: int, bot: float) -> Aim:
+def thought_of(turn: int, bot: float) -> FiringSolution:
     field = laid_out(bot)
-    aim = Thought(loads(DUEL).world, field, field.tanks.every[0], chances(0, turn)).go_on(10**9)
+    aim = BotPlanner(loads(DUEL).world, field, field.tanks.every[0], hit_probabilities(0, turn)).go_on(10**9)
     assert aim is not None
     return aim
 
@@ -101,8 +99,8 @@ def thought_of(turn: int, bot: float) -> Aim:
 def test_search_by_and_by_and_by_copies_finds_what_one_go_does(edges: Edges) -> None:
     ground, air = hills(5, 0.4, (60.0, 240.0)), world(0.05, 0.0, 4.0)
     muzzle = Muzzle((60.0, ground.under(60.0, 1.5) + 0.75), 2.25)
-    range_ = Range(air, muzzle, ground, edges, 75.0, 240.0, 0.2 * RADIUS)
-    at_once, slow, copies = Search(range_).all(), Search(range_), 0
+    range_ = TargetingProblem(air, muzzle, ground, edges, 75.0, 240.0, 0.2 * RADIUS)
+    at_once, slow, copies = AimSolver(range_).all(), AimSolver(range_), 0
     while slow.go_on(20_000) is None:
         left_behind, slow = slow, copy.deepcopy(slow)
         left_behind.go_on(50_000)  # what goes on elsewhere is none of the copy's
@@ -116,10 +114,10 @@ def test_less_skill_errs_normally_and_by_the_turn() -> None:
     best = thought_of(0, bot=1.0)
     assert best == thought_of(1, bot=1.0)  # no error, whatever the chances
     assert true.angle != best.angle
-    errors = np.array([chances(3, turn).standard_normal(2) for turn in range(400)])
+    errors = np.array([hit_probabilities(3, turn).standard_normal(2) for turn in range(400)])
     assert abs(errors.mean()) < 4.0 / math.sqrt(800)  # 4 σ of a mean
     assert errors.std() == pytest.approx(1.0, abs=4.0 / math.sqrt(1600))
-    random = chances(0, 0)
-    choose(laid_out(0.75).tanks, laid_out(0.75).tanks.every[0], random)
+    random = hit_probabilities(0, 0)
+    choose_shot(laid_out(0.75).tanks, laid_out(0.75).tanks.every[0], random)
     first = random.standard_normal(2)
     assert true.angle - best.angle == pytest.approx(0.25 * ANGLE_ERROR * first[0], abs=1e-12)

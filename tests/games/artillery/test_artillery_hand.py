@@ -5,13 +5,13 @@ import math
 import pytest
 from dueling import two_tanks
 
-from sandbox.games.artillery.hand import ArtilleryHand
+from sandbox.games.artillery.battlefield import WEAPONS
+from sandbox.games.artillery.bot import ArtilleryBot
 from sandbox.games.artillery.rules import ArtilleryRules
-from sandbox.games.artillery.weapons import WEAPONS
-from sandbox.games.bout import Bout
-from sandbox.games.policies import POLICIES, Script
+from sandbox.games.contract import Policy, UnsuitableSceneError
+from sandbox.games.players import POLICIES, ScriptedInput
 from sandbox.games.registry import rules_of
-from sandbox.games.rules import Policy, UnfitError
+from sandbox.games.session import HeadlessGame
 from sandbox.measure.run import run
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
@@ -19,30 +19,30 @@ from sandbox.scene.files.shipped_scenes import find
 FIELD = two_tanks("duration = 12.0", "money = 0", blue="bot = 0.0")
 
 
-def played(policy: Policy) -> tuple[ArtilleryRules, Bout, str]:
+def played(policy: Policy) -> tuple[ArtilleryRules, HeadlessGame, str]:
     scene = loads(FIELD)
     rules = rules_of(scene)
     assert isinstance(rules, ArtilleryRules)
-    bout = Bout(rules, policy, "hand")
+    bout = HeadlessGame(rules, policy, "hand")
     trajectory = run(scene, "reference", bout=bout, integrator="rk4", audit=False)
     return rules, bout, trajectory.info["state_hash"]
 
 
 def test_full_skill_hits_by_keys_alone() -> None:
-    rules, bout, state = played(ArtilleryHand(1, skill=1.0))
+    rules, bout, state = played(ArtilleryBot(1, skill=1.0))
     own = [shot for shot in rules.shots if shot.shooter == "Red"]
     assert own
     first, blue = own[0], loads(FIELD).bodies.position[1].tolist()
     assert first.place is not None
     assert math.dist(first.place, blue) <= WEAPONS[0].radius
     assert rules.score > 0
-    again, seen, same = played(Script(bout.presses))
+    again, seen, same = played(ScriptedInput(bout.presses))
     assert (again.score, seen.presses, same) == (rules.score, bout.presses, state)
 
 
 def test_skill_is_a_share_and_the_game_has_to_be_artillery() -> None:
     with pytest.raises(ValueError, match="0 to 1"):
-        ArtilleryHand(1, skill=1.5)
-    assert isinstance(POLICIES["skilled"](loads(FIELD)), ArtilleryHand)
-    with pytest.raises(UnfitError, match="pinball and artillery"):
+        ArtilleryBot(1, skill=1.5)
+    assert isinstance(POLICIES["skilled"](loads(FIELD)), ArtilleryBot)
+    with pytest.raises(UnsuitableSceneError, match="pinball and artillery"):
         POLICIES["skilled"](load(find("landing")))

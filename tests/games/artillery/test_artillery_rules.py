@@ -11,17 +11,14 @@ from dueling import two_tanks
 
 from sandbox.action import Action, SetParameter, actions_from_json
 from sandbox.engines.switching import start
-from sandbox.games.artillery.bot import chances
-from sandbox.games.artillery.field import Field
+from sandbox.games.artillery.battlefield import PER_KILL, WEAPONS, Battlefield, Weapon
+from sandbox.games.artillery.bot_planner import hit_probabilities
 from sandbox.games.artillery.rules import ArtilleryRules
-from sandbox.games.artillery.shot import Shot
-from sandbox.games.artillery.tanks import PER_KILL
-from sandbox.games.artillery.weapons import WEAPONS, Weapon
-from sandbox.games.bout import Bout
-from sandbox.games.policies import Nobody, Script
-from sandbox.games.referee import Referee
+from sandbox.games.artillery.shells import ArtilleryShot
+from sandbox.games.contract import Press, UnsuitableSceneError
+from sandbox.games.players import NoInput, ScriptedInput
 from sandbox.games.registry import rules_of
-from sandbox.games.rules import Press, UnfitError
+from sandbox.games.session import GameSession, HeadlessGame
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
 from sandbox.measure.seeds import seeded
@@ -37,10 +34,10 @@ RK4: dict[str, Any] = {"integrator": "rk4"}
 
 def played(
     scene: Scene, presses: tuple[Press, ...] = (), engine: str = "pymunk", **settings: Any
-) -> tuple[ArtilleryRules, Trajectory, Bout]:
+) -> tuple[ArtilleryRules, Trajectory, HeadlessGame]:
     rules = rules_of(scene)
     assert isinstance(rules, ArtilleryRules)
-    bout = Bout(rules, Script(presses) if presses else Nobody(), "script")
+    bout = HeadlessGame(rules, ScriptedInput(presses) if presses else NoInput(), "script")
     trajectory = run(scene, engine, bout=bout, **settings)
     assert trajectory.status == "ok", trajectory.reason
     return rules, trajectory, bout
@@ -102,9 +99,9 @@ def test_a_perfect_gunner_hits_with_its_first_shot(seed: int) -> None:
 
 
 def test_miss_is_told_along_each_axis() -> None:
-    shot = Shot("Red", "shell", (172.07, 3.06), (171.94, 3.131), 6.0)
+    shot = ArtilleryShot("Red", "shell", (172.07, 3.06), (171.94, 3.131), 6.0)
     assert shot.told == "landed at 172.07 m, exact solution 171.94 m (Δx 130 mm, Δy 71.0 mm)"
-    level = Shot("Red", "shell", (172.07, 3.0), (171.94, 3.0), 6.0)
+    level = ArtilleryShot("Red", "shell", (172.07, 3.0), (171.94, 3.0), 6.0)
     assert level.told == "landed at 172.07 m, exact solution 171.94 m (Δx 130 mm)"
 
 
@@ -126,7 +123,7 @@ def test_shells_at_the_sides_go_the_exact_way(edges: str) -> None:
     assert isinstance(rules, ArtilleryRules)
     for tank, angle in zip(rules.field.tanks.every, (120.0, 60.0), strict=True):  # both outwards
         tank.angle, tank.power = math.radians(angle), 0.8
-    run(scene, "reference", bout=Bout(rules, Script(presses), "script"), **RK4)
+    run(scene, "reference", bout=HeadlessGame(rules, ScriptedInput(presses), "script"), **RK4)
     assert len(rules.shots) == 2
     for shot in rules.shots:
         assert (shot.place is None) == (shot.exact is None) == (edges == "open")
@@ -140,7 +137,7 @@ def test_ground_is_dug_away_and_engine_and_rules_agree_on_it() -> None:
     reshaped = [action for action in made.info["actions"] if action["kind"] == "reshape"]
     assert len(reshaped) == 1
     assert tuple(map(tuple, reshaped[0]["points"])) == rules.field.ground.points
-    before = Field(scene, scene.bodies).ground.heights
+    before = Battlefield(scene, scene.bodies).ground.heights
     assert rules.field.ground.heights.sum() < before.sum()
     assert rules.turn == 2
     assert rules.shooter.name == "Blue"
@@ -155,7 +152,7 @@ def test_wind_is_of_the_turn_and_of_the_seed() -> None:
         assert all(abs(wind) <= 6.0 for wind in winds[-1])
     assert len(winds[0]) == 2
     assert winds[0] != winds[1]
-    assert winds[0] == [float(chances(2, 2 * turn).uniform(-6.0, 6.0)) for turn in (1, 2)]
+    assert winds[0] == [float(hit_probabilities(2, 2 * turn).uniform(-6.0, 6.0)) for turn in (1, 2)]
 
 
 @pytest.mark.parametrize(("time", "disturbed"), [(0.05, False), (1.0, True)])
@@ -164,7 +161,7 @@ def test_air_that_a_hand_changes_is_the_exact_flights_too(time: float, disturbed
     scene = loads(TEXT)
     rules, relay = rules_of(scene), start(scene, "reference", scene.solver.replace(**RK4))
     assert isinstance(rules, ArtilleryRules)
-    referee, contacts = Referee(rules), Contacts.none()
+    referee, contacts = GameSession(rules), Contacts.none()
     while not rules.shots:
         for action in referee.look(relay.time, relay.frame(), contacts):
             relay.apply(action)
@@ -196,9 +193,9 @@ def test_dirt_lifts_who_stands_under_it() -> None:
     red = rules.field.tanks.every[0]
     red.weapon, red.angle, red.power = 4, math.radians(90.0), 0.3  # straight up: it comes down on its own tank
     assert WEAPONS[red.weapon].kind == "dirt"
-    made = run(scene, bout=Bout(rules, Script(taps("fire")), "script"))
+    made = run(scene, bout=HeadlessGame(rules, ScriptedInput(taps("fire")), "script"))
     assert made.status == "ok"
-    lifted = float(rules.field.ground.surface(50.0)) - float(Field(scene, scene.bodies).ground.surface(50.0))
+    lifted = float(rules.field.ground.surface(50.0)) - float(Battlefield(scene, scene.bodies).ground.surface(50.0))
     assert lifted == pytest.approx(2.0 * WEAPONS[4].radius, rel=0.1)  # a chord near the middle of the disc
     assert made.position[-1, 0, 1] == pytest.approx(scene.bodies.position[0, 1] + lifted, abs=0.3)  # it may tilt
     assert red.health == 100.0
@@ -223,7 +220,7 @@ def test_a_pit_under_a_tank_costs_health_by_its_depth() -> None:
             return self.field.blast(self._time, self.shooter, (x, y - 0.75), pit)
 
     digs = Digs(scene, scene.bodies)
-    made = run(scene, bout=Bout(digs, Script(taps("fire")), "script"))
+    made = run(scene, bout=HeadlessGame(digs, ScriptedInput(taps("fire")), "script"))
     assert made.status == "ok"
     blue = digs.field.tanks.every[1]
     fallen = y - float(made.position[-1, 1, 1])
@@ -295,7 +292,7 @@ def test_keys_set_the_gun_and_only_in_turn() -> None:
     red, blue = rules.field.tanks.every
     before = red.angle, red.power
     held = (Press(0.1, "left", 1.0), Press(0.6, "left", 0.0), Press(1.0, "up", 1.0), Press(2.0, "up", 0.0))
-    run(loads(TEXT, overrides=["world.duration=3"]), bout=Bout(rules, Script(held), "script"))
+    run(loads(TEXT, overrides=["world.duration=3"]), bout=HeadlessGame(rules, ScriptedInput(held), "script"))
     assert math.degrees(red.angle - before[0]) == pytest.approx(0.1 + 0.5 * 5.0, abs=0.06)  # a step of 10 ms
     assert red.power - before[1] == pytest.approx(0.001 + 0.05 * 0.6 + 8 * 0.05 * 0.4, abs=0.01)
     assert (blue.angle, blue.power) == (math.radians(120.0), 0.6)
@@ -313,7 +310,7 @@ def test_a_copy_goes_on_by_itself() -> None:
     rules = rules_of(loads(BOTS))
     assert isinstance(rules, ArtilleryRules)
     other = copy.deepcopy(rules)
-    run(loads(BOTS, overrides=["world.duration=12"]), bout=Bout(rules, Nobody(), "none"))
+    run(loads(BOTS, overrides=["world.duration=12"]), bout=HeadlessGame(rules, NoInput(), "none"))
     assert other.turn == 0
     assert rules.turn > 0
     assert other.field.ground is not rules.field.ground
@@ -333,5 +330,5 @@ def test_lines_and_cues_tell_what_goes_on() -> None:
 
 def test_a_scene_without_players_is_unfit() -> None:
     scene = loads('[play]\ngame = "artillery"\n[[ball]]\nposition = [0.0, 0.0]\nradius = 1.0')
-    with pytest.raises(UnfitError, match="needs \\[artillery\\]"):
+    with pytest.raises(UnsuitableSceneError, match="needs \\[artillery\\]"):
         rules_of(scene)

@@ -8,8 +8,8 @@ from grounds import flat, hills
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.games.artillery.ground import Crater, Ground
-from sandbox.games.artillery.landscape import QUANTUM
+from sandbox.games.artillery.scene import QUANTUM
+from sandbox.games.artillery.terrain import Crater, Ground
 
 CENTRES = st.tuples(st.floats(-20, 320), st.floats(-20, 80))
 RADII = st.floats(0.01, 40)

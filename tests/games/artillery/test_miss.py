@@ -9,9 +9,9 @@ from grounds import G, world
 from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.games.artillery import miss
-from sandbox.games.artillery.flight import Landing
-from sandbox.games.artillery.miss import miss_table
+from sandbox.games.artillery import landing_error as miss
+from sandbox.games.artillery.ballistics import Landing
+from sandbox.games.artillery.landing_error import landing_error_table
 from sandbox.scene.description.world import Settings, World
 
 DTS = 0.1, 0.05, 0.025
@@ -19,7 +19,7 @@ DTS = 0.1, 0.05, 0.025
 
 def test_euler_misses_by_one_step_in_vacuum() -> None:
     """Explicit Euler's heights are those of v_y + g h/2, so that it flies h too long, and v_x h too far."""
-    found = miss_table(world(), 50.0, math.radians(45.0), DTS)
+    found = landing_error_table(world(), 50.0, math.radians(45.0), DTS)
     far = 50.0 * math.cos(math.radians(45.0))
     for row in found.rows:
         sign = {"explicit_euler": 1.0, "semi_implicit_euler": -1.0, None: 1.0 if row.engine == "pymunk" else 0.0}
@@ -36,7 +36,7 @@ def test_euler_misses_by_one_step_in_vacuum() -> None:
 @pytest.mark.parametrize("drags", [(0.2, 0.0), (0.0, 0.01)])
 def test_misses_fall_with_each_integrators_order(drags: tuple[float, float]) -> None:
     dts = tuple(0.2 * 2.0 ** (-k / 2) for k in range(7))
-    found = miss_table(world(*drags, -8.0), 50.0, math.radians(45.0), dts)
+    found = landing_error_table(world(*drags, -8.0), 50.0, math.radians(45.0), dts)
     for name, integrator in INTEGRATORS.items():
         offs = [abs(row.off) for row in found.rows if row.integrator == name]
         slope = np.polyfit(np.log(dts), np.log(offs), 1)[0]
@@ -48,7 +48,7 @@ def test_misses_fall_with_each_integrators_order(drags: tuple[float, float]) -> 
 def test_what_never_comes_down_is_told() -> None:
     rising = world().model_copy(update={"gravity": (0.0, 0.0)})
     with pytest.raises(ValueError, match="does not come down within"):
-        miss_table(rising, 50.0, 1.0, (0.1,))
+        landing_error_table(rising, 50.0, 1.0, (0.1,))
 
 
 def test_refusal_of_one_integrator_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -58,6 +58,6 @@ def test_refusal_of_one_integrator_leaves_the_others(monkeypatch: pytest.MonkeyP
         return Landing(1.0, (1.0, 0.0))
 
     monkeypatch.setattr(miss, "flown", fly)
-    found = miss_table(world(), 50.0, math.radians(45.0), DTS)
+    found = landing_error_table(world(), 50.0, math.radians(45.0), DTS)
     assert {row.integrator for row in found.rows} == {*INTEGRATORS, None} - {"rk4"}
     assert [engine for engine, _ in found.refused].count("exact") == 1

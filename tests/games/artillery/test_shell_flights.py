@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from sandbox.engines.reference.integrators import INTEGRATORS, transition
-from sandbox.games.artillery.flight import Flight, crossing, inputs_of, landing, rk4, strike
-from sandbox.games.artillery.ground import Ground
-from sandbox.games.artillery.miss import _exact
+from sandbox.games.artillery.ballistics import Flight, crossing, first_strike, inputs_of, landing, rk4
+from sandbox.games.artillery.landing_error import _exact
+from sandbox.games.artillery.terrain import Ground
 from sandbox.scene.description.world import World
 
 
@@ -142,8 +142,10 @@ def test_discs_are_struck_before_the_ground_behind_them() -> None:
     found = landing(world(), np.array([100.0, 0.5]), shot(40.0, 40.0), ground, discs=discs)
     assert found is not None
     assert math.dist(found.place, (252.0, 7.0)) == pytest.approx(2.0, abs=1e-9)
-    assert strike(discs, np.array([90.0, 30.0]), np.array([110.0, 30.0])) == (pytest.approx(0.45), 1)
-    assert strike(discs, np.array([100.0, 30.0]), np.array([110.0, 30.0])) is None  # from inside: it has entered before
+    assert first_strike(discs, np.array([90.0, 30.0]), np.array([110.0, 30.0])) == (pytest.approx(0.45), 1)
+    assert (
+        first_strike(discs, np.array([100.0, 30.0]), np.array([110.0, 30.0])) is None
+    )  # from inside: it has entered before
 
 
 def test_a_straight_way_enters_at_the_first_bend_it_meets() -> None:

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.games.artillery.landscape import QUANTUM, columns_of, course_of, heights_of, settled
-from sandbox.games.artillery.terrain import Terrain
+from sandbox.games.artillery.scene import QUANTUM, Terrain, columns_of, course_of, heights_of, settled
 from sandbox.measure.seeds import seeded
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.document import to_document

@@ -3,24 +3,21 @@
 from collections.abc import Iterable
 from typing import Any
 
-from sandbox.games.billiards.rules.call import Call
-from sandbox.games.billiards.rules.happening import Happening
-from sandbox.games.billiards.rules.rules import Rules
-from sandbox.games.billiards.rules.verdict import Verdict
+from sandbox.games.billiards.rules.base import Ruleset, ShotCall, ShotEvent, ShotResult
 
 KINDS = {"hits": "ball", "at": "cushion", "in": "pocket"}
 
 
-def shot(*lines: str | tuple[str, ...]) -> tuple[Happening, ...]:
+def shot(*lines: str | tuple[str, ...]) -> tuple[ShotEvent, ...]:
     return tuple(
-        Happening(float(time), ball, KINDS[verb], other)
+        ShotEvent(float(time), ball, KINDS[verb], other)
         for time, line in enumerate(lines)
         for ball, verb, other in (each.split() for each in ([line] if isinstance(line, str) else line))
     )
 
 
-def played(rules: Rules[Any], state: Any, *lines: str | tuple[str, ...], **call: Any) -> Verdict[Any]:
-    return rules.judge(state, Call(**call), shot(*lines))
+def played(rules: Ruleset[Any], state: Any, *lines: str | tuple[str, ...], **call: Any) -> ShotResult[Any]:
+    return rules.judge(state, ShotCall(**call), shot(*lines))
 
 
 def fallen(balls: Iterable[str]) -> tuple[str, ...]:

@@ -8,12 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.games.billiards.rules.call import Call
-from sandbox.games.billiards.rules.happening import GameError, Happening
-from sandbox.games.billiards.rules.registry import RULES
-from sandbox.games.billiards.rules.rules import Rules
+from sandbox.games.billiards.rules.base import GameError, Ruleset, ShotCall, ShotEvent, ShotResult, Situation
+from sandbox.games.billiards.rules.registry import RULESETS
 from sandbox.games.billiards.rules.snooker import SnookerState, remaining
-from sandbox.games.billiards.rules.verdict import Lie, Verdict
 
 POCKETS = ("left", "right")
 CAROM = ("three-cushion", "straight-rail")
@@ -27,31 +24,31 @@ turns = st.lists(
 )
 
 
-def happenings(rules: Rules[Any], state: Any, events: list[tuple[str, int, int]]) -> tuple[Happening, ...]:
+def happenings(rules: Ruleset[Any], state: Any, events: list[tuple[str, int, int]]) -> tuple[ShotEvent, ...]:
     """Events of balls that are there; a cue ball that touches what is on is as likely as anything else."""
     cue = rules.cue_ball(state)
     balls = (cue, *(ball for ball in state.table if ball != cue))
     targets = sorted(rules.legal_targets(state))
-    told: list[Happening] = []
+    told: list[ShotEvent] = []
     for time, (kind, a, b) in enumerate(events):
         if kind == "ball":
             pair = (cue, targets[b % len(targets)]) if a % 2 else (balls[a % len(balls)], balls[b % len(balls)])
-            told.append(Happening(time - a % 2, pair[0], "ball", pair[1]))
+            told.append(ShotEvent(time - a % 2, pair[0], "ball", pair[1]))
         elif kind == "pocket" and rules.name not in CAROM:
-            told.append(Happening(time, balls[a % len(balls)], "pocket", POCKETS[b % 2]))
+            told.append(ShotEvent(time, balls[a % len(balls)], "pocket", POCKETS[b % 2]))
         else:
-            told.append(Happening(time, balls[a % len(balls)], "cushion", "rail"))
+            told.append(ShotEvent(time, balls[a % len(balls)], "cushion", "rail"))
     return tuple(told)
 
 
-def call_of(rules: Rules[Any], state: Any, pick: int) -> Call:
+def call_of(rules: Ruleset[Any], state: Any, pick: int) -> ShotCall:
     asked = rules.choices(state)
     ball = (None, *asked.balls)[pick % (len(asked.balls) + 1)]
     pocket = (None, *POCKETS)[pick % 3] if asked.pocket else None
-    return Call(ball, pocket, safety=asked.safety and pick % 7 == 0, push_out=asked.push_out and pick % 2 == 0)
+    return ShotCall(ball, pocket, safety=asked.safety and pick % 7 == 0, push_out=asked.push_out and pick % 2 == 0)
 
 
-def is_sound(rules: Rules[Any], state: Any) -> None:
+def is_sound(rules: Ruleset[Any], state: Any) -> None:
     start = rules.start(state.players)
     assert len(state.scores) == state.players
     assert min(state.scores) >= 0
@@ -65,7 +62,7 @@ def is_sound(rules: Rules[Any], state: Any) -> None:
     assert rules.restored(json.loads(json.dumps(rules.document(state)))) == state
 
 
-def follows(rules: Rules[Any], before: Any, verdict: Verdict[Any]) -> None:
+def follows(rules: Ruleset[Any], before: Any, verdict: ShotResult[Any]) -> None:
     """What one shot may do."""
     after = verdict.state
     gained = tuple(now - then for now, then in zip(after.scores, before.scores, strict=True))
@@ -80,11 +77,11 @@ def follows(rules: Rules[Any], before: Any, verdict: Verdict[Any]) -> None:
 
 
 @pytest.mark.parametrize("players", [1, 2])
-@pytest.mark.parametrize("name", RULES)
+@pytest.mark.parametrize("name", RULESETS)
 @settings(max_examples=60, deadline=None)
 @given(turns=turns, misses=st.booleans())
 def test_any_shots_leave_a_sound_state(name: str, players: int, turns: list[Any], misses: bool) -> None:
-    rules = RULES[name]
+    rules = RULESETS[name]
     state = rules.start(players)
     if isinstance(state, SnookerState):
         state = replace(state, misses=misses, table=state.table[10:])  # few reds, so that the colours are reached
@@ -105,42 +102,42 @@ def test_any_shots_leave_a_sound_state(name: str, players: int, turns: list[Any]
             break
         cue = rules.cue_ball(state)
         near = tuple(ball for ball in state.table if ball != cue)[: choice % 2]
-        state = rules.settle(state, Lie(near, snookered, near)).state
+        state = rules.settle(state, Situation(near, snookered, near)).state
         is_sound(rules, state)
 
 
 @pytest.mark.parametrize("players", [1, 2])
-@pytest.mark.parametrize("name", RULES)
+@pytest.mark.parametrize("name", RULESETS)
 @settings(max_examples=20, deadline=None)
 @given(mistakes=st.lists(st.integers(0, 2), max_size=12))
 def test_frame_of_players_who_make_what_is_on_ends(name: str, players: int, mistakes: list[int]) -> None:
     """Each shot makes what is on, but for some that miss, scratch or touch nothing."""
-    rules = RULES[name]
+    rules = RULESETS[name]
     state = rules.start(players)
     balls = 2 * len(state.table) + 110  # a colour with each red; the distances of carom
     for turn in range(len(mistakes) + balls):
         cue, target = rules.cue_ball(state), min(rules.legal_targets(state), key=len)
-        touch = Happening(0.0, cue, "ball", target)
+        touch = ShotEvent(0.0, cue, "ball", target)
         lines = [touch]
         if name in CAROM:
             third = next(ball for ball in state.table if ball not in (cue, target))
-            lines += [Happening(1.0, cue, "cushion", "rail")] * 3 + [Happening(2.0, cue, "ball", third)]
+            lines += [ShotEvent(1.0, cue, "cushion", "rail")] * 3 + [ShotEvent(2.0, cue, "ball", third)]
         else:
-            lines.append(Happening(1.0, target, "pocket", "left"))
+            lines.append(ShotEvent(1.0, target, "pocket", "left"))
         if turn < len(mistakes):
-            scratch = Happening(1.0, cue, "pocket", "left")
+            scratch = ShotEvent(1.0, cue, "pocket", "left")
             lines = [[], [touch], [touch, *([] if name in CAROM else [scratch])]][mistakes[turn]]
         asked = rules.choices(state)
-        call = Call(target if target in asked.balls else None, "left" if asked.pocket else None)
+        call = ShotCall(target if target in asked.balls else None, "left" if asked.pocket else None)
         state = rules.judge(state, call, lines).state
         if state.over:
             break
     assert state.over
 
 
-@pytest.mark.parametrize("name", RULES)
+@pytest.mark.parametrize("name", RULESETS)
 def test_what_is_no_state_is_refused(name: str) -> None:
-    rules = RULES[name]
+    rules = RULESETS[name]
     good = rules.document(rules.start())
     for bad in ({}, [], {**good, "turn": "who"}, {**good, "turn": 2}, {**good, "more": 1}):
         with pytest.raises(GameError):

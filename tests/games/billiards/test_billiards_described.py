@@ -5,9 +5,9 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from sandbox.games.billiards.equipment import BALLS, Billiards
-from sandbox.games.billiards.preset import RACKS, expanded
-from sandbox.games.billiards.rules.registry import RULES
+from sandbox.games.billiards.rules.registry import RULESETS
+from sandbox.games.billiards.scene import RACKS, expanded
+from sandbox.games.billiards.tables import BALLS, Billiards
 from sandbox.games.names import TableGame
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, loads
@@ -51,8 +51,8 @@ def test_preset_becomes_a_scene_of_primitives(table: str, game: str) -> None:
 
 
 def test_every_game_has_rules_for_the_balls_it_is_racked_with() -> None:
-    assert set(RULES) == set(get_args(TableGame)) == set(RACKS)
-    for name, rules in RULES.items():
+    assert set(RULESETS) == set(get_args(TableGame)) == set(RACKS)
+    for name, rules in RULESETS.items():
         if name != "free":
             assert rules.rack == RACKS[name]  # type: ignore[index]
 

@@ -5,14 +5,12 @@ import pytest
 from tables_by_hand import lying, match, table
 
 from sandbox.engines.exact.tabletop.shots import Table
-from sandbox.games.billiards.bot.bot import BEST, WORST, Bot
-from sandbox.games.billiards.bot.ease import pots
-from sandbox.games.billiards.bot.named import bots_in
-from sandbox.games.billiards.bot.trial import ease
-from sandbox.games.billiards.frame import play
-from sandbox.games.billiards.layout import Layout
+from sandbox.games.billiards.bot import BEST, WORST, BilliardsBot, parse_bots
+from sandbox.games.billiards.headless import play_frame
 from sandbox.games.billiards.match import Match
-from sandbox.games.billiards.rules.happening import GameError
+from sandbox.games.billiards.rules.base import GameError
+from sandbox.games.billiards.shot_search import ease, pot_options
+from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.description.base import Point
 
 FAR = {str(k): (0.06 + 0.075 * k, 0.12) for k in range(2, 10)}
@@ -25,7 +23,7 @@ def alone(one: Point, cue: Point) -> Match:
     return Match.restored(table("9-ball"), plain)
 
 
-def pots_it(bot: Bot, now: Match) -> bool:
+def pots_it(bot: BilliardsBot, now: Match) -> bool:
     plan = bot.plan(now)
     ready = Table(now.scene).with_balls(dict(zip(now.layout.names, now.position, strict=True)))
     return "1" in ready.shoot(plan.stroke).pocketed
@@ -40,22 +38,22 @@ STRAIGHT = [
 
 
 def test_simple_shots_fall() -> None:
-    made = [pots_it(Bot(0.8, seed), alone(*shot)) for shot in STRAIGHT for seed in range(5)]
+    made = [pots_it(BilliardsBot(0.8, seed), alone(*shot)) for shot in STRAIGHT for seed in range(5)]
     assert np.mean(made) >= 0.9  # σ is 0.75 mrad: the pockets are 20 σ and more wide
 
 
 def test_unskilled_miss_more() -> None:
     now = alone((0.9, 2.0), (0.3, 0.5))
-    made = {skill: np.mean([pots_it(Bot(skill, seed), now) for seed in range(8)]) for skill in (0.0, 1.0)}
+    made = {skill: np.mean([pots_it(BilliardsBot(skill, seed), now) for seed in range(8)]) for skill in (0.0, 1.0)}
     assert made[1.0] == 1.0
     assert made[0.0] <= 0.5  # σ is 30 mrad, over 1.6 m 5 cm: nearly a ball
 
 
 def test_same_seed_plays_the_same_and_errors_are_as_told() -> None:
     now = alone((0.9, 0.95), (0.7, 0.65))
-    bot = Bot(0.3, 7)
-    assert bot.plan(now) == Bot(0.3, 7).plan(now)
-    assert bot.plan(now) != Bot(0.3, 8).plan(now)
+    bot = BilliardsBot(0.3, 7)
+    assert bot.plan(now) == BilliardsBot(0.3, 7).plan(now)
+    assert bot.plan(now) != BilliardsBot(0.3, 8).plan(now)
     meant = bot.intend(now).stroke
     erred = np.array(
         [(s.aim - meant.aim, s.speed / meant.speed - 1.0) for k in range(4000) if (s := bot.erred(meant, k))]
@@ -63,14 +61,14 @@ def test_same_seed_plays_the_same_and_errors_are_as_told() -> None:
     # the spread of n = 4000 normal errors is known to 1/√(2n) = 1.1 %, here within four times that
     assert erred.std(axis=0) == pytest.approx((bot.sigma, bot.off), rel=0.045)
     assert erred.mean(axis=0) == pytest.approx((0.0, 0.0), abs=4.0 * bot.off / 4000**0.5)
-    assert (Bot(0.0).sigma, Bot(1.0).sigma) == pytest.approx((WORST, BEST), rel=1e-12)
+    assert (BilliardsBot(0.0).sigma, BilliardsBot(1.0).sigma) == pytest.approx((WORST, BEST), rel=1e-12)
 
 
 def test_ball_in_hand_is_put_where_a_pot_is_easy() -> None:
     plain = alone((0.9, 2.0), (0.3, 0.5)).document()
     plain["state"] |= {"in_hand": "anywhere"}
     now = Match.restored(table("9-ball"), plain)
-    plan = Bot(0.5, 1).intend(now)
+    plan = BilliardsBot(0.5, 1).intend(now)
     assert plan.place is not None
     assert now.refusal(plan.place) is None
     before, after = alone((0.9, 2.0), (0.3, 0.5)), alone((0.9, 2.0), plan.place)
@@ -84,7 +82,7 @@ def test_one_who_is_snookered_still_hits_the_ball_on() -> None:
     plain["state"] |= {"opening": False, "in_hand": None}
     now = Match.restored(table("9-ball"), plain)
     assert ease(now, 0.001) == 0.0
-    plan = Bot(1.0, 1).intend(now)
+    plan = BilliardsBot(1.0, 1).intend(now)
     outcome = Table(now.scene).with_balls(dict(zip(now.layout.names, now.position, strict=True))).shoot(plan.stroke)
     after = now.played(outcome.contacts, outcome.position, plan.call)
     assert after.verdict is not None
@@ -93,10 +91,10 @@ def test_one_who_is_snookered_still_hits_the_ball_on() -> None:
 
 def test_ease_is_the_chance_of_normal_errors() -> None:
     """Straight in, so that the object ball's error is that of the touch: erf(δ / √2 σ) within that of the formula."""
-    layout = Layout.of(table("9-ball"))
+    layout = TableGeometry.of(table("9-ball"))
     radius = layout.radius[0]
     one, cue = np.array([[1.0, 1.27]]), np.array([0.6, 1.27])
-    shots = pots(layout, radius, cue, one, one, 0.02)
+    shots = pot_options(layout, radius, cue, one, one, 0.02)
     side = list(layout.pockets).index("right pocket")
     assert shots.ghost[0, side] == pytest.approx((1.0 - 2.0 * radius, 1.27), abs=1e-12)
     x, _, hole = layout.pockets["right pocket"]
@@ -106,17 +104,17 @@ def test_ease_is_the_chance_of_normal_errors() -> None:
     # 5e-4 of the formula, and 3 σ of 2e5 draws, 3e-3
     assert shots.chance[0, side] == pytest.approx(np.mean(np.abs(errors) < margin), abs=4e-3)
     assert x > 1.27
-    blocked = pots(layout, radius, cue, one, np.array([[1.0, 1.27], [0.8, 1.27]]), 0.02)
+    blocked = pot_options(layout, radius, cue, one, np.array([[1.0, 1.27], [0.8, 1.27]]), 0.02)
     assert blocked.chance[0, side] == 0.0
 
 
 def test_players_are_named() -> None:
-    assert bots_in("bot:0.5, bot", 3) == (Bot(0.5, 6), Bot(0.7, 7))
+    assert parse_bots("bot:0.5, bot", 3) == (BilliardsBot(0.5, 6), BilliardsBot(0.7, 7))
     for wrong in ("cat", "bot:2", "bot:", "bot:x", "bot:nan", "", "bot,bot,bot"):
         with pytest.raises(GameError):
-            bots_in(wrong)
+            parse_bots(wrong)
     with pytest.raises(GameError, match="0 to 1"):
-        Bot(1.5)
+        BilliardsBot(1.5)
 
 
 @pytest.mark.slow
@@ -126,8 +124,8 @@ def test_skill_wins(name: str, terms: dict[str, int]) -> None:
     for seed in range(8):
         scene = table(name, seed)
         good = seed % 2  # the first shot goes round
-        bots = [Bot(0.9 if each == good else 0.2, seed) for each in (0, 1)]
-        won += play(Match.begin(scene, **terms), bots).match.state.winner == good
+        bots = [BilliardsBot(0.9 if each == good else 0.2, seed) for each in (0, 1)]
+        won += play_frame(Match.begin(scene, **terms), bots).match.state.winner == good
     assert won >= 6  # of equals one in seven wins so many
 
 
@@ -142,5 +140,5 @@ def test_every_call_is_one_that_can_be_made() -> None:
     plain["position"][now.layout.number["8"]] = [1.0, 1.27]
     plain["position"][now.layout.number["9"]] = [0.3, 0.3]
     plain["position"][now.layout.number["cue"]] = [0.7, 1.27]
-    plan = Bot(0.9, 1).intend(Match.restored(table("8-ball"), plain))
+    plan = BilliardsBot(0.9, 1).intend(Match.restored(table("8-ball"), plain))
     assert (plan.call.ball, plan.call.pocket) == ("8", "right pocket")

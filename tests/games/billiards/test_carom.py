@@ -5,12 +5,11 @@ from dataclasses import replace
 import pytest
 from shot_by_hand import played
 
+from sandbox.games.billiards.rules.base import GameError, Situation
 from sandbox.games.billiards.rules.carom import Carom
-from sandbox.games.billiards.rules.happening import GameError
-from sandbox.games.billiards.rules.registry import RULES
-from sandbox.games.billiards.rules.verdict import Lie
+from sandbox.games.billiards.rules.registry import RULESETS
 
-THREE, STRAIGHT = (RULES[name] for name in ("three-cushion", "straight-rail"))
+THREE, STRAIGHT = (RULESETS[name] for name in ("three-cushion", "straight-rail"))
 assert isinstance(THREE, Carom)
 START = THREE.start(distance=2)
 PLAY = replace(START, opening=False)
@@ -102,7 +101,7 @@ def test_who_plays_alone_ends_at_the_distance() -> None:
 
 
 def test_touching_balls_may_be_spotted_each_on_its_own() -> None:
-    state = THREE.settle(PLAY, Lie(touching=("red",))).state
+    state = THREE.settle(PLAY, Situation(touching=("red",))).state
     assert THREE.choices(state).decisions == ("play", "spot")
     spotted = THREE.decide(state, "spot")
     assert [(each.ball, each.spots) for each in spotted.respot] == [
@@ -115,13 +114,13 @@ def test_touching_balls_may_be_spotted_each_on_its_own() -> None:
 
 
 def test_touching_balls_of_the_second_player_and_all_three() -> None:
-    state = THREE.settle(replace(PLAY, turn=1), Lie(touching=("white", "red"))).state
+    state = THREE.settle(replace(PLAY, turn=1), Situation(touching=("white", "red"))).state
     spots = {each.ball: each.spots for each in THREE.decide(state, "spot").respot}
     assert spots == {"white": ("centre",), "yellow": ("head",), "red": ("foot",)}
 
 
 def test_touching_balls_of_straight_rail_all_go_back_and_the_red_is_first() -> None:
-    state = STRAIGHT.settle(replace(STRAIGHT.start(), opening=False), Lie(touching=("red",))).state
+    state = STRAIGHT.settle(replace(STRAIGHT.start(), opening=False), Situation(touching=("red",))).state
     verdict = STRAIGHT.decide(state, "spot")
     assert verdict.rerack
     assert verdict.state.opening

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from shot_by_hand import fallen, played
 
-from sandbox.games.billiards.rules.eight_ball import GROUPS, EightBall, EightBallState
-from sandbox.games.billiards.rules.happening import GameError
+from sandbox.games.billiards.rules.base import GameError
+from sandbox.games.billiards.rules.pool import GROUPS, EightBall, EightBallState
 
 RULES = EightBall()
 START = RULES.start()

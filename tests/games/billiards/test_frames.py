@@ -5,11 +5,10 @@ from dataclasses import replace
 import pytest
 from tables_by_hand import match, table
 
-from sandbox.games.billiards.bot.bot import Bot
-from sandbox.games.billiards.frame import Frame, Plan, Turn, play
+from sandbox.games.billiards.bot import BilliardsBot
+from sandbox.games.billiards.headless import FramePlan, FrameRecord, FrameTurn, play_frame
 from sandbox.games.billiards.match import Match
-from sandbox.games.billiards.rules.call import Decision
-from sandbox.games.billiards.rules.happening import GameError
+from sandbox.games.billiards.rules.base import Decision, GameError
 from sandbox.measure.replay import rerun
 from sandbox.recording import Recording
 from sandbox.scene.description.surface import Stroke
@@ -18,7 +17,7 @@ TERMS = {"three-cushion": {"distance": 2}, "straight-rail": {"distance": 3}, "sn
 GAMES = ["8-ball", "9-ball", "snooker", "three-cushion", "straight-rail"]
 
 
-def sound(turn: Turn, now: Match) -> None:
+def sound(turn: FrameTurn, now: Match) -> None:
     """Check what holds after every turn: what is on the table lies there and apart, what is down in a pocket."""
     here = now.on_table
     for name, (x, y, r) in here.items():
@@ -37,9 +36,9 @@ def sound(turn: Turn, now: Match) -> None:
         assert now.refusal(now.position[now.layout.number[now.cue]]) is None
 
 
-def frame(name: str, skills: tuple[float, float], seed: int = 1) -> Frame:
+def frame(name: str, skills: tuple[float, float], seed: int = 1) -> FrameRecord:
     begun = Match.begin(table(name, seed), **TERMS.get(name, {}))
-    return play(begun, [Bot(skill, 2 * seed + k) for k, skill in enumerate(skills)], told=sound)
+    return play_frame(begun, [BilliardsBot(skill, 2 * seed + k) for k, skill in enumerate(skills)], told=sound)
 
 
 def test_frame_of_9_ball_ends_and_replays() -> None:
@@ -63,22 +62,22 @@ def test_frame_is_cut_off_where_it_does_not_end() -> None:
         def decide(self, match: Match) -> Decision:
             return "play"
 
-        def plan(self, match: Match) -> Plan:
-            return Plan(Stroke(aim=0.0, speed=0.1))
+        def plan(self, match: Match) -> FramePlan:
+            return FramePlan(Stroke(aim=0.0, speed=0.1))
 
-    played = play(match("three-cushion"), [Timid(), Timid()], most=3)
+    played = play_frame(match("three-cushion"), [Timid(), Timid()], most=3)
     assert (len(played.turns), played.match.over, played.match.turn) == (3, False, 1)
 
 
 def test_what_may_not_be_done_is_refused() -> None:
-    class Cheat(Bot):
-        def plan(self, match: Match) -> Plan:
-            return Plan(Stroke(aim=0.0, speed=1.0), place=(0.6, 2.0))
+    class Cheat(BilliardsBot):
+        def plan(self, match: Match) -> FramePlan:
+            return FramePlan(Stroke(aim=0.0, speed=1.0), place=(0.6, 2.0))
 
     with pytest.raises(GameError, match="behind the head string"):
-        play(match("9-ball"), [Cheat(), Cheat()])
+        play_frame(match("9-ball"), [Cheat(), Cheat()])
     with pytest.raises(GameError, match="has 2 players, not 1"):
-        play(match("9-ball"), [Bot()])
+        play_frame(match("9-ball"), [BilliardsBot()])
 
 
 def test_replay_of_turns_that_do_not_fit_is_refused() -> None:
@@ -91,7 +90,7 @@ def test_replay_of_turns_that_do_not_fit_is_refused() -> None:
 def test_free_play_takes_any_table_and_one_player() -> None:
     begun = Match.begin(table("three-cushion"), "free", players=1)
     assert begun.cue == "white"
-    played = play(begun, [Bot(0.9)], most=4, told=sound)
+    played = play_frame(begun, [BilliardsBot(0.9)], most=4, told=sound)
     assert not played.match.over
 
 

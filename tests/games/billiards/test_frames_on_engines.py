@@ -2,12 +2,12 @@
 
 from tables_by_hand import match
 
-from sandbox.games.billiards.bot.bot import Bot
-from sandbox.games.billiards.frame import play
+from sandbox.games.billiards.bot import BilliardsBot
+from sandbox.games.billiards.headless import play_frame
 
 
 def test_shots_on_pymunk_are_judged_and_replay() -> None:
-    played = play(match("9-ball"), [Bot(0.9, 1), Bot(0.9, 2)], "pymunk", most=3)
+    played = play_frame(match("9-ball"), [BilliardsBot(0.9, 1), BilliardsBot(0.9, 2)], "pymunk", most=3)
     assert len(played.shots) == 3
     first = played.shots[0]
     assert not any("touched no ball" in foul for foul in first.fouls)

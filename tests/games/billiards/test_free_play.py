@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from shot_by_hand import played
 
-from sandbox.games.billiards.rules.free_play import ALWAYS, FreePlay
-from sandbox.games.billiards.rules.happening import GameError
+from sandbox.games.billiards.rules.base import GameError
+from sandbox.games.billiards.rules.pool import ALWAYS, FreePlay
 
 RULES = FreePlay()
 START = RULES.start()

@@ -3,38 +3,37 @@
 import pytest
 from shot_by_hand import shot
 
-from sandbox.games.billiards.rules.call import Call, Choices
-from sandbox.games.billiards.rules.happening import GameError, read
-from sandbox.games.billiards.rules.registry import RULES, rules_named
+from sandbox.games.billiards.rules.base import GameError, ShotCall, ShotChoices, summarise
+from sandbox.games.billiards.rules.registry import RULESETS, ruleset_named
 
 TABLE = ("1", "2", "3")
 
 
 def test_first_touch_is_the_earliest_in_any_order_and_from_either_side() -> None:
     happenings = shot("cue at rail", "2 hits cue", "2 hits 1", "cue hits 3")
-    assert read(happenings[::-1], "cue", TABLE).first == ("2",)
+    assert summarise(happenings[::-1], "cue", TABLE).first == ("2",)
 
 
 def test_first_touch_of_two_at_one_time_is_both() -> None:
-    assert read(shot(("cue hits 1", "cue hits 2"), "cue hits 3"), "cue", TABLE).first == ("1", "2")
+    assert summarise(shot(("cue hits 1", "cue hits 2"), "cue hits 3"), "cue", TABLE).first == ("1", "2")
 
 
 def test_cushions_before_the_touch_drive_no_ball() -> None:
-    assert read(shot("cue at rail", "cue hits 1"), "cue", TABLE).driven == frozenset()
-    assert read(shot("cue hits 1", "cue at rail", "2 in corner"), "cue", TABLE).driven == {"cue", "2"}
+    assert summarise(shot("cue at rail", "cue hits 1"), "cue", TABLE).driven == frozenset()
+    assert summarise(shot("cue hits 1", "cue at rail", "2 in corner"), "cue", TABLE).driven == {"cue", "2"}
 
 
 def test_cushion_at_the_time_of_the_touch_drives_a_ball() -> None:
-    assert read(shot(("1 at rail", "cue hits 1")), "cue", TABLE).driven == {"1"}
+    assert summarise(shot(("1 at rail", "cue hits 1")), "cue", TABLE).driven == {"1"}
 
 
 def test_ball_touches_itself_never_and_cushions_are_no_balls() -> None:
-    seen = read(shot("cue hits cue", "cue at 1", "2 hits 3"), "cue", TABLE)
+    seen = summarise(shot("cue hits cue", "cue at 1", "2 hits 3"), "cue", TABLE)
     assert seen.first == ()
 
 
 def test_ball_that_fell_is_told_once_with_its_pocket() -> None:
-    seen = read(shot("cue hits 1", "1 in left", "1 in right", "cue in left"), "cue", TABLE)
+    seen = summarise(shot("cue hits 1", "1 in left", "1 in right", "cue in left"), "cue", TABLE)
     assert seen.down == ("1",)
     assert seen.pocket_of("1") == "left"
     assert seen.pocket_of("2") is None
@@ -43,25 +42,25 @@ def test_ball_that_fell_is_told_once_with_its_pocket() -> None:
 
 def test_ball_that_is_not_there_is_refused() -> None:
     with pytest.raises(GameError, match="not on the table: 9"):
-        read(shot("cue hits 9"), "cue", TABLE)
+        summarise(shot("cue hits 9"), "cue", TABLE)
 
 
 def test_call_that_cannot_be_made_is_refused_with_all_that_is_wrong() -> None:
     with pytest.raises(GameError) as told:
-        Choices(balls=("1", "2")).check(Call(ball="3", pocket="left", safety=True, push_out=True))
+        ShotChoices(balls=("1", "2")).check(ShotCall(ball="3", pocket="left", safety=True, push_out=True))
     for each in ("'3' cannot be called now; possible: 1, 2", "no pocket", "no safety", "no push-out"):
         assert each in str(told.value)
 
 
 def test_games_go_by_name() -> None:
-    for name in RULES:
-        assert rules_named(name).name == name
+    for name in RULESETS:
+        assert ruleset_named(name).name == name
     with pytest.raises(GameError, match="unknown game 'chess'; games: 8-ball"):
-        rules_named("chess")
+        ruleset_named("chess")
 
 
-@pytest.mark.parametrize("name", RULES)
+@pytest.mark.parametrize("name", RULESETS)
 def test_games_are_for_one_or_two(name: str) -> None:
     for players in (0, 3):
         with pytest.raises(GameError, match="1 or 2 can"):
-            RULES[name].start(players)
+            RULESETS[name].start(players)

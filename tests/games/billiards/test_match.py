@@ -9,11 +9,10 @@ from tables_by_hand import lying, match, table
 import sandbox
 from sandbox.arrays import FloatArray
 from sandbox.engines.exact.tabletop.shots import Table
-from sandbox.games.billiards.frame import roll_out
+from sandbox.games.billiards.headless import run_until_rest
 from sandbox.games.billiards.match import Match
-from sandbox.games.billiards.placing import refusal
-from sandbox.games.billiards.rules.call import Call
-from sandbox.games.billiards.rules.happening import GameError
+from sandbox.games.billiards.placement import placement_refusal
+from sandbox.games.billiards.rules.base import GameError, ShotCall
 from sandbox.scene.description.surface import Stroke
 
 UP = 0.5 * np.pi
@@ -23,7 +22,7 @@ def table_of(now: Match) -> Table:
     return Table(now.scene).with_balls(dict(zip(now.layout.names, now.position, strict=True)))
 
 
-def shot(now: Match, stroke: Stroke, call: Call | None = None) -> Match:
+def shot(now: Match, stroke: Stroke, call: ShotCall | None = None) -> Match:
     """What a stroke leads to, on the exact engine."""
     outcome = table_of(now).shoot(stroke, now.cue)
     assert outcome.complete
@@ -73,7 +72,7 @@ def test_cue_ball_that_falls_is_in_hand_at_a_legal_place() -> None:
     assert (after.turn, after.state.in_hand) == (1, "anywhere")
     radius = after.layout.radius[0]
     others = [disc for name, disc in after.on_table.items() if name != "cue"]
-    assert refusal(after.layout, "anywhere", position_of(after, "cue"), radius, others) is None
+    assert placement_refusal(after.layout, "anywhere", position_of(after, "cue"), radius, others) is None
     moved = after.place(after.nearest((0.3, 0.3)))
     assert position_of(moved, "cue") == (0.3, 0.3)
     with pytest.raises(GameError, match="another ball"):
@@ -144,7 +143,7 @@ def test_shot_is_taken_back_by_the_moves_of_the_match_before() -> None:
     simulation.contacts()
     began = simulation.time
     simulation.apply(before.strike(Stroke(aim=0.0, speed=1.5), began))
-    contacts = roll_out(simulation)
+    contacts = run_until_rest(simulation)
     after = before.played(contacts, simulation.frame().position, None, began)
     assert after.moves(simulation.frame().position) == ()
     moves = before.moves(simulation.frame().position, simulation.time)
@@ -154,7 +153,7 @@ def test_shot_is_taken_back_by_the_moves_of_the_match_before() -> None:
     assert [tuple(each) for each in simulation.frame().position.tolist()] == list(before.position)
     # and the ball that was down rolls again, to the same end
     simulation.apply(before.strike(Stroke(aim=0.0, speed=1.5), simulation.time))
-    again = before.played(roll_out(simulation), simulation.frame().position, None, moves[0].time)
+    again = before.played(run_until_rest(simulation), simulation.frame().position, None, moves[0].time)
     assert again.state == after.state
 
 
@@ -204,12 +203,12 @@ def test_stepped_simulation_and_whole_shots_give_the_same_verdicts(name: str) ->
     simulation.contacts()
     for aim, speed in strokes(5, 6).tolist():
         stroke = Stroke(aim=UP, speed=8.0) if now.shots == 0 else Stroke(aim=aim, speed=speed)
-        call = Call(ball=now.choices.balls[0]) if name == "snooker" and now.choices.balls else Call()
+        call = ShotCall(ball=now.choices.balls[0]) if name == "snooker" and now.choices.balls else ShotCall()
         whole = shot(now, stroke, call)
         began = simulation.time
         for action in (*now.moves(simulation.frame().position, began), now.strike(stroke, began)):
             simulation.apply(action)
-        contacts = roll_out(simulation)
+        contacts = run_until_rest(simulation)
         stepped = now.played(contacts, simulation.frame().position, call, began)
         assert stepped.state == whole.state
         assert stepped.verdict == whole.verdict

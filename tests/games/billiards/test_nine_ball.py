@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from shot_by_hand import fallen, played
 
-from sandbox.games.billiards.rules.happening import GameError
-from sandbox.games.billiards.rules.nine_ball import NineBall
+from sandbox.games.billiards.rules.base import GameError
+from sandbox.games.billiards.rules.pool import NineBall
 
 RULES = NineBall()
 START = RULES.start()

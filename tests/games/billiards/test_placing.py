@@ -8,32 +8,37 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tables_by_hand import table
 
-from sandbox.games.billiards.layout import Disc, Layout
-from sandbox.games.billiards.placing import allowed, nearest, refusal, spread
-from sandbox.games.billiards.rules.state import Place
+from sandbox.games.billiards.placement import allowed, nearest, placement_refusal, spread
+from sandbox.games.billiards.rules.base import Place
+from sandbox.games.billiards.table_geometry import PlacedDisc, TableGeometry
 
-POOL, SNOOKER = Layout.of(table("9-ball")), Layout.of(table("snooker"))
+POOL, SNOOKER = TableGeometry.of(table("9-ball")), TableGeometry.of(table("snooker"))
 R = POOL.radius[0]
-OTHERS: list[Disc] = [(0.6, 1.2, R), (0.6 + 2.0 * R + 0.01, 1.2, R), (0.2, 0.3, R)]
+OTHERS: list[PlacedDisc] = [(0.6, 1.2, R), (0.6 + 2.0 * R + 0.01, 1.2, R), (0.2, 0.3, R)]
 
 
 def test_what_is_refused_is_told() -> None:
-    assert refusal(POOL, "anywhere", (0.3, 2.0), R, OTHERS) is None
-    assert refusal(POOL, "anywhere", (0.6, 1.2 + 1.9 * R), R, OTHERS) == "another ball is there"
-    assert refusal(POOL, "anywhere", (0.5 * R, 1.0), R, []) == "the ball would be outside the cushions"
-    assert refusal(POOL, "anywhere", (-3.0, 1.0), R, []) == "the ball would be outside the cushions"
-    assert refusal(POOL, "anywhere", (math.nan, 1.0), R, []) == "the ball would be outside the cushions"
-    assert refusal(POOL, "anywhere", (0.01, 0.01), R, []) == "the ball would be outside the cushions"  # in the pocket
+    assert placement_refusal(POOL, "anywhere", (0.3, 2.0), R, OTHERS) is None
+    assert placement_refusal(POOL, "anywhere", (0.6, 1.2 + 1.9 * R), R, OTHERS) == "another ball is there"
+    assert placement_refusal(POOL, "anywhere", (0.5 * R, 1.0), R, []) == "the ball would be outside the cushions"
+    assert placement_refusal(POOL, "anywhere", (-3.0, 1.0), R, []) == "the ball would be outside the cushions"
+    assert placement_refusal(POOL, "anywhere", (math.nan, 1.0), R, []) == "the ball would be outside the cushions"
     assert (
-        refusal(POOL, "behind the head string", (0.3, 0.7), R, []) == "the ball must be placed behind the head string"
+        placement_refusal(POOL, "anywhere", (0.01, 0.01), R, []) == "the ball would be outside the cushions"
+    )  # in the pocket
+    assert (
+        placement_refusal(POOL, "behind the head string", (0.3, 0.7), R, [])
+        == "the ball must be placed behind the head string"
     )
-    assert refusal(POOL, "behind the head string", (0.3, 0.635), R, []) is None  # on the string, where racks have it
+    assert (
+        placement_refusal(POOL, "behind the head string", (0.3, 0.635), R, []) is None
+    )  # on the string, where racks have it
 
 
 def test_d_is_a_half_disc_towards_baulk() -> None:
     radius, (x, y) = SNOOKER.radius[0], SNOOKER.spots["brown"]
     for far, way, good in ((0.28, -1.0, True), (0.30, -1.0, False), (0.1, 1.0, False), (0.0, 1.0, True)):
-        told = refusal(SNOOKER, "in the D", (x, y + way * far), radius, [])
+        told = placement_refusal(SNOOKER, "in the D", (x, y + way * far), radius, [])
         assert told == (None if good else "the ball must be placed in the D")
 
 
@@ -62,7 +67,7 @@ def test_nearest_is_legal_and_nothing_on_a_grid_is_nearer(place: Place, at: tupl
     ]
     found = nearest(SNOOKER, place, at, radius, others)
     assert found is not None
-    assert refusal(SNOOKER, place, found, radius, others) is None
+    assert placement_refusal(SNOOKER, place, found, radius, others) is None
     grid = np.stack(np.meshgrid(np.linspace(x0, x1, 60), np.linspace(y0, y1, 120)), axis=-1).reshape(-1, 2)
     legal = grid[allowed(SNOOKER, place, grid, radius, others)]
     # 2 mm: places around balls and along the D are tried 5° apart, and in narrow corners only some of them

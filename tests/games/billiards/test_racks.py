@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from sandbox.games.billiards.racks import HAIR
+from sandbox.games.billiards.tables import HAIR
 from sandbox.scene.description.base import Point
 from sandbox.scene.files.load import from_document
 

@@ -5,10 +5,8 @@ from dataclasses import replace
 import pytest
 from shot_by_hand import fallen, played
 
-from sandbox.games.billiards.rules.happening import GameError
-from sandbox.games.billiards.rules.snooker import Snooker, SnookerState, remaining
-from sandbox.games.billiards.rules.snooker_balls import COLOURS, REDS, VALUES
-from sandbox.games.billiards.rules.verdict import Lie
+from sandbox.games.billiards.rules.base import GameError, Situation
+from sandbox.games.billiards.rules.snooker import COLOURS, REDS, VALUES, Snooker, SnookerState, remaining
 
 RULES = Snooker()
 START = RULES.start()
@@ -16,7 +14,7 @@ PLAY = replace(START, opening=False, in_hand=None)
 COLOUR = replace(PLAY, on="colour", table=(*REDS[1:], *COLOURS), scores=(1, 0))
 ORDER = replace(PLAY, on="yellow", table=COLOURS)
 BLACK = replace(PLAY, on="black", table=("black",))
-SNOOKERED = Lie(snookered=True)
+SNOOKERED = Situation(snookered=True)
 
 
 def test_start_is_in_the_d_with_reds_on_and_147_to_be_made() -> None:

@@ -4,15 +4,14 @@ from dataclasses import replace
 
 from shot_by_hand import played
 
-from sandbox.games.billiards.rules.snooker import Snooker
-from sandbox.games.billiards.rules.snooker_balls import COLOURS, REDS
-from sandbox.games.billiards.rules.verdict import Lie
+from sandbox.games.billiards.rules.base import Situation
+from sandbox.games.billiards.rules.snooker import COLOURS, REDS, Snooker
 
 RULES = Snooker()
 PLAY = replace(RULES.start(), opening=False, in_hand=None)
 COLOUR = replace(PLAY, on="colour", table=(*REDS[1:], *COLOURS), scores=(1, 0))
 ORDER = replace(PLAY, on="yellow", table=COLOURS)
-SNOOKERED = Lie(snookered=True)
+SNOOKERED = Situation(snookered=True)
 
 
 def test_offender_may_be_made_to_play_again_without_a_free_ball() -> None:
@@ -27,7 +26,7 @@ def test_free_ball_is_had_after_a_foul_alone() -> None:
     fair = played(RULES, PLAY, "cue hits red-1").state
     assert not RULES.settle(fair, SNOOKERED).state.free
     foul = played(RULES, PLAY).state
-    assert not RULES.settle(foul, Lie()).state.free
+    assert not RULES.settle(foul, Situation()).state.free
     free = RULES.settle(foul, SNOOKERED).state
     assert RULES.choices(free).balls == COLOURS
     assert RULES.legal_targets(free) == set(PLAY.table)
@@ -79,35 +78,35 @@ def test_free_ball_may_be_left_alone() -> None:
 
 def test_free_ball_that_snookers_is_foul_but_for_pink_and_black() -> None:
     state = played(RULES, FREE, "cue hits blue", ball="blue").state
-    verdict = RULES.settle(state, Lie(snookered=True, by=("blue",)))
+    verdict = RULES.settle(state, Situation(snookered=True, by=("blue",)))
     assert verdict.points == verdict.state.scores == (0, 4)
     assert (verdict.state.fouled, verdict.state.free) == (True, True)
     assert verdict.state.decisions == ("play", "pass")
-    assert not RULES.settle(state, Lie(snookered=True, by=("pink",))).fouls
+    assert not RULES.settle(state, Situation(snookered=True, by=("pink",))).fouls
     last = replace(PLAY, on="pink", table=("pink", "black"), free=True)
     state = played(RULES, last, "cue hits black", ball="black").state
-    assert not RULES.settle(state, Lie(snookered=True, by=("black",))).fouls
+    assert not RULES.settle(state, Situation(snookered=True, by=("black",))).fouls
 
 
 def test_free_ball_that_snookers_on_a_dearer_colour_costs_that() -> None:
     state = replace(PLAY, on="blue", table=("blue", "pink", "black"), free=True)
     state = played(RULES, state, "cue hits pink", ball="pink").state
-    assert RULES.settle(state, Lie(snookered=True, by=("pink",))).points == (0, 5)
+    assert RULES.settle(state, Situation(snookered=True, by=("pink",))).points == (0, 5)
 
 
 def test_free_ball_of_one_who_plays_alone_gives_no_points_away() -> None:
     state = replace(RULES.start(players=1), opening=False, free=True)
     state = played(RULES, state, "cue hits blue", ball="blue").state
-    verdict = RULES.settle(state, Lie(snookered=True, by=("blue",)))
+    verdict = RULES.settle(state, Situation(snookered=True, by=("blue",)))
     assert verdict.fouls
     assert verdict.state.scores == (0,)
 
 
 def test_touching_ball_on_counts_as_played() -> None:
-    red = RULES.settle(PLAY, Lie(touching=("red-1",))).state
+    red = RULES.settle(PLAY, Situation(touching=("red-1",))).state
     assert not played(RULES, red).fouls
     assert not played(RULES, red, "cue hits black").fouls
-    pink = RULES.settle(COLOUR, Lie(touching=("pink",))).state
+    pink = RULES.settle(COLOUR, Situation(touching=("pink",))).state
     assert not played(RULES, pink, ball="pink").fouls
     assert not played(RULES, pink).fouls
     assert not played(RULES, pink, "cue hits blue", "blue in left").fouls
@@ -115,4 +114,4 @@ def test_touching_ball_on_counts_as_played() -> None:
 
 
 def test_touching_ball_not_on_does_not() -> None:
-    assert played(RULES, RULES.settle(PLAY, Lie(touching=("pink",))).state).fouls
+    assert played(RULES, RULES.settle(PLAY, Situation(touching=("pink",))).state).fouls

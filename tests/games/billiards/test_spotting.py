@@ -5,37 +5,36 @@ import math
 import pytest
 from tables_by_hand import table
 
-from sandbox.games.billiards.layout import Layout
-from sandbox.games.billiards.rules.happening import GameError
-from sandbox.games.billiards.rules.snooker_balls import respots
-from sandbox.games.billiards.rules.verdict import Respot
-from sandbox.games.billiards.spotting import spotted
+from sandbox.games.billiards.referee import respotted_position
+from sandbox.games.billiards.rules.base import GameError, Respot
+from sandbox.games.billiards.rules.snooker import respots
+from sandbox.games.billiards.table_geometry import TableGeometry
 
-POOL, SNOOKER = Layout.of(table("9-ball")), Layout.of(table("snooker"))
+POOL, SNOOKER = TableGeometry.of(table("9-ball")), TableGeometry.of(table("snooker"))
 R = POOL.radius[0]
 FOOT = POOL.spots["foot"]
 NINE = Respot("9", ("foot",))
 
 
 def test_free_spot_is_taken() -> None:
-    assert spotted(POOL, NINE, R, [(0.2, 0.3, R)]) == FOOT
+    assert respotted_position(POOL, NINE, R, [(0.2, 0.3, R)]) == FOOT
 
 
 def test_ball_goes_behind_what_occupies_the_spot() -> None:
-    x, y = spotted(POOL, NINE, R, [(FOOT[0], FOOT[1] - R, R)])
+    x, y = respotted_position(POOL, NINE, R, [(FOOT[0], FOOT[1] - R, R)])
     assert x == FOOT[0]
     assert y == pytest.approx(FOOT[1] + R + 1e-5, abs=1e-12)  # 2R behind that ball, and a hair
 
 
 def test_ball_goes_behind_a_row_and_past_gaps_that_are_too_narrow() -> None:
     row = [(FOOT[0], FOOT[1] + k * 3.0 * R, R) for k in range(4)]
-    _, y = spotted(POOL, NINE, R, row)
+    _, y = respotted_position(POOL, NINE, R, row)
     assert y == pytest.approx(FOOT[1] + 11.0 * R + 1e-5, abs=1e-12)
 
 
 def test_full_line_sends_a_ball_before_the_spot() -> None:
     row = [(FOOT[0], FOOT[1] + k * 2.0 * R, R) for k in range(12)]
-    _, y = spotted(POOL, NINE, R, row)
+    _, y = respotted_position(POOL, NINE, R, row)
     assert y == pytest.approx(FOOT[1] - 2.0 * R - 1e-5, abs=1e-12)
 
 
@@ -43,16 +42,16 @@ def test_colour_takes_the_highest_free_spot_and_the_black_goes_behind_its_own() 
     radius, spots = SNOOKER.radius[0], SNOOKER.spots
     taken = [(*spots["black"], radius), (*spots["blue"], radius)]
     (blue,) = respots(("blue",))
-    assert spotted(SNOOKER, blue, radius, taken) == spots["pink"]
+    assert respotted_position(SNOOKER, blue, radius, taken) == spots["pink"]
     all_taken = [(*spot, radius) for spot in spots.values()]
     (black,) = respots(("black",))
-    x, y = spotted(SNOOKER, black, radius, all_taken)
+    x, y = respotted_position(SNOOKER, black, radius, all_taken)
     assert (x, y) == pytest.approx((spots["black"][0], spots["black"][1] + 2.0 * radius + 1e-5), abs=1e-12)
 
 
 def test_table_without_the_spot_or_without_room_is_refused() -> None:
     with pytest.raises(GameError, match="no spot 'black'"):
-        spotted(POOL, Respot("black", ("black",)), R, [])
+        respotted_position(POOL, Respot("black", ("black",)), R, [])
     row = [(FOOT[0], y * R, R) for y in range(0, math.ceil(POOL.area[1][1] / R) + 1, 2)]
     with pytest.raises(GameError, match="no room"):
-        spotted(POOL, NINE, R, row)
+        respotted_position(POOL, NINE, R, row)

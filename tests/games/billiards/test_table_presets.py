@@ -9,16 +9,7 @@ import pytest
 import shapely
 from shapely import LineString, Point, Polygon, box, unary_union
 
-from sandbox.games.billiards.equipment import (
-    BCA_CORNER,
-    BCA_SIDE,
-    INCH,
-    TABLES,
-    WPA_CORNER,
-    WPA_SIDE,
-    TableName,
-    spots_of,
-)
+from sandbox.games.billiards.tables import BCA_CORNER, BCA_SIDE, INCH, TABLES, WPA_CORNER, WPA_SIDE, TableName, spots_of
 from sandbox.scene.files.load import from_document
 from sandbox.scene.scene import Scene
 

@@ -3,7 +3,7 @@
 from sandbox.engines.contract import Simulation
 from sandbox.engines.registry import start
 from sandbox.games.curling.rules import Curling
-from sandbox.games.referee import Referee
+from sandbox.games.session import GameSession
 from sandbox.scene.description.base import Point
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
@@ -23,7 +23,7 @@ class Rink:
 
     def __init__(self, scene: Scene) -> None:
         self.rules = Curling(scene, scene.bodies)
-        self.referee = Referee(self.rules)
+        self.referee = GameSession(self.rules)
         self.simulation: Simulation = start(scene, "pymunk")
         self.names = scene.bodies.names
         self.cues: list[str] = []

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from sandbox.games.curling.count import beyond, counted, guards, in_house, short
-from sandbox.games.curling.score import Score
+from sandbox.games.curling.rules import CurlingScore
 from sandbox.games.curling.sheet import (
     BACK,
     HOG,
@@ -16,9 +15,14 @@ from sandbox.games.curling.sheet import (
     STONES,
     TEES,
     WIDTH,
-    gone,
-    stone,
-    waiting,
+    end_score,
+    in_free_guard_zone,
+    in_house,
+    is_hogged,
+    is_out_of_play,
+    parked_position,
+    removed_position,
+    stone_name,
 )
 from sandbox.scene.description.base import Point
 
@@ -34,11 +38,13 @@ def test_the_sheet_is_that_of_the_rules() -> None:
 
 
 def test_stones_that_wait_or_are_gone_lie_apart_and_off_the_sheet() -> None:
-    places = [where(team, k) for where in (waiting, gone) for team in (RED, YELLOW) for k in range(STONES)]
+    places = [
+        where(team, k) for where in (parked_position, removed_position) for team in (RED, YELLOW) for k in range(STONES)
+    ]
     for n, place in enumerate(places):
         assert abs(place[1]) - STONE > WIDTH / 2
         assert all(math.dist(place, other) > 2 * STONE for other in places[:n])
-    assert stone(YELLOW, 7) == "yellow-8"
+    assert stone_name(YELLOW, 7) == "yellow-8"
     assert pytest.approx(HOG - TEES) == RELEASE + STONE  # its front at the nearer hog line
 
 
@@ -59,20 +65,20 @@ def test_stones_that_wait_or_are_gone_lie_apart_and_off_the_sheet() -> None:
     ],
 )
 def test_an_end_is_worth(stones: list[tuple[int, Point]], team: int | None, points: int) -> None:
-    assert counted(stones) == (team, points)
-    assert counted(stones[::-1]) == (team, points)
+    assert end_score(stones) == (team, points)
+    assert end_score(stones[::-1]) == (team, points)
     swapped = [(1 - whose, place) for whose, place in stones]
-    assert counted(swapped) == (None if team is None else 1 - team, points)
+    assert end_score(swapped) == (None if team is None else 1 - team, points)
 
 
 def test_who_is_out_of_play() -> None:
     eps = 1e-9
-    assert beyond((0.0, WIDTH / 2 - STONE))  # the side line is touched
-    assert not beyond((0.0, -WIDTH / 2 + STONE + eps))
-    assert beyond((BACK + STONE + eps, 0.0))  # wholly past the back line
-    assert not beyond((BACK + STONE - eps, 0.0))
-    assert short((-HOG + STONE - eps, 0.0))  # not wholly past the hog line
-    assert not short((-HOG + STONE + eps, 0.0))
+    assert is_out_of_play((0.0, WIDTH / 2 - STONE))  # the side line is touched
+    assert not is_out_of_play((0.0, -WIDTH / 2 + STONE + eps))
+    assert is_out_of_play((BACK + STONE + eps, 0.0))  # wholly past the back line
+    assert not is_out_of_play((BACK + STONE - eps, 0.0))
+    assert is_hogged((-HOG + STONE - eps, 0.0))  # not wholly past the hog line
+    assert not is_hogged((-HOG + STONE + eps, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -88,12 +94,12 @@ def test_who_is_out_of_play() -> None:
     ],
 )
 def test_the_free_guard_zone_lies_before_the_tee_line_and_outside_the_house(place: Point, guard: bool) -> None:
-    assert guards(place) is guard
-    assert not (guards(place) and in_house(place))
+    assert in_free_guard_zone(place) is guard
+    assert not (in_free_guard_zone(place) and in_house(place))
 
 
 def test_turns_alternate_and_the_hammer_goes_to_who_did_not_score() -> None:
-    score = Score(ends=2)
+    score = CurlingScore(ends=2)
     teams = []
     for _ in range(16):
         teams.append(score.team)

@@ -8,14 +8,12 @@ from ice import Rink, sheet
 
 import sandbox
 from sandbox.action import Move, SetParameter, actions_from_json
-from sandbox.games.bout import Bout
-from sandbox.games.curling.count import guards, short
-from sandbox.games.curling.rules import Curling
-from sandbox.games.curling.score import Score
-from sandbox.games.curling.sheet import RELEASE, gone, waiting
-from sandbox.games.policies import Nobody, Script
+from sandbox.games.contract import Press, UnsuitableSceneError
+from sandbox.games.curling.rules import Curling, CurlingScore
+from sandbox.games.curling.sheet import RELEASE, in_free_guard_zone, is_hogged, parked_position, removed_position
+from sandbox.games.players import NoInput, ScriptedInput
 from sandbox.games.registry import rules_of
-from sandbox.games.rules import Press, UnfitError
+from sandbox.games.session import HeadlessGame
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 
@@ -55,30 +53,30 @@ def test_the_other_turn_is_the_mirror_of_the_first(rink: Rink) -> None:
 
 def test_a_stone_short_of_the_hog_line_is_taken_away(rink: Rink) -> None:
     rink.throw(weight=-8.0)
-    assert rink.place("red-1") == gone(0, 0)
+    assert rink.place("red-1") == removed_position(0, 0)
     assert ("", "stone removed: short of the hog line") in rink.rules.lines()
 
 
 def test_a_stone_past_the_back_line_is_taken_away_as_it_passes(rink: Rink) -> None:
     rink.throw(weight=10.0)
-    assert rink.place("red-1") == gone(0, 0)
+    assert rink.place("red-1") == removed_position(0, 0)
 
 
 def test_a_guard_that_is_taken_out_too_soon_is_put_back(rink: Rink) -> None:
     lay(rink, yellow_1=(-4.0, -0.55))
-    rink.rules._score = Score(2, thrown=2)
+    rink.rules._score = CurlingScore(2, thrown=2)
     rink.rules._ready = False
     rink.until("next")
     rink.rules._broom = rink.rules._ice.through((-4.0, -0.55), 1, 3.2).heading * -RELEASE
     rink.throw(weight=14.0)
     assert rink.place("yellow-1") == (-4.0, -0.55)
-    assert rink.place("red-2") == gone(0, 1)
+    assert rink.place("red-2") == removed_position(0, 1)
     assert ("", "free guard zone: stones replaced") in rink.rules.lines()
 
 
 def test_a_stone_short_of_the_hog_line_that_touched_a_guard_is_a_guard(rink: Rink) -> None:
     lay(rink, red_1=(-6.15, -0.02))
-    rink.rules._score = Score(2, thrown=1)
+    rink.rules._score = CurlingScore(2, thrown=1)
     rink.rules._ready = False
     rink.until("next")
     rink.rules._broom = rink.rules._ice.through((-6.15, -0.02), 1, 0.2).heading * -RELEASE
@@ -86,8 +84,8 @@ def test_a_stone_short_of_the_hog_line_that_touched_a_guard_is_a_guard(rink: Rin
     rink.step(("throw", 1.0), ("throw", 0.0))
     rink.until("next")
     x, y = rink.place("yellow-1")
-    assert short((x, y))
-    assert not guards((x, y))
+    assert is_hogged((x, y))
+    assert not in_free_guard_zone((x, y))
     lay(rink, red_1=(0.0, 2.0))
     rink.rules._broom = rink.rules._ice.through((x, y), 1, 3.2).heading * -RELEASE
     rink.throw(weight=14.0)
@@ -97,12 +95,12 @@ def test_a_stone_short_of_the_hog_line_that_touched_a_guard_is_a_guard(rink: Rin
 
 def test_the_sixth_stone_may_take_out_a_guard(rink: Rink) -> None:
     lay(rink, red_1=(-4.0, -0.55))
-    rink.rules._score = Score(2, thrown=5)
+    rink.rules._score = CurlingScore(2, thrown=5)
     rink.rules._ready = False
     rink.until("next")
     rink.rules._broom = rink.rules._ice.through((-4.0, -0.55), 1, 3.2).heading * -RELEASE
     rink.throw(weight=14.0)
-    assert rink.place("red-1") == gone(0, 0)
+    assert rink.place("red-1") == removed_position(0, 0)
 
 
 def test_sweeping_takes_a_stone_further_and_straighter(rink: Rink) -> None:
@@ -122,15 +120,15 @@ def test_sweeping_takes_a_stone_further_and_straighter(rink: Rink) -> None:
 
 def test_the_end_is_counted_and_the_next_one_begins(rink: Rink) -> None:
     lay(rink, yellow_1=(0.5, 0.0), yellow_2=(0.0, -0.7), red_1=(0.0, 1.2))
-    rink.rules._score = Score(2, thrown=15)
+    rink.rules._score = CurlingScore(2, thrown=15)
     rink.rules._ready = False
     rink.until("next")
     rink.throw(weight=14.0, aside=2.2)
     assert rink.rules._score.points == (0, 2)
     assert rink.rules._score.hammer == 0
     assert rink.place("yellow-1") == (RELEASE, 0.0)
-    assert rink.place("yellow-2") == waiting(1, 1)
-    assert rink.place("red-1") == waiting(0, 0)
+    assert rink.place("yellow-2") == parked_position(1, 1)
+    assert rink.place("red-1") == parked_position(0, 0)
 
 
 def test_nothing_but_sweeping_helps_while_stones_run(rink: Rink) -> None:
@@ -148,11 +146,11 @@ def test_a_copy_goes_on_by_itself(rink: Rink) -> None:
 
 def test_an_end_of_two_teams_that_play_by_themselves_replays_to_score_and_state() -> None:
     scene = sheet("play.curling.people=0", "play.curling.ends=1", "world.duration=120.0")
-    played = sandbox.run(scene, bout=Bout(Curling(scene, scene.bodies), Nobody(), "none"), audit=False)
+    played = sandbox.run(scene, bout=HeadlessGame(Curling(scene, scene.bodies), NoInput(), "none"), audit=False)
     again = sandbox.run(
         scene,
         actions=actions_from_json(json.dumps(played.info["actions"])),
-        bout=Bout(Curling(scene, scene.bodies), None, "none", ()),
+        bout=HeadlessGame(Curling(scene, scene.bodies), None, "none", ()),
         audit=False,
     )
     assert again.info["state_hash"] == played.info["state_hash"]
@@ -167,11 +165,13 @@ def test_what_a_person_did_is_done_again_with_sweeping_and_all() -> None:
     scene = sheet("world.duration=60.0")
     script = [Press(0.5, "right", 1.0), Press(1.5, "right", 0.0), Press(2.0, "throw", 1.0), Press(6.0, "sweep", 1.0)]
     script += [Press(14.0, "sweep", 0.0), Press(31.0, "throw", 1.0)]
-    played = sandbox.run(scene, bout=Bout(Curling(scene, scene.bodies), Script(script), "script"), audit=False)
+    played = sandbox.run(
+        scene, bout=HeadlessGame(Curling(scene, scene.bodies), ScriptedInput(script), "script"), audit=False
+    )
     actions = actions_from_json(json.dumps(played.info["actions"]))
     assert sum(isinstance(action, SetParameter) for action in actions) == 4  # two figures, twice
     rules = Curling(scene, scene.bodies)
-    again = sandbox.run(scene, actions=actions, bout=Bout(rules, None, "script", script), audit=False)
+    again = sandbox.run(scene, actions=actions, bout=HeadlessGame(rules, None, "script", script), audit=False)
     assert again.info["state_hash"] == played.info["state_hash"]
     assert again.info["game"]["otherwise"] is None
     assert rules._score.thrown == 2
@@ -181,7 +181,7 @@ def test_what_a_person_did_is_done_again_with_sweeping_and_all() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_a_match_between_teams_comes_to_an_end(seed: int) -> None:
     scene = sheet("play.curling.people=0", "play.curling.ends=2", f"world.seed={seed}")
-    run = sandbox.run(scene, bout=Bout(Curling(scene, scene.bodies), Nobody(), "none"), audit=False)
+    run = sandbox.run(scene, bout=HeadlessGame(Curling(scene, scene.bodies), NoInput(), "none"), audit=False)
     assert " wins " in run.info["game"]["over"]
     assert run.status == "ok"
 
@@ -195,7 +195,7 @@ def test_a_person_plays_red_and_its_score_is_theirs() -> None:
 
 
 def test_a_scene_without_stones_is_refused() -> None:
-    with pytest.raises(UnfitError, match="red-1"):
+    with pytest.raises(UnsuitableSceneError, match="red-1"):
         rules_of(from_document({"play": {"game": "curling"}, "surface": {"bodies": "pucks", "sliding_friction": 0.01}}))
-    with pytest.raises(UnfitError, match="pucks"):
+    with pytest.raises(UnsuitableSceneError, match="pucks"):
         rules_of(from_document({"play": {"game": "curling"}}))

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sandbox.action import Action, Drive, Move, Toggle
-from sandbox.games.pinball.pinball import Pinball
-from sandbox.games.rules import Seen
+from sandbox.games.contract import StepInfo
+from sandbox.games.pinball.rules import Pinball
 from sandbox.scene.files.load import loads
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
@@ -99,7 +99,7 @@ class Table:
     def look(self, *hits: tuple[str, float] | tuple[str, float, int]) -> list[Action]:
         """Pass a step in which balls hit things at a speed, m/s; return what the rules do."""
         time = self.time
-        now = self.game.look(Seen(time, self.frame(), self._contacts(hits), ()))
+        now = self.game.look(StepInfo(time, self.frame(), self._contacts(hits), ()))
         self._obey(now)
         self.cues += self.game.cues()
         self.step += 1

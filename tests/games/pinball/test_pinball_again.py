@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from sandbox.action import actions_from_json
-from sandbox.games.player import Player
+from sandbox.games.players import PlayerSpec
 from sandbox.measure.run import run
 from sandbox.recording import Press, Recording
 from sandbox.scene.description.world import Settings
@@ -16,7 +16,7 @@ FULL = Path(__file__).parents[3] / "scenes" / "pinball" / "full.toml"
 def test_session_of_the_full_table_leads_to_the_same_score_and_state() -> None:
     scene = load(FULL)
     scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 12.0})})
-    first = run(scene, "pymunk", audit=False, bout=Player("skilled").bout(scene))
+    first = run(scene, "pymunk", audit=False, bout=PlayerSpec("skilled").bout(scene))
     info = first.info
     assert {"drive", "move"} <= {action["kind"] for action in info["actions"]}
     session = Recording(
@@ -29,7 +29,7 @@ def test_session_of_the_full_table_leads_to_the_same_score_and_state() -> None:
         presses=tuple(Press(*press) for press in info["game"]["presses"]),
     )
     session = Recording.from_json(session.to_json())
-    bout = Player.of(session).bout(session.scene)
+    bout = PlayerSpec.of(session).bout(session.scene)
     again = run(session.whole_scene, "pymunk", actions=session.actions, audit=False, bout=bout)
     assert again.info["state_hash"] == info["state_hash"]
     assert again.info["game"]["score"] == info["game"]["score"] > 0

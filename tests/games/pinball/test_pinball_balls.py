@@ -7,7 +7,7 @@ import pytest
 from pinball_by_hand import OPEN, SERVE, Table, drives, moves, table, thrown
 
 from sandbox.action import Move
-from sandbox.games.pinball.course import COUNT, SAVED
+from sandbox.games.pinball.game_flow import COUNT, SAVED
 
 WAIT = COUNT + 0.05
 """s, until the next ball is there"""
@@ -221,7 +221,7 @@ def test_control_that_there_is_not_is_refused() -> None:
 
 
 def test_unknown_before_the_first_look_does_nothing() -> None:
-    from sandbox.games.pinball.pinball import Pinball
+    from sandbox.games.pinball.rules import Pinball
 
     scene = table()
     assert Pinball(scene, scene.bodies).control("left flipper", 1.0) == ()

@@ -8,21 +8,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sandbox.games.pinball.bob import DAMPING, GRAVITY, LENGTH, TRIP, Bob
-from sandbox.games.pinball.nudge import JOLT, SECONDS
+from sandbox.games.pinball.tilt import DAMPING, GRAVITY, JOLT, LENGTH, SECONDS, TRIP, TiltBob
 
 OMEGA = math.sqrt(GRAVITY / LENGTH)
 PERIOD = 2.0 * math.pi / OMEGA
 
 
-def amplitude(bob: Bob) -> float:
+def amplitude(bob: TiltBob) -> float:
     """Of the free swing that a bob without damping is in, rad."""
     return math.hypot(abs(bob.angle), abs(bob.rate) / OMEGA)
 
 
-def free(damping: float = 0.0) -> Bob:
+def free(damping: float = 0.0) -> TiltBob:
     """A bob without a ring."""
-    return Bob(damping, math.inf)
+    return TiltBob(damping, math.inf)
 
 
 @given(st.floats(0.01, 10.0), st.floats(0.001, 0.5))
@@ -34,7 +33,7 @@ def test_push_leaves_the_amplitude_of_the_closed_form(push: float, seconds: floa
 
 
 def test_swing_is_that_of_an_integrator() -> None:
-    bob = Bob(DAMPING, math.inf)
+    bob = TiltBob(DAMPING, math.inf)
     bob.swing(SECONDS, complex(3.0, -2.0))
     bob.swing(0.3, 0j)
     for axis, push in (("real", 3.0), ("imag", -2.0)):
@@ -55,7 +54,7 @@ def test_one_whole_nudge_would_swing_it_by_seven_degrees_and_strikes_the_ring_as
     bob.swing(SECONDS, JOLT)
     assert math.degrees(amplitude(bob)) == pytest.approx(7.08, abs=0.01)  # rounding of the figure
     assert math.degrees(abs(bob.angle)) == pytest.approx(0.874, abs=0.001)  # rounding of the figure
-    ringed = Bob(0.0)
+    ringed = TiltBob(0.0)
     assert ringed.swing(SECONDS, JOLT) == 0
     assert ringed.swing(0.005, 0j) == 1
 
@@ -64,7 +63,7 @@ def test_least_push_that_trips_is_a_seventh_of_a_nudge() -> None:
     least = TRIP * GRAVITY / (2.0 * math.sin(OMEGA * SECONDS / 2.0))
     assert least / JOLT == pytest.approx(0.1413, abs=1e-4)  # rounding of the figure
     for share, strokes in ((0.995, 0), (1.005, 1)):  # the ring is looked at every 1 ms, the swing is flat at its top
-        bob = Bob(0.0)
+        bob = TiltBob(0.0)
         bob.swing(SECONDS, share * least)
         assert bob.swing(PERIOD / 2.0, 0j) == strokes
 
@@ -72,7 +71,7 @@ def test_least_push_that_trips_is_a_seventh_of_a_nudge() -> None:
 @pytest.mark.parametrize(("later", "trips"), [(PERIOD, True), (PERIOD / 2.0, False)])
 def test_two_small_pushes_trip_in_phase_alone(later: float, trips: bool) -> None:
     small = 0.6 * TRIP * GRAVITY / (2.0 * math.sin(OMEGA * SECONDS / 2.0))
-    bob = Bob(0.0)
+    bob = TiltBob(0.0)
     struck = bob.swing(SECONDS, small) + bob.swing(later - SECONDS, 0j)
     assert struck == 0
     struck = bob.swing(SECONDS, small) + bob.swing(PERIOD, 0j)
@@ -81,14 +80,14 @@ def test_two_small_pushes_trip_in_phase_alone(later: float, trips: bool) -> None
 
 @given(st.complex_numbers(max_magnitude=20.0), st.floats(0.001, 0.2))
 def test_bob_never_leaves_the_ring(push: complex, seconds: float) -> None:
-    bob = Bob()
+    bob = TiltBob()
     for acceleration in (push, -push, 0j):
         bob.swing(seconds, acceleration)
         assert abs(bob.angle) <= TRIP * (1.0 + 1e-12)  # rounding of a unit vector
 
 
 def test_bob_comes_to_rest() -> None:
-    bob = Bob()
+    bob = TiltBob()
     bob.swing(SECONDS, JOLT)
     assert not bob.still
     bob.swing(15.0 * PERIOD, 0j)  # e^(−2π·.05·15) = .9 %, of at most the .017 rad of the ring

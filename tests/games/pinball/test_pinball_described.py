@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from sandbox.games.pinball.elements import Pinball
-from sandbox.games.pinball.preset import BUILD, elements_of, expanded
+from sandbox.games.pinball.scene import BUILD, elements_of, expanded
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, loads
 from sandbox.scene.scene import Scene

@@ -3,22 +3,22 @@
 import pytest
 from pinball_by_hand import OPEN, Table, table
 
-from sandbox.games.pinball.hand import HELD, PULL, PinballHand
-from sandbox.games.policies import POLICIES
-from sandbox.games.rules import Seen, UnfitError
+from sandbox.games.contract import StepInfo, UnsuitableSceneError
+from sandbox.games.pinball.bot import HELD, PULL, PinballBot
+from sandbox.games.players import POLICIES
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
 
 BAT = "left bat"
 
 
-def watch(game: Table, hand: PinballHand, seconds: float) -> list[tuple[float, str, float]]:
+def watch(game: Table, hand: PinballBot, seconds: float) -> list[tuple[float, str, float]]:
     """Let a hand play, and return what it presses, and when."""
     found = []
     for _ in range(round(seconds / 0.01)):
         time = game.time
         game.look()
-        for control, value in hand.decide(Seen(time, game.frame(), Contacts.none(), ()), game.game):
+        for control, value in hand.decide(StepInfo(time, game.frame(), Contacts.none(), ()), game.game):
             game.press(control, value)
             found.append((time, control, value))
     return found
@@ -34,7 +34,7 @@ def at_bat(velocity: tuple[float, float] = (0.0, -0.1)) -> Table:
 
 
 def test_ball_within_reach_is_flipped_once_and_the_flipper_let_go() -> None:
-    pressed = watch(at_bat(), PinballHand(1, 1.0), 1.0)
+    pressed = watch(at_bat(), PinballBot(1, 1.0), 1.0)
     (down, *_), (up, *_) = pressed
     assert [(control, value) for _, control, value in pressed] == [("left flipper", 1.0), ("left flipper", 0.0)]
     assert up - down == pytest.approx(HELD, abs=0.0101)  # the first step after it
@@ -45,20 +45,20 @@ def test_other_balls_are_let_be(where: tuple[float, float] | None, velocity: tup
     game = at_bat(velocity)
     if where is not None:
         game.put(0, where, velocity)
-    assert not watch(game, PinballHand(1, 1.0), 1.0)
+    assert not watch(game, PinballBot(1, 1.0), 1.0)
 
 
 def test_skill_is_the_part_of_balls_that_is_seen() -> None:
     seen = 0
     for seed in range(60):
-        pressed = watch(at_bat(), PinballHand(seed, 0.5), 0.2)
+        pressed = watch(at_bat(), PinballBot(seed, 0.5), 0.2)
         seen += any(control == "left flipper" for _, control, _ in pressed)
     assert 18 <= seen <= 46  # of 60 at a half, with 7 % at most for nothing; 3 sigma
 
 
 def test_waiting_ball_is_plunged() -> None:
     game = Table(table())
-    pressed = watch(game, PinballHand(1, 1.0), PULL + 0.9)
+    pressed = watch(game, PinballBot(1, 1.0), PULL + 0.9)
     (down, control, strength), (up, *_) = pressed[:2]
     assert control == "plunger"
     assert 0.85 <= strength <= 1.0
@@ -68,14 +68,14 @@ def test_waiting_ball_is_plunged() -> None:
 
 def test_hand_is_by_its_seed_alone() -> None:
     def plays(seed: int) -> list[tuple[float, str, float]]:
-        return watch(at_bat(), PinballHand(seed, 0.3), 3.0)
+        return watch(at_bat(), PinballBot(seed, 0.3), 3.0)
 
     assert plays(1) == plays(1)
     assert plays(1) != plays(2)
 
 
 def test_skilled_does_not_play_what_it_does_not_know() -> None:
-    assert isinstance(POLICIES["skilled"](table()), PinballHand)
+    assert isinstance(POLICIES["skilled"](table()), PinballBot)
     ship = loads('[play]\ngame = "landing"\n[[ball]]\nposition = [0.0, 0.0]\nradius = 0.1\n')
-    with pytest.raises(UnfitError, match="not landing"):
+    with pytest.raises(UnsuitableSceneError, match="not landing"):
         POLICIES["skilled"](ship)

@@ -5,10 +5,10 @@ import copy
 import pytest
 from pinball_by_hand import DT, OPEN, Table, table
 
-from sandbox.games.pinball.drops import FALL
-from sandbox.games.pinball.pinball import BLINK
-from sandbox.games.pinball.targets import FLASH
-from sandbox.games.rules import Lit
+from sandbox.games.contract import HasLamps
+from sandbox.games.pinball.devices import FLASH
+from sandbox.games.pinball.drop_targets import FALL
+from sandbox.games.pinball.rules import BLINK
 
 
 @pytest.fixture
@@ -16,7 +16,7 @@ def played() -> Table:
     """A ball on the table, whose save has run out, and nothing lit."""
     each = Table(table())
     each.play()
-    assert isinstance(each.game, Lit)
+    assert isinstance(each.game, HasLamps)
     assert each.game.lit() == frozenset()
     return each
 

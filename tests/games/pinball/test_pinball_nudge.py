@@ -5,8 +5,7 @@ import pytest
 from pinball_by_hand import MASS, OPEN, SERVE, Table, drives, moves, table
 
 from sandbox.action import Action, Force, Impulse
-from sandbox.games.pinball.bob import GRAVITY, Bob
-from sandbox.games.pinball.nudge import AGAIN, JOLT, SECONDS
+from sandbox.games.pinball.tilt import AGAIN, GRAVITY, JOLT, SECONDS, TiltBob
 
 
 @pytest.fixture
@@ -120,7 +119,7 @@ def test_bob_is_driven_as_hard_as_the_balls(played: Table) -> None:
     played.press("nudge right", 1.0)
     played.wait(0.04)
     # In looks of 10 ms, though the push is over in the middle of one; the table itself goes to the left.
-    expected = Bob(trip=np.inf)
+    expected = TiltBob(trip=np.inf)
     expected.swing(SECONDS, -JOLT)
     expected.swing(0.04 - SECONDS, 0j)
     assert played.game.nudge.bob.angle == pytest.approx(expected.angle, rel=1e-9)  # times near 8 s, rounded

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sandbox.games.policies import Script
-from sandbox.games.rules import Press
+from sandbox.games.contract import Press
+from sandbox.games.players import ScriptedInput
 from sandbox.measure.play_out import play_out
 from sandbox.scene.files.load import load
 
@@ -24,7 +24,7 @@ def test_plunge_is_the_same_on_both_engines(path: Path) -> None:
     that comes one substep sooner, or a gate that stops the ball makes 1e-6 m at once.
     """
     scene = load(path, ["world.duration=3.0"])
-    native, reference = (play_out(scene, Script(PLUNGE), engine) for engine in ("pymunk", "reference"))
+    native, reference = (play_out(scene, ScriptedInput(PLUNGE), engine) for engine in ("pymunk", "reference"))
     one, other = native.trajectory, reference.trajectory
     np.testing.assert_allclose(other.position, one.position, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(other.velocity, one.velocity, rtol=0.0, atol=1e-7)  # m/s, of 1e-9 m in 10 ms

@@ -7,10 +7,10 @@ import pytest
 
 from sandbox.action import actions_from_json
 from sandbox.engines.switching import start
-from sandbox.games.pinball.hand import PinballHand
-from sandbox.games.player import Player
+from sandbox.games.contract import StepInfo, UnsuitableSceneError
+from sandbox.games.pinball.bot import PinballBot
+from sandbox.games.players import PlayerSpec
 from sandbox.games.registry import required_rules, rules_of
-from sandbox.games.rules import Seen, UnfitError
 from sandbox.measure.run import run
 from sandbox.recording import Press, Recording
 from sandbox.scene.description.world import Settings
@@ -96,13 +96,13 @@ def plain(duration: float = 60.0, seed: int = 1) -> Scene:
 SHOOT = tuple(Press(t, "plunger", v) for k in range(20) for t, v in ((3.0 * k + 0.5, 1.0), (3.0 * k + 1.0, 0.0)))
 
 
-def play(scene: Scene, player: Player) -> Trajectory:
+def play(scene: Scene, player: PlayerSpec) -> Trajectory:
     return run(scene, "pymunk", audit=False, bout=player.bout(scene))
 
 
 @pytest.fixture(scope="module")
 def played() -> Trajectory:
-    return play(plain(), Player("shoot", SHOOT))
+    return play(plain(), PlayerSpec("shoot", SHOOT))
 
 
 def test_plain_table_is_played_to_its_end(played: Trajectory) -> None:
@@ -137,7 +137,7 @@ def test_session_replays_to_the_same_score_and_state(played: Trajectory) -> None
         presses=tuple(Press(*press) for press in info["game"]["presses"]),
     )
     again = run(
-        session.whole_scene, "pymunk", actions=session.actions, audit=False, bout=Player.of(session).bout(scene)
+        session.whole_scene, "pymunk", actions=session.actions, audit=False, bout=PlayerSpec.of(session).bout(scene)
     )
     assert again.info["state_hash"] == info["state_hash"]
     assert again.info["game"]["score"] == info["game"]["score"]
@@ -146,9 +146,9 @@ def test_session_replays_to_the_same_score_and_state(played: Trajectory) -> None
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_random_player_plays_alike_by_the_seed_alone(seed: int) -> None:
-    one, two = (play(plain(20.0, seed), Player()) for _ in range(2))
+    one, two = (play(plain(20.0, seed), PlayerSpec()) for _ in range(2))
     assert one.info["state_hash"] == two.info["state_hash"]
-    other = play(plain(20.0, seed + 10), Player())
+    other = play(plain(20.0, seed + 10), PlayerSpec())
     assert other.info["state_hash"] != one.info["state_hash"]
 
 
@@ -165,13 +165,13 @@ def test_table_without_a_ball_is_refused() -> None:
     text = TABLE.format(duration=1.0, seed=1)
     text = text[: text.index("[[ball]]")] + '[play]\ngame = "pinball"\n'
     scene = loads(text)
-    with pytest.raises(UnfitError, match="needs a ball"):
+    with pytest.raises(UnsuitableSceneError, match="needs a ball"):
         rules_of(scene)
 
 
 def test_hand_plays_pinball_alone() -> None:
     other, frame = required_rules(load(find("landing"))), start(plain(), "pymunk").frame()
-    with pytest.raises(UnfitError, match="only plays pinball"):
-        PinballHand(1).decide(Seen(0.0, frame, Contacts.none(), ()), other)
+    with pytest.raises(UnsuitableSceneError, match="only plays pinball"):
+        PinballBot(1).decide(StepInfo(0.0, frame, Contacts.none(), ()), other)
     with pytest.raises(ValueError, match="0 to 1"):
-        PinballHand(1, 1.5)
+        PinballBot(1, 1.5)

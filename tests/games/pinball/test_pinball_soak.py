@@ -12,13 +12,13 @@ from sandbox.action import Move
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.contract import Observer
 from sandbox.engines.switching import start
-from sandbox.games.pinball.board import MARGIN
-from sandbox.games.pinball.hand import PinballHand
-from sandbox.games.pinball.pinball import Pinball
-from sandbox.games.pinball.search import PATIENCE
-from sandbox.games.policies import Chance
-from sandbox.games.referee import Referee
-from sandbox.games.rules import Policy
+from sandbox.games.contract import Policy
+from sandbox.games.pinball.ball_control import SEARCH_AFTER
+from sandbox.games.pinball.bot import PinballBot
+from sandbox.games.pinball.playfield import MARGIN
+from sandbox.games.pinball.rules import Pinball
+from sandbox.games.players import RandomInput
+from sandbox.games.session import GameSession
 from sandbox.measure.play_out import play_out
 from sandbox.measure.run import Auditor
 from sandbox.scene.files.load import load
@@ -28,9 +28,9 @@ from sandbox.trajectory import Frame
 TABLES = sorted((Path(__file__).parents[3] / "scenes" / "pinball").glob("*.toml"))
 
 PLAYERS = {
-    "skilled": lambda seed: PinballHand(seed, 0.8),
-    "clumsy": lambda seed: PinballHand(seed, 0.2),
-    "random": Chance,
+    "skilled": lambda seed: PinballBot(seed, 0.8),
+    "clumsy": lambda seed: PinballBot(seed, 0.2),
+    "random": RandomInput,
 }
 
 
@@ -77,7 +77,10 @@ class Keeper:
             waits = ball not in rules.trough.live or ball in rules.holes.held or in_lane
             rests = not waits and not rules.up and math.hypot(*frame.velocity[ball].tolist()) < 0.005
             self.rest[ball] = self.rest[ball] + self.dt if rests else 0.0
-            assert self.rest[ball] <= PATIENCE + PATIENCE / 2.0, (frame.time, frame.position[ball])  # a round of search
+            assert self.rest[ball] <= SEARCH_AFTER + SEARCH_AFTER / 2.0, (
+                frame.time,
+                frame.position[ball],
+            )  # a round of search
 
 
 def play(scene: Scene, policy: Policy, seconds: float, audit: bool = False) -> Game:
@@ -89,7 +92,7 @@ def play(scene: Scene, policy: Policy, seconds: float, audit: bool = False) -> G
     watch = Watch(scene, simulation.bodies, rules.board.balls)
     if auditor is not None:
         simulation.watch(_Both(auditor, watch))
-    referee, keeper, said = Referee(rules), Keeper(rules, scene.solver.dt), list[tuple[float, str]]()
+    referee, keeper, said = GameSession(rules), Keeper(rules, scene.solver.dt), list[tuple[float, str]]()
     while rules.over is None and simulation.time < seconds:
         frame = simulation.frame()
         keeper.look(frame)
@@ -146,7 +149,7 @@ def test_no_ball_is_stuck_lost_or_through_anything_in_an_hour_of_play(path: Path
 
 @pytest.mark.parametrize("path", TABLES, ids=lambda path: path.stem)
 def test_game_is_played_and_scored(path: Path) -> None:
-    game = play(seeded(path, 1), PinballHand(1), 15.0)
+    game = play(seeded(path, 1), PinballBot(1), 15.0)
     assert game.rules.score > 0
     assert "ball search" not in [text for _, text in game.said]
 
@@ -156,7 +159,7 @@ def test_multiball_of_the_full_table_puts_all_balls_into_play() -> None:
     simulation = start(scene, "pymunk")
     simulation.contacts()
     rules = Pinball(scene, simulation.bodies)
-    referee, hand = Referee(rules), PinballHand(1, 0.8)
+    referee, hand = GameSession(rules), PinballBot(1, 0.8)
     store = simulation.frame().position[rules.board.balls[1]].copy()
     most = 0
     while simulation.time < 12.0:

@@ -5,12 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pinball_by_hand import MASS, Table, contacts, table
 
-from sandbox.games.pinball.board import Board
-from sandbox.games.pinball.switches import Switches
-from sandbox.games.rules import Seen
+from sandbox.games.contract import StepInfo
+from sandbox.games.pinball.events import Switches
+from sandbox.games.pinball.playfield import Playfield
 
 SCENE = table()
-BOARD = Board.of(SCENE, SCENE.bodies)
+BOARD = Playfield.of(SCENE, SCENE.bodies)
 FRAME = Table(SCENE).frame()
 
 
@@ -19,7 +19,7 @@ def number(name: str) -> int:
 
 
 def names(switches: Switches, *rows: tuple[float, tuple[int, int], float]) -> list[str]:
-    return [hit.element.name for hit in switches.read(Seen(0.0, FRAME, contacts(rows), ()))]
+    return [hit.element.name for hit in switches.read(StepInfo(0.0, FRAME, contacts(rows), ()))]
 
 
 @pytest.mark.parametrize(("name", "threshold"), [("bumper a", 0.054), ("sling", 0.054), ("standup 1", 0.108)])
@@ -33,7 +33,7 @@ def test_switch_closes_above_its_threshold_of_approach(name: str, threshold: flo
 
 def test_kick_and_falloff_of_the_thing_decide() -> None:
     scene = table().model_copy(update={"posts": tuple(_kicking(post) for post in table().posts)})
-    board = Board.of(scene, scene.bodies)
+    board = Playfield.of(scene, scene.bodies)
     bumper = next(each for each in board.elements if each.name == "bumper a")
     assert bumper.least == pytest.approx(0.2 * (1.0 + 0.5 / (1.0 + 3.0 * 0.2)), rel=1e-15)  # rounding of three factors
 

@@ -6,9 +6,8 @@ import pytest
 from pinball_by_hand import OPEN, Table, moves, table, thrown, toggles
 
 from sandbox.action import Move
-from sandbox.games.pinball.drops import FALL, REST
-from sandbox.games.pinball.holes import HOLD
-from sandbox.games.pinball.spinner import DECAY, PLATE
+from sandbox.games.pinball.devices import DECAY, HOLD_TIME, PLATE_RADIUS
+from sandbox.games.pinball.drop_targets import FALL, REST
 
 
 @pytest.fixture
@@ -100,7 +99,7 @@ def test_spinner_turns_as_often_as_its_closed_form_says(played: Table) -> None:
     played.look(("spinner", 0.0))
     first = played.wait(0.2)
     assert not first
-    omega = speed / PLATE
+    omega = speed / PLATE_RADIUS
     turned = omega / DECAY * (1.0 - math.exp(-DECAY * 0.2)) / (2.0 * math.pi)
     assert played.cues.count("spinner") == math.floor(turned)
     played.wait(10.0)
@@ -114,7 +113,7 @@ def test_hole_holds_then_throws_the_ball_out(played: Table) -> None:
     played.put(0, (0.3, 0.7), (0.0, 0.0))
     played.look(("hole", 0.0))
     assert played.game.score == 5_000
-    assert not played.wait(HOLD - 0.02)
+    assert not played.wait(HOLD_TIME - 0.02)
     (out,) = played.wait(0.03)
     assert isinstance(out, Move)
     assert (out.body, out.position) == ("ball 0", (0.3, 0.7))

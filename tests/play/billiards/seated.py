@@ -1,10 +1,10 @@
 """Tables for tests: few balls, so that strokes are short."""
 
-from sandbox.games.billiards.layout import Layout
-from sandbox.play.billiards.game import Game, Players
-from sandbox.play.running.live import Live
-from sandbox.play.running.session import Session
+from sandbox.games.billiards.table_game import BilliardsGame, Players
+from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.files.load import loads
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.session import Session
 
 RADIUS = 0.028575
 """m, of pool balls"""
@@ -31,20 +31,20 @@ side = 0.2
 """
 
 
-def game_of(text: str, players: Players | None = None) -> Game:
+def game_of(text: str, players: Players | None = None) -> BilliardsGame:
     """Sit down at a table."""
     scene = loads(text)
-    live = Live(Session(Layout.of(scene).scene, "exact"))
-    return Game(live, players, scene.shots[0] if scene.shots else None)
+    live = LiveView(Session(TableGeometry.of(scene).scene, "exact"))
+    return BilliardsGame(live, players, scene.shots[0] if scene.shots else None)
 
 
-def turn(game: Game, elapsed: float = 1.0 / 60.0) -> None:
+def turn(game: BilliardsGame, elapsed: float = 1.0 / 60.0) -> None:
     """Let real time pass, s, as the stage does."""
     game.live.go_on(elapsed, game.waits)
     game.go_on(elapsed)
 
 
-def roll_out(game: Game, until: float = 60.0) -> None:
+def roll_out(game: BilliardsGame, until: float = 60.0) -> None:
     """Let the balls roll until the table waits."""
     turn(game)
     while not game.waits:

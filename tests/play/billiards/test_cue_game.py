@@ -8,11 +8,10 @@ import pytest
 from seated import FREE, NINE, RADIUS, game_of, roll_out, turn
 
 from sandbox.action import ActionError, Strike
-from sandbox.games.billiards.rules.verdict import Verdict
+from sandbox.games.billiards.controls import BilliardsOverlay, HumanPlayer
+from sandbox.games.billiards.hud import status_line
+from sandbox.games.billiards.rules.base import ShotResult
 from sandbox.measure.replay import rerun
-from sandbox.play.billiards.person import Person
-from sandbox.play.billiards.seen import Seen
-from sandbox.play.instruments.scoreboard import status_line
 
 
 def test_time_stands_still_until_somebody_strikes() -> None:
@@ -34,7 +33,7 @@ def test_shot_of_the_scene_is_laid_ready_and_not_played() -> None:
 def test_forecast_is_what_is_played() -> None:
     game = game_of(FREE)
     game.cue.aim, game.cue.speed = math.pi / 2 - 0.02, 1.5
-    aim = Seen(Person(game)).aim()
+    aim = BilliardsOverlay(HumanPlayer(game)).aim()
     assert aim is not None
     assert aim.forecast is not None
     found = aim.forecast
@@ -54,7 +53,7 @@ def test_forecast_does_not_change_the_table() -> None:
     before = game.live.session.relay.state_hash()
     for k in range(5):
         game.cue.aim = 0.3 * k
-        Seen(Person(game)).aim()
+        BilliardsOverlay(HumanPlayer(game)).aim()
     assert game.live.session.relay.state_hash() == before
 
 
@@ -168,17 +167,17 @@ def test_bot_answers_the_break() -> None:
 
 def test_bot_has_one_name_and_no_aim_while_it_thinks() -> None:
     game = game_of(NINE, "you vs bot")
-    person = Person(game)
+    person = HumanPlayer(game)
     state, said = replace(game.match.state, turn=1), ("foul: scratch; player 2 has the ball in hand",)
-    game.go_another_way(replace(game.match, state=state, verdict=Verdict(state, messages=said)))
+    game.go_another_way(replace(game.match, state=state, verdict=ShotResult(state, messages=said)))
     assert game.bot_is_thinking
-    assert Seen(person).aim() is None
+    assert BilliardsOverlay(person).aim() is None
     assert status_line(person) == "foul: scratch; bot has the ball in hand; bot is thinking"
     for _ in range(200_000):
         turn(game, 0.02)
         if not game.bot_is_thinking:
             break
-    aim = Seen(person).aim()
+    aim = BilliardsOverlay(person).aim()
     assert aim is not None
     assert aim.angle == game.cue.aim
     assert status_line(person).endswith("bot is aiming")
@@ -187,7 +186,7 @@ def test_bot_has_one_name_and_no_aim_while_it_thinks() -> None:
 
 def test_ball_in_hand_goes_only_where_the_rules_say() -> None:
     game = game_of(NINE)
-    person = Person(game)
+    person = HumanPlayer(game)
     assert game.match.state.in_hand == "behind the head string"
     head = game.match.layout.home[1]
     person.take_in_hand()
@@ -211,14 +210,14 @@ def test_ball_that_is_not_in_hand_stays() -> None:
     roll_out(game)
     if game.match.state.in_hand is None:
         with pytest.raises(ActionError, match="in hand"):
-            Person(game).take_in_hand()
+            HumanPlayer(game).take_in_hand()
 
 
 def test_free_play_gives_the_ball_in_hand_at_any_time() -> None:
     game = game_of(FREE)
     game.shoot(1.0)
     roll_out(game)
-    person = Person(game)
+    person = HumanPlayer(game)
     person.take_in_hand()
     person.carry((0.8, 0.4))
     person.put_down()

@@ -5,21 +5,20 @@ import math
 import pytest
 from seated import FREE, NINE, game_of
 
-from sandbox.play.billiards.cue import EDGE, FASTEST
-from sandbox.play.billiards.game import Game
-from sandbox.play.billiards.gestures import DIAL, FINE, ROOM, Gestures
-from sandbox.play.billiards.person import Person
+from sandbox.games.billiards.aiming import EDGE, FASTEST
+from sandbox.games.billiards.controls import DIAL, FINE, ROOM, CueControls, HumanPlayer
+from sandbox.games.billiards.table_game import BilliardsGame
 
 CUE = (0.5, 0.5)
 AWAY = (0.9, 0.2)
 """m, where no ball is"""
 
 
-def hand_at(game: Game) -> Gestures:
-    return Gestures(Person(game))
+def hand_at(game: BilliardsGame) -> CueControls:
+    return CueControls(HumanPlayer(game))
 
 
-def move(hand: Gestures, before: tuple[float, float], now: tuple[float, float], time: float = 0.0) -> None:
+def move(hand: CueControls, before: tuple[float, float], now: tuple[float, float], time: float = 0.0) -> None:
     hand.motion(before, now, (0.0, 0.0), False, time)
 
 

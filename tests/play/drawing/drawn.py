@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 import pygame
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import Colour
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.sight import Sight
 from sandbox.scene.files.load import from_document
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
+from sandbox.window.camera import Camera
+from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.palette import Colour
+from sandbox.window.render.renderer import Renderer
 
 SIZE = (200, 120)
 CAMERA = Camera((0.0, 0.0), 20.0, SIZE)
@@ -39,9 +39,9 @@ def frame(which: Scene, **changed: object) -> Frame:
     return Frame(**(arrays | changed))
 
 
-def sight(which: Scene, *overlays: str, shapes: bool = True, **more: object) -> Sight:
+def sight(which: Scene, *overlays: str, shapes: bool = True, **more: object) -> Snapshot:
     shown = {"shapes", *overlays} if shapes else set(overlays)
-    return Sight(which, **({"bodies": which.bodies, "frame": frame(which), "overlays": frozenset(shown)} | more))
+    return Snapshot(which, **({"bodies": which.bodies, "frame": frame(which), "overlays": frozenset(shown)} | more))
 
 
 def contact(pair: tuple[int, int], point: tuple, normal: tuple, impulse: tuple = (0.0, 0.0)) -> Contacts:
@@ -50,10 +50,10 @@ def contact(pair: tuple[int, int], point: tuple, normal: tuple, impulse: tuple =
     )
 
 
-def drawn(what: Sight, camera: Camera = CAMERA, *, picture: Picture | None = None, **how: object) -> np.ndarray:
+def drawn(what: Snapshot, camera: Camera = CAMERA, *, picture: Renderer | None = None, **how: object) -> np.ndarray:
     """Return the picture of a sight as colours (W, H, 3)."""
     surface = pygame.Surface(camera.size)
-    (picture or Picture()).draw(surface, camera, what, **how)
+    (picture or Renderer()).draw(surface, camera, what, **how)
     return pygame.surfarray.array3d(surface)
 
 

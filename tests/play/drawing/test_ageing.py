@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from drawn import at, drawn, frame, scene, sight
 
-from sandbox.play.drawing import ageing
-from sandbox.play.drawing.ageing import SHADES, Ageing, faded
-from sandbox.play.drawing.picture import Picture
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.window.render import particles as ageing
+from sandbox.window.render.particles import SHADES, LifetimeColours, fade_colours
+from sandbox.window.render.renderer import Renderer
 
 FADING = {
     "velocity_min": [0.0, 0.0],
@@ -29,7 +29,7 @@ def seen(which, time: float, x: float = 0.0, bodies: Bodies | None = None) -> tu
 
 
 def test_colours_are_mixed_in_equal_parts_and_reach_both_ends():
-    shades = faded(("#ff0000", "#00ff00", "#0000ff")).astype(int)
+    shades = fade_colours(("#ff0000", "#00ff00", "#0000ff")).astype(int)
     assert len(shades) == SHADES
     assert shades[0].tolist() == [255, 0, 0]
     assert shades[-1].tolist() == [0, 0, 255]
@@ -65,7 +65,7 @@ def test_those_who_do_not_fade_keep_their_colours(radius):
             one(3.0, radius, colours=["#000000", "#ffffff"]),
         ]
     )
-    made = Ageing(which.bodies)
+    made = LifetimeColours(which.bodies)
     assert len(made) == 2
     assert np.asarray(made.who).tolist() == [0, 2]
     for time, first, last in ((0.0, (255, 0, 0), (0, 0, 0)), (1.999, (0, 0, 255), (255, 255, 255))):
@@ -81,7 +81,7 @@ def test_contact_colours_outrank_ages():
 
 
 def test_one_picture_shows_every_age_in_turn():
-    which, picture = scene(emitter=[one(0.0, 0.02)]), Picture()
+    which, picture = scene(emitter=[one(0.0, 0.02)]), Renderer()
     for time in (0.0, 1.999, 0.0):
         what = sight(which, frame=frame(which, time=time))
         assert (drawn(what, picture=picture) == drawn(what)).all()
@@ -91,7 +91,7 @@ def test_crowds_fade_alike_compiled_and_not(monkeypatch):
     crowd = {"velocity_max": [1.0, 1.0], "count": 30_000, "lifetime_jitter": 1.5, "position": [0.0, 0.0]}
     which = scene(emitter=[{**FADING, **crowd}, {**FADING, **crowd, "colours": ["#000000", "#ffffff"]}])
     bodies = replace(which.bodies, born=np.linspace(-0.5, 0.5, len(which.bodies)))
-    made = Ageing(bodies)
+    made = LifetimeColours(bodies)
     shades = np.arange(len(made.shades), dtype=np.uint32)
     for time in (0.0, 0.7, 3.0):
         seen = []

@@ -10,25 +10,24 @@ from pressing import key, key_up
 from windowed import turned, window_on
 
 from sandbox.action import Reshape
-from sandbox.games.artillery.landscape import course_of
 from sandbox.games.artillery.rules import ArtilleryRules
-from sandbox.games.bout import Bout
-from sandbox.games.policies import Nobody
+from sandbox.games.artillery.scene import course_of
+from sandbox.games.artillery.view import artillery_view_state, sky_image, sky_tone
+from sandbox.games.artillery.view_state import ArtilleryViewState, ExplosionView, FallingDirt
+from sandbox.games.players import NoInput
+from sandbox.games.session import HeadlessGame
 from sandbox.measure.run import run
-from sandbox.play.artillery.gunnery import Burst, Clod, Gunnery
-from sandbox.play.artillery.seen import gunnery_of
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.artillery.sky import sky, tone
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.footage.film import Film
-from sandbox.play.footage.still import offscreen
-from sandbox.play.running.live import Live
-from sandbox.play.sight import Sight
-from sandbox.play.window import Window
 from sandbox.recording import Recording
 from sandbox.scene.files.load import loads
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
+from sandbox.window.app import App
+from sandbox.window.camera import Camera
+from sandbox.window.capture.film import RecordedRun
+from sandbox.window.capture.image_files import offscreen
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.renderer import Renderer
 
 SIZE = (400, 240)
 TEXT = """
@@ -63,12 +62,12 @@ def duel(edges: str = "open") -> Scene:
     return loads(TEXT.format(edges=edges))
 
 
-def drawn(scene: Scene, gunnery: Gunnery | None = None, camera: Camera = CAMERA) -> np.ndarray:
+def drawn(scene: Scene, gunnery: ArtilleryViewState | None = None, camera: Camera = CAMERA) -> np.ndarray:
     bodies = scene.bodies
     columns = bodies.position, bodies.velocity, bodies.angle, bodies.angular_velocity
     frame = Frame(0.0, *(each.copy() for each in columns), np.ones(len(bodies), np.bool_))
     surface = offscreen(SIZE)
-    Picture().draw(surface, camera, Sight(scene, bodies, frame, gunnery=gunnery))
+    Renderer().draw(surface, camera, Snapshot(scene, bodies, frame, gunnery=gunnery))
     return pygame.surfarray.array3d(surface).astype(int)
 
 
@@ -78,7 +77,7 @@ def pixel(x: float, y: float) -> tuple[int, int]:
 
 
 def test_ground_is_below_its_surface_and_sky_above() -> None:
-    picture, above = drawn(duel()), pygame.surfarray.array3d(sky(SIZE)).astype(int)
+    picture, above = drawn(duel()), pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
     for x in (35.0, 50.0, 65.0):
         assert (picture[pixel(x, 16.0)] == above[pixel(x, 16.0)]).all()
         red, _, blue = picture[pixel(x, 8.5)].tolist()
@@ -92,7 +91,7 @@ def test_a_crater_shows_the_sky_behind_it() -> None:
     heights[45:55] = [2.0] * 10
     wall = scene.walls[0].model_copy(update={"points": course_of(heights, 100.0)})
     picture = drawn(scene.model_copy(update={"walls": (wall,)}))
-    above = pygame.surfarray.array3d(sky(SIZE)).astype(int)
+    above = pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
     assert (picture[pixel(50.0, 6.0)] == above[pixel(50.0, 6.0)]).all()
     assert (picture[pixel(40.0, 6.0)] != above[pixel(40.0, 6.0)]).any()
 
@@ -108,10 +107,10 @@ def test_sides_that_hold_shells_are_seen(edges: str) -> None:
 def test_dirt_in_the_air_hangs_over_sky() -> None:
     scene = duel()
     rules = ArtilleryRules(scene, scene.bodies)
-    plain = gunnery_of(rules, 0.0)
-    clod = Clod(left=48.0, right=52.0, bottom=22.0, top=26.0, floor=8.0)
-    falling = Gunnery(plain.guns, plain.size, 0.0, clods=(clod,))
-    picture, above = drawn(scene, falling), pygame.surfarray.array3d(sky(SIZE)).astype(int)
+    plain = artillery_view_state(rules, 0.0)
+    clod = FallingDirt(left=48.0, right=52.0, bottom=22.0, top=26.0, floor=8.0)
+    falling = ArtilleryViewState(plain.guns, plain.size, 0.0, clods=(clod,))
+    picture, above = drawn(scene, falling), pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
     red, _, blue = picture[pixel(50.0, 23.0)].tolist()
     assert red > blue
     assert (picture[pixel(50.0, 9.0)] == above[pixel(50.0, 9.0)]).all()  # where it is to lie, it does not lie yet
@@ -121,7 +120,7 @@ def test_tanks_guns_blasts_and_wind_are_drawn_where_they_are() -> None:
     scene = duel()
     rules = ArtilleryRules(scene, scene.bodies)
     run_to_aim(rules, scene)
-    gunnery = gunnery_of(rules, 0.0)
+    gunnery = artillery_view_state(rules, 0.0)
     assert [gun.name for gun in gunnery.guns] == ["Red", "Blue"]
     assert [gun.aiming for gun in gunnery.guns] == [True, False]
     assert gunnery.tracer is not None
@@ -130,14 +129,14 @@ def test_tanks_guns_blasts_and_wind_are_drawn_where_they_are() -> None:
     for x in (20.0, 80.0):
         i, j = pixel(x, float(scene.bodies.position[0, 1]) + 2.0)
         assert (picture[i - 12 : i + 12, j - 10 : j + 20] != plain[i - 12 : i + 12, j - 10 : j + 20]).any()
-    burst = Burst(0.1, (50.0, 30.0), 6.0, dirt=False)
-    bright = drawn(scene, Gunnery((), gunnery.size, 0.0, bursts=(burst,)))[pixel(50.0, 30.0)]
+    burst = ExplosionView(0.1, (50.0, 30.0), 6.0, dirt=False)
+    bright = drawn(scene, ArtilleryViewState((), gunnery.size, 0.0, bursts=(burst,)))[pixel(50.0, 30.0)]
     assert bright.sum() > plain[pixel(50.0, 30.0)].sum()
 
 
 def run_to_aim(rules: ArtilleryRules, scene: Scene) -> None:
     short = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.05})})
-    run(short, bout=Bout(rules, Nobody(), "none"))
+    run(short, bout=HeadlessGame(rules, NoInput(), "none"))
     assert rules.phase == "aim"
 
 
@@ -147,21 +146,23 @@ def test_no_camera_is_too_far_or_too_near(centre: tuple[float, float], scale: fl
     scene = duel("rubber")
     rules = ArtilleryRules(scene, scene.bodies)
     run_to_aim(rules, scene)
-    clods = (Clod(48.0, 52.0, 22.0, 26.0, 8.0),)
+    clods = (FallingDirt(48.0, 52.0, 22.0, 26.0, 8.0),)
     way = np.array([[20.0, 12.0], [1e9, 1e9], [60.0, 12.0]])
-    told = gunnery_of(rules, 0.0)
-    wild = Gunnery(told.guns, told.size, 900.0, (way,), (0,), (Burst(0.2, (50.0, 1e12), 5.0, True),), clods, way)
+    told = artillery_view_state(rules, 0.0)
+    wild = ArtilleryViewState(
+        told.guns, told.size, 900.0, (way,), (0,), (ExplosionView(0.2, (50.0, 1e12), 5.0, True),), clods, way
+    )
     drawn(scene, wild, Camera(centre, scale, SIZE))
 
 
 def test_the_sky_goes_from_its_first_tone_to_its_last() -> None:
-    assert (tone(0.0), tone(2.0)) == ((13, 17, 34), (240, 186, 140))
+    assert (sky_tone(0.0), sky_tone(2.0)) == ((13, 17, 34), (240, 186, 140))
 
 
 def test_films_show_the_ground_as_it_was() -> None:
     scene = duel()
     pit = Reshape(time=1.0, thing="terrain", points=course_of([2.0] * 100, 100.0))
-    film = Film(run(scene, actions=[pit]))
+    film = RecordedRun(run(scene, actions=[pit]))
     before, after = film.sight(0.5, frozenset()).scene, film.sight(1.5, frozenset()).scene
     assert before.walls == scene.walls
     assert after.walls[0].points == pit.points
@@ -169,12 +170,12 @@ def test_films_show_the_ground_as_it_was() -> None:
 
 
 @pytest.fixture
-def window(tmp_path: Path) -> Iterator[Window]:
+def window(tmp_path: Path) -> Iterator[App]:
     with window_on(TEXT.format(edges="open"), tmp_path, (640, 400)) as opened:
         yield opened
 
 
-def turn(window: Window, *events: pygame.event.Event) -> ArtilleryRules:
+def turn(window: App, *events: pygame.event.Event) -> ArtilleryRules:
     turned(window, *events)
     assert window.stage.host is not None
     rules = window.stage.host.rules
@@ -182,7 +183,7 @@ def turn(window: Window, *events: pygame.event.Event) -> ArtilleryRules:
     return rules
 
 
-def test_keys_aim_and_fire_and_going_back_takes_back(window: Window, tmp_path: Path) -> None:
+def test_keys_aim_and_fire_and_going_back_takes_back(window: App, tmp_path: Path) -> None:
     rules = turn(window)
     red = rules.shooter
     angle, power = red.angle, red.power
@@ -198,7 +199,7 @@ def test_keys_aim_and_fire_and_going_back_takes_back(window: Window, tmp_path: P
     while (rules := turn(window)).phase == "fly":
         pass
     live = window.stage.show
-    assert isinstance(live, Live)
+    assert isinstance(live, LiveView)
     crater = live.scene.walls[0].points
     assert rules.phase == "settle"
     assert rules.field.ground.points == crater

@@ -4,8 +4,14 @@ import math
 
 import pytest
 
-from sandbox.games.billiards.equipment import TABLES
-from sandbox.play.drawing.table.cushions import DEPTH, cushions, others, outside, width_of
+from sandbox.games.billiards.tables import TABLES
+from sandbox.games.billiards.view_table import (
+    DEPTH,
+    cushion_outlines,
+    rail_width,
+    table_bounds,
+    walls_that_are_no_cushions,
+)
 from sandbox.scene.files.load import loads
 from sandbox.scene.scene import Scene
 
@@ -20,23 +26,23 @@ def test_every_cushion_is_found_and_lies_between_area_and_wood(name: str) -> Non
     scene = table(name)
     area = scene.play.area
     assert area is not None
-    found = cushions(scene, area)
+    found = cushion_outlines(scene, area)
     assert len(found) == (4 if name.startswith("carom") else 6)
     (left, bottom), (right, top) = area
-    depth = DEPTH * width_of(area)
+    depth = DEPTH * rail_width(area)
     for each in found:
         for x, y in each.outline:
             # A facing may end behind the line of the wood, where its hole is.
             out = max(left - x, x - right, bottom - y, y - top)
             assert -1e-9 < out < max(depth, 0.1)
-    assert outside(area)[0][0] < left - depth
+    assert table_bounds(area)[0][0] < left - depth
 
 
 def test_noses_with_jaws_are_tangent_to_them() -> None:
     scene = table("pool-9ft")
     assert scene.play.area is not None
     jaws = [(post.position, post.radius) for post in scene.posts]
-    for each in cushions(scene, scene.play.area):
+    for each in cushion_outlines(scene, scene.play.area):
         on_jaws = [
             point
             for point in each.nose
@@ -49,7 +55,7 @@ def test_noses_with_jaws_are_tangent_to_them() -> None:
 def test_cushions_without_jaws_meet_in_a_mitre() -> None:
     scene = table("carom-10ft")
     assert scene.play.area is not None
-    corners = {point for each in cushions(scene, scene.play.area) for point in each.outline[2:]}
+    corners = {point for each in cushion_outlines(scene, scene.play.area) for point in each.outline[2:]}
     assert len({(round(x, 9), round(y, 9)) for x, y in corners}) == 4
 
 
@@ -67,12 +73,12 @@ height = 0.037
 """
     )
     assert scene.play.area is not None
-    assert len(cushions(scene, scene.play.area)) == 4
-    assert others(scene, scene.play.area) == ((scene.walls[0],), ())
+    assert len(cushion_outlines(scene, scene.play.area)) == 4
+    assert walls_that_are_no_cushions(scene, scene.play.area) == ((scene.walls[0],), ())
 
 
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_have_nothing_else(name: str) -> None:
     scene = table(name)
     assert scene.play.area is not None
-    assert others(scene, scene.play.area) == ((), ())
+    assert walls_that_are_no_cushions(scene, scene.play.area) == ((), ())

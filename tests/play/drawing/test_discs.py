@@ -4,15 +4,24 @@ import numpy as np
 import pygame
 import pytest
 
-from sandbox.play.drawing.discs import BUDGET, LARGEST, Discs, Style, dark, spokes
+from sandbox.window.render.circles import (
+    LARGEST,
+    SPRITE_BUDGET,
+    CircleRenderer,
+    CircleStyle,
+    darken,
+    draw_rotation_marks,
+)
 
 WHITE = (255, 255, 255)
-PLAIN = Style(line=0.0)
+PLAIN = CircleStyle(line=0.0)
 
 
-def disc(x: float, y: float, radius: float, style: Style = PLAIN, size: tuple[int, int] = (300, 300)) -> np.ndarray:
+def disc(
+    x: float, y: float, radius: float, style: CircleStyle = PLAIN, size: tuple[int, int] = (300, 300)
+) -> np.ndarray:
     surface = pygame.Surface(size)
-    Discs().draw(surface, np.asarray([(x, y)]), np.asarray([radius]), np.full((1, 3), 255, np.uint8), style)
+    CircleRenderer().draw(surface, np.asarray([(x, y)]), np.asarray([radius]), np.full((1, 3), 255, np.uint8), style)
     return pygame.surfarray.array3d(surface)[..., 0] / 255.0
 
 
@@ -25,7 +34,7 @@ def test_antialiased_area_is_that_of_the_disc(radius, offset):
 
 @pytest.mark.parametrize("radius", [10.0, 33.3, 120.0])
 def test_plain_area_is_about_that_of_the_disc(radius):
-    picture = disc(150.0, 150.0, radius, Style(0.0, antialias=False))
+    picture = disc(150.0, 150.0, radius, CircleStyle(0.0, antialias=False))
     assert set(np.unique(picture)) == {0.0, 1.0}
     assert picture.sum() == pytest.approx(math.pi * radius**2, abs=2 * math.pi * radius * 0.5)  # half a px at the edge
 
@@ -41,14 +50,16 @@ def test_middle_of_area_is_the_centre(radius):
 def test_a_rim_is_darker_than_the_filling():
     surface = pygame.Surface((100, 100))
     colour = (200, 100, 40)
-    Discs().draw(surface, np.asarray([(50.0, 50.0)]), np.asarray([30.0]), np.asarray([colour], np.uint8), Style(3.0))
+    CircleRenderer().draw(
+        surface, np.asarray([(50.0, 50.0)]), np.asarray([30.0]), np.asarray([colour], np.uint8), CircleStyle(3.0)
+    )
     assert surface.get_at((50, 50))[:3] == colour
-    assert surface.get_at((50, 50 - 28))[:3] == dark(colour)
+    assert surface.get_at((50, 50 - 28))[:3] == darken(colour)
 
 
 def test_a_ring_is_hollow():
     surface = pygame.Surface((100, 100))
-    Discs().ring(surface, (50.0, 50.0), 30.0, WHITE, Style(4.0))
+    CircleRenderer().ring(surface, (50.0, 50.0), 30.0, WHITE, CircleStyle(4.0))
     assert surface.get_at((50, 50))[:3] == (0, 0, 0)
     assert surface.get_at((50 + 28, 50))[:3] == WHITE
 
@@ -71,19 +82,19 @@ def test_discs_far_outside_change_nothing():
 
 
 def test_sprites_are_bounded():
-    discs, surface = Discs(), pygame.Surface((100, 100))
+    discs, surface = CircleRenderer(), pygame.Surface((100, 100))
     for k in range(400):
         radius = np.asarray([95.0 - k / 20])
         discs.draw(surface, np.asarray([(50.0, 50.0)]), radius, np.full((1, 3), 9, np.uint8), PLAIN)
     kept = [sprite for sprites in discs._sprites.values() for sprite in sprites.values()]
-    assert sum(s.get_width() * s.get_height() for s in kept) <= BUDGET + 200**2  # and what one picture added
+    assert sum(s.get_width() * s.get_height() for s in kept) <= SPRITE_BUDGET + 200**2  # and what one picture added
     assert len(kept) < 400
 
 
 def test_many_large_discs_are_still_drawn():
     surface = pygame.Surface((200, 200))
     centre = np.stack((np.linspace(0, 200, 60), np.full(60, 100.0)), 1)
-    Discs().draw(surface, centre, np.full(60, 100.0), np.full((60, 3), 255, np.uint8), PLAIN)
+    CircleRenderer().draw(surface, centre, np.full(60, 100.0), np.full((60, 3), 255, np.uint8), PLAIN)
     assert (pygame.surfarray.array3d(surface)[:, 100] == 255).all()
 
 
@@ -94,7 +105,7 @@ def test_a_spoke_points_where_the_angle_says_with_y_up(angle, radius, antialias)
     surface.fill(WHITE)
     tint = np.full((1, 3), 255, np.uint8)
     middle = np.asarray([(50.5, 50.5)])
-    spokes(surface, middle, np.asarray([radius]), np.asarray([angle]), tint, antialias)
+    draw_rotation_marks(surface, middle, np.asarray([radius]), np.asarray([angle]), tint, antialias)
     inked = 255.0 - pygame.surfarray.array3d(surface).mean(2)
     along = np.arange(100) + 0.5
     x = (inked.sum(1) * along).sum() / inked.sum() - 50.5
@@ -105,7 +116,7 @@ def test_a_spoke_points_where_the_angle_says_with_y_up(angle, radius, antialias)
 
 def test_a_spoke_at_nan_is_left_out():
     surface = pygame.Surface((100, 100))
-    spokes(
+    draw_rotation_marks(
         surface, np.asarray([(50.0, 50.0)]), np.asarray([30.0]), np.asarray([math.nan]), np.ones((1, 3), np.uint8), True
     )
     assert not pygame.surfarray.array3d(surface).any()

@@ -3,7 +3,7 @@ import math
 import pygame
 import pytest
 
-from sandbox.play.drawing.text import font_file, measure, write
+from sandbox.window.render.text import draw_text, font_file, text_size
 
 WHITE = (255, 255, 255)
 
@@ -19,7 +19,7 @@ def inked(surface: pygame.Surface) -> pygame.Rect:
 @pytest.mark.parametrize("anchor", ["topleft", "midright", "center", "bottomright", "midbottom"])
 def test_the_anchor_lies_where_it_was_asked_for(anchor):
     surface = pygame.Surface((300, 200))
-    rect = write(surface, "Hällo μ", (150.0, 100.0), 20, WHITE, anchor)
+    rect = draw_text(surface, "Hällo μ", (150.0, 100.0), 20, WHITE, anchor)
     assert getattr(rect, anchor) == (150, 100)
     assert rect.contains(inked(surface))
 
@@ -28,36 +28,36 @@ def test_measure_says_what_write_covers():
     surface = pygame.Surface((300, 200))
     for bold in (False, True):
         for mono in (False, True):
-            rect = write(surface, "0.123 m/s", (0, 0), 17, WHITE, bold=bold, mono=mono)
-            assert rect.size == measure("0.123 m/s", 17, bold, mono)
+            rect = draw_text(surface, "0.123 m/s", (0, 0), 17, WHITE, bold=bold, mono=mono)
+            assert rect.size == text_size("0.123 m/s", 17, bold, mono)
 
 
 def test_figures_are_equally_wide_in_mono():
-    assert measure("1111", 16, mono=True) == measure("8888", 16, mono=True)
+    assert text_size("1111", 16, mono=True) == text_size("8888", 16, mono=True)
 
 
 @pytest.mark.parametrize("text", ["", "\0", "a\nb", "\ud800", "\u200b", "x" * 100_000, "🎱"])
 def test_any_text_can_be_written(text):
     surface = pygame.Surface((50, 50))
-    assert write(surface, text, (10, 10), 12, WHITE).topleft == (10, 10)
+    assert draw_text(surface, text, (10, 10), 12, WHITE).topleft == (10, 10)
 
 
 @pytest.mark.parametrize("at", [(math.nan, 0.0), (0.0, math.inf), (1e30, 0.0), (0.0, -1e300)])
 def test_nothing_is_written_nowhere(at):
     surface = pygame.Surface((50, 50))
-    assert write(surface, "words", at, 12, WHITE).size == (0, 0)
+    assert draw_text(surface, "words", at, 12, WHITE).size == (0, 0)
     assert not pygame.surfarray.array3d(surface).any()
 
 
 @pytest.mark.parametrize("size", [0.0, -5.0, math.nan, math.inf, 1e9])
 def test_any_size_is_brought_into_range(size):
-    assert 0 < measure("word", size)[1] < 500
+    assert 0 < text_size("word", size)[1] < 500
 
 
 def test_fonts_are_found_again_after_pygame_was_quit():
-    before = measure("word", 16)
+    before = text_size("word", 16)
     pygame.quit()
-    assert measure("word", 16) == before
+    assert text_size("word", 16) == before
 
 
 def test_the_font_is_an_installed_file():

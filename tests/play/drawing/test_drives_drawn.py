@@ -5,7 +5,7 @@ import math
 import numpy as np
 from drawn import at, changed, drawn, frame, scene, sight
 
-from sandbox.play.drawing.palette import BACKGROUND
+from sandbox.window.render.palette import BACKGROUND
 
 BAR = {"name": "bar", "position": [1.0, 0.0], "size": [2.0, 1.0]}
 TORQUE = {"kind": "torque", "body": "bar", "pivot": [0.0, 0.0], "stops": [0.0, 1.0], "torque": 1.0}

@@ -8,16 +8,16 @@ from drawn import CAMERA, SIZE, at, changed, drawn, scene, sight
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.fixtures import draw_fixtures
-from sandbox.play.drawing.grid import NARROWEST, draw_grid, draw_scale, length_text, step_of
-from sandbox.play.drawing.palette import BACKGROUND, FAINT, GRID, GRID_STRONG, SOLID, SURFACE
+from sandbox.window.camera import Camera
+from sandbox.window.render.grid import NARROWEST, draw_grid, draw_scale, length_text, step_of
+from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG, SOLID, SURFACE
+from sandbox.window.render.static_geometry import draw_static_bodies
 
 
 def fixtures(camera=CAMERA, *, antialias=True, **tables) -> np.ndarray:
     surface = pygame.Surface(camera.size)
     surface.fill(BACKGROUND)
-    draw_fixtures(surface, camera, scene(**tables), antialias=antialias)
+    draw_static_bodies(surface, camera, scene(**tables), antialias=antialias)
     return pygame.surfarray.array3d(surface)
 
 
@@ -68,7 +68,7 @@ def test_a_wall_is_as_wide_as_it_is_thick():
 @pytest.mark.parametrize(("unit", "width"), [(1.0, 2), (2.0, 4)])
 def test_a_wall_without_thickness_is_a_line(unit, width):
     surface = pygame.Surface(SIZE)
-    draw_fixtures(surface, CAMERA, scene(wall=[{"points": [[0, -2], [0, 2]]}]), unit)
+    draw_static_bodies(surface, CAMERA, scene(wall=[{"points": [[0, -2], [0, 2]]}]), unit)
     covered = pygame.surfarray.array3d(surface)[:, 60].sum(1) / sum(SURFACE)
     assert covered.sum() == pytest.approx(width, abs=0.02)  # 8 bits a pixel
 
@@ -106,7 +106,7 @@ def test_no_wall_or_post_is_too_far(points, thickness, power):
     post = {"position": list(points[1]), "radius": max(thickness, 1e-9)}
     for more in ({}, {"solid": False}, {"one_way": True}):
         there = {key: value for key, value in more.items() if key == "solid"}
-        draw_fixtures(surface, camera, scene(wall=[{**wall, **more}], post=[{**post, **there}]))
+        draw_static_bodies(surface, camera, scene(wall=[{**wall, **more}], post=[{**post, **there}]))
     assert surface.get_size() == camera.size
 
 

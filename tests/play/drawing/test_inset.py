@@ -4,13 +4,12 @@ import numpy as np
 import pygame
 from drawn import frame
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.inset import HIGH, WIDE, Inset
-from sandbox.play.drawing.palette import hex_colour
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.sight import Sight
 from sandbox.scene.files.load import from_document
 from sandbox.scene.scene import Scene
+from sandbox.window.camera import Camera
+from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.palette import hex_colour
+from sandbox.window.render.renderer import HIGH, WIDE, InsetRenderer, Renderer
 
 SIZE = (800, 600)
 FREE = pygame.Rect(0, 0, 700, 560)
@@ -25,10 +24,10 @@ def scene(inset: list[list[float]] | None) -> Scene:
 
 def drawn(of: Scene, camera: Camera) -> tuple[np.ndarray, np.ndarray, pygame.Rect | None]:
     """Return the pixels before and after, and where the inset is."""
-    surface, sight = pygame.Surface(SIZE), Sight(of, of.bodies, frame(of))
-    Picture().draw(surface, camera, sight)
+    surface, sight = pygame.Surface(SIZE), Snapshot(of, of.bodies, frame(of))
+    Renderer().draw(surface, camera, sight)
     before = pygame.surfarray.array3d(surface)
-    place = Inset().draw(surface, camera, sight, FREE)
+    place = InsetRenderer().draw(surface, camera, sight, FREE)
     return before, pygame.surfarray.array3d(surface), place
 
 
@@ -67,9 +66,9 @@ def test_no_inset_where_none_is_stated_or_the_picture_is_as_near() -> None:
 
 def test_room_is_left_for_what_else_is_in_the_corner() -> None:
     of, camera, surface = scene([[8.0, -0.5], [10.0, 0.5]]), far(), pygame.Surface(SIZE)
-    sight = Sight(of, of.bodies, frame(of))
-    place = Inset().draw(surface, camera, sight, FREE, aside=300)
+    sight = Snapshot(of, of.bodies, frame(of))
+    place = InsetRenderer().draw(surface, camera, sight, FREE, aside=300)
     assert place is not None
     assert place.right <= FREE.right - 300
     assert place.left >= 0
-    assert Inset().draw(surface, camera, sight, pygame.Rect(0, 0, 1, 1)) is None
+    assert InsetRenderer().draw(surface, camera, sight, pygame.Rect(0, 0, 1, 1)) is None

@@ -8,12 +8,12 @@ import pytest
 from drawn import CAMERA, ball, changed, drawn, frame, scene, sight
 
 from sandbox.engines.common import kernel
-from sandbox.play.drawing import threads as module
-from sandbox.play.drawing import wires
-from sandbox.play.drawing.joints import COILED, SHADES, Held, strain
-from sandbox.play.drawing.palette import ORANGE, SKY
-from sandbox.play.drawing.threads import draw_threads
 from sandbox.scene.scene import Scene
+from sandbox.window.render import kernels as wires
+from sandbox.window.render import lines as module
+from sandbox.window.render.joints import COILED, SHADES, JointSegments, strain
+from sandbox.window.render.lines import draw_thin_lines
+from sandbox.window.render.palette import ORANGE, SKY
 
 TWO = [ball(-3, 0, 0.3, name="a", angle=0.1), ball(3, 0, 0.3, name="b", angle=0.1)]
 PAIR = {"between": ["a", "b"]}
@@ -113,7 +113,7 @@ def test_a_spring_narrows_as_it_stretches():
 
 def test_strain_is_blue_grey_orange():
     which = joined(*(KINDS["spring"] | {"rest_length": rest} for rest in (60.0, 6.0, 0.06, 0.0)))
-    held = Held(which.links, np.tile((0.0, 0.0, 6.0 * CAMERA.scale, 0.0), (4, 1)))
+    held = JointSegments(which.links, np.tile((0.0, 0.0, 6.0 * CAMERA.scale, 0.0), (4, 1)))
     short, rest, long, none = SHADES[strain(held, CAMERA.scale)].astype(int)
     assert np.abs(short - SKY).max() <= 20  # nine tenths of the way
     assert (rest == SHADES[32]).all()
@@ -142,7 +142,7 @@ def test_springs_of_a_cloth_are_lines():
     assert np.abs(picture[50, 66:71].astype(int) - tone).max(axis=1).min() < 60  # two rows of pixels share a line
 
 
-assert wires.wires, "imported before a test says that there is numba"
+assert wires.rasterise_lines, "imported before a test says that there is numba"
 
 
 def threads(ends: list, compiled: bool) -> np.ndarray:
@@ -150,7 +150,7 @@ def threads(ends: list, compiled: bool) -> np.ndarray:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernel, "COMPILED", True)  # without numba the same pass runs as plain Python
         patch.setattr(module, "MANY", 0 if compiled else 10**9)
-        draw_threads(surface, np.asarray(ends, np.float64), np.full(len(ends), 0xFFFFFF, np.uint32))
+        draw_thin_lines(surface, np.asarray(ends, np.float64), np.full(len(ends), 0xFFFFFF, np.uint32))
     return pygame.surfarray.array3d(surface)[..., 0] / 255.0
 
 

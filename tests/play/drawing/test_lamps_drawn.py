@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from drawn import SIZE, ball, scene, sight
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing import picture as drawing
-from sandbox.play.drawing.lamps import GLOW, LARGEST, RADIUS
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.footage.still import offscreen
+from sandbox.games.pinball.view import GLOW, MAX_LAMP_RADIUS, RADIUS
 from sandbox.scene.scene import Scene
+from sandbox.window.camera import Camera
+from sandbox.window.capture.image_files import offscreen
+from sandbox.window.render import renderer as drawing
+from sandbox.window.render.renderer import Renderer
 
 SCALE = 1000.0
 CLOSE = Camera((0.0, 0.0), SCALE, SIZE)
@@ -28,10 +28,10 @@ def lamps(ground: str = "playfield", **part: Any) -> Scene:
     return scene(balls=[ball(90, 90)], play=play, post=[{"position": [5, 5], "radius": 0.1}])
 
 
-def seen(which: Scene, *lit: str, camera: Camera = CLOSE, by: Picture | None = None) -> np.ndarray[Any, Any]:
+def seen(which: Scene, *lit: str, camera: Camera = CLOSE, by: Renderer | None = None) -> np.ndarray[Any, Any]:
     """Return the colours along the row through the middle, to the right of it."""
     surface = offscreen(SIZE)
-    (by or Picture()).draw(surface, camera, sight(which, lit=frozenset(lit)))
+    (by or Renderer()).draw(surface, camera, sight(which, lit=frozenset(lit)))
     return np.asarray([surface.get_at((x, SIZE[1] // 2))[:3] for x in range(SIZE[0] // 2, SIZE[0])], dtype=int)
 
 
@@ -61,7 +61,7 @@ def test_ground_is_kept_while_lamps_change(monkeypatch: pytest.MonkeyPatch) -> N
     drawn = []
     once = drawing.draw_playfield
     monkeypatch.setattr(drawing, "draw_playfield", lambda *args: (drawn.append(1), once(*args)))
-    which, by = lamps(), Picture()
+    which, by = lamps(), Renderer()
     dark = seen(which, by=by)
     lit = seen(which, "post-1", by=by)
     assert (seen(which, by=by) == dark).all()  # and goes out without a trace
@@ -69,7 +69,7 @@ def test_ground_is_kept_while_lamps_change(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(drawn) == 1
 
 
-@pytest.mark.parametrize("scale", [1e-12, 1.0, LARGEST / RADIUS, 1e6, 1e12])
+@pytest.mark.parametrize("scale", [1e-12, 1.0, MAX_LAMP_RADIUS / RADIUS, 1e6, 1e12])
 def test_lit_lamps_are_drawn_at_any_scale(scale: float) -> None:
     camera = Camera((0.0, 0.0), scale, SIZE)
     assert seen(lamps(), "post-1", camera=camera).shape == (SIZE[0] // 2, 3)

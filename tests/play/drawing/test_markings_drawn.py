@@ -8,10 +8,10 @@ from drawn import CAMERA, at, ball, changed, drawn, frame, scene, sight
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import Colour, hex_colour
-from sandbox.play.drawing.pucks import STONE
+from sandbox.games.curling.view import GRANITE
 from sandbox.scene.errors import SceneError
+from sandbox.window.camera import Camera
+from sandbox.window.render.palette import Colour, hex_colour
 
 ICE, LINE = "#dce7ec", "#b5433c"
 SHEET = {"colour": ICE, "points": [[-4, -2], [4, -2], [4, 2], [-4, 2]]}
@@ -69,7 +69,7 @@ def test_a_puck_is_a_stone_with_a_coloured_top_and_a_handle_that_turns() -> None
     puck = {**ball(0, 0, 2.0), "colour": "#d0463c"}
     which = scene(balls=[puck], surface={"bodies": "pucks", "sliding_friction": 0.1})
     level = drawn(sight(which))
-    assert at(level, 0.0, 1.6) == STONE
+    assert at(level, 0.0, 1.6) == GRANITE
     assert at(level, 0.2, 1.0) == hex_colour("#d0463c")
     assert sum(at(level, 0.8, 0.0)) > sum(at(level, 0.0, 0.8))  # the handle is paler
     upright = drawn(sight(which, frame=frame(which, angle=np.asarray([math.pi / 2]))))

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from drawn import CAMERA, at, ball, changed, contact, drawn, frame, scene, sight
 
-from sandbox.play.drawing.arrows import HEAT
-from sandbox.play.drawing.palette import ORANGE, YELLOW
-from sandbox.play.sight import Flash
 from sandbox.trajectory import Contacts
+from sandbox.window.playback.snapshot import MissedContactMarker
+from sandbox.window.render.palette import ORANGE, YELLOW
+from sandbox.window.render.vectors import HEAT
 
 ONE = scene(balls=[ball(0, 0, velocity=[5.0, 0.0])])
 WEIGHT = 9.81
@@ -217,14 +217,14 @@ def test_a_ghost_may_know_fewer_bodies():
 def test_a_missed_contact_flashes_grows_and_fades():
     widths, brightness, without = [], [], drawn(sight(ONE)).astype(int)
     for age in (0.0, 0.5, 1.0, 1.4):
-        picture = drawn(sight(ONE, flashes=(Flash((0.0, 0.0), age),)))
+        picture = drawn(sight(ONE, flashes=(MissedContactMarker((0.0, 0.0), age),)))
         left, _, right, _ = box(changed(without, picture))
         widths.append(right - left)
         brightness.append(int((picture - without)[..., 0].max()))
     assert widths == sorted(set(widths))
     assert brightness == sorted(set(brightness), reverse=True)
     assert brightness[0] > 100
-    assert not effect(ONE, flashes=(Flash((0.0, 0.0), 1.5),)).any()
+    assert not effect(ONE, flashes=(MissedContactMarker((0.0, 0.0), 1.5),)).any()
 
 
 def test_the_hand_is_joined_to_the_body():

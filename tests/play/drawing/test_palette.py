@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from drawn import ball, scene
 
-from sandbox.play.drawing.palette import ACCENTS, NEUTRAL, colour_of, colour_of_fixed, hex_colour, mixed
 from sandbox.scene.description.discs import Ball
+from sandbox.window.render.palette import ACCENTS, NEUTRAL, colour_of, colour_of_fixed, hex_colour, mix_colours
 
 SPARKS = {"position": [0.0, 0.0], "velocity_min": [-1.0, 0.0], "velocity_max": [1.0, 1.0]}
 
@@ -48,8 +48,8 @@ def test_hex_colour(text, colour):
 
 
 def test_mixed_reaches_both_ends():
-    assert mixed((0, 10, 20), (100, 110, 120), 0.0) == (0, 10, 20)
-    assert mixed((0, 10, 20), (100, 110, 120), 1.0) == (100, 110, 120)
+    assert mix_colours((0, 10, 20), (100, 110, 120), 0.0) == (0, 10, 20)
+    assert mix_colours((0, 10, 20), (100, 110, 120), 1.0) == (100, 110, 120)
 
 
 def test_fixed_things_have_their_own_colour_where_stated():

@@ -3,9 +3,9 @@ import pygame
 import pytest
 from drawn import CAMERA, SIZE, at, ball, changed, drawn, frame, scene, sight
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import ACCENTS, BACKGROUND, CLEAR, FAINT, SOLID, TOUCHING
-from sandbox.play.drawing.picture import Picture
+from sandbox.window.camera import Camera
+from sandbox.window.render.palette import ACCENTS, BACKGROUND, CLEAR, FAINT, SOLID, TOUCHING
+from sandbox.window.render.renderer import Renderer
 
 FLOOR = [{"point": [0.0, -2.0], "normal": [0.0, 1.0]}]
 
@@ -47,7 +47,7 @@ def test_culling_changes_no_pixel(antialias):
 
 def test_a_picture_is_the_same_whatever_was_drawn_before():
     what = sight(scene(balls=[ball(0, 0), ball(1, 1, 0.02)], plane=FLOOR), "centres")
-    picture = Picture()
+    picture = Renderer()
     for k in range(1, 30):
         camera = Camera((0.1 * k, 0.0), 20.0 + k, SIZE)
         assert not changed(drawn(what, camera, picture=picture), drawn(what, camera)).any()
@@ -55,7 +55,7 @@ def test_a_picture_is_the_same_whatever_was_drawn_before():
 
 
 def test_a_new_scene_or_size_is_noticed():
-    picture = Picture()
+    picture = Renderer()
     drawn(sight(scene(plane=FLOOR)), picture=picture)
     assert at(drawn(sight(scene(world={})), picture=picture), 0.0, -2.5) != SOLID
     larger = Camera(CAMERA.centre, CAMERA.scale, (300, 200))
@@ -125,7 +125,7 @@ def test_a_spawned_body_is_drawn():
         angular_velocity=bodies.angular_velocity,
         present=np.ones(2, np.bool_),
     )
-    picture = Picture()
+    picture = Renderer()
     drawn(sight(what), picture=picture)
     assert at(drawn(sight(what, bodies=bodies, frame=grown), picture=picture), 3.0, 0.0) == ACCENTS[1]
 
@@ -133,12 +133,12 @@ def test_a_spawned_body_is_drawn():
 @pytest.mark.parametrize("depth", [8, 16, 24, 32])
 def test_any_format_of_surface_will_do(depth):
     surface = pygame.Surface(SIZE, 0, depth)
-    Picture().draw(surface, CAMERA, sight(scene(balls=[ball(0, 0), ball(2, 0, 0.01)], plane=FLOOR), "names", "bounds"))
+    Renderer().draw(surface, CAMERA, sight(scene(balls=[ball(0, 0), ball(2, 0, 0.01)], plane=FLOOR), "names", "bounds"))
     assert surface.get_at((100, 60))[:3] != BACKGROUND
 
 
 def test_caches_do_not_grow_with_the_cameras():
-    picture, what = Picture(), sight(scene(balls=[ball(0, 0)], plane=FLOOR))
+    picture, what = Renderer(), sight(scene(balls=[ball(0, 0)], plane=FLOOR))
     for k in range(50):
         drawn(what, Camera((0.01 * k, 0.0), 20.0, SIZE), picture=picture)
     sprites = [sprite for known in picture._discs._sprites.values() for sprite in known.values()]

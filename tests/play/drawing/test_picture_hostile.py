@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_numpy
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.sight import OVERLAYS, Flash
 from sandbox.trajectory import Contacts
+from sandbox.window.camera import Camera
+from sandbox.window.playback.snapshot import OVERLAYS, MissedContactMarker
+from sandbox.window.render.renderer import Renderer
 
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 FAR = st.floats(-1e16, 1e16)
@@ -55,7 +55,7 @@ def sights(draw):
         ghost=draw(st.sampled_from([None, ghost])),
         trails=(draw(arrays(5, COUNT, 2)), draw(arrays(2, COUNT - 1, 2)), np.empty((0, COUNT, 2))),
         overlapping=draw(st.sampled_from([None, np.asarray([True, False])])),
-        flashes=(Flash((draw(ANY), draw(ANY)), draw(ANY)), Flash((0.0, 0.0), 0.5)),
+        flashes=(MissedContactMarker((draw(ANY), draw(ANY)), draw(ANY)), MissedContactMarker((0.0, 0.0), 0.5)),
         picked=draw(st.sampled_from([None, -1, 0, 2, 99])),
         pull=draw(
             st.sampled_from([None, ((0.0, 0.0), (1e16, -1e16)), ((0.0, 0.0), (0.5, 0.5)), ((np.nan, 0.0), (0.0, 0.0))])
@@ -95,5 +95,5 @@ def test_a_frame_that_knows_fewer_bodies_is_drawn():
 
 def test_a_surface_without_pixels_is_left_alone():
     surface = pygame.Surface((0, 0))
-    Picture().draw(surface, Camera((0.0, 0.0), 1.0, (0, 0)), sight(WHICH, *OVERLAYS))
+    Renderer().draw(surface, Camera((0.0, 0.0), 1.0, (0, 0)), sight(WHICH, *OVERLAYS))
     assert surface.get_size() == (0, 0)

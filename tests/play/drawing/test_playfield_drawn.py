@@ -10,11 +10,11 @@ from drawn import SIZE, at, ball, drawn, scene, sight
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import BACKGROUND
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.drawing.strokes import cut
-from sandbox.play.footage.still import offscreen
+from sandbox.window.camera import Camera
+from sandbox.window.capture.image_files import offscreen
+from sandbox.window.render.lines import clip_polygon
+from sandbox.window.render.palette import BACKGROUND
+from sandbox.window.render.renderer import Renderer
 
 BED: dict[str, Any] = {"points": [[-4, -2], [4, -2], [4, 2], [-4, 2]], "colour": "#102030"}
 SPOT: dict[str, Any] = {"position": [2, 0], "radius": 1, "colour": "#405060"}
@@ -52,7 +52,7 @@ def test_what_stands_casts_a_shadow_once_and_what_lets_pass_none() -> None:
     ):
         which = sight(scene(balls=FAR, play={"ground": "playfield", "marking": [bed]}, wall=walls))
         surface = offscreen(SIZE)
-        Picture().draw(surface, close, which)
+        Renderer().draw(surface, close, which)
         dark[name] = tuple(surface.get_at((100, 60 + 50)))[:3]  # 5 mm below the wall
     assert dark["none"] == dark["passed"] == (128, 128, 128)
     assert dark["one"] == dark["two"] < (110, 110, 110)
@@ -69,7 +69,7 @@ def test_parts_with_a_light_have_a_lamp() -> None:
     seen = []
     for which in (lit, dark):
         surface = offscreen(SIZE)
-        Picture().draw(surface, close, which)
+        Renderer().draw(surface, close, which)
         seen.append(tuple(surface.get_at((100, 60)))[:3])
     assert seen[1] == (16, 32, 48)
     assert seen[0][0] > seen[1][0] + 30
@@ -87,7 +87,7 @@ def test_playfield_is_drawn_at_any_scale(scale: float) -> None:
     surface = offscreen(SIZE)
     wall, post = {"points": [[-1, 0], [1, 0]], "thickness": 0.5}, {"position": [0, 1], "radius": 0.3}
     which = sight(scene(balls=FAR, play={"ground": "playfield", "marking": [BED, SPOT]}, wall=[wall], post=[post]))
-    Picture().draw(surface, Camera((-3.0, -1.5), scale, SIZE), which)
+    Renderer().draw(surface, Camera((-3.0, -1.5), scale, SIZE), which)
     middle = tuple(surface.get_at((SIZE[0] // 2, SIZE[1] // 2)))[:3]
     assert (middle == (16, 32, 48)) == (scale > 1.0)
 
@@ -99,6 +99,6 @@ def test_cut_polygon_has_the_area_of_what_is_in_the_picture(corners: list[tuple[
     if not whole.is_valid or whole.area < 1.0:
         return
     within = whole.intersection(shapely.box(-2.0, -2.0, SIZE[0] + 2.0, SIZE[1] + 2.0))  # it leaves a margin
-    kept = cut(corners, area)
+    kept = clip_polygon(corners, area)
     assert (shapely.Polygon(kept).area if kept else 0.0) == pytest.approx(within.area, abs=1e-6)
     assert all(-2.001 <= x <= SIZE[0] + 2.001 and -2.001 <= y <= SIZE[1] + 2.001 for x, y in kept)

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_numpy
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.points import PIECE, Points, packed
+from sandbox.window.camera import Camera
+from sandbox.window.render.particles import PIECE, ParticleRenderer, packed_pixels
 
 CAMERA = Camera((3.0, -2.0), 10.0, (64, 48))
 
@@ -16,7 +16,7 @@ CAMERA = Camera((3.0, -2.0), 10.0, (64, 48))
 def painted(surface: pygame.Surface, position, camera=CAMERA, side=1, present=None, colours=None) -> np.ndarray:
     position = np.asarray(position, dtype=float).reshape(-1, 2)
     tints = np.full((len(position), 3), 255, np.uint8) if colours is None else np.asarray(colours, np.uint8)
-    Points().draw(surface, camera, position, packed(tints, surface), present, side)
+    ParticleRenderer().draw(surface, camera, position, packed_pixels(tints, surface), present, side)
     return pygame.surfarray.array3d(surface)
 
 

@@ -8,12 +8,12 @@ import pytest
 from drawn import CAMERA, at, ball, changed, drawn, frame, scene, sight
 
 from sandbox.engines.common import kernel
-from sandbox.play.drawing import polygons as module
-from sandbox.play.drawing import stencil
-from sandbox.play.drawing.discs import Style, dark
-from sandbox.play.drawing.palette import ACCENTS, NEUTRAL, YELLOW
-from sandbox.play.drawing.polygons import Polygons
 from sandbox.scene.scene import Scene
+from sandbox.window.render import kernels as stencil
+from sandbox.window.render import polygons as module
+from sandbox.window.render.circles import CircleStyle, darken
+from sandbox.window.render.palette import ACCENTS, NEUTRAL, YELLOW
+from sandbox.window.render.polygons import PolygonRenderer
 
 STAR = [
     [math.cos(k * math.pi / 5) * (1.0 if k % 2 else 2.5), math.sin(k * math.pi / 5) * (1.0 if k % 2 else 2.5)]
@@ -46,21 +46,21 @@ AREAS = {
 }
 
 
-assert stencil.stencil, "imported before a test says that there is numba"
+assert stencil.rasterise_polygons, "imported before a test says that there is numba"
 
 
 def white(which: Scene, *, few: int, antialias: bool = True, hollow: bool = False, scale: float = 20.0) -> np.ndarray:
     """Return a body drawn white without a rim, on black: how much of each pixel it covers."""
     surface, bodies = pygame.Surface((240, 240), 0, 32), which.bodies
     who = np.arange(len(bodies))
-    style = Style(2.0 if hollow else 0.0, hollow, antialias)
+    style = CircleStyle(2.0 if hollow else 0.0, hollow, antialias)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "FEW", few)
         patch.setattr(kernel, "COMPILED", True)  # without numba the same pass runs as plain Python
         if few:
             patch.setattr(module, "_in_one_pass", lambda *_: False)
         tint = np.full((len(who), 3), 255, np.uint8)
-        Polygons().draw(surface, bodies, who, np.full((len(who), 2), 120.3), bodies.angle, scale, tint, style)
+        PolygonRenderer().draw(surface, bodies, who, np.full((len(who), 2), 120.3), bodies.angle, scale, tint, style)
     return pygame.surfarray.array3d(surface)[..., 0] / 255.0
 
 
@@ -113,8 +113,8 @@ def test_flush_edges_of_two_pieces_are_still_seen(few):
 def test_a_polygon_has_its_colour_and_a_darker_rim():
     picture = drawn(sight(scene(box=[{"position": [0, 0], "size": [4, 3]}])))
     assert at(picture, 0.0, 0.0) == ACCENTS[0]
-    assert at(picture, 0.0, 1.46) == dark(ACCENTS[0])
-    assert at(picture, 0.0, 1.6) != dark(ACCENTS[0])
+    assert at(picture, 0.0, 1.46) == darken(ACCENTS[0])
+    assert at(picture, 0.0, 1.6) != darken(ACCENTS[0])
 
 
 def test_a_fixed_box_is_neutral():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sandbox.play.drawing.table.rolling import Rolling
+from sandbox.games.billiards.view_balls import BallOrientations
 from sandbox.trajectory import Frame
 
 RADIUS = 0.03
@@ -19,7 +19,7 @@ def frame(time: float, spin: tuple[float, float, float]) -> Frame:
 
 def turned(spin: tuple[float, float, float], seconds: float, pictures: int) -> np.ndarray:
     """Return the rotation that a ball has made, (3, 3)."""
-    rolling = Rolling()
+    rolling = BallOrientations()
     rolling.go_on(frame(0.0, spin))
     before = rolling.turned[0].copy()
     for k in range(1, pictures + 1):
@@ -52,7 +52,7 @@ def test_long_rolling_leaves_a_rotation() -> None:
 
 
 def test_time_that_stands_or_runs_backwards_turns_nothing() -> None:
-    rolling = Rolling()
+    rolling = BallOrientations()
     rolling.go_on(frame(1.0, (1.0, 2.0, 3.0)))
     before, version = rolling.turned.copy(), rolling.version.copy()
     rolling.go_on(frame(1.0, (1.0, 2.0, 3.0)))

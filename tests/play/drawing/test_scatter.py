@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.play.camera import Camera
-from sandbox.play.drawing import points as module
-from sandbox.play.drawing.points import Points, packed
+from sandbox.window.camera import Camera
+from sandbox.window.render import particles as module
+from sandbox.window.render.particles import ParticleRenderer, packed_pixels
 
 SIZE = (97, 61)
 
@@ -16,10 +16,10 @@ SIZE = (97, 61)
 def drawn(many: int, position: np.ndarray, present: np.ndarray | None, side: int, camera: Camera) -> np.ndarray:
     surface = pygame.Surface(SIZE, 0, 32)
     surface.set_clip(pygame.Rect(3, 5, 80, 50))
-    colours = packed(np.random.default_rng(1).integers(1, 255, (len(position), 3)).astype(np.uint8), surface)
+    colours = packed_pixels(np.random.default_rng(1).integers(1, 255, (len(position), 3)).astype(np.uint8), surface)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "MANY", many)
-        Points().draw(surface, camera, position, colours, present, side)
+        ParticleRenderer().draw(surface, camera, position, colours, present, side)
     return pygame.surfarray.array2d(surface)
 
 

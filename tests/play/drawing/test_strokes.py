@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from sandbox.play.drawing.strokes import arrow, clipped, dashes, stroke
+from sandbox.window.render.lines import clip_segment, draw_arrow, draw_dashes, draw_line
 
 AREA = pygame.Rect(10, 20, 200, 100)
 WHITE = (255, 255, 255)
@@ -20,7 +20,7 @@ def covered(surface: pygame.Surface) -> np.ndarray:
 
 @given(a=PLACE, b=PLACE, margin=st.floats(1.0, 50.0))
 def test_a_clipped_segment_is_what_lies_in_the_area(a, b, margin):
-    part = clipped(a, b, AREA, margin)
+    part = clip_segment(a, b, AREA, margin)
     share = np.linspace(0.0, 1.0, 2001)[:, None]
     points = np.asarray(a) * (1 - share) + np.asarray(b) * share
     low, high = np.asarray(AREA.topleft) - margin, np.asarray(AREA.bottomright) + margin
@@ -46,9 +46,9 @@ def test_a_clipped_segment_is_what_lies_in_the_area(a, b, margin):
 @given(a=ANYWHERE, b=ANYWHERE, width=st.sampled_from([1.0, 2.0, 9.0]), antialias=st.booleans())
 def test_no_line_is_too_long(a, b, width, antialias):
     surface = pygame.Surface((30, 20))
-    stroke(surface, a, b, WHITE, width, antialias)
-    arrow(surface, a, b, WHITE, width, antialias, edge=(9, 9, 9))
-    dashes(surface, [(a, b)], WHITE, 4.0, antialias)
+    draw_line(surface, a, b, WHITE, width, antialias)
+    draw_arrow(surface, a, b, WHITE, width, antialias, edge=(9, 9, 9))
+    draw_dashes(surface, [(a, b)], WHITE, 4.0, antialias)
     assert surface.get_size() == (30, 20)
 
 
@@ -56,7 +56,7 @@ def test_no_line_is_too_long(a, b, width, antialias):
 @pytest.mark.parametrize("antialias", [True, False])
 def test_a_stroke_is_as_wide_as_asked(width, antialias):
     surface = pygame.Surface((60, 40))
-    stroke(surface, (5.0, 20.5), (55.0, 20.5), WHITE, width, antialias)
+    draw_line(surface, (5.0, 20.5), (55.0, 20.5), WHITE, width, antialias)
     assert covered(surface)[30].sum() == pytest.approx(width, abs=1.0)  # whole pixels at the two edges
     assert not covered(surface)[:3].any()
     assert not covered(surface)[58:].any()
@@ -64,7 +64,7 @@ def test_a_stroke_is_as_wide_as_asked(width, antialias):
 
 def test_an_arrow_ends_at_its_tip_and_is_widest_at_its_head():
     surface = pygame.Surface((100, 60))
-    arrow(surface, (10.0, 30.5), (80.0, 30.5), WHITE, 2.0)
+    draw_arrow(surface, (10.0, 30.5), (80.0, 30.5), WHITE, 2.0)
     across = covered(surface).sum(1)
     assert np.flatnonzero(across).max() == pytest.approx(80, abs=1)  # whole pixels
     assert 67 <= np.argmax(across) <= 73
@@ -75,7 +75,7 @@ def test_dashes_keep_their_place_while_the_edge_of_the_picture_passes():
     rows = []
     for start in (-1003.25, -3.25):  # a whole number of dashes and gaps, of 5 px each, apart
         surface = pygame.Surface((100, 20))
-        dashes(surface, [((start, 10.5), (300.0, 10.5))], WHITE, 5.0, antialias=False)
+        draw_dashes(surface, [((start, 10.5), (300.0, 10.5))], WHITE, 5.0, antialias=False)
         rows.append(covered(surface)[:, 10])
     assert (rows[0] == rows[1]).all()
     assert 0.4 < rows[0].mean() < 0.7  # as much gap as dash, whose ends are whole pixels

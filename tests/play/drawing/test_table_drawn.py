@@ -4,16 +4,16 @@ import numpy as np
 import pygame
 import pytest
 
-from sandbox.play.billiards.aim import Aim
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.drawing.table.cloth import CAROM, HOLE, POOL, SNOOKER
-from sandbox.play.drawing.table.coats import IVORY, coat_of, painted
-from sandbox.play.framing import framing
-from sandbox.play.sight import Sight
+from sandbox.games.billiards.aiming import CueAim
+from sandbox.games.billiards.view_balls import IVORY, paint_texture, texture_of
+from sandbox.games.billiards.view_table import CAROM, HOLE, POOL, SNOOKER
 from sandbox.scene.files.load import loads
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
+from sandbox.window.camera import Camera
+from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.renderer import Renderer
+from sandbox.window.view_bounds import view_bounds
 
 SIZE = (700, 400)
 AT_REST = """
@@ -33,10 +33,10 @@ def frame_of(scene: Scene, position: np.ndarray | None = None, time: float = 0.0
     return Frame(time, place.copy(), none, bodies.angle, np.zeros(len(bodies)), np.ones(len(bodies), np.bool_), none)
 
 
-def drawn(scene: Scene, frame: Frame, aim: Aim | None = None, turned: bool = True) -> tuple[np.ndarray, Camera]:
-    camera = Camera.fitting(framing(scene), SIZE, turned=turned)
+def drawn(scene: Scene, frame: Frame, aim: CueAim | None = None, turned: bool = True) -> tuple[np.ndarray, Camera]:
+    camera = Camera.fitting(view_bounds(scene), SIZE, turned=turned)
     surface = pygame.Surface(SIZE)
-    Picture().draw(surface, camera, Sight(scene, scene.bodies, frame, aim=aim))
+    Renderer().draw(surface, camera, Snapshot(scene, scene.bodies, frame, aim=aim))
     return pygame.surfarray.array3d(surface).astype(int), camera
 
 
@@ -82,19 +82,21 @@ def test_cue_lies_behind_the_ball() -> None:
     scene = loads(AT_REST)
     cue = scene.bodies.names.index("cue")
     without, camera = drawn(scene, frame_of(scene))
-    picture, _ = drawn(scene, frame_of(scene), Aim(cue, (0.5, 0.5), 0.0, 0.0, 0.0))
+    picture, _ = drawn(scene, frame_of(scene), CueAim(cue, (0.5, 0.5), 0.0, 0.0, 0.0))
     assert np.abs(at(picture, camera, (0.3, 0.5)) - at(without, camera, (0.3, 0.5))).max() > 60
-    back, _ = drawn(scene, frame_of(scene), Aim(cue, (0.5, 0.5), 0.0, 0.0, 0.2))
+    back, _ = drawn(scene, frame_of(scene), CueAim(cue, (0.5, 0.5), 0.0, 0.0, 0.2))
     beside = (0.5 - 0.0286 - 0.1, 0.5)  # which the cue leaves when it is drawn back
     assert np.abs(at(back, camera, beside) - at(without, camera, beside)).max() < 40
 
 
 def test_numbers_and_stripes_are_painted_on_the_ball() -> None:
-    solid = coat_of("3", (208, 36, 36), struck=False)
-    stripe = coat_of("11", (226, 138, 134), struck=False)
+    solid = texture_of("3", (208, 36, 36), struck=False)
+    stripe = texture_of("11", (226, 138, 134), struck=False)
     face, side, pole = np.array([[0.0, 0.4, 0.9165]]), np.array([[1.0, 0.0, 0.0]]), np.array([[0.0, 1.0, 0.0]])
-    assert painted(solid, side, 20.0)[0] == pytest.approx(solid.colour, abs=1e-9)
-    assert painted(solid, pole, 20.0)[0] == pytest.approx(solid.colour, abs=1e-9)
-    assert painted(solid, face, 20.0)[0].min() > painted(solid, side, 20.0)[0].min() + 60  # the disc of its number
-    assert painted(stripe, pole, 20.0)[0] == pytest.approx(IVORY, abs=1e-9)
-    assert painted(stripe, side, 20.0)[0] == pytest.approx(stripe.colour, abs=1e-9)
+    assert paint_texture(solid, side, 20.0)[0] == pytest.approx(solid.colour, abs=1e-9)
+    assert paint_texture(solid, pole, 20.0)[0] == pytest.approx(solid.colour, abs=1e-9)
+    assert (
+        paint_texture(solid, face, 20.0)[0].min() > paint_texture(solid, side, 20.0)[0].min() + 60
+    )  # the disc of its number
+    assert paint_texture(stripe, pole, 20.0)[0] == pytest.approx(IVORY, abs=1e-9)
+    assert paint_texture(stripe, side, 20.0)[0] == pytest.approx(stripe.colour, abs=1e-9)

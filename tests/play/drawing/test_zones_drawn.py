@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from drawn import at, ball, drawn, frame, scene, sight
 
-from sandbox.play.drawing.palette import BACKGROUND, SOLID
-from sandbox.play.picking import overlapping
 from sandbox.trajectory import Contacts
+from sandbox.window.hit_test import overlapping_bodies
+from sandbox.window.render.palette import BACKGROUND, SOLID
 
 ZONES: dict[str, tuple[dict[str, Any], tuple[float, float], tuple[float, float]]] = {
     "circle": ({"position": [0, 0], "radius": 1.5}, (0.5, 0.5), (1.3, 1.3)),
@@ -70,4 +70,4 @@ def test_who_lies_over_another_on_another_layer_overlaps_nothing() -> None:
     balls = [ball(0, 0), {**ball(0.5, 0), "layer": "up"}, ball(3, 0), ball(3.5, 0)]
     layered = scene(balls=balls, wall=[{"points": [[-1, 0], [1, 0]], "layers": ["up"]}])
     known = frame(layered, layer=layered.bodies.layer)
-    assert overlapping(layered, layered.bodies, known).tolist() == [False, True, True, True]
+    assert overlapping_bodies(layered, layered.bodies, known).tolist() == [False, True, True, True]

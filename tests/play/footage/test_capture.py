@@ -12,11 +12,10 @@ import pytest
 from films import gif_frames, mp4_frames
 from PIL import Image
 
-from sandbox.play.footage import capture
-from sandbox.play.footage.capture import Recorder, recorder_for, recorder_in, screenshot, size_within
-from sandbox.play.footage.colours import FAR, Colours
-from sandbox.play.footage.outfile import CaptureError, safe
-from sandbox.play.footage.still import fitted, offscreen, pixels
+from sandbox.window.capture import recorder as capture
+from sandbox.window.capture.gif import FAR, PaletteQuantiser
+from sandbox.window.capture.image_files import CaptureError, fit_image, offscreen, rgb_pixels, safe_stem
+from sandbox.window.capture.recorder import Recorder, recorder_for, recorder_in, screenshot, size_within
 
 SIZE = (96, 54)
 BACK, BALL = (20, 24, 31), (86, 180, 233)
@@ -40,7 +39,7 @@ def test_screenshot_takes_the_first_free_number_and_shows_the_surface(tmp_path: 
     assert [path.name for path in paths] == ["sandbox-bounce-1.png", "sandbox-bounce-3.png"]
     assert (tmp_path / "sandbox-bounce-2.png").read_bytes() == b"mine"
     with Image.open(paths[1]) as image:
-        assert np.array_equal(np.asarray(image.convert("RGB")), pixels(picture(), SIZE))
+        assert np.array_equal(np.asarray(image.convert("RGB")), rgb_pixels(picture(), SIZE))
     assert len(left_in(tmp_path)) == 3
 
 
@@ -79,8 +78,8 @@ def test_file_system_without_links_is_served_too(tmp_path: Path, monkeypatch: py
     ],
 )
 def test_names_become_safe_for_a_file(name: str, stem: str) -> None:
-    assert safe(name) == stem
-    assert re.fullmatch(r"[A-Za-z0-9_-]{1,60}", safe(name * 100))
+    assert safe_stem(name) == stem
+    assert re.fullmatch(r"[A-Za-z0-9_-]{1,60}", safe_stem(name * 100))
 
 
 def test_folder_that_is_not_there_is_told(tmp_path: Path) -> None:
@@ -134,7 +133,7 @@ def test_gif_has_every_picture_where_it_was_for_as_long_as_it_was(tmp_path: Path
     frames, shown = gif_frames(recorder.close())
     assert shown == [30, 40, 30, 30, 40]  # whole 0.01 s at each end: 33.3, 66.7, 100, 133.3, 166.7 ms
     for x, frame in zip(places, frames, strict=True):
-        assert np.array_equal(frame, pixels(picture(x), SIZE))  # two colours fit any palette
+        assert np.array_equal(frame, rgb_pixels(picture(x), SIZE))  # two colours fit any palette
     with Image.open(tmp_path / "film.gif") as image:
         assert image.info["loop"] == 0
 
@@ -155,7 +154,7 @@ def test_gif_leaves_out_what_viewers_would_show_too_long(tmp_path: Path) -> None
         recorder.add(picture(10 + k % 60), 1 / 60)
     frames, shown = gif_frames(recorder.close())
     assert (len(frames), sum(shown)) == (60, 2000)
-    assert np.array_equal(frames[1], pixels(picture(12), SIZE))
+    assert np.array_equal(frames[1], rgb_pixels(picture(12), SIZE))
 
 
 def test_gif_of_many_colours_stays_close_and_does_not_flicker(tmp_path: Path) -> None:
@@ -186,8 +185,8 @@ def test_gif_gets_a_new_palette_for_new_colours(tmp_path: Path) -> None:
 
 
 def test_palette_is_kept_where_it_serves() -> None:
-    colours = Colours(255)
-    renewed = [colours.reduce(pixels(picture(x), SIZE))[2] for x in (20, 30, 40)]
+    colours = PaletteQuantiser(255)
+    renewed = [colours.reduce(rgb_pixels(picture(x), SIZE))[2] for x in (20, 30, 40)]
     assert renewed == [True, False, False]
 
 
@@ -290,18 +289,18 @@ def test_larger_surface_is_averaged_down(tmp_path: Path) -> None:
     large = offscreen((192, 108))
     large.fill((0, 0, 0))
     large.fill((200, 100, 0), (0, 0, 192, 1))
-    assert tuple(pixels(large, SIZE)[0, 10]) == (100, 50, 0)
-    assert tuple(pixels(large, SIZE)[1, 10]) == (0, 0, 0)
+    assert tuple(rgb_pixels(large, SIZE)[0, 10]) == (100, 50, 0)
+    assert tuple(rgb_pixels(large, SIZE)[1, 10]) == (0, 0, 0)
 
 
 def test_other_proportions_get_bars() -> None:
     white = offscreen((50, 50))
     white.fill((255, 255, 255))
-    seen = pixels(white, (100, 50))
+    seen = rgb_pixels(white, (100, 50))
     assert (seen[:, 25:75] == 255).all()
     assert (seen[:, :25] == BACK).all()
     assert (seen[:, 75:] == BACK).all()
-    assert fitted(white, (50, 50)) is white
+    assert fit_image(white, (50, 50)) is white
 
 
 @pytest.mark.parametrize(

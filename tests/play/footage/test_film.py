@@ -7,16 +7,16 @@ import pytest
 
 from sandbox.action import Action, Move, Remove, Spawn
 from sandbox.measure.run import run
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import BACKGROUND, SKY
-from sandbox.play.footage.crowd import crowd
-from sandbox.play.footage.film import LINGER, Film, bodies_of, moments, scene_of
-from sandbox.play.footage.still import offscreen, pixels
-from sandbox.play.sight import OVERLAYS
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
+from sandbox.window.camera import Camera
+from sandbox.window.capture.film import LINGER, RecordedRun, bodies_of_run, frame_times, scene_of_run
+from sandbox.window.capture.image_files import offscreen, rgb_pixels
+from sandbox.window.playback.snapshot import OVERLAYS
+from sandbox.window.render.palette import BACKGROUND, SKY
+from sandbox.window.view_bounds import crowd_bounds
 
 FALL = """
 title = "Fall"
@@ -52,8 +52,8 @@ restitution = 1
 """
 
 
-def film_of(text: str = FALL, *actions: Action) -> Film:
-    return Film(run(loads(text), actions=actions))
+def film_of(text: str = FALL, *actions: Action) -> RecordedRun:
+    return RecordedRun(run(loads(text), actions=actions))
 
 
 def test_frames_are_the_stored_ones_at_their_times() -> None:
@@ -116,7 +116,7 @@ def test_state_that_is_no_number_is_not_there() -> None:
     stored = run(loads(FALL))
     position = stored.position.copy()
     position[5:, 0] = np.nan, np.inf
-    film = Film(replace(stored, position=position))
+    film = RecordedRun(replace(stored, position=position))
     assert film.frame(0.44).present.all()
     assert np.array_equal(film.frame(0.44).position[0], position[4, 0])
     assert film.frame(0.55).present.tolist() == [False, True]
@@ -129,7 +129,7 @@ def test_state_that_is_no_number_is_not_there() -> None:
 def test_moments_lie_at_k_over_fps_and_fill_the_time(
     start: float, end: float, fps: float, speed: float, count: int
 ) -> None:
-    times, shown = moments(start, end, fps, speed)
+    times, shown = frame_times(start, end, fps, speed)
     assert len(times) == len(shown) == count
     assert times == pytest.approx(start + np.arange(count) / fps * speed, rel=1e-14)  # a few roundings
     assert shown[:-1] == pytest.approx(1 / fps, rel=1e-14)  # as above
@@ -176,7 +176,7 @@ def test_pixels_of_a_body_are_where_the_run_says(time: float) -> None:
     film, size = film_of(), (320, 180)
     surface, camera = offscreen(size), Camera.fitting(film.box, size)
     film.draw(surface, camera, time, caption=False)
-    seen = pixels(surface, size).astype(int)
+    seen = rgb_pixels(surface, size).astype(int)
     x, y = camera.to_screen(film.frame(time).position[0])
     reach = 0.5 * camera.scale
     for dx, dy in ((0.0, 0.6), (-0.6, 0.0), (0.0, -0.6)):  # not on the spoke that shows its angle
@@ -195,7 +195,7 @@ def test_caption_is_written_into_the_corner_alone() -> None:
     for caption in (False, True):
         surface = offscreen(size)
         film.draw(surface, camera, 0.5, caption=caption)
-        pictures.append(pixels(surface, size).astype(int))
+        pictures.append(rgb_pixels(surface, size).astype(int))
     rows, columns = np.nonzero(np.abs(pictures[1] - pictures[0]).sum(axis=2))
     assert len(rows) > 100  # a few letters
     assert rows.max() < 60
@@ -209,7 +209,7 @@ def test_energy_is_drawn_into_its_corner_at_any_time() -> None:
         plain, graph = offscreen(size), offscreen(size)
         film.draw(plain, camera, time)
         film.draw(graph, camera, time, frozenset({"shapes", "energy"}))
-        rows, columns = np.nonzero((pixels(plain, size) != pixels(graph, size)).any(axis=2))
+        rows, columns = np.nonzero((rgb_pixels(plain, size) != rgb_pixels(graph, size)).any(axis=2))
         assert rows.min() > 540 / 2
         assert columns.min() > 960 / 2
 
@@ -220,24 +220,24 @@ def test_every_overlay_can_be_drawn() -> None:
     camera = Camera.fitting(film.box, size)
     film.draw(plain, camera, 0.35)
     film.draw(full, camera, 0.35, frozenset(OVERLAYS))
-    assert not np.array_equal(pixels(plain, size), pixels(full, size))
+    assert not np.array_equal(rgb_pixels(plain, size), rgb_pixels(full, size))
 
 
 def test_crowd_is_all_of_a_few_and_without_strays_of_many() -> None:
     rng = np.random.default_rng(3)
     position = rng.uniform(-1.0, 1.0, (50, 40, 2))
-    low, high = crowd(position, np.full(40, 0.1), np.empty((0, 2)))
+    low, high = crowd_bounds(position, np.full(40, 0.1), np.empty((0, 2)))
     assert np.array([low, high]) == pytest.approx(
         np.array([position.min(axis=(0, 1)) - 0.1, position.max(axis=(0, 1)) + 0.1])
     )
     position[:, 7] = np.linspace(0.0, 1e6, 50)[:, None]
     position[3, 8], position[9, 9] = np.nan, np.inf
-    low, high = crowd(position, np.full(40, 0.1), np.array([[-1.5, 0.0], [1e9, 0.0]]))
+    low, high = crowd_bounds(position, np.full(40, 0.1), np.array([[-1.5, 0.0], [1e9, 0.0]]))
     assert (low[0], high[0]) == (-1.5, pytest.approx(1.1, abs=0.05))  # m: the last bit is one of 38 bodies' extremes
     single = np.zeros((3, 1, 2))
     single[:, 0, 1] = 0.0, 5.0, 10.0
-    assert crowd(single, np.array([0.5]), np.empty((0, 2))) == ((-0.5, -0.5), (0.5, 10.5))
-    assert crowd(np.empty((1, 0, 2)), np.empty(0), np.empty((0, 2))) == ((-1.0, -1.0), (1.0, 1.0))
+    assert crowd_bounds(single, np.array([0.5]), np.empty((0, 2))) == ((-0.5, -0.5), (0.5, 10.5))
+    assert crowd_bounds(np.empty((1, 0, 2)), np.empty(0), np.empty((0, 2))) == ((-1.0, -1.0), (1.0, 1.0))
 
 
 def damaged(**info: object) -> Trajectory:
@@ -256,15 +256,15 @@ def damaged(**info: object) -> Trajectory:
 )
 def test_run_that_does_not_tell_what_it_is_of_is_refused(info: dict[str, object], path: str) -> None:
     with pytest.raises(SceneError) as caught:
-        Film(damaged(**info), "my run")
+        RecordedRun(damaged(**info), "my run")
     assert {(fault.file, fault.path) for fault in caught.value.faults} == {("my run", path)}
 
 
 def test_scene_and_bodies_are_those_of_the_run() -> None:
     scene = loads(FALL)
     stored = run(scene)
-    assert scene_of(stored) == scene
-    assert bodies_of(stored, scene) is scene.bodies
+    assert scene_of_run(stored) == scene
+    assert bodies_of_run(stored, scene) is scene.bodies
 
 
 def test_same_time_is_computed_once() -> None:

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sandbox.games.player import Player
+from sandbox.games.pinball.view import RADIUS
+from sandbox.games.players import PlayerSpec
 from sandbox.measure.run import run
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.lamps import RADIUS
-from sandbox.play.footage.film import Film
-from sandbox.play.footage.still import offscreen, pixels
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import load
 from sandbox.trajectory import Trajectory
+from sandbox.window.camera import Camera
+from sandbox.window.capture.film import RecordedRun
+from sandbox.window.capture.image_files import offscreen, rgb_pixels
 
 CLASSIC = Path(__file__).parents[3] / "scenes" / "pinball" / "classic.toml"
 
@@ -22,13 +22,13 @@ CLASSIC = Path(__file__).parents[3] / "scenes" / "pinball" / "classic.toml"
 @pytest.fixture(scope="module")
 def played() -> Trajectory:
     scene = load(CLASSIC, ("world.duration=8.0",))
-    return run(scene, audit=False, bout=Player("skilled").bout(scene))
+    return run(scene, audit=False, bout=PlayerSpec("skilled").bout(scene))
 
 
 def test_picture_of_a_run_shows_the_lamps_that_were_lit(played: Trajectory, tmp_path: Path) -> None:
     played.save(tmp_path / "run.npz")
-    film = Film(Trajectory.load(tmp_path / "run.npz"))
-    dark = Film(replace(played, info=played.info | {"game": None}))
+    film = RecordedRun(Trajectory.load(tmp_path / "run.npz"))
+    dark = RecordedRun(replace(played, info=played.info | {"game": None}))
     time, names = next((time, names) for time, names in played.info["game"]["lamps"] if names)
     assert film.sight(time, frozenset()).lit == frozenset(names)
     lamps = {part.name: part.light for part in film.scene.play.parts}
@@ -37,7 +37,7 @@ def test_picture_of_a_run_shows_the_lamps_that_were_lit(played: Trajectory, tmp_
         surface = offscreen((540, 960))
         camera = Camera.fitting(each.box, (540, 960))
         each.draw(surface, camera, time, caption=False)
-        shots.append(pixels(surface, (540, 960)).astype(int).sum(axis=2))
+        shots.append(rgb_pixels(surface, (540, 960)).astype(int).sum(axis=2))
     brighter = np.argwhere(shots[0] > shots[1])
     assert len(brighter)
     rows_and_columns = camera.to_screen(np.asarray([lamps[name] for name in names]))[:, ::-1]
@@ -48,4 +48,4 @@ def test_picture_of_a_run_shows_the_lamps_that_were_lit(played: Trajectory, tmp_
 def test_lamps_that_are_none_are_told(played: Trajectory) -> None:
     info = played.info | {"game": played.info["game"] | {"lamps": [["never", 3]]}}
     with pytest.raises(SceneError, match=r"info\.game: invalid lamp record"):
-        Film(replace(played, info=info))
+        RecordedRun(replace(played, info=info))

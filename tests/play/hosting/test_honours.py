@@ -9,8 +9,8 @@ import pygame
 import pytest
 
 from sandbox.games.high_scores import FILE, opened
-from sandbox.play.instruments import honours_panel
-from sandbox.play.instruments.honours_panel import HonoursPanel
+from sandbox.window.ui import high_score_dialog as honours_panel
+from sandbox.window.ui.high_score_dialog import HighScoreView
 
 TABLE = "pinball: Test"
 
@@ -37,7 +37,7 @@ class Hosted:
         self.live = SimpleNamespace(scene=SimpleNamespace(title="Test", play=SimpleNamespace(game="pinball")))
 
 
-def press(panel: HonoursPanel, *keys: int | str) -> list[bool]:
+def press(panel: HighScoreView, *keys: int | str) -> list[bool]:
     found = []
     for key in keys:
         code, text = (key, "") if isinstance(key, int) else (ord(key.lower()), key)
@@ -45,15 +45,15 @@ def press(panel: HonoursPanel, *keys: int | str) -> list[bool]:
     return found
 
 
-def ended(host: Hosted | None = None) -> HonoursPanel:
+def ended(host: Hosted | None = None) -> HighScoreView:
     """A panel that has just seen a game end."""
-    panel = HonoursPanel()
+    panel = HighScoreView()
     panel.watch(host or Hosted())
     return panel
 
 
 def test_initials_are_asked_for_at_the_end_and_kept() -> None:
-    host, panel = Hosted(over=None), HonoursPanel()
+    host, panel = Hosted(over=None), HighScoreView()
     panel.watch(host)
     assert panel.honours.entering is None
     assert press(panel, "a") == [False]
@@ -115,7 +115,7 @@ def test_going_back_asks_anew() -> None:
 
 def test_damage_is_told(folder: Path) -> None:
     (folder / FILE).write_text("{", encoding="utf-8")
-    panel = HonoursPanel()
+    panel = HighScoreView()
     (note,) = panel.watch(Hosted())
     assert "damaged" in note
     assert panel.honours.entering is not None

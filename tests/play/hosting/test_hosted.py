@@ -12,24 +12,22 @@ from toy_game import TOY, Toy
 from windowed import turned, window_on
 
 from sandbox.games import registry
+from sandbox.games.contract import Control
 from sandbox.games.registry import RULES, rules_of
-from sandbox.games.rules import Control
 from sandbox.measure.replay import rerun
-from sandbox.play.drawing.palette import WARNING
-from sandbox.play.framing import framing
-from sandbox.play.hosting.control_keys import KeyNameError, codes_of, told
-from sandbox.play.hosting.gamepad import LAYOUTS, PLAYSTATION, RUNGS, XBOX, Gamepads, layout_of
-from sandbox.play.hosting.host import Host
-from sandbox.play.hosting.jingle import FIGURES, figure_of, jingle
-from sandbox.play.hosting.past import MOST, Board, Past, Shown
-from sandbox.play.instruments.score_panel import draw_score
-from sandbox.play.running.live import Live
-from sandbox.play.sound import Sounds
-from sandbox.play.stage import Stage
-from sandbox.play.window import Window
 from sandbox.recording import Recording
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find, shipped
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.game_host import MAX_ENTRIES, DisplayHistory, GameDisplay, GameHost, ScoreDisplay
+from sandbox.window.input.bindings import KeyNameError, codes_of, control_help
+from sandbox.window.input.gamepad import LAYOUTS, PLAYSTATION, RUNGS, XBOX, Gamepads, layout_of
+from sandbox.window.playback.live import LiveView
+from sandbox.window.render.palette import WARNING
+from sandbox.window.sound import CUE_NOTES, Sounds, cue_notes, cue_sound
+from sandbox.window.ui.score_panel import draw_score
+from sandbox.window.view_bounds import view_bounds
 
 UP, LEFT, R, P = pygame.K_UP, pygame.K_LEFT, pygame.K_r, pygame.K_p
 
@@ -52,23 +50,23 @@ def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def window(tmp_path: Path) -> Iterator[Window]:
+def window(tmp_path: Path) -> Iterator[App]:
     with window_on(TOY, tmp_path, (1000, 640)) as opened:
         opened.stage.start_game()
         yield opened
 
 
-def presses_of(live: Live) -> list[tuple[str, float]]:
+def presses_of(live: LiveView) -> list[tuple[str, float]]:
     assert live.session.game is not None
     return [(press.control, press.value) for press in live.session.game.presses]
 
 
-def host_of(window: Window) -> Host:
+def host_of(window: App) -> GameHost:
     assert window.stage.host is not None
     return window.stage.host
 
 
-def test_keys_set_controls_until_they_are_let_go(window: Window) -> None:
+def test_keys_set_controls_until_they_are_let_go(window: App) -> None:
     live = turned(window, key(UP))
     assert presses_of(live) == [("kick", 1.0)]
     turned(window, key(UP))  # the keyboard repeats what is held
@@ -77,7 +75,7 @@ def test_keys_set_controls_until_they_are_let_go(window: Window) -> None:
     assert host_of(window).rules.score == 0.5
 
 
-def test_control_is_let_go_with_the_last_of_its_keys(window: Window) -> None:
+def test_control_is_let_go_with_the_last_of_its_keys(window: App) -> None:
     turned(window, key(UP), key(pygame.K_LSHIFT))
     live = turned(window, key_up(UP))
     assert presses_of(live) == [("kick", 1.0)]
@@ -85,12 +83,12 @@ def test_control_is_let_go_with_the_last_of_its_keys(window: Window) -> None:
     assert presses_of(live)[-1] == ("kick", 0.0)
 
 
-def test_who_looks_elsewhere_lets_go(window: Window) -> None:
+def test_who_looks_elsewhere_lets_go(window: App) -> None:
     turned(window, key(UP))
     assert presses_of(turned(window, FOCUS_LOST))[-1] == ("kick", 0.0)
 
 
-def test_help_lists_controls_and_scene_keys_are_theirs(window: Window) -> None:
+def test_help_lists_controls_and_scene_keys_are_theirs(window: App) -> None:
     claims = window.desk.claims(window.stage)
     assert claims.told == (
         ("Up or Left Shift", "kick it; gamepad: A, stick up"),
@@ -101,11 +99,11 @@ def test_help_lists_controls_and_scene_keys_are_theirs(window: Window) -> None:
 
 
 def test_help_tells_the_cross_of_a_gamepad_from_its_stick() -> None:
-    (_, what), *_ = told((Control("go", "go", ("left",), "y left +leftx up"),))
+    (_, what), *_ = control_help((Control("go", "go", ("left",), "y left +leftx up"),))
     assert what == "go; gamepad: Y, D-pad left, stick right, D-pad up"
 
 
-def test_restart_is_a_new_game(window: Window) -> None:
+def test_restart_is_a_new_game(window: App) -> None:
     turned(window, key(UP), elapsed=0.3)
     old = host_of(window)
     live = turned(window, key(R), elapsed=0.0)
@@ -116,13 +114,13 @@ def test_restart_is_a_new_game(window: Window) -> None:
     assert presses_of(live) == []
 
 
-def test_reload_is_a_new_game(window: Window) -> None:
+def test_reload_is_a_new_game(window: App) -> None:
     turned(window, key(UP), elapsed=0.3)
     live = turned(window, key(pygame.K_l, mod=pygame.KMOD_CTRL), elapsed=0.0)
     assert (host_of(window).rules.score, presses_of(live)) == (0, [])
 
 
-def test_going_back_brings_the_score_of_then(window: Window) -> None:
+def test_going_back_brings_the_score_of_then(window: App) -> None:
     for _ in range(30):
         live = turned(window)
     scores = [host_of(window).rules.score]
@@ -136,7 +134,7 @@ def test_going_back_brings_the_score_of_then(window: Window) -> None:
     assert host_of(window).rules.score == scores[0]
 
 
-def test_looking_back_shows_the_score_and_lamps_of_then(window: Window) -> None:
+def test_looking_back_shows_the_score_and_lamps_of_then(window: App) -> None:
     seen = {}
     for _ in range(30):
         live = turned(window)
@@ -152,10 +150,10 @@ def test_looking_back_shows_the_score_and_lamps_of_then(window: Window) -> None:
 
 
 def test_past_of_another_way_is_forgotten() -> None:
-    def shown(score: str) -> Shown:
-        return Shown(Board(score, (), None), frozenset())
+    def shown(score: str) -> GameDisplay:
+        return GameDisplay(ScoreDisplay(score, (), None), frozenset())
 
-    past = Past()
+    past = DisplayHistory()
     assert past.at(1.0) is None
     for time in range(10):
         past.note(float(time), float(time), shown(str(time // 2)))
@@ -167,17 +165,17 @@ def test_past_of_another_way_is_forgotten() -> None:
 
 
 def test_past_of_a_long_game_is_thinned_where_it_is_long_ago() -> None:
-    past = Past()
-    for time in range(3 * MOST):
-        past.note(float(time), float(time), Shown(Board(str(time), (), None), frozenset()))
-    found = [int(then.board.score) for time in range(3 * MOST) if (then := past.at(float(time)))]
-    assert len(set(found)) <= MOST
-    assert found[-100:] == list(range(3 * MOST - 100, 3 * MOST))
+    past = DisplayHistory()
+    for time in range(3 * MAX_ENTRIES):
+        past.note(float(time), float(time), GameDisplay(ScoreDisplay(str(time), (), None), frozenset()))
+    found = [int(then.board.score) for time in range(3 * MAX_ENTRIES) if (then := past.at(float(time)))]
+    assert len(set(found)) <= MAX_ENTRIES
+    assert found[-100:] == list(range(3 * MAX_ENTRIES - 100, 3 * MAX_ENTRIES))
     assert found == sorted(found)
     assert found[0] == 0
 
 
-def test_what_was_held_later_is_let_go_of_on_another_way(window: Window) -> None:
+def test_what_was_held_later_is_let_go_of_on_another_way(window: App) -> None:
     turned(window, key(LEFT), elapsed=0.2)
     held = turned(window, elapsed=0.2).session.step_number
     live = turned(window, key_up(LEFT), elapsed=0.2)
@@ -187,7 +185,7 @@ def test_what_was_held_later_is_let_go_of_on_another_way(window: Window) -> None
     assert presses_of(live) == [("aim", 1.0), ("kick", 1.0), ("aim", 0.0), ("kick", 0.0)]
 
 
-def test_pause_and_steps_keep_the_game(window: Window) -> None:
+def test_pause_and_steps_keep_the_game(window: App) -> None:
     turned(window, key(P))
     live = turned(window, key(UP), key_up(UP), elapsed=0.5)
     step = live.session.step_number
@@ -197,7 +195,7 @@ def test_pause_and_steps_keep_the_game(window: Window) -> None:
     assert host_of(window).rules.score == 0.5
 
 
-def test_engine_changes_and_the_game_goes_on(window: Window) -> None:
+def test_engine_changes_and_the_game_goes_on(window: App) -> None:
     turned(window, key(UP), key_up(UP), elapsed=0.3)
     assert window.stage.switch("reference")
     live = turned(window, key(UP), key_up(UP), elapsed=0.3)
@@ -208,7 +206,7 @@ def test_engine_changes_and_the_game_goes_on(window: Window) -> None:
     assert run.info["game"]["otherwise"] is None
 
 
-def test_session_that_is_saved_replays(window: Window, tmp_path: Path) -> None:
+def test_session_that_is_saved_replays(window: App, tmp_path: Path) -> None:
     turned(window, key(LEFT), elapsed=0.3)
     turned(window, key(UP), key_up(UP), elapsed=0.3)
     turned(window, key(pygame.K_s, mod=pygame.KMOD_CTRL), elapsed=0.0)
@@ -219,10 +217,10 @@ def test_session_that_is_saved_replays(window: Window, tmp_path: Path) -> None:
     assert (run.info["state_hash"], run.info["game"]["score"]) == (recording.state_hash, recording.score)
 
 
-def test_panel_is_drawn_and_tells_the_end(window: Window) -> None:
+def test_panel_is_drawn_and_tells_the_end(window: App) -> None:
     turned(window)
     host = host_of(window)
-    assert host.shown().board == Board("0.0", (("bounces", "0"), ("aim", "0.50")), None)
+    assert host.shown().board == ScoreDisplay("0.0", (("bounces", "0"), ("aim", "0.50")), None)
     going = pygame.surfarray.array3d(window.surface)
     rules = host.rules
     assert isinstance(rules, Toy)
@@ -234,17 +232,17 @@ def test_panel_is_drawn_and_tells_the_end(window: Window) -> None:
     assert presses_of(turned(window, key(UP))) == []  # nobody plays any more
 
 
-def lies_clear(window: Window) -> bool:
+def lies_clear(window: App) -> bool:
     """Tell whether the whole scene is seen beside the score panel and the state of things."""
     assert window.stage.show is not None
-    corners = window.camera.to_screen(np.asarray(framing(window.stage.show.scene)))
+    corners = window.camera.to_screen(np.asarray(view_bounds(window.stage.show.scene)))
     (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     field = pygame.Rect(round(left), round(top), int(right - left), int(bottom - top))
     return window.desk.free.contains(field) and field.collidelist(window.desk.taken(window.stage)) < 0
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (1000, 300), (640, 480)])  # the last has the score at the bottom
-def test_scene_lies_clear_of_the_score_panel(window: Window, size: tuple[int, int]) -> None:
+def test_scene_lies_clear_of_the_score_panel(window: App, size: tuple[int, int]) -> None:
     turned(window)
     assert lies_clear(window)
     window.resize(pygame.Surface(size))
@@ -254,7 +252,7 @@ def test_scene_lies_clear_of_the_score_panel(window: Window, size: tuple[int, in
     assert window.camera == before  # nothing has grown
 
 
-def test_scene_makes_room_as_the_panel_grows_unless_somebody_moved_it(window: Window) -> None:
+def test_scene_makes_room_as_the_panel_grows_unless_somebody_moved_it(window: App) -> None:
     turned(window)
     rules, before = host_of(window).rules, window.camera
     assert isinstance(rules, Toy)
@@ -277,7 +275,7 @@ def test_panel_stays_in_what_is_free(size: tuple[int, int], over: str | None) ->
     surface = pygame.Surface(size)
     lines = tuple((f"label {k}", f"{10**k} m/s") for k in range(8))
     free = surface.get_rect()
-    board = Board("1 234 567", lines, over)
+    board = ScoreDisplay("1 234 567", lines, over)
     rect = draw_score(surface, board, free, 100, 1.0)
     assert rect.width <= size[0]
     if min(size) > 200:
@@ -300,7 +298,7 @@ def joy(kind: int, number: int = 7, **more: Any) -> pygame.event.Event:
 
 
 @pytest.fixture
-def plugged(window: Window) -> Callable[[str], None]:
+def plugged(window: App) -> Callable[[str], None]:
     """Plug a gamepad in, as the hardware would."""
 
     def plug(name: str) -> None:
@@ -310,7 +308,7 @@ def plugged(window: Window) -> Callable[[str], None]:
     return plug
 
 
-def test_gamepad_plays(window: Window, plugged: Callable[[str], None]) -> None:
+def test_gamepad_plays(window: App, plugged: Callable[[str], None]) -> None:
     plugged("Xbox 360 Controller")
     assert ("info", "gamepad connected: Xbox 360 Controller") in window.stage.messages.shown()
     live = turned(window, joy(pygame.JOYBUTTONDOWN, button=0))
@@ -326,7 +324,7 @@ def test_gamepad_plays(window: Window, plugged: Callable[[str], None]) -> None:
     assert presses_of(live)[-1] == ("kick", 1.0)
 
 
-def test_gamepad_that_is_pulled_out_lets_go(window: Window, plugged: Callable[[str], None]) -> None:
+def test_gamepad_that_is_pulled_out_lets_go(window: App, plugged: Callable[[str], None]) -> None:
     plugged("DualSense Wireless Controller")
     turned(window, joy(pygame.JOYBUTTONDOWN, button=0))
     live = turned(window, joy(pygame.JOYDEVICEREMOVED))
@@ -337,7 +335,7 @@ def test_gamepad_that_is_pulled_out_lets_go(window: Window, plugged: Callable[[s
 
 
 @pytest.mark.parametrize(("name", "start"), [("Xbox Series X Controller", 7), ("PS4 Controller", 6)])
-def test_start_pauses(window: Window, plugged: Callable[[str], None], name: str, start: int) -> None:
+def test_start_pauses(window: App, plugged: Callable[[str], None], name: str, start: int) -> None:
     plugged(name)
     turned(window, joy(pygame.JOYBUTTONDOWN, button=start))
     assert window.stage.paused
@@ -346,7 +344,7 @@ def test_start_pauses(window: Window, plugged: Callable[[str], None], name: str,
 
 
 def test_hats_and_crosses_are_the_same() -> None:
-    from sandbox.play.hosting.gamepad import _words
+    from sandbox.window.input.gamepad import _words
 
     assert _words(joy(pygame.JOYHATMOTION, hat=0, value=(-1, 1)), XBOX) == {
         "left": 1.0,
@@ -403,10 +401,10 @@ def test_controls_of_every_shipped_game_can_be_reached(path: Path, monkeypatch: 
     words = {word for layout in (XBOX, PLAYSTATION) for word in (*layout.buttons.values(), *layout.triggers.values())}
     words |= {f"{sign}{stick}" for stick in XBOX.sticks.values() for sign in "+-"} | {"left", "right", "up", "down"}
     assert {word for control in rules.controls for word in (control.pad or "").split()} <= words
-    assert all(about for _, about in told(rules.controls))
+    assert all(about for _, about in control_help(rules.controls))
 
 
-def test_cues_are_heard_once_sound_is_asked_for(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cues_are_heard_once_sound_is_asked_for(window: App, monkeypatch: pytest.MonkeyPatch) -> None:
     heard: list[str] = []
     monkeypatch.setattr(Sounds, "cue", lambda _, name: heard.append(name))
     for _ in range(30):
@@ -420,10 +418,10 @@ def test_cues_have_sounds_of_their_own() -> None:
     assert sounds.enable()
     assert sounds.cue("win")
     sounds.disable()
-    assert figure_of("bumper") == figure_of("bumper")
-    assert len({figure_of(f"cue {k}") for k in range(40)}) > 15
-    for cue in (*FIGURES, "bumper", ""):
-        samples = jingle(cue)
+    assert cue_notes("bumper") == cue_notes("bumper")
+    assert len({cue_notes(f"cue {k}") for k in range(40)}) > 15
+    for cue in (*CUE_NOTES, "bumper", ""):
+        samples = cue_sound(cue)
         assert samples.dtype == np.int16
         assert 1000 < np.abs(samples).max() <= 0.8 * 32767 + 1
         assert np.abs(samples[-16:]).max() < 400  # it ends in silence
@@ -433,7 +431,7 @@ def test_scene_that_its_game_does_not_fit_is_shown_without(tmp_path: Path, monke
     monkeypatch.undo()
     file = tmp_path / "toy.toml"
     file.write_text(TOY)  # landing needs a ship
-    stage = Stage()
+    stage = AppState()
     assert stage.open(file)
     assert stage.host is None
     assert stage.live is not None
@@ -443,7 +441,7 @@ def test_scene_that_its_game_does_not_fit_is_shown_without(tmp_path: Path, monke
 
 
 def test_a_game_of_many_keys_says_where_they_are_told() -> None:
-    opened = Window(Stage(), size=(900, 600), say=lambda _: None)
+    opened = App(AppState(), size=(900, 600), say=lambda _: None)
     opened.stage.open(find("duel"))
     opened.turn(0.02)
     said = [text for _, text in opened.stage.messages.shown()]

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.play.drawing.palette import INK, PURPLE, SKY
-from sandbox.play.instruments.graph import MOST, EnergyGraph, spread
+from sandbox.window.render.palette import INK, PURPLE, SKY
+from sandbox.window.ui.energy_plot import MAX_SAMPLES, EnergyGraph, value_limits
 
 RECT = pygame.Rect(10, 10, 340, 150)
 
@@ -54,13 +54,13 @@ def test_clear_forgets_everything() -> None:
 
 def test_samples_stay_bounded_and_the_span_stays_covered() -> None:
     graph = EnergyGraph()
-    for k in range(5 * MOST):
+    for k in range(5 * MAX_SAMPLES):
         graph.add(k * 1e-4, 1.0, 1.0, 2.0)
-    assert len(graph.samples) <= MOST
+    assert len(graph.samples) <= MAX_SAMPLES
     assert graph.samples[0][0] == 0.0  # all within the last 10 s
-    for k in range(5 * MOST):
+    for k in range(5 * MAX_SAMPLES):
         graph.add(100.0 + k * 0.01, 1.0, 1.0, 2.0)
-    assert len(graph.samples) <= MOST
+    assert len(graph.samples) <= MAX_SAMPLES
     newest = graph.samples[-1][0]
     assert min(sample[0] for sample in graph.samples if sample[0] >= newest - 10.0) < newest - 9.9  # within 10 steps
 
@@ -129,7 +129,7 @@ def test_any_energies_are_drawn(samples: list[tuple[float, float, float, float]]
 
 @given(st.lists(st.floats(0, 100), min_size=1, max_size=4))
 def test_labels_keep_apart_and_in_order(wanted: list[float]) -> None:
-    places = spread(wanted, 15.0, 0.0, 100.0)
+    places = value_limits(wanted, 15.0, 0.0, 100.0)
     ordered = sorted(places)
     assert all(b - a >= 15.0 - 1e-9 for a, b in pairwise(ordered))  # rounding of sums
     assert all(-1e-9 <= place <= 100.0 for place in places)  # rounding of sums; 4 labels fit

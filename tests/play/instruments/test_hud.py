@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import sandbox.play.instruments.hud as hud
-from sandbox.play.drawing.palette import VERMILION, WARNING
-from sandbox.play.instruments.hud import draw_hud, rows
-from sandbox.play.sight import Status
+import sandbox.window.ui.hud as hud
+from sandbox.window.playback.snapshot import HudStatus
+from sandbox.window.render.palette import VERMILION, WARNING
+from sandbox.window.ui.hud import draw_hud, hud_rows
 
-QUIET = Status("Bounce", "pymunk", "dt 10 ms · 1 × 10", 1234, 12.34)
-FULL = Status(
+QUIET = HudStatus("Bounce", "pymunk", "dt 10 ms · 1 × 10", 1234, 12.34)
+FULL = HudStatus(
     "Break",
     "pymunk",
     "dt 10 ms · 4 × 10",
@@ -35,8 +35,8 @@ FULL = Status(
 )
 
 
-def texts(status: Status) -> list[str]:
-    return [row.text for row in rows(status)]
+def texts(status: HudStatus) -> list[str]:
+    return [row.text for row in hud_rows(status)]
 
 
 def test_title_engine_settings_step_and_time_are_always_told() -> None:
@@ -44,7 +44,7 @@ def test_title_engine_settings_step_and_time_are_always_told() -> None:
 
 
 def test_pause_is_told_in_red_with_its_keys() -> None:
-    (row,) = [row for row in rows(replace(QUIET, paused=True)) if "PAUSED" in row.text]
+    (row,) = [row for row in hud_rows(replace(QUIET, paused=True)) if "PAUSED" in row.text]
     assert row.text == "PAUSED  (P or Space)"
     assert row.colour == WARNING
 
@@ -63,9 +63,9 @@ def test_pause_of_a_window_without_focus_fits_beside_a_score_panel(unit: float) 
 @pytest.mark.parametrize("stopped", [True, False])
 def test_end_is_told_with_its_reason_in_place_of_the_pause(stopped: bool) -> None:
     status = replace(QUIET, paused=stopped, ended="at 3 s: it broke", real_speed=0.0)
-    (row,) = rows(status)[3:]
+    (row,) = hud_rows(status)[3:]
     assert (row.text, row.colour) == ("ENDED: at 3 s: it broke (R: restart)", WARNING)
-    (pause,) = [row for row in rows(replace(QUIET, paused=True)) if "PAUSED" in row.text]
+    (pause,) = [row for row in hud_rows(replace(QUIET, paused=True)) if "PAUSED" in row.text]
     assert row.mark != pause.mark
 
 
@@ -94,11 +94,11 @@ def test_real_speed_is_not_told_while_paused() -> None:
 
 
 def test_trust_differs_in_word_and_shape() -> None:
-    (held,) = [row for row in rows(replace(QUIET, trust="trusted")) if row.mark]
-    (lost,) = [row for row in rows(replace(QUIET, trust="lost", horizon=3.2)) if row.mark]
+    (held,) = [row for row in hud_rows(replace(QUIET, trust="trusted")) if row.mark]
+    (lost,) = [row for row in hud_rows(replace(QUIET, trust="lost", horizon=3.2)) if row.mark]
     assert (held.text, lost.text) == ("predictable", "no longer predictable (since 3.20 s)")
     assert held.mark != lost.mark
-    assert not [row for row in rows(replace(QUIET, trust="unknown")) if row.mark]
+    assert not [row for row in hud_rows(replace(QUIET, trust="unknown")) if row.mark]
 
 
 def test_ghost_tells_its_engine_and_how_far_it_is() -> None:
@@ -110,7 +110,7 @@ def test_ghost_tells_its_engine_and_how_far_it_is() -> None:
     ("missed", "text"), [(0, "no missed contacts"), (1, "1 missed contact"), (7, "7 missed contacts")]
 )
 def test_missed_contacts_are_counted_and_warned_of(missed: int, text: str) -> None:
-    (row,) = [row for row in rows(replace(QUIET, missed=missed)) if "missed" in row.text]
+    (row,) = [row for row in hud_rows(replace(QUIET, missed=missed)) if "missed" in row.text]
     assert row.text == text
     assert (row.colour == VERMILION) == (missed > 0)
 
@@ -122,7 +122,7 @@ def test_replay_recording_and_waiting_are_told() -> None:
 
 
 def drawn(
-    status: Status, size: tuple[int, int], unit: float, right: int = 0
+    status: HudStatus, size: tuple[int, int], unit: float, right: int = 0
 ) -> tuple[list[pygame.Rect], pygame.Surface]:
     """Return the plates that were laid, and the picture."""
     laid: list[pygame.Rect] = []
@@ -182,7 +182,7 @@ def test_faults_change_the_middle_of_the_picture() -> None:
 words = st.text(max_size=40) | st.sampled_from(["", " ", "x" * 500, "ball\n\x00\ud800", "a b c " * 60])
 numbers = st.floats()
 statuses = st.builds(
-    Status,
+    HudStatus,
     title=words,
     engine=words,
     settings=words,
@@ -210,6 +210,6 @@ statuses = st.builds(
 
 @given(statuses, st.integers(1, 500), st.integers(1, 400), st.floats(0.25, 4), st.integers(0, 300))
 @settings(max_examples=150, deadline=None)
-def test_any_status_is_drawn_on_any_size(status: Status, width: int, height: int, unit: float, right: int) -> None:
+def test_any_status_is_drawn_on_any_size(status: HudStatus, width: int, height: int, unit: float, right: int) -> None:
     laid, surface = drawn(status, (width, height), unit, right)
     assert all(surface.get_rect().contains(rect) for rect in laid if rect.size > (0, 0))

@@ -6,17 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.play.instruments.knob import Knob
+from sandbox.window.playback.parameters import Parameter
 
-GRAVITY = Knob("gravity", "gravity", -30, 30, -9.81, step=0.01, unit="m/s²")
-STEP = Knob("dt", "time step", 1e-4, 0.1, 0.01, log=True, step=0.1, unit="s")
-SUBSTEPS = Knob("substeps", "substeps", 1, 32, 1, step=1)
-WORDS = Knob("integrator", "integrator", value="leapfrog", choices=("explicit_euler", "leapfrog", "rk4"))
-KNOBS = [GRAVITY, STEP, SUBSTEPS, Knob("e", "restitution"), Knob("mu", "friction", 0, 2, 0.3)]
+GRAVITY = Parameter("gravity", "gravity", -30, 30, -9.81, step=0.01, unit="m/s²")
+STEP = Parameter("dt", "time step", 1e-4, 0.1, 0.01, log=True, step=0.1, unit="s")
+SUBSTEPS = Parameter("substeps", "substeps", 1, 32, 1, step=1)
+WORDS = Parameter("integrator", "integrator", value="leapfrog", choices=("explicit_euler", "leapfrog", "rk4"))
+KNOBS = [GRAVITY, STEP, SUBSTEPS, Parameter("e", "restitution"), Parameter("mu", "friction", 0, 2, 0.3)]
 
 
 @pytest.mark.parametrize("knob", KNOBS)
-def test_ends_are_exact_and_values_clamp(knob: Knob) -> None:
+def test_ends_are_exact_and_values_clamp(knob: Parameter) -> None:
     assert knob.at(0.0) == knob.at(-3.0) == knob.low
     assert knob.at(1.0) == knob.at(3.0) == knob.high
     assert knob.share(knob.low) == knob.share(knob.low - 1e-5) == 0.0
@@ -25,7 +25,7 @@ def test_ends_are_exact_and_values_clamp(knob: Knob) -> None:
 
 @pytest.mark.parametrize("knob", KNOBS)
 @given(share=st.floats(0, 1))
-def test_values_lie_within_and_grow_with_the_share(knob: Knob, share: float) -> None:
+def test_values_lie_within_and_grow_with_the_share(knob: Parameter, share: float) -> None:
     value = knob.at(share)
     assert knob.low <= value <= knob.high
     assert knob.at(share / 2) <= value
@@ -35,7 +35,7 @@ def test_values_lie_within_and_grow_with_the_share(knob: Knob, share: float) -> 
 
 
 def test_values_are_whole_steps_without_crumbs() -> None:
-    assert Knob("e", "e", step=0.1).at(0.31) == 0.3
+    assert Parameter("e", "e", step=0.1).at(0.31) == 0.3
     assert GRAVITY.at(0.3366) == -9.8
     assert SUBSTEPS.at(0.5) == 16.0
     assert STEP.at(2 / 3) == 0.01
@@ -43,7 +43,7 @@ def test_values_are_whole_steps_without_crumbs() -> None:
 
 @pytest.mark.parametrize("knob", KNOBS)
 @pytest.mark.parametrize("way", [1, -1])
-def test_wheel_goes_from_end_to_end_and_stays_there(knob: Knob, way: int) -> None:
+def test_wheel_goes_from_end_to_end_and_stays_there(knob: Parameter, way: int) -> None:
     value: float | str = knob.low if way > 0 else knob.high
     end = knob.high if way > 0 else knob.low
     seen = [value]
@@ -70,15 +70,15 @@ def test_choices_go_round_and_an_unknown_one_leads_to_an_end() -> None:
         (STEP, 0.01, "10.0 ms"),
         (SUBSTEPS, 4.0, "4"),
         (WORDS, "explicit_euler", "explicit euler"),
-        (Knob("speed", "speed", unit="%"), 0.63, "63 %"),
+        (Parameter("speed", "speed", unit="%"), 0.63, "63 %"),
         (SUBSTEPS, math.nan, "?"),
     ],
 )
-def test_value_is_shown_with_its_unit(knob: Knob, value: float | str, text: str) -> None:
+def test_value_is_shown_with_its_unit(knob: Parameter, value: float | str, text: str) -> None:
     assert knob.text(value) == text
 
 
 def test_value_that_is_no_figure_lies_at_the_low_end() -> None:
     assert STEP.share(math.nan) == 0.0
     assert STEP.stepped(math.inf, 1) == STEP.low
-    assert Knob("flat", "flat", 1.0, 1.0, 1.0).at(0.7) == 1.0
+    assert Parameter("flat", "flat", 1.0, 1.0, 1.0).at(0.7) == 1.0

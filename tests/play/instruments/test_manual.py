@@ -6,19 +6,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pressing import key, press, wheel
 
-from sandbox.play.instruments.manual import CLAIMED, Manual, groups
-from sandbox.play.keys import BINDINGS
+from sandbox.window.input.keymap import BINDINGS
+from sandbox.window.ui.help import CLAIMED, HelpOverlay, help_groups
 
 CLAIMS = (("S (hold)", "stroke"), ("Space", "shoot"), ("G", "ball in hand"))
 
 
 def test_help_lists_every_binding() -> None:
-    listed = {line for group in groups() for line in group.lines}
+    listed = {line for group in help_groups() for line in group.lines}
     assert {(binding.label, binding.about) for binding in BINDINGS} <= listed
 
 
 def test_help_names_every_key_of_the_table() -> None:
-    named = {name for group in groups() for label, _ in group.lines for name in label.split(" or ")}
+    named = {name for group in help_groups() for label, _ in group.lines for name in label.split(" or ")}
     letters = {"P", "Space", "O", ".", ",", "R", "Backspace", "[", "]", "Ctrl+O", "-", "=", "E", "G", "Home", "Tab"}
     assert letters <= named
     assert {"F1", "H", "Ctrl+P", "Ctrl+R", "Ctrl+L", "Ctrl+S", "Esc", "T", "M", "B", "N", "Delete"} <= named
@@ -26,7 +26,7 @@ def test_help_names_every_key_of_the_table() -> None:
 
 
 def test_help_tells_what_the_mouse_does() -> None:
-    mouse = dict(groups()[-1].lines)
+    mouse = dict(help_groups()[-1].lines)
     assert mouse["Wheel"] == "zoom about the cursor"
     assert mouse["Right-drag"] == "pan"
     assert mouse["Left-drag"] == "pull a body"
@@ -34,7 +34,7 @@ def test_help_tells_what_the_mouse_does() -> None:
 
 
 def test_claimed_keys_come_first_and_are_taken_from_ours() -> None:
-    found = groups(CLAIMS)
+    found = help_groups(CLAIMS)
     assert found[0].title == CLAIMED
     assert found[0].lines == CLAIMS
     ours = {about: label for group in found[1:] for label, about in group.lines}
@@ -44,14 +44,14 @@ def test_claimed_keys_come_first_and_are_taken_from_ours() -> None:
 
 
 def test_claim_on_a_global_key_takes_nothing() -> None:
-    ours = {about: label for group in groups((("P", "x"), ("Esc", "y")))[1:] for label, about in group.lines}
+    ours = {about: label for group in help_groups((("P", "x"), ("Esc", "y")))[1:] for label, about in group.lines}
     assert ours["pause / resume"] == "P or Space"
     assert ours["quit"] == "Esc"
 
 
 def test_any_key_or_click_closes_and_is_used_up() -> None:
     for event in (key(pygame.K_p), key(pygame.K_F1), key(pygame.K_ESCAPE), press(5, 5)):
-        manual = Manual()
+        manual = HelpOverlay()
         assert not manual.handle(event)
         manual.open = True
         assert manual.handle(event)
@@ -59,7 +59,7 @@ def test_any_key_or_click_closes_and_is_used_up() -> None:
 
 
 def test_wheel_scrolls_where_the_window_is_too_small() -> None:
-    manual = Manual()
+    manual = HelpOverlay()
     manual.open = True
     first, later = pygame.Surface((300, 200)), pygame.Surface((300, 200))
     manual.draw(first, 1.0, CLAIMS)
@@ -71,7 +71,7 @@ def test_wheel_scrolls_where_the_window_is_too_small() -> None:
 
 
 def test_wheel_changes_nothing_where_all_is_seen() -> None:
-    manual = Manual()
+    manual = HelpOverlay()
     manual.open = True
     first, later = pygame.Surface((1280, 800)), pygame.Surface((1280, 800))
     manual.draw(first, 1.0, CLAIMS)
@@ -86,7 +86,7 @@ def test_wheel_changes_nothing_where_all_is_seen() -> None:
 def test_help_is_whole_in_common_windows(size: tuple[int, int], unit: float) -> None:
     surface = pygame.Surface(size)
     surface.fill((1, 2, 3))
-    Manual().draw(surface, unit)
+    HelpOverlay().draw(surface, unit)
     edge = pygame.surfarray.array3d(surface)[:, [0, 1, -2, -1]]
     assert len({tuple(colour) for colour in edge.reshape(-1, 3).tolist()}) == 1  # no words at the upper or lower edge
 
@@ -97,5 +97,5 @@ def test_help_is_whole_in_common_windows(size: tuple[int, int], unit: float) -> 
 @settings(max_examples=30, deadline=None)
 def test_help_is_drawn_on_any_size(width: int, height: int, unit: float, claimed: list[tuple[str, str]]) -> None:
     surface = pygame.Surface((width, height))
-    Manual().draw(surface, unit, claimed)
+    HelpOverlay().draw(surface, unit, claimed)
     assert surface.get_at((0, 0)) != (0, 0, 0)

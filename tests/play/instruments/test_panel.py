@@ -10,20 +10,19 @@ from hypothesis import strategies as st
 from pressing import FOCUS_LOST, move, press, release, wheel
 from pygame_widgets.widget import WidgetHandler
 
-from sandbox.play.instruments.dials import KnobSlider
-from sandbox.play.instruments.knob import Knob
-from sandbox.play.instruments.panel import Panel
-from sandbox.play.instruments.widgets import Control, PushButton, Switch
-from sandbox.play.sight import OVERLAYS
+from sandbox.window.playback.parameters import Parameter
+from sandbox.window.playback.snapshot import OVERLAYS
+from sandbox.window.ui.panel import SidePanel
+from sandbox.window.ui.widgets import Checkbox, ParameterSlider, PushButton, Widget
 
 SIZE = (1280, 800)
 BUTTONS = ("play", "step", "back", "restart", "camera", "record", "save")
 TOGGLES = dict.fromkeys((*OVERLAYS, "ghost", "trust", "sound", "antialias"), False)
 KNOBS = (
-    Knob("gravity", "gravity", -30, 30, -9.8, step=0.1, unit="m/s²", default=-9.8),
-    Knob("friction", "friction", 0, 2, 0.5, enabled=False, why="nothing rubs here"),
-    Knob("dt", "time step", 1e-4, 0.1, 0.01, log=True, step=0.1, unit="s"),
-    Knob("integrator", "integrator", value="b", choices=("a", "b")),
+    Parameter("gravity", "gravity", -30, 30, -9.8, step=0.1, unit="m/s²", default=-9.8),
+    Parameter("friction", "friction", 0, 2, 0.5, enabled=False, why="nothing rubs here"),
+    Parameter("dt", "time step", 1e-4, 0.1, 0.01, log=True, step=0.1, unit="s"),
+    Parameter("integrator", "integrator", value="b", choices=("a", "b")),
 )
 
 
@@ -32,15 +31,15 @@ class Noted:
 
     def __init__(self, size: tuple[int, int] = SIZE, unit: float = 1.0) -> None:
         self.calls: list[tuple[object, ...]] = []
-        self.panel = Panel(size, unit)
+        self.panel = SidePanel(size, unit)
         self.panel.on_change = lambda key, value, final: self.calls.append(("change", key, value, final))
         self.panel.on_toggle = lambda name, on: self.calls.append(("toggle", name, on))
         self.panel.on_button = lambda name: self.calls.append(("button", name))
         self.panel.show(KNOBS, TOGGLES, BUTTONS)
 
-    def find(self, name: str) -> Control:
+    def find(self, name: str) -> Widget:
         for widget in self.panel.widgets:
-            named = widget.name if isinstance(widget, Switch | PushButton) else widget.knob.key  # type: ignore[attr-defined]  # the rest are dials
+            named = widget.name if isinstance(widget, Checkbox | PushButton) else widget.knob.key  # type: ignore[attr-defined]  # the rest are dials
             if named == name:
                 return widget
         raise AssertionError(name)
@@ -93,12 +92,12 @@ def test_drag_that_began_in_the_picture_is_not_consumed() -> None:
 def test_showing_values_calls_nobody_back_and_keeps_the_widgets() -> None:
     noted = Noted()
     before = noted.panel.widgets
-    noted.panel.show([*KNOBS[:2], Knob("dt", "time step", 1e-3, 1, 0.5, log=True), KNOBS[3]], TOGGLES, BUTTONS)
+    noted.panel.show([*KNOBS[:2], Parameter("dt", "time step", 1e-3, 1, 0.5, log=True), KNOBS[3]], TOGGLES, BUTTONS)
     noted.panel.show(KNOBS, {**TOGGLES, "trails": True}, ("pause", *BUTTONS[1:]))
     assert noted.calls == []
     assert noted.panel.widgets == before
     trails = noted.find("trails")
-    assert isinstance(trails, Switch)
+    assert isinstance(trails, Checkbox)
     assert trails.on
 
 
@@ -117,7 +116,7 @@ def test_panels_leave_nothing_behind() -> None:
     before = len(WidgetHandler.getWidgets())
     noted = Noted()
     known = [weakref.ref(widget) for widget in noted.panel.widgets]
-    noted.panel.show((Knob("gravity", "gravity", choices=("a", "b"), value="a"),), {}, ())
+    noted.panel.show((Parameter("gravity", "gravity", choices=("a", "b"), value="a"),), {}, ())
     gc.collect()
     assert len(noted.panel.widgets) == 1
     assert not any(ref() for ref in known)
@@ -202,7 +201,7 @@ def test_kept_picture_is_drawn_anew_when_something_changes(change: str) -> None:
         panel.handle(press(637, 419))
     else:
         name = "height" if change == "label" else "gravity"
-        knob = Knob("gravity", name, -30, 30, 5.0 if change == "knob" else -9.8, step=0.1, unit="m/s²")
+        knob = Parameter("gravity", name, -30, 30, 5.0 if change == "knob" else -9.8, step=0.1, unit="m/s²")
         buttons = ("pause" if change == "button" else "play", *BUTTONS[1:])
         panel.show((knob, *KNOBS[1:]), {**TOGGLES, "shapes": change == "toggle"}, buttons)
     panel.draw(after)
@@ -226,7 +225,7 @@ def test_buttons_name_their_keys() -> None:
 @pytest.mark.parametrize(("size", "unit"), [((640, 480), 1.0), ((1280, 800), 1.0), ((3840, 2160), 2.0)])
 def test_widgets_keep_apart_and_inside(size: tuple[int, int], unit: float) -> None:
     panel = Noted(size, unit).panel
-    rects = [widget.row if isinstance(widget, KnobSlider) else widget.rect for widget in panel.widgets]
+    rects = [widget.row if isinstance(widget, ParameterSlider) else widget.rect for widget in panel.widgets]
     assert all(rect.collidelist(rects[k + 1 :]) < 0 for k, rect in enumerate(rects))
     assert all(rect.left >= 0 and rect.right <= panel.width for rect in rects)
 
@@ -234,7 +233,7 @@ def test_widgets_keep_apart_and_inside(size: tuple[int, int], unit: float) -> No
 @given(st.integers(1, 500), st.integers(1, 400), st.floats(0.25, 4), st.integers(0, 4))
 @settings(max_examples=40, deadline=None)
 def test_panel_is_drawn_on_any_size(width: int, height: int, unit: float, count: int) -> None:
-    panel = Panel((width, height), unit)
+    panel = SidePanel((width, height), unit)
     panel.visible = True  # a small window folds it away
     panel.show(KNOBS[:count], TOGGLES, BUTTONS)
     surface = pygame.Surface((width, height))

@@ -7,12 +7,11 @@ import pygame
 import pytest
 from pressing import key, move, press, release, wheel
 
-from sandbox.play.drawing.palette import BACKGROUND
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.instruments.picker import Picker
-from sandbox.play.instruments.thumbnail import read, thumbnail
 from sandbox.scene.files.load import loads
 from sandbox.scene.files.shipped_scenes import shipped
+from sandbox.window.render.palette import BACKGROUND
+from sandbox.window.render.renderer import Renderer
+from sandbox.window.ui.scene_browser import SceneBrowser, draw_thumbnail, read_scene
 
 BALL = 'title = "{title}"\nabout = "{about}"\n[world]\ngravity = [0, -9.81]\n[[ball]]\nposition = [0, 0]\nradius = 1\n'
 
@@ -28,24 +27,24 @@ def files(tmp_path: Path) -> list[tuple[str, Path]]:
     return [*found, ("mine/bad", tmp_path / "bad.toml")]
 
 
-def drawn(files: list[tuple[str, Path]], size: tuple[int, int] = (900, 700), times: int = 40) -> Picker:
-    picker = Picker(files)
+def drawn(files: list[tuple[str, Path]], size: tuple[int, int] = (900, 700), times: int = 40) -> SceneBrowser:
+    picker = SceneBrowser(files)
     for _ in range(times):
         picker.draw(pygame.Surface(size), 1.0)
     return picker
 
 
-def typed(picker: Picker, text: str) -> None:
+def typed(picker: SceneBrowser, text: str) -> None:
     for letter in text:
         picker.handle(key(ord(letter), unicode=letter))
 
 
-def place(picker: Picker, number: int) -> tuple[int, int]:
+def place(picker: SceneBrowser, number: int) -> tuple[int, int]:
     return picker._places[number][1].center
 
 
 def test_one_file_is_read_or_pictured_each_time(files: list[tuple[str, Path]]) -> None:
-    picker = Picker(files)
+    picker = SceneBrowser(files)
     done = 0
     for _ in range(10):
         picker.draw(pygame.Surface((900, 700)), 1.0)
@@ -63,19 +62,19 @@ def test_all_files_are_read_and_those_in_sight_pictured(files: list[tuple[str, P
 
 
 def test_faulty_file_tells_its_first_fault(files: list[tuple[str, Path]]) -> None:
-    found = read(files[-1][1])
+    found = read_scene(files[-1][1])
     assert found.scene is None
     assert found.fault.startswith("line 3: ball[0].radius")
 
 
 def test_missing_file_tells_that(tmp_path: Path) -> None:
-    assert "no file" in read(tmp_path / "none.toml").fault
+    assert "no file" in read_scene(tmp_path / "none.toml").fault
 
 
 def test_crowded_scatter_tells_that_it_does_not_fit(tmp_path: Path) -> None:
     path = tmp_path / "crowd.toml"
     path.write_text("[[scatter]]\ncount = 50\nlower = [0, 0]\nupper = [1, 1]\nradius = 0.5\n")
-    assert read(path).fault
+    assert read_scene(path).fault
 
 
 def test_arrows_and_enter_choose(files: list[tuple[str, Path]]) -> None:
@@ -146,7 +145,7 @@ def test_wheel_scrolls(files: list[tuple[str, Path]]) -> None:
 
 @pytest.mark.parametrize("event", [key(pygame.K_ESCAPE), key(pygame.K_o, pygame.KMOD_LCTRL)])
 def test_escape_and_its_own_key_close(files: list[tuple[str, Path]], event: pygame.event.Event) -> None:
-    picker = Picker(files)
+    picker = SceneBrowser(files)
     assert picker.handle(event) is None
     assert picker.closed
 
@@ -162,16 +161,16 @@ def test_thumbnails_of_all_shipped_scenes_show_something() -> None:
     scenes = shipped()
     assert scenes
     for name, path in scenes:
-        scene = read(path).scene
+        scene = read_scene(path).scene
         assert scene is not None, name
-        made = thumbnail(scene, (200, 112), Picture(), 0.7)
+        made = draw_thumbnail(scene, (200, 112), Renderer(), 0.7)
         assert np.ptp(pygame.surfarray.array3d(made).astype(int), axis=(0, 1)).max() > 60, name
 
 
 def test_burst_is_shown_in_flight() -> None:
     burst = "[world]\nduration = 2\n[[emitter]]\nposition = [0, 0]\ncount = 200\nradius = 0.05\n"
     scene = loads(burst + "velocity_min = [-5, -5]\nvelocity_max = [5, 5]\n")
-    made = pygame.surfarray.array3d(thumbnail(scene, (200, 200), Picture(), 1.0)).astype(int)
+    made = pygame.surfarray.array3d(draw_thumbnail(scene, (200, 200), Renderer(), 1.0)).astype(int)
     away = np.abs(made - np.asarray(BACKGROUND)).max(axis=2) > 60
     assert away[:80].any()
     assert away[120:].any()

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pressing import FOCUS_LOST, move, press, release
 
-from sandbox.play.drawing.palette import ORANGE
-from sandbox.play.instruments.timeline import Timeline
+from sandbox.window.render.palette import ORANGE
+from sandbox.window.ui.timeline import Timeline
 
 AREA = pygame.Rect(10, 100, 600, 34)
 

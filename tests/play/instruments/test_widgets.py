@@ -9,33 +9,32 @@ from pressing import move, press, release
 from pygame_widgets.slider import Slider
 from pygame_widgets.widget import WidgetHandler
 
-from sandbox.play.instruments.dials import DOUBLE, Choice, KnobSlider
-from sandbox.play.instruments.icons import NAMES, icon
-from sandbox.play.instruments.knob import Knob
-from sandbox.play.instruments.widgets import Control, PushButton, Report, Switch
+from sandbox.window.playback.parameters import Parameter
+from sandbox.window.ui.icons import ICON_NAMES, icon
+from sandbox.window.ui.widgets import DOUBLE, Checkbox, OptionButton, ParameterSlider, PushButton, Widget, WidgetEvent
 
 ROW = pygame.Rect(20, 20, 214, 34)  # a slider's track is then 200 px long
-KNOB = Knob("friction", "friction", 0.0, 2.0, 0.5, step=0.01, default=0.3)
+KNOB = Parameter("friction", "friction", 0.0, 2.0, 0.5, step=0.01, default=0.3)
 
 
-def slider(knob: Knob = KNOB) -> KnobSlider:
-    made = KnobSlider(pygame.Surface((300, 100)), knob)
+def slider(knob: Parameter = KNOB) -> ParameterSlider:
+    made = ParameterSlider(pygame.Surface((300, 100)), knob)
     made.place(ROW, 1.0)
     made.show_knob(knob)
     return made
 
 
-def placed(widget: Control) -> Control:
+def placed(widget: Widget) -> Widget:
     widget.place(ROW, 1.0)
     return widget
 
 
-def at(made: KnobSlider, share: float) -> tuple[float, float]:
+def at(made: ParameterSlider, share: float) -> tuple[float, float]:
     track = made.rect
     return track.left + share * track.width, track.centery
 
 
-def changes(widget: Control) -> list[tuple[object, bool]]:
+def changes(widget: Widget) -> list[tuple[object, bool]]:
     return [(report.value, report.final) for report in widget.reports]
 
 
@@ -82,7 +81,7 @@ def test_drag_back_to_the_start_ends_with_a_final_report_too() -> None:
 
 
 def test_logarithmic_slider_hits_its_ends() -> None:
-    made = slider(Knob("dt", "dt", 1e-4, 0.1, 0.01, log=True, step=0.1, unit="s"))
+    made = slider(Parameter("dt", "dt", 1e-4, 0.1, 0.01, log=True, step=0.1, unit="s"))
     made.listen([press(*at(made, 0.5)), move(-900, 0, held=True), move(900, 0, held=True), release(900, 0)])
     assert [value for value, _ in changes(made)][1:] == [1e-4, 0.1, 0.1]
 
@@ -106,7 +105,7 @@ def test_slow_second_click_is_no_double_click(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_disabled_slider_keeps_its_value_and_says_why() -> None:
-    made = slider(Knob("friction", "friction", 0, 2, 0.5, enabled=False, why="nothing rubs"))
+    made = slider(Parameter("friction", "friction", 0, 2, 0.5, enabled=False, why="nothing rubs"))
     made.listen([press(*at(made, 0.9)), release(*at(made, 0.9))])
     assert not made.turn(1, (round(at(made, 0.5)[0]), made.rect.centery))
     assert changes(made) == []
@@ -115,10 +114,10 @@ def test_disabled_slider_keeps_its_value_and_says_why() -> None:
 
 def test_showing_a_value_reports_nothing_and_leaves_a_drag_alone() -> None:
     made = slider()
-    made.show_knob(Knob("friction", "friction", 0, 2, 1.0))
+    made.show_knob(Parameter("friction", "friction", 0, 2, 1.0))
     assert (made.now, changes(made), made.getValue()) == (1.0, [], 0.5)
     made.listen([press(*at(made, 0.75))])
-    made.show_knob(Knob("friction", "friction", 0, 2, 0.1))
+    made.show_knob(Parameter("friction", "friction", 0, 2, 0.1))
     assert made.now == 1.5
 
 
@@ -131,7 +130,7 @@ def test_wheel_over_the_track_changes_by_one_step() -> None:
 
 
 def test_choice_goes_on_and_back() -> None:
-    made = Choice(pygame.Surface((300, 100)), Knob("i", "integrator", value="b", choices=("a", "b", "c")))
+    made = OptionButton(pygame.Surface((300, 100)), Parameter("i", "integrator", value="b", choices=("a", "b", "c")))
     placed(made)
     right, left = (ROW.right - 5, ROW.centery), (ROW.right - round(0.66 * ROW.width), ROW.centery)
     made.listen([press(*right), release(*right)])
@@ -142,14 +141,17 @@ def test_choice_goes_on_and_back() -> None:
 
 
 def test_switch_turns_by_a_click_in_one_frame() -> None:
-    made = Switch(pygame.Surface((300, 100)), "trails", False)
+    made = Checkbox(pygame.Surface((300, 100)), "trails", False)
     placed(made)
     made.listen([press(*ROW.center), release(*ROW.center), press(*ROW.center), release(*ROW.center)])
-    assert made.reports == [Report("toggle", "trails", True), Report("toggle", "trails", False)]
+    assert made.reports == [WidgetEvent("toggle", "trails", True), WidgetEvent("toggle", "trails", False)]
 
 
 def test_click_that_ends_elsewhere_counts_nowhere() -> None:
-    for widget in (PushButton(pygame.Surface((300, 100)), "play"), Switch(pygame.Surface((300, 100)), "trails", False)):
+    for widget in (
+        PushButton(pygame.Surface((300, 100)), "play"),
+        Checkbox(pygame.Surface((300, 100)), "trails", False),
+    ):
         placed(widget)
         widget.listen([press(*ROW.center), release(ROW.right + 9, ROW.bottom + 9)])
         widget.listen([press(ROW.right + 9, ROW.bottom + 9), release(*ROW.center)])
@@ -161,13 +163,13 @@ def test_button_reports_its_name() -> None:
     made = PushButton(pygame.Surface((300, 100)), "play", "Go on")
     placed(made)
     made.listen([press(*ROW.center), release(*ROW.center)])
-    assert made.reports == [Report("button", "play")]
+    assert made.reports == [WidgetEvent("button", "play")]
 
 
 def test_widgets_go_away_with_the_last_that_holds_them() -> None:
     before = len(WidgetHandler.getWidgets())
     surface = pygame.Surface((9, 9))
-    made = [slider(), Choice(surface, KNOB), Switch(surface, "a", True), PushButton(surface, "b")]
+    made = [slider(), OptionButton(surface, KNOB), Checkbox(surface, "a", True), PushButton(surface, "b")]
     known = [weakref.ref(widget) for widget in made]
     assert len(WidgetHandler.getWidgets()) == before
     del made
@@ -175,13 +177,13 @@ def test_widgets_go_away_with_the_last_that_holds_them() -> None:
     assert [ref() for ref in known] == [None] * 4
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ICON_NAMES)
 def test_every_icon_has_a_shape_of_its_own(name: str) -> None:
     made = icon(name, 24, (255, 255, 255))
     assert made is not None
     lit = pygame.surfarray.array_alpha(made)
     assert 0.08 < (lit > 127).mean() < 0.8
-    others = [icon(other, 24, (255, 255, 255)) for other in NAMES if other != name]
+    others = [icon(other, 24, (255, 255, 255)) for other in ICON_NAMES if other != name]
     assert all(other is not None and (pygame.surfarray.array_alpha(other) != lit).any() for other in others)
 
 
@@ -193,11 +195,11 @@ def test_unknown_icon_is_none() -> None:
 @pytest.mark.parametrize("unit", [0.3, 1.0, 3.0])
 def test_widgets_draw_at_any_size(size: tuple[int, int], unit: float) -> None:
     surface = pygame.Surface((1000, 100))
-    words = Knob("i", "integrator", value="b", choices=("a", "b"), enabled=False)
+    words = Parameter("i", "integrator", value="b", choices=("a", "b"), enabled=False)
     for widget in (
-        KnobSlider(surface, KNOB),
-        Choice(surface, words),
-        Switch(surface, "trails", True, key="9"),
+        ParameterSlider(surface, KNOB),
+        OptionButton(surface, words),
+        Checkbox(surface, "trails", True, key="9"),
         PushButton(surface, "play"),
         PushButton(surface, "some name"),
     ):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.play.instruments.figures import clock, figure, percent
+from sandbox.window.format import format_percent, format_si, format_time
 
 
 @pytest.mark.parametrize(
@@ -34,12 +34,12 @@ from sandbox.play.instruments.figures import clock, figure, percent
     ],
 )
 def test_figure_has_three_digits_and_a_prefix(value: float, unit: str, text: str) -> None:
-    assert figure(value, unit) == text
+    assert format_si(value, unit) == text
 
 
 @given(st.floats(1e-12, 9.99e11))
 def test_figure_says_the_value_to_half_its_last_digit(value: float) -> None:
-    number, unit = figure(value, "m").split()
+    number, unit = format_si(value, "m").split()
     power = {"p": -12, "n": -9, "µ": -6, "m": -3, "k": 3, "M": 6, "G": 9}[unit[0]] if len(unit) > 1 else 0
     # half of the third digit is at most 0.5 %, reached at 1.00
     assert math.isclose(float(number) * 10.0**power, value, rel_tol=0.00501)
@@ -48,16 +48,16 @@ def test_figure_says_the_value_to_half_its_last_digit(value: float) -> None:
 
 @given(st.floats(), st.sampled_from(["", "m", "m/s²", "%"]))
 def test_figures_of_any_float_are_short(value: float, unit: str) -> None:
-    assert len(figure(value, unit)) < 20
-    assert len(percent(value)) < 20
-    assert len(clock(value, abs(value))) < 24
+    assert len(format_si(value, unit)) < 20
+    assert len(format_percent(value)) < 20
+    assert len(format_time(value, abs(value))) < 24
 
 
 @pytest.mark.parametrize(
     ("share", "text"), [(1.0, "100 %"), (0.63, "63 %"), (0.004, "0.400 %"), (0.0, "0 %"), (math.inf, "∞ %")]
 )
 def test_percent_keeps_small_shares_apart_from_nothing(share: float, text: str) -> None:
-    assert percent(share) == text
+    assert format_percent(share) == text
 
 
 @pytest.mark.parametrize(
@@ -65,4 +65,4 @@ def test_percent_keeps_small_shares_apart_from_nothing(share: float, text: str) 
     [(12.3, 0.01, "12.30 s"), (1.5, 1e-4, "1.5000 s"), (3.0, 1.0, "3.00 s"), (0.5, 0.0, "0.50 s")],
 )
 def test_clock_shows_each_step(time: float, step: float, text: str) -> None:
-    assert clock(time, step) == text
+    assert format_time(time, step) == text

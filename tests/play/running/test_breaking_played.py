@@ -7,16 +7,16 @@ import pytest
 
 from sandbox.action import Force, Switch
 from sandbox.measure.run import run
-from sandbox.play.footage.film import Film
-from sandbox.play.running import live as module
-from sandbox.play.running.live import Live
-from sandbox.play.running.session import Session
-from sandbox.play.running.stored import Stored
-from sandbox.play.sight import Sight
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
+from sandbox.window.capture.film import RecordedRun
+from sandbox.window.playback import live as module
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.recorded import RecordedView
+from sandbox.window.playback.session import Session
+from sandbox.window.playback.snapshot import Snapshot
 
 ALL = frozenset({"shapes", "joints"})
 CLOTH = """
@@ -53,11 +53,11 @@ def cloth() -> Scene:
     return loads(CLOTH)
 
 
-def shown(show: Live | Stored) -> Sight:
+def shown(show: LiveView | RecordedView) -> Snapshot:
     return show.sight(ALL)
 
 
-def at(show: Live, step: int) -> Live:
+def at(show: LiveView, step: int) -> LiveView:
     show.seek(step)
     show.arrive()
     return show
@@ -65,7 +65,7 @@ def at(show: Live, step: int) -> Live:
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 def test_joints_are_seen_until_they_break_and_again_on_the_way_back(engine: str) -> None:
-    show = Live(Session(cloth(), engine))
+    show = LiveView(Session(cloth(), engine))
     assert len(shown(show).links) == len(cloth().links)
     whole = [len(shown(at(show, step)).links) for step in range(0, 61, 5)]
     assert whole[0] == len(cloth().links) > whole[-1]
@@ -80,8 +80,8 @@ def test_joints_are_seen_until_they_break_and_again_on_the_way_back(engine: str)
 
 
 def test_energy_of_what_is_watched_leaves_out_what_broke() -> None:
-    show, found = at(Live(Session(cloth())), 60), run(cloth())
-    stored = Stored(Film(found))
+    show, found = at(LiveView(Session(cloth())), 60), run(cloth())
+    stored = RecordedView(RecordedRun(found))
     stored.scrub(0.6)
     assert show.energy() == pytest.approx(stored.energy(), rel=1e-12)  # the same frame, told twice
     assert shown(show).links.names == shown(stored).links.names
@@ -90,7 +90,7 @@ def test_energy_of_what_is_watched_leaves_out_what_broke() -> None:
 
 
 def test_doing_something_else_forgets_what_broke_later() -> None:
-    show = at(Live(Session(cloth())), 60)
+    show = at(LiveView(Session(cloth())), 60)
     assert np.isfinite(show.session.breaks).any()
     at(show, 0)
     assert np.isfinite(show.session.breaks).any()  # it would go the same way
@@ -100,7 +100,7 @@ def test_doing_something_else_forgets_what_broke_later() -> None:
 
 
 def test_joints_hold_the_same_bodies_after_a_switch_that_left_some_behind() -> None:
-    show = at(Live(Session(cloth())), 60)
+    show = at(LiveView(Session(cloth())), 60)
     links = shown(show).links
     show.act(Switch(time=0.0, engine="reference"))
     assert np.array_equal(shown(show).links.b, links.b)
@@ -109,7 +109,7 @@ def test_joints_hold_the_same_bodies_after_a_switch_that_left_some_behind() -> N
 
 
 def test_breaks_are_told_at_once_and_then_once_a_second() -> None:
-    show = Live(Session(cloth()))
+    show = LiveView(Session(cloth()))
     for _ in range(60):
         show.go_on(0.01, paused=False)
     told = [text for _, text in show.notes if text.endswith("broke")]
@@ -121,4 +121,4 @@ def test_film_refuses_a_run_with_other_joints_than_its_scene() -> None:
     found = run(cloth())
     odd = Trajectory(**{**vars(found), "broken_time": np.full(3, np.nan)})
     with pytest.raises(SceneError, match="broken_time: the run had 3 joints"):
-        Film(odd)
+        RecordedRun(odd)

@@ -7,14 +7,13 @@ import pygame
 import pytest
 
 from sandbox.action import Throttle
-from sandbox.play.camera import Camera
-from sandbox.play.drawing.palette import ORANGE
-from sandbox.play.drawing.picture import Picture
-from sandbox.play.running.burning import LONG, burning
-from sandbox.play.running.live import Live
-from sandbox.play.running.session import Session
-from sandbox.play.sight import Sight
 from sandbox.scene.files.load import loads
+from sandbox.window.camera import Camera
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.session import Session
+from sandbox.window.playback.snapshot import LONG, Snapshot, active_thrusters
+from sandbox.window.render.palette import ORANGE
+from sandbox.window.render.renderer import Renderer
 
 SHIP = """
 title = "Ship"
@@ -45,22 +44,22 @@ def throttle(level: float) -> dict[str, Throttle]:
 
 
 def test_thrust_with_a_key_burns_as_far_as_it_is_open() -> None:
-    assert burning(SCENE, SCENE.bodies, {}, 0.0) == ()
-    assert burning(SCENE, SCENE.bodies, throttle(0.0), 0.0) == ()
-    (flame,) = burning(SCENE, SCENE.bodies, throttle(0.25), 0.0)
+    assert active_thrusters(SCENE, SCENE.bodies, {}, 0.0) == ()
+    assert active_thrusters(SCENE, SCENE.bodies, throttle(0.0), 0.0) == ()
+    (flame,) = active_thrusters(SCENE, SCENE.bodies, throttle(0.25), 0.0)
     assert flame.body == 0
     assert flame.place == pytest.approx((-1.0, 0.0))  # seen from the centre of mass
     assert flame.way == pytest.approx((-0.5 * LONG * REACH, 0.0))  # against the force, by the root of 0.25
 
 
 def test_thrust_of_a_time_burns_then() -> None:
-    assert [len(burning(SCENE, SCENE.bodies, {}, time)) for time in (0.99, 1.0, 1.99, 2.0)] == [0, 1, 1, 0]
-    (flame,) = burning(SCENE, SCENE.bodies, {}, 1.0)
+    assert [len(active_thrusters(SCENE, SCENE.bodies, {}, time)) for time in (0.99, 1.0, 1.99, 2.0)] == [0, 1, 1, 0]
+    (flame,) = active_thrusters(SCENE, SCENE.bodies, {}, 1.0)
     assert flame.way == pytest.approx((0.0, -0.5 * LONG * REACH))  # a fourth of the strongest force
 
 
 def test_window_shows_what_fires() -> None:
-    live = Live(Session(SCENE))
+    live = LiveView(Session(SCENE))
     assert live.sight(frozenset({"shapes"})).flames == ()
     live.act(Throttle(time=0.0, thrust="main", level=1.0))
     (flame,) = live.sight(frozenset({"shapes"})).flames
@@ -73,9 +72,9 @@ def test_flame_is_drawn_behind_the_nozzle_and_turns_with_the_body() -> None:
     surface = pygame.Surface((400, 400))
     camera = Camera((1.0, 1.0), 40.0, (400, 400))
     bodies = SCENE.bodies
-    flames = burning(SCENE, bodies, throttle(1.0), 0.0)
-    live = Live(Session(SCENE))
-    Picture().draw(surface, camera, Sight(SCENE, bodies, live.frame, flames=flames))
+    flames = active_thrusters(SCENE, bodies, throttle(1.0), 0.0)
+    live = LiveView(Session(SCENE))
+    Renderer().draw(surface, camera, Snapshot(SCENE, bodies, live.frame, flames=flames))
     orange = np.abs(pygame.surfarray.array3d(surface).astype(int) - ORANGE).sum(axis=2) < 10
     centre = live.frame.position[0]
     along = np.array((math.cos(0.5), math.sin(0.5)))

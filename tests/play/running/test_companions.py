@@ -9,15 +9,21 @@ from sandbox.action import ActionError, Force, Impulse, Pull, Remove, Spawn, Swi
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.errors import usual_tolerance
 from sandbox.measure.compare.truth import truth_of
-from sandbox.play.running import companions
-from sandbox.play.running.companions import Companion, Trust, apart, follows, ghost_of
-from sandbox.play.running.company import Company
-from sandbox.play.running.session import Session
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.scene.scene import Scene
+from sandbox.window.playback import diagnostics as companions
+from sandbox.window.playback.diagnostics import (
+    Diagnostics,
+    DivergenceMonitor,
+    ShadowRun,
+    can_follow,
+    ghost_setting,
+    max_body_distance,
+)
+from sandbox.window.playback.session import Session
 
 BOUNCE = load(find("bounce"))
 
@@ -30,20 +36,20 @@ def pile() -> Scene:
     return load(find("pile"), [("grid.ball.rows", 3), ("grid.ball.columns", 10)])
 
 
-def together(session: Session, company: Company, steps: int) -> None:
+def together(session: Session, company: Diagnostics, steps: int) -> None:
     for _ in range(steps):
         session.advance()
         company.advance(session.redone())
 
 
-def beside(trust: Trust, session: Session) -> None:
+def beside(trust: DivergenceMonitor, session: Session) -> None:
     trust.follow(session.step_number)
     trust.look(session.frame, session.step_number)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_ghost_is_exact_where_it_can_be_else_another_engine(engine: str) -> None:
-    ghost, note = ghost_of(Session(BOUNCE, engine).relay.checkpoint())
+    ghost, note = ghost_setting(Session(BOUNCE, engine).relay.checkpoint())
     assert ghost.engine == ("reference" if engine == "exact" else "exact")
     assert note == ""
     ghost.close()
@@ -51,10 +57,10 @@ def test_ghost_is_exact_where_it_can_be_else_another_engine(engine: str) -> None
 
 def test_ghost_says_why_it_is_not_exact() -> None:
     session = Session(from_document({"ball": [{"position": [k * 0.5, 0], "radius": 1} for k in range(2)]}))
-    ghost, note = ghost_of(session.relay.checkpoint())
+    ghost, note = ghost_setting(session.relay.checkpoint())
     assert ghost.engine == "reference"
     assert "exact refuses" in note
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_ghost(True)
     assert company.ghost_engine == "reference"
     assert [level for level, _ in company.notes] == ["info"]
@@ -63,7 +69,7 @@ def test_ghost_says_why_it_is_not_exact() -> None:
 def test_distance_to_the_ghost_in_free_fall_is_the_error_of_explicit_euler() -> None:
     """x(k·h) is g·h·t/2 too high; `exact` has the parabola."""
     session, h = Session(BOUNCE, "pymunk"), BOUNCE.solver.dt
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_ghost(True)
     assert company.distance == 0.0
     for k in range(1, 1000):
@@ -80,7 +86,7 @@ def test_distance_to_the_ghost_in_free_fall_is_the_error_of_explicit_euler() -> 
 
 def test_ghost_does_what_the_session_does_and_keeps_its_engine() -> None:
     session = Session(BOUNCE, "pymunk")
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_ghost(True)
     for action in (
         Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)),
@@ -106,7 +112,7 @@ def test_ghost_and_twin_do_all_that_was_done_after_one_step(at_once: int) -> Non
     """As rules do several things at once, and as it is done again on a way back: the last push stands."""
     pushes = tuple(Impulse(time=0.01, body="ball", impulse=(x, 0.0)) for x in (1.0, 2.0, 4.0))
     session = Session(BOUNCE, "pymunk", actions=pushes)
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_ghost(True)
     company.show_trust(True)
     for _ in range(42 // at_once):
@@ -123,7 +129,7 @@ def test_ghost_and_twin_do_all_that_was_done_after_one_step(at_once: int) -> Non
 
 def test_ghost_that_cannot_follow_says_why_and_another_engine_goes_on() -> None:
     session = Session(BOUNCE, "pymunk")
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_ghost(True)
     company.did(session.act(Spawn(time=0.0, ball=Ball(position=(0.3, 5.5), radius=0.5))))
     together(session, company, 1)
@@ -138,7 +144,7 @@ def test_exact_ghost_of_a_heap_gives_up_and_says_so(monkeypatch: pytest.MonkeyPa
     """Rigid balls in a heap touch ever more often: it is given up by its own bounds, or its patience."""
     monkeypatch.setattr(companions, "PATIENCE", 0.02)
     session = Session(pile(), "pymunk")
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_ghost(True)
     assert company.ghost_engine == "exact"
     for _ in range(400):
@@ -157,7 +163,7 @@ def test_twin_loses_trust_when_compare_says_so() -> None:
     assert truth.trusted_until < scene.world.duration
     for engine in ("pymunk", "exact"):
         session = Session(scene, engine)
-        trust = Trust(session.relay.checkpoint())
+        trust = DivergenceMonitor(session.relay.checkpoint())
         assert trust.tolerance == usual_tolerance(scene)
         spreads = []
         while trust.state == "trusted" and session.time < 3.0 * truth.trusted_until:
@@ -178,7 +184,7 @@ def test_twin_loses_trust_when_compare_says_so() -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_bounce_is_trusted_to_its_end(engine: str) -> None:
     session = Session(BOUNCE, engine)
-    trust = Trust(session.relay.checkpoint())
+    trust = DivergenceMonitor(session.relay.checkpoint())
     for _ in range(60):
         session.advance(100)
         beside(trust, session)
@@ -190,7 +196,7 @@ def test_bounce_is_trusted_to_its_end(engine: str) -> None:
 
 def test_what_meets_nothing_is_trusted_without_a_twin() -> None:
     session = Session(load(find("fireworks")))
-    trust = Trust(session.relay.checkpoint())
+    trust = DivergenceMonitor(session.relay.checkpoint())
     assert not trust.able
     beside(trust, session)
     assert trust.state == "trusted"
@@ -202,7 +208,7 @@ def test_twin_that_ends_leaves_trust_unknown(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(companions, "PATIENCE", 0.0)
     scene = load(find("gas"), [("grid.atom.velocity_jitter", 100.0), ("solver.dt", 10.0)])
     session = Session(scene, "exact")
-    trust = Trust(session.relay.checkpoint())
+    trust = DivergenceMonitor(session.relay.checkpoint())
     trust.follow(1)
     trust.look(session.frame, 1)
     assert trust.state == "unknown"
@@ -213,7 +219,7 @@ def test_twin_that_ends_leaves_trust_unknown(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_company_waits_while_the_session_goes_back_and_comes_again() -> None:
     session = Session(BOUNCE, "pymunk")
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_ghost(True)
     company.show_trust(True)
     kick = Impulse(time=0.0, body="ball", impulse=(0.5, 1.0))
@@ -242,7 +248,7 @@ def test_company_waits_while_the_session_goes_back_and_comes_again() -> None:
 
 def test_company_begins_anew_where_the_past_is_changed() -> None:
     session = Session(BOUNCE, "pymunk")
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_ghost(True)
     company.show_trust(True)
     together(session, company, 300)
@@ -264,7 +270,7 @@ def test_companions_do_what_a_recording_does_again() -> None:
     first.act(Impulse(time=0.0, body="ball", impulse=(3.0, 4.0)))
     first.advance(300)
     session = Session(BOUNCE, "pymunk", actions=first.actions)
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_ghost(True)
     company.show_trust(True)
     for _ in range(12):
@@ -278,7 +284,7 @@ def test_companions_do_what_a_recording_does_again() -> None:
 
 def test_horizon_is_known_before_and_after_it_when_going_back() -> None:
     session = Session(gas(), "pymunk")
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_trust(True)
     assert company.trust is not None
     company.trust.tolerance = 1e-11
@@ -305,7 +311,7 @@ def test_misses_are_counted_and_flash_and_those_of_the_future_are_forgotten() ->
         }
     )
     session = Session(scene, "pymunk")
-    company = Company(session)
+    company = Diagnostics(session)
     assert company.missed == 0
     seen = []
     for _ in range(14):
@@ -320,16 +326,16 @@ def test_misses_are_counted_and_flash_and_those_of_the_future_are_forgotten() ->
     assert company.missed == 1
     together(session, company, 7)
     assert company.missed == 2
-    sparks = Company(Session(load(find("fireworks"))))
+    sparks = Diagnostics(Session(load(find("fireworks"))))
     assert sparks.missed is None
     assert sparks.flashes == ()
 
 
 def test_follower_is_told_only_what_every_engine_knows() -> None:
-    assert follows(Switch(time=1.0, engine="exact", settings={"integrator": "rk4"})) is None
-    assert follows(Switch(time=1.0, settings={"dt": 0.1, "slop": 0.2})) == Switch(time=1.0, settings={"dt": 0.1})
+    assert can_follow(Switch(time=1.0, engine="exact", settings={"integrator": "rk4"})) is None
+    assert can_follow(Switch(time=1.0, settings={"dt": 0.1, "slop": 0.2})) == Switch(time=1.0, settings={"dt": 0.1})
     kick = Impulse(time=0.0, body="a", impulse=(1.0, 0.0))
-    assert follows(kick) is kick
+    assert can_follow(kick) is kick
     wanted = Settings(dt=0.1, substeps=3, slop=0.1, integrator="rk4", half_kick=True)
     assert wanted.common() == Settings(dt=0.1, substeps=3)
 
@@ -337,19 +343,19 @@ def test_follower_is_told_only_what_every_engine_knows() -> None:
 def test_apart_is_the_largest_distance_of_those_in_both() -> None:
     one = Session(from_document({"ball": [{"position": [5.0 * k, 0], "radius": 1} for k in range(2)]}))
     two = Session(from_document({"ball": [{"position": [5.0 * k, 4.0 * k], "radius": 1} for k in range(3)]}))
-    assert apart(one.frame, two.frame) == 4.0
-    assert apart(two.frame, one.frame) == 4.0
+    assert max_body_distance(one.frame, two.frame) == 4.0
+    assert max_body_distance(two.frame, one.frame) == 4.0
     two.act(Remove(time=0.0, body="ball-2"))
-    assert apart(one.frame, two.frame) == 0.0
+    assert max_body_distance(one.frame, two.frame) == 0.0
     empty = Session(from_document({"title": "t"}))
-    assert apart(one.frame, empty.frame) is None
-    assert Company(empty).distance is None
+    assert max_body_distance(one.frame, empty.frame) is None
+    assert Diagnostics(empty).distance is None
 
 
 def test_ghost_takes_over_a_steady_force_or_leaves_it_to_who_can() -> None:
     session = Session(from_document({"ball": [{"name": "a", "position": [0, 0], "radius": 1}]}), "pymunk")
     session.act(Force(time=0.0, body="a", force=(1.0, 0.0)))
-    company = Company(session)
+    company = Diagnostics(session)
     company.show_ghost(True)
     together(session, company, 100)
     ghost = company.ghost_frame
@@ -360,7 +366,7 @@ def test_ghost_takes_over_a_steady_force_or_leaves_it_to_who_can() -> None:
 
 
 def test_companion_that_ended_is_quiet(monkeypatch: pytest.MonkeyPatch) -> None:
-    companion = Companion(Session(BOUNCE).relay.checkpoint())
+    companion = ShadowRun(Session(BOUNCE).relay.checkpoint())
     companion.act(Remove(time=0.0, body="zzz"))
     assert companion.ended is not None
     assert companion.frame is None
@@ -369,5 +375,5 @@ def test_companion_that_ended_is_quiet(monkeypatch: pytest.MonkeyPatch) -> None:
     companion.close()
     monkeypatch.setattr(companions, "ENGINES", {})
     with pytest.raises(ActionError, match="no other engine"):
-        ghost_of(Session(BOUNCE).relay.checkpoint())
+        ghost_setting(Session(BOUNCE).relay.checkpoint())
     assert np.isfinite(Session(BOUNCE).frame.position).all()

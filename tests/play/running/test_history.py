@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from sandbox.engines.segment import Checkpoint
 from sandbox.engines.switching import SwitchableSimulation
-from sandbox.play.running import history as module
-from sandbox.play.running.history import APART, BYTES_PER_BODY, BYTES_PER_FRAME, MOST, History, Mark
 from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Frame
+from sandbox.window.playback import history as module
+from sandbox.window.playback.history import APART, BYTES_PER_BODY, BYTES_PER_FRAME, MAX_FRAMES, History, Keyframe
 
 
 def frame(time: float, bodies: int = 1) -> Frame:
@@ -95,7 +95,7 @@ def test_hundred_thousand_bodies_keep_within_256_megabytes() -> None:
 def test_cut_forgets_what_came_later_and_makes_room_for_it() -> None:
     history = filled(10)
     for step in (2, 5, 8):
-        history.mark(Mark(step, 0, point()))
+        history.mark(Keyframe(step, 0, point()))
     history.cut(5)
     assert history.furthest == 5
     assert history.marks == (2, 5)
@@ -111,7 +111,7 @@ def test_checkpoints_stand_apart_and_are_found() -> None:
     for k in range(200):
         history.keep(k, frame(float(k)))
         if history.wants_mark(k):
-            history.mark(Mark(k, 0, point()))
+            history.mark(Keyframe(k, 0, point()))
     assert len(history.marks) >= 5
     assert all(b - a >= APART for a, b in pairwise((0, *history.marks)))
     for step in (0, 40, 100, 199):
@@ -122,8 +122,8 @@ def test_checkpoints_stand_apart_and_are_found() -> None:
 def test_checkpoints_are_no_more_than_there_may_be_and_go_on_over_all_time() -> None:
     history = History()
     for k in range(0, 10_000, 10):
-        history.mark(Mark(k, 0, point_of_nothing))
-    assert len(history.marks) <= MOST
+        history.mark(Keyframe(k, 0, point_of_nothing))
+    assert len(history.marks) <= MAX_FRAMES
     assert list(history.marks) == sorted(history.marks)
     assert history.marks[0] == 0
     assert history.marks[-1] == 9990
@@ -134,7 +134,7 @@ point_of_nothing = point()
 
 def test_distrust_is_for_good() -> None:
     history = filled(100)
-    history.mark(Mark(50, 0, point()))
+    history.mark(Keyframe(50, 0, point()))
     history.distrust()
     assert history.marks == ()
     assert not history.wants_mark(99)
@@ -143,7 +143,7 @@ def test_distrust_is_for_good() -> None:
 def test_action_that_is_put_in_counts_for_its_step_and_all_later() -> None:
     history = filled(100)
     for step, actions in ((10, 1), (40, 2), (70, 2)):
-        history.mark(Mark(step, actions, point()))
+        history.mark(Keyframe(step, actions, point()))
     history.inserted(40)
     found = [history.before(step) for step in (10, 40, 70)]
     assert [mark.actions for mark in found if mark is not None] == [1, 3, 3]

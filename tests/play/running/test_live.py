@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Reshape, Spawn, Toggle
 from sandbox.measure.replay import rerun
 from sandbox.measure.run import run
-from sandbox.play.footage.film import Film
-from sandbox.play.running import journey
-from sandbox.play.running import live as module
-from sandbox.play.running.live import Live
-from sandbox.play.running.session import Session
-from sandbox.play.running.stored import Stored
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
+from sandbox.window.capture.film import RecordedRun
+from sandbox.window.playback import live as journey
+from sandbox.window.playback import live as module
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.recorded import RecordedView
+from sandbox.window.playback.session import Session
 
 ALL = frozenset({"shapes", "trails", "contacts"})
 
@@ -36,11 +36,11 @@ def bounce() -> Scene:
     return load(find("bounce"))
 
 
-def live(name: str = "bounce", engine: str = "pymunk") -> Live:
-    return Live(Session(load(find(name)), engine))
+def live(name: str = "bounce", engine: str = "pymunk") -> LiveView:
+    return LiveView(Session(load(find(name)), engine))
 
 
-def arrived(show: Live) -> Live:
+def arrived(show: LiveView) -> LiveView:
     while show.busy is not None:
         show.go_on(1 / 60, paused=True)
     return show
@@ -98,7 +98,7 @@ def test_recorded_part_ends_in_a_pause_once() -> None:
     first.act(Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)))
     first.advance(50)
     recording = first.recording()
-    show = Live(Session(bounce(), actions=recording.actions), until=recording.duration)
+    show = LiveView(Session(bounce(), actions=recording.actions), until=recording.duration)
     for _ in range(9):
         show.go_on(0.03, paused=False)
         if show.wants_pause:
@@ -141,7 +141,7 @@ def test_scrub_shows_walls_as_they_were_then() -> None:
     """Also while the session stands before or behind that time; and each time is one scene, which is drawn once."""
     shelf = {"name": "shelf", "points": [[-1, 0], [1, 0]]}
     ball = {"name": "ball", "position": [0, 5.0], "radius": 0.1}
-    show = Live(Session(from_document({"ball": [ball], "wall": [shelf]}), "pymunk"))
+    show = LiveView(Session(from_document({"ball": [ball], "wall": [shelf]}), "pymunk"))
     courses = [((-1.0, 0.0), (1.0, 0.0))]
     for k in (1.0, 2.0):
         show.step()
@@ -211,7 +211,7 @@ def test_on_the_way_nothing_can_be_done(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_session_that_ended_says_so_once_and_again_after_going_back() -> None:
     ball = {"name": "a", "position": [9.9e15, 0], "radius": 1, "velocity": [1e12, 0]}
-    show = Live(Session(from_document({"ball": [ball], "solver": {"dt": 10.0}}), "reference"))
+    show = LiveView(Session(from_document({"ball": [ball], "solver": {"dt": 10.0}}), "reference"))
     show.session.advance(9010)
     for _ in range(3):
         show.step()
@@ -266,7 +266,7 @@ def test_relaunch_is_another_firework_each_time_and_can_be_replayed() -> None:
 
 
 def test_switch_while_pulling_goes_on_pulling() -> None:
-    show = Live(Session(from_document({"ball": [{"name": "a", "position": [0, 0], "radius": 1}]})))
+    show = LiveView(Session(from_document({"ball": [{"name": "a", "position": [0, 0], "radius": 1}]})))
     show.act(Pull(time=0.0, body="a", target=(2.0, 0.0)))
     for engine in ("exact", "reference", "pymunk"):
         show.step()
@@ -318,7 +318,7 @@ DEEDS: list[Action] = [
 @given(plan=st.lists(moves, max_size=15), engine=st.sampled_from(["pymunk", "reference", "exact"]))
 @settings(max_examples=30)
 def test_odd_scenes_can_be_played_in_any_order(which: int, plan: list[tuple[str, float]], engine: str) -> None:
-    show = Live(Session(from_document(ODD[which]), engine))
+    show = LiveView(Session(from_document(ODD[which]), engine))
     for kind, number in plan:
         try:
             match kind:
@@ -355,8 +355,10 @@ def test_odd_scenes_can_be_played_in_any_order(which: int, plan: list[tuple[str,
 # Stored runs.
 
 
-def stored(**more: Any) -> Stored:
-    return Stored(Film(run(bounce().model_copy(update={"world": bounce().world}), "pymunk", dt=0.01, **more)))
+def stored(**more: Any) -> RecordedView:
+    return RecordedView(
+        RecordedRun(run(bounce().model_copy(update={"world": bounce().world}), "pymunk", dt=0.01, **more))
+    )
 
 
 def test_stored_run_is_gone_through_by_frames() -> None:
@@ -401,7 +403,7 @@ def test_stored_run_goes_on_by_real_time_and_its_speed() -> None:
 
 def test_stored_run_of_one_frame_stands_still() -> None:
     session = Session(bounce())
-    show = Stored(Film(first_frame(session)))
+    show = RecordedView(RecordedRun(first_frame(session)))
     show.step()
     show.back()
     show.go_on(1.0, paused=False)
@@ -418,7 +420,7 @@ def test_way_back_knows_what_was_solid_then() -> None:
     shelf = {"name": "shelf", "points": [[-1, 0], [1, 0]]}
     ball = {"name": "ball", "position": [0, 0.1], "radius": 0.1}
     scene = from_document({"world": {"gravity": [0, -9.81], "duration": 5}, "ball": [ball], "wall": [shelf]})
-    show = Live(Session(scene, "pymunk"))
+    show = LiveView(Session(scene, "pymunk"))
     for _ in range(60):
         show.go_on(1 / 60, paused=False)
     show.act(Toggle(time=0.0, thing="shelf", solid=False))

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.arrays import FloatArray
-from sandbox.play.running.between import between
-from sandbox.play.running.pace import LONGEST, Pace
 from sandbox.trajectory import Frame
+from sandbox.window.playback.clock import MAX_FRAME_TIME, FixedStepClock, interpolate
 
 
 def frame(time: float, position: FloatArray, velocity: FloatArray, present: list[bool] | None = None) -> Frame:
@@ -18,7 +17,7 @@ def frame(time: float, position: FloatArray, velocity: FloatArray, present: list
 
 
 def test_rungs_are_those_of_a_tenth_of_a_decade() -> None:
-    pace, seen = Pace(), []
+    pace, seen = FixedStepClock(), []
     for _ in range(11):
         seen.append(round(100 * pace.speed))
         pace.slower()
@@ -40,7 +39,7 @@ def test_rungs_are_those_of_a_tenth_of_a_decade() -> None:
     rung=st.integers(-20, 10),
 )
 def test_simulated_time_is_real_time_by_the_speed_up_to_a_step(pictures: list[float], dt: float, rung: int) -> None:
-    pace = Pace()
+    pace = FixedStepClock()
     for _ in range(abs(rung)):
         (pace.faster if rung > 0 else pace.slower)()
     real, steps = 0.0, 0
@@ -56,14 +55,14 @@ def test_simulated_time_is_real_time_by_the_speed_up_to_a_step(pictures: list[fl
 
 @given(elapsed=st.floats(0.0, 1e6), dt=st.floats(1e-6, 10.0))
 def test_no_picture_asks_for_more_than_the_cap(elapsed: float, dt: float) -> None:
-    asked = Pace().due(elapsed, dt)
-    assert asked * dt <= LONGEST * (1.0 + 1e-9)  # rounding of the quotient
-    assert asked == 0 or (asked + 1) * dt >= min(elapsed, LONGEST) * (1.0 - 1e-9)  # as above
+    asked = FixedStepClock().due(elapsed, dt)
+    assert asked * dt <= MAX_FRAME_TIME * (1.0 + 1e-9)  # rounding of the quotient
+    assert asked == 0 or (asked + 1) * dt >= min(elapsed, MAX_FRAME_TIME) * (1.0 - 1e-9)  # as above
 
 
 def test_steps_that_could_not_be_made_are_dropped_and_the_speed_says_so() -> None:
     """A machine that makes only 2 of 10 steps a picture: what is asked for does not grow."""
-    pace = Pace()
+    pace = FixedStepClock()
     for _ in range(100):
         asked = pace.due(0.1, 0.01)
         assert asked in (9, 10)  # 0.1 / 0.01, after rounding
@@ -73,7 +72,7 @@ def test_steps_that_could_not_be_made_are_dropped_and_the_speed_says_so() -> Non
 
 
 def test_real_speed_is_that_asked_for_until_it_is_known() -> None:
-    pace = Pace()
+    pace = FixedStepClock()
     pace.slower()
     assert pace.real_speed == pace.speed
     for _ in range(60):
@@ -86,9 +85,9 @@ def test_real_speed_is_that_asked_for_until_it_is_known() -> None:
 
 
 def test_flow_is_capped_real_time_by_the_speed() -> None:
-    pace = Pace()
+    pace = FixedStepClock()
     assert pace.flow(0.02) == 0.02
-    assert pace.flow(9.0) == LONGEST
+    assert pace.flow(9.0) == MAX_FRAME_TIME
     pace.faster()
     assert pace.flow(0.02) == 0.02 * pace.speed
 
@@ -97,7 +96,7 @@ def test_flow_is_capped_real_time_by_the_speed() -> None:
 def test_picture_lies_on_the_straight_line_between_two_states(share: float) -> None:
     velocity = np.asarray([[2.0, 0.0]])
     a, b = frame(1.0, np.asarray([[0.0, 1.0]]), velocity), frame(1.5, np.asarray([[1.0, 1.5]]), velocity)
-    found = between(a, b, share)
+    found = interpolate(a, b, share)
     assert found.time == pytest.approx(1.0 + 0.5 * share, rel=1e-15)  # one rounding
     assert found.position[0] == pytest.approx([share, 1.0 + 0.5 * share], abs=1e-15)  # as above
     assert found.angle[0] == pytest.approx(1.0 + 0.5 * share, abs=1e-15)  # as above
@@ -108,15 +107,18 @@ def test_who_was_put_elsewhere_appeared_or_is_gone_is_shown_as_in_the_later_stat
     moved = np.asarray([[0.1, 0.0], [9.0, 0.0], [0.1, 0.0], [0.0, 5.0]])
     before = frame(0.0, start, np.full((3, 2), 1.0), [True, True, True])
     after = frame(0.1, moved, np.full((4, 2), 1.0), [True, True, False, True])
-    found = between(before, after, 0.5).position
+    found = interpolate(before, after, 0.5).position
     assert found.tolist() == [[0.05, 0.0], [9.0, 0.0], [0.1, 0.0], [0.0, 5.0]]
-    assert between(after, before, 0.5).position.shape == (3, 2)  # a body that is not in the later state is not there
-    assert between(before, after, 1.0) is after
-    assert between(after, after, 0.3) is after
+    assert interpolate(after, before, 0.5).position.shape == (
+        3,
+        2,
+    )  # a body that is not in the later state is not there
+    assert interpolate(before, after, 1.0) is after
+    assert interpolate(after, after, 0.3) is after
 
 
 def test_picture_of_a_state_that_is_not_finite_is_no_worse_than_it() -> None:
     here = np.asarray([[0.0, 0.0], [1.0, 1.0]])
     there = np.asarray([[np.nan, np.inf], [1.1, 1.0]])
-    found = between(frame(0.0, here, here), frame(0.1, there, there), 0.5)
+    found = interpolate(frame(0.0, here, here), frame(0.1, there, there), 0.5)
     assert np.isfinite(found.position[1]).all()

@@ -14,16 +14,16 @@ from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Set
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, UnknownEngineError
 from sandbox.measure.replay import rerun
-from sandbox.play.running import history as history_module
-from sandbox.play.running.history import Mark
-from sandbox.play.running.session import Session, WrongWayError
-from sandbox.play.running.switching import switch
 from sandbox.recording import Recording
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
+from sandbox.window.playback import history as history_module
+from sandbox.window.playback.history import Keyframe
+from sandbox.window.playback.live import switch_engine
+from sandbox.window.playback.session import Session, WrongWayError
 
 
 def shipped(name: str) -> Scene:
@@ -205,7 +205,7 @@ def test_way_from_a_checkpoint_is_shorter() -> None:
     assert session.relay.work["substeps"] < 60
 
 
-def doctored(mark: Mark) -> Mark:
+def doctored(mark: Keyframe) -> Keyframe:
     """Return a checkpoint that leads elsewhere: a body is a little faster than it was."""
     frame = mark.point.frame
     faster = Frame(
@@ -430,17 +430,17 @@ def test_seek_can_be_given_up_for_another() -> None:
 def test_switch_leaves_to_the_other_engine_what_it_does_not_know() -> None:
     scene = SCENES["bounce"]
     session = played(Session(scene, "reference", scene.solver.replace(integrator="rk4", detection="swept")), 9)
-    note = switch(session, "pymunk")
+    note = switch_engine(session, "pymunk")
     assert note is not None
     assert note.startswith("chosen by pymunk: ")
     assert "integrator" in note
     assert session.engine == "pymunk"
     assert session.settings.dt == scene.solver.dt
-    assert switch(session, "exact") is None
+    assert switch_engine(session, "exact") is None
     assert_replays(played(session, 9))
     before = session.frame.state_hash()
     with pytest.raises(ActionError, match="zzz"):
-        switch(session, "zzz")
+        switch_engine(session, "zzz")
     assert session.frame.state_hash() == before
 
 
@@ -564,7 +564,7 @@ def test_balls_on_a_floor_go_back_and_forth_to_the_same_states(seed: int) -> Non
 def test_what_a_wrong_way_has_shown_is_forgotten() -> None:
     session = struck(1.5, 4.0, 300)
     before = hashes(session)
-    session.history.mark(Mark(150, 1, session.relay.checkpoint()))  # of quite another time
+    session.history.mark(Keyframe(150, 1, session.relay.checkpoint()))  # of quite another time
     go(session, 200)
     assert all(hashes(session)[step] == state for step, state in before.items())
     go(session, 300)

@@ -9,10 +9,10 @@ from toy_game import Toy, toy_game, toy_scene
 
 from sandbox.action import ActionError, Impulse, Remove, Switch
 from sandbox.games import registry
-from sandbox.games.referee import Referee
+from sandbox.games.session import GameSession
 from sandbox.measure.replay import rerun
-from sandbox.play.running.session import Session, WrongWayError
 from sandbox.recording import Recording
+from sandbox.window.playback.session import Session, WrongWayError
 
 
 @pytest.fixture(autouse=True)
@@ -53,7 +53,7 @@ def session_of(engine: str = "pymunk") -> Session:
 
 def again(recording: Recording, engine: str | None = None) -> Session:
     session = recording if engine is None else recording.on(engine)
-    game = Referee(Toy(session.scene, session.scene.bodies), session.presses)
+    game = GameSession(Toy(session.scene, session.scene.bodies), session.presses)
     return Session(session.scene, session.engine, session.settings, session.actions, game, session.duration)
 
 

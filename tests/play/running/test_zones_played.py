@@ -7,12 +7,12 @@ import pytest
 
 from sandbox.action import Impulse
 from sandbox.measure.replay import rerun
-from sandbox.play.running.session import Session
 from sandbox.recording import Recording
 from sandbox.scene.description.fixed import HELD
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.scene.scene import Scene
+from sandbox.window.playback.session import Session
 
 HOLES: list[dict[str, Any]] = [
     {"name": "mouth", "points": [[0.3, -1], [0.3, 1]], "thickness": 0.1, "to_layer": "up"},

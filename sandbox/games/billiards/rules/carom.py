@@ -6,19 +6,28 @@ starting position, so that both have had as many; who draws level shares the fra
 
 from dataclasses import dataclass, replace
 
-from sandbox.games.billiards.rules.call import Call, Decision
-from sandbox.games.billiards.rules.happening import GameError, Shot, touched_by
-from sandbox.games.billiards.rules.rules import Rules
-from sandbox.games.billiards.rules.state import State, counted
-from sandbox.games.billiards.rules.verdict import Lie, Respot, Verdict, player
+from sandbox.games.billiards.rules.base import (
+    Decision,
+    GameError,
+    Respot,
+    Ruleset,
+    RulesState,
+    ShotCall,
+    ShotResult,
+    ShotSummary,
+    Situation,
+    balls_touched_by,
+    counted,
+    player_name,
+)
 
 RED = "red"
 WHITES = ("white", "yellow")
-BALLS = (*WHITES, RED)
+CAROM_NAMES = (*WHITES, RED)
 
 
 @dataclass(frozen=True, kw_only=True)
-class CaromState(State):
+class CaromState(RulesState):
     """A score is the number of caroms. `table` names all three balls."""
 
     distance: int
@@ -33,7 +42,7 @@ class CaromState(State):
     """whether this is the turn with which the frame ends"""
 
 
-class Carom(Rules[CaromState]):
+class Carom(Ruleset[CaromState]):
     """A game of caroms."""
 
     rack = "carom"
@@ -60,7 +69,7 @@ class Carom(Rules[CaromState]):
         if points < 1:
             raise GameError(f"distance {points} is out of range; it should be 1 or more")
         none = (0,) * counted(players)
-        return CaromState(players=players, scores=none, innings=none, table=BALLS, distance=points)
+        return CaromState(players=players, scores=none, innings=none, table=CAROM_NAMES, distance=points)
 
     def legal_targets(self, state: CaromState) -> frozenset[str]:
         """Return both other balls; on the opening shot the red (UMB 23)."""
@@ -68,29 +77,29 @@ class Carom(Rules[CaromState]):
             return frozenset()
         return frozenset((RED,) if state.opening else state.without((self.cue_ball(state),)))
 
-    def settle(self, state: CaromState, lie: Lie) -> Verdict[CaromState]:
+    def settle(self, state: CaromState, lie: Situation) -> ShotResult[CaromState]:
         """Return the state with the balls that touch: the player may have them spotted, or play away (UMB 27)."""
         if state.over:
-            return Verdict(state)
+            return ShotResult(state)
         decisions: tuple[Decision, ...] = ("play", "spot") if lie.touching else ()
         told = (f"the cue ball is frozen to the {' and the '.join(lie.touching)}",) if lie.touching else ()
-        return Verdict(replace(state, touching=lie.touching, decisions=decisions), messages=told)
+        return ShotResult(replace(state, touching=lie.touching, decisions=decisions), messages=told)
 
-    def _decide(self, state: CaromState, decision: Decision) -> Verdict[CaromState]:
+    def _decide(self, state: CaromState, decision: Decision) -> ShotResult[CaromState]:
         after = replace(state, touching=())
         if decision != "spot":
-            return Verdict(after)
+            return ShotResult(after)
         if self.cushions == 0:  # in straight rail all three go back
-            return Verdict(replace(after, opening=True), rerack=True)
+            return ShotResult(replace(after, opening=True), rerack=True)
         # UMB 83: the red to the foot spot, the cue ball to the head, the other to the centre; where the third ball is
         # in the way, to the spot that would be the third ball's.
         cue = self.cue_ball(state)
         spots = {RED: "foot", cue: "head", next(ball for ball in WHITES if ball != cue): "centre"}
-        lifted = [ball for ball in BALLS if ball == cue or ball in state.touching]
-        rest = tuple(spots[ball] for ball in BALLS if ball not in lifted)
-        return Verdict(after, respot=tuple(Respot(ball, (spots[ball], *rest)) for ball in lifted))
+        lifted = [ball for ball in CAROM_NAMES if ball == cue or ball in state.touching]
+        rest = tuple(spots[ball] for ball in CAROM_NAMES if ball not in lifted)
+        return ShotResult(after, respot=tuple(Respot(ball, (spots[ball], *rest)) for ball in lifted))
 
-    def _judge(self, state: CaromState, call: Call, shot: Shot) -> Verdict[CaromState]:  # noqa: ARG002
+    def _judge(self, state: CaromState, call: ShotCall, shot: ShotSummary) -> ShotResult[CaromState]:  # noqa: ARG002
         if any(each.kind == "pocket" for each in shot.happenings):
             raise GameError("a carom table has no pockets")
         after = replace(state, opening=False, touching=())
@@ -102,26 +111,26 @@ class Carom(Rules[CaromState]):
         after = replace(after, scores=state.scored(state.turn, 1), run=state.run + 1)
         points = tuple(int(each == state.turn) for each in range(state.players))
         if after.scores[state.turn] >= state.distance:
-            told = f"{player(state.turn)} has reached {state.distance}"
+            told = f"{player_name(state.turn)} has reached {state.distance}"
             verdict = self._ended(replace(after, last=after.last or state.turn == state.players - 1), (), full=True)
             return replace(verdict, points=points, messages=(told, *verdict.messages))
-        return Verdict(after, points=points, goes_on=True)
+        return ShotResult(after, points=points, goes_on=True)
 
-    def _made(self, shot: Shot) -> bool:
+    def _made(self, shot: ShotSummary) -> bool:
         """Tell whether the cue ball touched both, with its cushions before the second; one cushion counts each time."""
         touched: set[str] = set()
         cushions = 0
         for each in shot.happenings:
             if each.kind == "cushion" and each.ball == shot.cue:
                 cushions += 1
-            ball = touched_by(shot.cue, each)
+            ball = balls_touched_by(shot.cue, each)
             if ball is not None and ball not in touched:
                 touched.add(ball)
                 if len(touched) == 2:
                     return cushions >= self.cushions
         return False
 
-    def _ended(self, state: CaromState, fouls: tuple[str, ...], full: bool = False) -> Verdict[CaromState]:
+    def _ended(self, state: CaromState, fouls: tuple[str, ...], full: bool = False) -> ShotResult[CaromState]:
         """Return what the end of a turn leads to: the other's, the last, or none."""
         none = (0,) * state.players
         told = tuple(f"foul: {each}" for each in fouls)
@@ -130,11 +139,11 @@ class Carom(Rules[CaromState]):
         if state.last:
             top = max(state.scores)
             winner = state.scores.index(top) if state.scores.count(top) == 1 else None
-            ends = f"{player(winner)} wins" if winner is not None else "the frame is drawn"
+            ends = f"{player_name(winner)} wins" if winner is not None else "the frame is drawn"
             over = replace(after, over=True, winner=winner)
-            return Verdict(over, fouls, none, messages=(*told, ends))
+            return ShotResult(over, fouls, none, messages=(*told, ends))
         after = replace(after, turn=state.other, last=full, opening=full)
         if not full:
-            return Verdict(after, fouls, none, messages=told)
-        ends = f"{player(state.other)} has a last turn, from the starting position"
-        return Verdict(after, fouls, none, rerack=True, messages=(*told, ends))
+            return ShotResult(after, fouls, none, messages=told)
+        ends = f"{player_name(state.other)} has a last turn, from the starting position"
+        return ShotResult(after, fouls, none, rerack=True, messages=(*told, ends))

@@ -1,44 +1,70 @@
-"""What 8-ball and 9-ball share: standard fouls (WPA 6), and the break."""
+"""What 8-ball and 9-ball share: standard fouls (WPA 6), and the break.
 
-from sandbox.games.billiards.rules.happening import Shot, named_first
-from sandbox.games.billiards.rules.verdict import Respot
+8-ball (WPA 3): one group each, then the eight, in the pocket that was called.
+
+A ball other than the eight need not be called (WPA 1.6: what is obvious need not be): without a call whatever falls of
+the shooter's own group counts, and on an open table the first ball to fall chooses the group. With a call only that
+ball counts, in that pocket where one is named.
+
+9-ball (WPA 2): the lowest ball first; who makes the nine fairly wins.
+
+Free play: no rules but turns. Who makes a ball goes on; a cue ball that fell is in hand.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from sandbox.games.billiards.rules.base import (
+    Decision,
+    GameError,
+    Respot,
+    Ruleset,
+    RulesState,
+    ShotCall,
+    ShotChoices,
+    ShotResult,
+    ShotSummary,
+    counted,
+    first_ball_hit,
+    player_name,
+)
 
 DRIVEN = 4
 """object balls that a break must drive to a cushion, if none falls (WPA 2.3, 3.3)"""
 
 
-def scratch(shot: Shot) -> list[str]:
+def scratch(shot: ShotSummary) -> list[str]:
     """Return the foul of a cue ball that fell (WPA 6.1)."""
     return ["scratch"] if shot.scratched else []
 
 
-def wrong_ball(shot: Shot, targets: frozenset[str]) -> list[str]:
+def wrong_ball(shot: ShotSummary, targets: frozenset[str]) -> list[str]:
     """Return the foul of what was touched first (WPA 6.2); of two at one time, one that is right will do."""
     if not shot.first:
         return ["the cue ball hit no ball"]
     if targets.isdisjoint(shot.first):
-        return [f"{named_first(shot)} hit first instead of {_of(targets)}"]
+        return [f"{first_ball_hit(shot)} hit first instead of {_of(targets)}"]
     return []
 
 
-def no_rail(shot: Shot) -> list[str]:
+def no_rail(shot: ShotSummary) -> list[str]:
     """Return the foul of a touch after which no ball fell or came to a cushion (WPA 6.3)."""
     return ["no rail after contact"] if shot.first and not shot.driven else []
 
 
-def from_behind(shot: Shot) -> list[str]:
+def from_behind(shot: ShotSummary) -> list[str]:
     """Return the foul of a cue ball in hand that was played at a ball behind the head string (WPA 6.11)."""
     if not shot.stayed_behind:
         return []
-    return [f"{named_first(shot)} behind the head string, and the cue ball had not crossed it"]
+    return [f"{first_ball_hit(shot)} behind the head string, and the cue ball had not crossed it"]
 
 
-def standard(shot: Shot, targets: frozenset[str]) -> tuple[str, ...]:
+def standard(shot: ShotSummary, targets: frozenset[str]) -> tuple[str, ...]:
     """Return the standard fouls of a shot."""
     return (*scratch(shot), *wrong_ball(shot, targets), *from_behind(shot), *no_rail(shot))
 
 
-def broke(shot: Shot) -> bool:
+def broke(shot: ShotSummary) -> bool:
     """Tell whether a break was strong enough."""
     return bool(shot.down) or len(shot.driven - {shot.cue}) >= DRIVEN
 
@@ -51,3 +77,313 @@ def at_foot(ball: str) -> Respot:
 def _of(targets: frozenset[str]) -> str:
     named = sorted(targets, key=lambda ball: (len(ball), ball))
     return f"the {named[0]}" if len(named) == 1 else f"one of {', '.join(named)}"
+
+
+Group = Literal["solids", "stripes"]
+EIGHT = "8"
+EIGHT_BALL_NAMES = tuple(str(number) for number in range(1, 16))
+GROUPS: dict[Group, tuple[str, ...]] = {"solids": EIGHT_BALL_NAMES[:7], "stripes": EIGHT_BALL_NAMES[8:]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class EightBallState(RulesState):
+    """A score is the number of the player's own balls that are down."""
+
+    groups: tuple[Group | None, ...]
+    """each player's; none while the table is open"""
+
+
+class EightBall(Ruleset[EightBallState]):
+    """8-ball."""
+
+    name = "8-ball"
+    rack = "8-ball"
+    kind = EightBallState
+
+    def start(self, players: int = 2) -> EightBallState:
+        """Return the state before the break."""
+        return EightBallState(
+            players=counted(players),
+            scores=(0,) * players,
+            table=EIGHT_BALL_NAMES,
+            in_hand="behind the head string",
+            groups=(None,) * players,
+        )
+
+    def legal_targets(self, state: EightBallState) -> frozenset[str]:
+        """Return what is on: any ball on the break, any but the eight on an open table, one's own, then the eight."""
+        if state.over:
+            return frozenset()
+        if state.opening:
+            return frozenset(state.table)
+        group = state.groups[state.turn]
+        mine = GROUPS[group] if group is not None else tuple(ball for ball in EIGHT_BALL_NAMES if ball != EIGHT)
+        return frozenset(mine).intersection(state.table) or frozenset((EIGHT,))
+
+    def choices(self, state: EightBallState) -> ShotChoices:
+        """Return what may be said; on the eight a pocket must be (WPA 3.6)."""
+        if state.over or state.opening:
+            return super().choices(state)
+        balls = self.legal_targets(state)
+        named = tuple(ball for ball in state.table if ball in balls)
+        return ShotChoices(state.decisions, named, pocket=True, needed=named == (EIGHT,), safety=True)
+
+    def _judge(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> ShotResult[EightBallState]:
+        return _counted(state, self._shot(state, call, shot))
+
+    def _shot(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> ShotResult[EightBallState]:
+        fouls = standard(shot, self.legal_targets(state))
+        if state.opening:
+            return self._break(state, shot, fouls)
+        if EIGHT in shot.down:
+            return self._eight(state, call, shot, fouls)
+        after = replace(state, table=state.without(shot.down), in_hand=None)
+        if fouls:
+            told = f"foul: {fouls[0]}; {player_name(state.other)} has the ball in hand"
+            after = replace(after, turn=state.other, in_hand="anywhere")
+            return ShotResult(after, fouls=fouls, messages=(told,))
+        made = self._made(state, call, shot)
+        if made is None or call.safety:
+            return ShotResult(replace(after, turn=state.other))
+        if state.groups[state.turn] is not None:
+            return ShotResult(after, goes_on=True)
+        mine: Group = "solids" if made in GROUPS["solids"] else "stripes"
+        its: Group = "stripes" if mine == "solids" else "solids"
+        after = replace(after, groups=tuple(mine if each == state.turn else its for each in range(state.players)))
+        return ShotResult(after, goes_on=True, messages=(f"{player_name(state.turn)} plays {mine}",))
+
+    def _made(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> str | None:
+        """Return a ball that fell as it was to: the one that was called, else the first of one's own."""
+        able = (call.ball,) if call.ball is not None else tuple(self.legal_targets(state))
+        for ball in shot.down:
+            if ball in able and call.pocket in (None, shot.pocket_of(ball)):
+                return ball
+        return None
+
+    def _break(self, state: EightBallState, shot: ShotSummary, fouls: tuple[str, ...]) -> ShotResult[EightBallState]:
+        """Judge a break (WPA 3.3). Too weak a break is no foul, but the other player may have all racked anew."""
+        respot = (at_foot(EIGHT),) if EIGHT in shot.down else ()
+        table = state.without(tuple(ball for ball in shot.down if ball != EIGHT))
+        place: Literal["behind the head string"] | None = "behind the head string" if scratch(shot) else None
+        after = replace(state, table=table, opening=False, in_hand=place)
+        weak, goes_on = not broke(shot), bool(shot.down) and not fouls
+        offered: tuple[Decision, ...] = ()
+        if weak:
+            also: tuple[Decision, ...] = ("rerack and pass",) if state.players == 2 else ()
+            offered = ("play", "rerack", *also)
+        elif respot:  # (e), (f): the eight on the break neither wins nor loses
+            offered = ("play", "rerack")
+        if fouls and not scratch(shot):  # (h)
+            offered = (*(offered or ("play",)), "in hand")
+        after = replace(after, turn=state.turn if goes_on else state.other, decisions=offered)
+        why = [f"foul: {each}" for each in fouls] + (["illegal break"] if weak else [])
+        told = why + (["the 8 was pocketed on the break and is spotted"] if respot else [])
+        return ShotResult(after, fouls=fouls, respot=respot, goes_on=goes_on, messages=tuple(told))
+
+    def _eight(
+        self, state: EightBallState, call: ShotCall, shot: ShotSummary, fouls: tuple[str, ...]
+    ) -> ShotResult[EightBallState]:
+        """Judge a shot on which the eight fell: it wins, or it loses (WPA 3.8)."""
+        lost = None
+        if fouls:
+            lost = f"the 8 was pocketed on a foul: {fouls[0]}"
+        elif EIGHT not in self.legal_targets(state):
+            lost = "the 8 was pocketed early"
+        elif call.safety or call.pocket is None or call.pocket != shot.pocket_of(EIGHT):
+            lost = "the 8 was pocketed in a pocket that was not called"
+        winner = state.turn if lost is None else state.opponent
+        after = replace(state, table=state.without(shot.down), in_hand=None, over=True, winner=winner)
+        ends = f"{player_name(winner)} wins" if winner is not None else "the rack is lost"
+        told = (ends,) if lost is None else (lost, ends)
+        return ShotResult(after, fouls=fouls, messages=told)
+
+    def _decide(self, state: EightBallState, decision: Decision) -> ShotResult[EightBallState]:
+        if decision in ("rerack", "rerack and pass"):
+            turn = state.turn if decision == "rerack" else state.other
+            return ShotResult(replace(self.start(state.players), turn=turn), rerack=True)
+        if decision == "in hand":  # of a break alone
+            return ShotResult(replace(state, in_hand="behind the head string"))
+        return super()._decide(state, decision)
+
+
+def _counted(before: EightBallState, verdict: ShotResult[EightBallState]) -> ShotResult[EightBallState]:
+    """Return a verdict with the scores that follow from the table."""
+    after = verdict.state
+    scores = tuple(
+        0 if group is None else sum(ball not in after.table for ball in GROUPS[group]) for group in after.groups
+    )
+    points = tuple(now - then for now, then in zip(scores, before.scores, strict=True))
+    return replace(verdict, state=replace(after, scores=scores), points=points)
+
+
+NINE = "9"
+NINE_BALL_NAMES = tuple(str(number) for number in range(1, 10))
+MAX_CONSECUTIVE_FOULS = 3
+"""in a row that lose the rack (WPA 6.14)"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NineBallState(RulesState):
+    """A score is the number of balls that the player has made."""
+
+    fouls: tuple[int, ...]
+    """of each player, without a fair shot between"""
+    push_out: bool = False
+    """whether the next shot may be a push-out"""
+
+
+class NineBall(Ruleset[NineBallState]):
+    """9-ball."""
+
+    name = "9-ball"
+    rack = "9-ball"
+    kind = NineBallState
+
+    def start(self, players: int = 2) -> NineBallState:
+        """Return the state before the break."""
+        none = (0,) * counted(players)
+        return NineBallState(
+            players=players, scores=none, fouls=none, table=NINE_BALL_NAMES, in_hand="behind the head string"
+        )
+
+    def legal_targets(self, state: NineBallState) -> frozenset[str]:
+        """Return the lowest ball on the table."""
+        return frozenset() if state.over else frozenset((min(state.table, key=int),))
+
+    def choices(self, state: NineBallState) -> ShotChoices:
+        """Return what may be said: nothing but a push-out, on the shot after a fair break (WPA 2.4)."""
+        return replace(super().choices(state), push_out=state.push_out and not state.over)
+
+    def _judge(self, state: NineBallState, call: ShotCall, shot: ShotSummary) -> ShotResult[NineBallState]:
+        fouls = self._fouls(state, call, shot)
+        fair = not fouls and not call.push_out
+        table = state.without(shot.down if fair else tuple(ball for ball in shot.down if ball != NINE))
+        respot = (at_foot(NINE),) if NINE in shot.down and not fair else ()
+        row = tuple(
+            (count + 1 if fouls else 0) if each == state.turn else count for each, count in enumerate(state.fouls)
+        )
+        made = len(shot.down) if fair else 0
+        points = tuple(made if each == state.turn else 0 for each in range(state.players))
+        after = replace(
+            state,
+            table=table,
+            opening=False,
+            in_hand=None,
+            fouls=row,
+            push_out=state.opening and not fouls,
+            scores=state.scored(state.turn, made),
+        )
+        if fouls:
+            return replace(_foul(after, fouls), respot=respot, points=points)
+        if call.push_out:
+            decisions: tuple[Decision, ...] = ("play", "pass") if state.players == 2 else ()
+            after = replace(after, turn=state.other, decisions=decisions)
+            return ShotResult(
+                after, respot=respot, points=points, messages=(f"{player_name(state.turn)} played a push-out",)
+            )
+        if NINE in shot.down:
+            after = replace(after, over=True, winner=state.turn)
+            return ShotResult(after, points=points, messages=(f"{player_name(state.turn)} wins",))
+        goes_on = bool(shot.down)
+        return ShotResult(after if goes_on else replace(after, turn=state.other), points=points, goes_on=goes_on)
+
+    def _fouls(self, state: NineBallState, call: ShotCall, shot: ShotSummary) -> tuple[str, ...]:
+        """Return what was foul: of a push-out a scratch alone (WPA 2.4), of a break also that it was too weak (2.3)."""
+        if call.push_out:
+            return tuple(scratch(shot))
+        wrong = [*scratch(shot), *wrong_ball(shot, self.legal_targets(state))]
+        if not state.opening:
+            return (*wrong, *no_rail(shot))
+        return (*wrong, *(["illegal break"] if shot.first and not broke(shot) else []))
+
+
+def _foul(after: NineBallState, fouls: tuple[str, ...]) -> ShotResult[NineBallState]:
+    """Return what a foul leads to: the ball in hand for the other, or the end."""
+    row, who = after.fouls[after.turn], player_name(after.turn)
+    if row >= MAX_CONSECUTIVE_FOULS:
+        winner = after.opponent
+        ends = f"{player_name(winner)} wins" if winner is not None else "the rack is lost"
+        lost = replace(after, over=True, winner=winner)
+        return ShotResult(
+            lost, fouls, messages=(f"foul: {fouls[0]}", f"{who} fouled {MAX_CONSECUTIVE_FOULS} times in a row", ends)
+        )
+    told = [f"foul: {fouls[0]}; {player_name(after.other)} has the ball in hand"]
+    if row == MAX_CONSECUTIVE_FOULS - 1:  # WPA 6.14: a player is to be told
+        told.append(f"{who} is on {row} fouls; one more loses the rack")
+    return ShotResult(replace(after, turn=after.other, in_hand="anywhere"), fouls, messages=tuple(told))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreePlayState(RulesState):
+    """A score is the number of balls that the player has made."""
+
+    rack: tuple[str, ...]
+    """the object balls at the start"""
+    cue: str
+    """the ball that is struck"""
+
+
+ALWAYS: tuple[Decision, ...] = ("play", "in hand", "rerack")
+
+
+class FreePlay(Ruleset[FreePlayState]):
+    """Free play."""
+
+    name = "free"
+    rack = "8-ball"
+    kind = FreePlayState
+
+    def start(self, players: int = 2, balls: tuple[str, ...] = EIGHT_BALL_NAMES, cue: str = "cue") -> FreePlayState:
+        """Return the state before the first shot.
+
+        Args:
+            players: 1 or 2.
+            balls: the object balls, of any rack; on a table without pockets they are never made.
+            cue: the ball that both strike.
+
+        Raises:
+            GameError: neither one nor two play, or the cue ball is one of the others.
+        """
+        scores = (0,) * counted(players)
+        if cue in balls:
+            raise GameError(f"{cue!r} cannot be both the cue ball and an object ball")
+        return FreePlayState(
+            players=players, scores=scores, table=balls, rack=balls, cue=cue, in_hand="anywhere", decisions=ALWAYS
+        )
+
+    def cue_ball(self, state: FreePlayState) -> str:
+        """Return the ball that is struck."""
+        return state.cue
+
+    def legal_targets(self, state: FreePlayState) -> frozenset[str]:
+        """Return every ball."""
+        return frozenset() if state.over else frozenset(state.table)
+
+    def _judge(self, state: FreePlayState, call: ShotCall, shot: ShotSummary) -> ShotResult[FreePlayState]:  # noqa: ARG002
+        table, made = state.without(shot.down), len(shot.down)
+        goes_on = made > 0 and not shot.scratched
+        points = tuple(made if each == state.turn else 0 for each in range(state.players))
+        after = replace(
+            state,
+            turn=state.turn if goes_on else state.other,
+            scores=state.scored(state.turn, made),
+            table=table,
+            opening=False,
+            in_hand="anywhere" if shot.scratched else None,
+            decisions=ALWAYS,
+        )
+        told = ("scratch: cue ball in hand",) if shot.scratched else ()
+        if table or not state.rack:
+            return ShotResult(after, points=points, goes_on=goes_on, messages=told)
+        top = max(after.scores)
+        winner = after.scores.index(top) if after.scores.count(top) == 1 else None
+        ends = f"table cleared: {player_name(winner)} wins" if winner is not None else "table cleared: a draw"
+        over = replace(after, over=True, winner=winner, in_hand=None, decisions=())
+        return ShotResult(over, points=points, messages=(*told, ends))
+
+    def _decide(self, state: FreePlayState, decision: Decision) -> ShotResult[FreePlayState]:
+        if decision == "rerack":
+            return ShotResult(replace(self.start(state.players, state.rack, state.cue), turn=state.turn), rerack=True)
+        return ShotResult(
+            replace(state, in_hand="anywhere" if decision == "in hand" else state.in_hand, decisions=ALWAYS)
+        )

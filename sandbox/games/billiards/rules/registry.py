@@ -3,15 +3,12 @@
 from typing import Any
 
 from sandbox.echo import short_repr
+from sandbox.games.billiards.rules.base import GameError, Ruleset
 from sandbox.games.billiards.rules.carom import Carom
-from sandbox.games.billiards.rules.eight_ball import EightBall
-from sandbox.games.billiards.rules.free_play import FreePlay
-from sandbox.games.billiards.rules.happening import GameError
-from sandbox.games.billiards.rules.nine_ball import NineBall
-from sandbox.games.billiards.rules.rules import Rules
+from sandbox.games.billiards.rules.pool import EightBall, FreePlay, NineBall
 from sandbox.games.billiards.rules.snooker import Snooker
 
-RULES: dict[str, Rules[Any]] = {
+RULESETS: dict[str, Ruleset[Any]] = {
     "8-ball": EightBall(),
     "9-ball": NineBall(),
     "three-cushion": Carom("three-cushion", cushions=3, distance=15),
@@ -21,13 +18,13 @@ RULES: dict[str, Rules[Any]] = {
 }
 
 
-def rules_named(name: str) -> Rules[Any]:
+def ruleset_named(name: str) -> Ruleset[Any]:
     """Return a game by name.
 
     Raises:
         GameError: with the names there are.
     """
     try:
-        return RULES[name]
+        return RULESETS[name]
     except KeyError:
-        raise GameError(f"unknown game {short_repr(name)}; games: {', '.join(RULES)}") from None
+        raise GameError(f"unknown game {short_repr(name)}; games: {', '.join(RULESETS)}") from None

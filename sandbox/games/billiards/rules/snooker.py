@@ -3,24 +3,156 @@
 Who plays alone scores what is made; the points of fouls go to nobody. A miss is called, where the frame is played with
 it, of every first touch that was wrong, unless a player needed points of fouls before or after (Foul and a Miss);
 whether the attempt was good is for nobody here to say.
+
+The balls of snooker: their names, values and spots.
+
+A stroke of snooker: what was on, what it scored, and what was foul.
 """
 
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from sandbox.games.billiards.rules.call import Call, Choices, Decision
-from sandbox.games.billiards.rules.happening import Shot
-from sandbox.games.billiards.rules.rules import Rules
-from sandbox.games.billiards.rules.snooker_balls import BALLS, LEAST, VALUES, colours, reds, respots, value
-from sandbox.games.billiards.rules.snooker_stroke import Stroke, stroke
-from sandbox.games.billiards.rules.state import State, counted
-from sandbox.games.billiards.rules.verdict import Lie, Verdict, player
+from sandbox.games.billiards.rules.base import (
+    Decision,
+    Respot,
+    Ruleset,
+    RulesState,
+    ShotCall,
+    ShotChoices,
+    ShotResult,
+    ShotSummary,
+    Situation,
+    counted,
+    first_ball_hit,
+    player_name,
+)
+
+REDS = tuple(f"red-{number}" for number in range(1, 16))
+VALUES = {"yellow": 2, "green": 3, "brown": 4, "blue": 5, "pink": 6, "black": 7}
+"""of the colours, in the order in which they are played once the reds are gone"""
+COLOURS = tuple(VALUES)
+SNOOKER_NAMES = (*REDS, *COLOURS)
+MIN_FOUL_POINTS = 4
+"""points of a foul, at least"""
+
+
+def value(ball: str) -> int:
+    """Return the points of a ball; 1 of a red."""
+    return VALUES.get(ball, 1)
+
+
+def reds(table: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the reds of some balls."""
+    return tuple(ball for ball in table if ball not in VALUES)
+
+
+def colours(table: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the colours of some balls, the lowest first."""
+    return tuple(ball for ball in COLOURS if ball in table)
+
+
+def respots(balls: tuple[str, ...]) -> tuple[Respot, ...]:
+    """Return colours to be spotted, the highest first, each on its own spot, else on the highest that is free."""
+    down = COLOURS[::-1]
+    return tuple(Respot(ball, (ball, *(spot for spot in down if spot != ball))) for ball in down if ball in balls)
+
+
+@dataclass(frozen=True)
+class SnookerShot:
+    """A shot, with what was on."""
+
+    shot: ShotSummary
+    on: frozenset[str]
+    """the balls on, without a free ball; none where no colour was nominated"""
+    worth: int
+    """points of a ball on"""
+    free: str | None
+    """the ball that stands for a ball on"""
+    touching: tuple[str, ...]
+    """what lay against the cue ball before"""
+
+    @property
+    def fair(self) -> frozenset[str]:
+        """What may fall: the balls on, and the free ball."""
+        return self.on if self.free is None else self.on | {self.free}
+
+    @property
+    def hit(self) -> bool:
+        """Whether the first touch was right.
+
+        Away from a ball on that touches the cue ball it counts as played (Touching Ball). A free ball is to be touched
+        first, or at one time with a ball on (Snookered after a Foul).
+        """
+        if self.free is None and not self.on.isdisjoint(self.touching):
+            return True
+        first = frozenset(self.shot.first)
+        return bool(first) and first <= self.fair and (self.free is None or self.free in first)
+
+    def value(self, ball: str) -> int:
+        """Return the points of a ball, a free one being worth what it stands for."""
+        return self.worth if ball == self.free else value(ball)
+
+    @property
+    def fouls(self) -> tuple[tuple[int, str], ...]:
+        """What was foul, each with its points (Penalties): those of a ball on or concerned, and 4 at least."""
+        shot, least = self.shot, max(MIN_FOUL_POINTS, self.worth)
+        found: list[tuple[int, str]] = []
+        if shot.scratched:
+            found.append((least, "in-off"))
+        if not self.hit:
+            if not shot.first:
+                found.append((least, "the cue ball hit no ball"))
+            else:
+                most = max(least, *(self.value(ball) for ball in shot.first))
+                found.append((most, f"{first_ball_hit(shot)} hit first"))
+        found += [
+            (max(least, self.value(ball)), f"the {ball} was potted but not on")
+            for ball in shot.down
+            if ball not in self.fair
+        ]
+        if found and not self.on:  # Penalties: a foul after a red before a colour was nominated
+            found = [(VALUES["black"], why) for _, why in found]
+        return tuple(found)
+
+    @property
+    def points(self) -> int:
+        """What a fair stroke scores: each red, but of a free ball and the colour on only one."""
+        made = [ball for ball in self.shot.down if ball in self.fair]
+        if not made:
+            return 0
+        return len(made) if self.worth == 1 else self.worth
+
+
+def judge_snooker_shot(
+    shot: ShotSummary, on: str, table: tuple[str, ...], named: str | None, free: bool, touching: tuple[str, ...]
+) -> SnookerShot:
+    """Return a stroke.
+
+    Args:
+        shot: what happened.
+        on: `red`, `colour`, or the name of the colour on.
+        table: the balls that were on the table.
+        named: the colour that was nominated, or the free ball. A colour that is hit first, or from which the cue
+            ball is played away, is nominated by that.
+        free: whether a free ball might be nominated.
+        touching: what lay against the cue ball before.
+    """
+    if on == "red":
+        return SnookerShot(shot, frozenset(reds(table)), 1, named if free else None, touching)
+    if on != "colour":
+        return SnookerShot(shot, frozenset((on,)), value(on), named if free else None, touching)
+    plain = colours(shot.first) if len(shot.first) == 1 else ()
+    meant = (named,) if named is not None else plain or colours(touching)
+    if len(meant) != 1 or meant[0] not in COLOURS:
+        return SnookerShot(shot, frozenset(), 1, None, touching)
+    return SnookerShot(shot, frozenset(meant), value(meant[0]), None, touching)
+
 
 On = Literal["red", "colour", "yellow", "green", "brown", "blue", "pink", "black"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class SnookerState(State):
+class SnookerState(RulesState):
     """Where a frame of snooker stands."""
 
     on: On = "red"
@@ -48,7 +180,7 @@ def remaining(state: SnookerState) -> int:
     return left + (black if state.on == "colour" else 0)
 
 
-class Snooker(Rules[SnookerState]):
+class Snooker(Ruleset[SnookerState]):
     """Snooker."""
 
     name = "snooker"
@@ -63,7 +195,7 @@ class Snooker(Rules[SnookerState]):
             misses: whether a miss may be played again.
         """
         scores = (0,) * counted(players)
-        return SnookerState(players=players, scores=scores, table=BALLS, in_hand="in the D", misses=misses)
+        return SnookerState(players=players, scores=scores, table=SNOOKER_NAMES, in_hand="in the D", misses=misses)
 
     def legal_targets(self, state: SnookerState) -> frozenset[str]:
         """Return the balls on; all, where any may be nominated as a free ball."""
@@ -71,7 +203,7 @@ class Snooker(Rules[SnookerState]):
             return frozenset()
         return frozenset(state.table) if state.free else balls_on(state)
 
-    def choices(self, state: SnookerState) -> Choices:
+    def choices(self, state: SnookerState) -> ShotChoices:
         """Return what may be decided, and what may be nominated."""
         base = super().choices(state)
         if state.over or not (state.free or state.on == "colour"):
@@ -80,7 +212,7 @@ class Snooker(Rules[SnookerState]):
         named = tuple(ball for ball in state.table if (ball in on) != state.free)
         return replace(base, balls=named)
 
-    def settle(self, state: SnookerState, lie: Lie) -> Verdict[SnookerState]:
+    def settle(self, state: SnookerState, lie: Situation) -> ShotResult[SnookerState]:
         """Return the state with what touches, and a free ball or a foul where the player is snookered.
 
         After a foul that leaves a snooker any ball is free; to snooker by the free ball itself is foul, unless
@@ -88,21 +220,21 @@ class Snooker(Rules[SnookerState]):
         """
         after = replace(state, touching=lie.touching, freed=None)
         if state.over or not lie.snookered:
-            return Verdict(after)
+            return ShotResult(after)
         if state.freed is not None and state.freed in lie.by and set(state.table) != {"pink", "black"}:
-            penalty = max(LEAST, VALUES.get(state.on, 1))
+            penalty = max(MIN_FOUL_POINTS, VALUES.get(state.on, 1))
             why = f"the free ball, {state.freed}, snookers the opponent"
             points = tuple(penalty * (each == state.turn) for each in range(state.players))
             scores = state.scored(state.turn if state.players == 2 else None, penalty)
             after = replace(after, scores=scores, fouled=True, free=True, decisions=_answers(state, False))
             told = (f"foul: {why}; {penalty} points", "free ball")
-            return Verdict(after, (why,), points if state.players == 2 else (0,), messages=told)
+            return ShotResult(after, (why,), points if state.players == 2 else (0,), messages=told)
         if not state.fouled:
-            return Verdict(after)
-        return Verdict(replace(after, free=True), messages=("free ball",))
+            return ShotResult(after)
+        return ShotResult(replace(after, free=True), messages=("free ball",))
 
-    def _judge(self, state: SnookerState, call: Call, shot: Shot) -> Verdict[SnookerState]:
-        played = stroke(shot, state.on, state.table, call.ball, state.free, state.touching)
+    def _judge(self, state: SnookerState, call: ShotCall, shot: ShotSummary) -> ShotResult[SnookerState]:
+        played = judge_snooker_shot(shot, state.on, state.table, call.ball, state.free, state.touching)
         clean = replace(
             state,
             opening=False,
@@ -116,7 +248,7 @@ class Snooker(Rules[SnookerState]):
         fouls = played.fouls
         return self._foul(state, clean, played, fouls) if fouls else self._fair(clean, played)
 
-    def _fair(self, state: SnookerState, played: Stroke) -> Verdict[SnookerState]:
+    def _fair(self, state: SnookerState, played: SnookerShot) -> ShotResult[SnookerState]:
         """Return what a fair stroke leads to."""
         down, points = played.shot.down, played.points
         last = state.on not in ("red", "colour")
@@ -127,15 +259,15 @@ class Snooker(Rules[SnookerState]):
         after = replace(state, table=table, scores=state.scored(state.turn, points), run=state.run + points)
         if not points:
             after = replace(after, turn=state.other, on=_next(table), run=0, freed=played.free)
-            return Verdict(_claimable(after), points=gained)
+            return ShotResult(_claimable(after), points=gained)
         if not table:
             return replace(_ended(after), points=gained)
         after = replace(after, on="colour" if state.on == "red" else _next(table))
-        return Verdict(_claimable(after), points=gained, respot=respots(back), goes_on=True)
+        return ShotResult(_claimable(after), points=gained, respot=respots(back), goes_on=True)
 
     def _foul(
-        self, state: SnookerState, clean: SnookerState, played: Stroke, fouls: tuple[tuple[int, str], ...]
-    ) -> Verdict[SnookerState]:
+        self, state: SnookerState, clean: SnookerState, played: SnookerShot, fouls: tuple[tuple[int, str], ...]
+    ) -> ShotResult[SnookerState]:
         """Return what a foul leads to: its dearest part counts, reds stay down, colours come back (Fouls)."""
         penalty, down = max(fouls)[0], played.shot.down
         why = tuple(each for _, each in fouls)
@@ -153,17 +285,19 @@ class Snooker(Rules[SnookerState]):
         )
         messages = (told, "foul and a miss: the shot may be replayed from the same position") if missed else (told,)
         colours_down = tuple(ball for ball in down if ball in VALUES)
-        return Verdict(after, why, gained, respot=respots(colours_down), messages=messages)
+        return ShotResult(after, why, gained, respot=respots(colours_down), messages=messages)
 
-    def _decide(self, state: SnookerState, decision: Decision) -> Verdict[SnookerState]:
+    def _decide(self, state: SnookerState, decision: Decision) -> ShotResult[SnookerState]:
         after = replace(state, before=None)
         if decision == "pass":  # a free ball is void where the offender plays again
-            return Verdict(replace(after, turn=state.other, free=False, fouled=False))
+            return ShotResult(replace(after, turn=state.other, free=False, fouled=False))
         if decision == "restore" and state.before is not None:
-            return Verdict(replace(state.before, scores=state.scores), restore=True)
+            return ShotResult(replace(state.before, scores=state.scores), restore=True)
         if decision == "claim":
-            return Verdict(replace(after, over=True, winner=state.turn), messages=(f"{player(state.turn)} wins",))
-        return Verdict(after)
+            return ShotResult(
+                replace(after, over=True, winner=state.turn), messages=(f"{player_name(state.turn)} wins",)
+            )
+        return ShotResult(after)
 
 
 def balls_on(state: SnookerState) -> frozenset[str]:
@@ -200,13 +334,13 @@ def _claimable(state: SnookerState) -> SnookerState:
     return replace(state, decisions=("play", "claim"))
 
 
-def _ended(state: SnookerState) -> Verdict[SnookerState]:
+def _ended(state: SnookerState) -> ShotResult[SnookerState]:
     """Return the end; with level scores the black is spotted, and the other player says who plays at it."""
     if state.players == 2 and state.scores[0] == state.scores[1]:
         after = replace(
             state, table=("black",), on="black", turn=state.other, in_hand="in the D", run=0, decisions=("play", "pass")
         )
         after = replace(after, fouled=False)
-        return Verdict(after, respot=respots(("black",)), messages=("scores level: the black is respotted",))
+        return ShotResult(after, respot=respots(("black",)), messages=("scores level: the black is respotted",))
     winner = state.scores.index(max(state.scores))
-    return Verdict(replace(state, over=True, winner=winner), messages=(f"{player(winner)} wins",))
+    return ShotResult(replace(state, over=True, winner=winner), messages=(f"{player_name(winner)} wins",))

@@ -1,0 +1,525 @@
+"""Guns: tanks with their barrels, names and health, and how the one is set whose turn it is.
+
+Dots: small discs and rings, and discs that let through what is behind them; only where a picture can have them.
+
+Sky: dusk over far ridges. It stands still behind the ground, whatever the camera does.
+
+Land: the ground of a game under its sky, darker the deeper, with a lit edge; it changes with craters and camera.
+
+Seen: a game of artillery as it is drawn at one moment.
+
+Fire: ways of shells, blasts, dirt in the air, and the wind.
+"""
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+import pygame
+
+from sandbox.arrays import FloatArray
+from sandbox.games.artillery.ballistics import Flight, landing
+from sandbox.games.artillery.battlefield import WHOLE
+from sandbox.games.artillery.rules import ArtilleryRules
+from sandbox.games.artillery.scene import GROUND, Artillery, displaced
+from sandbox.games.artillery.view_state import ArtilleryViewState, ExplosionView, FallingDirt, GunView
+from sandbox.games.contract import Rules
+from sandbox.scene.description.fixed import Wall
+from sandbox.scene.description.game_tables import table_of
+from sandbox.scene.scene import Scene
+from sandbox.window.camera import Camera
+from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.lines import Pixel, draw_arrow, draw_dashes, draw_line, fill_polygon
+from sandbox.window.render.palette import (
+    BACKGROUND,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    SKY,
+    WARNING,
+    YELLOW,
+    Colour,
+    hex_colour,
+    mix_colours,
+)
+from sandbox.window.render.static_geometry import draw_static_bodies
+from sandbox.window.render.text import draw_text
+
+SDL_COORDINATE_LIMIT = 1e4
+"""px from a picture's corner, beyond which SDL is not asked"""
+
+
+def draw_dot(surface: pygame.Surface, at: Pixel, radius: float, colour: Colour, line: float = 0.0) -> None:
+    """Draw a disc, or a ring of so many px."""
+    if abs(at[0]) < SDL_COORDINATE_LIMIT and abs(at[1]) < SDL_COORDINATE_LIMIT and radius < SDL_COORDINATE_LIMIT:
+        width = max(round(line), 1) if line else 0
+        pygame.draw.circle(surface, colour, (round(at[0]), round(at[1])), max(round(radius), 1), width)
+
+
+def draw_glow(surface: pygame.Surface, at: Pixel, radius: float, colour: Colour, opacity: int) -> None:
+    """Lay a disc over a picture of which so much, 0 to 255, hides what is behind."""
+    if not (
+        abs(at[0]) < SDL_COORDINATE_LIMIT and abs(at[1]) < SDL_COORDINATE_LIMIT and radius < 0.2 * SDL_COORDINATE_LIMIT
+    ):
+        return
+    side = max(math.ceil(radius), 1)
+    layer = pygame.Surface((2 * side + 1, 2 * side + 1), pygame.SRCALPHA)
+    pygame.draw.circle(layer, (*colour, opacity), (side, side), side)
+    surface.blit(layer, (round(at[0]) - side, round(at[1]) - side))
+
+
+BARREL_WIDTH = 0.75
+"""of a tank's width, from its middle to the muzzle"""
+MIN_TANK_SIZE = 20.0
+"""px, of a tank's width: farther off it is drawn larger than it is"""
+HULL = ((-0.50, -0.02), (-0.42, 0.18), (-0.20, 0.24), (0.20, 0.24), (0.42, 0.18), (0.50, -0.02))
+"""Corners, in widths and heights from the middle."""
+AIM_REACH = 26.0
+"""m, of the dots ahead of the muzzle at full power"""
+
+
+def draw_tanks(view: DrawContext, gunnery: ArtilleryViewState, tints: dict[int, Colour]) -> None:
+    """Draw all tanks that are in sight; `tints` are their colours by their bodies' numbers."""
+    frame = view.sight.frame
+    for gun in gunnery.guns:
+        if gun.number >= len(frame.position) or not frame.present[gun.number]:
+            continue
+        x, y = view.camera.to_screen(frame.position[gun.number]).tolist()
+        width = max(gunnery.size[0] * view.camera.scale, MIN_TANK_SIZE * view.unit)
+        if not (abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT and width < SDL_COORDINATE_LIMIT):
+            continue
+        height = width * gunnery.size[1] / gunnery.size[0]
+        lift = 0.5 * (height - gunnery.size[1] * view.camera.scale)  # what is drawn larger stands where it stands
+        _Tank(view, (x, y - lift), (width, height), -float(frame.angle[gun.number]), tints[gun.number]).draw(gun)
+        if gun.aiming:
+            _setting(view, gunnery, gun, (x, y - lift), width)
+        _label(view, gun, (x, y - lift - 1.1 * width), tints[gun.number])
+
+
+class _Tank:
+    """Draws one tank, whose middle lies at a pixel."""
+
+    def __init__(self, view: DrawContext, at: Pixel, size: Pixel, turn: float, tint: Colour) -> None:
+        self._view, self._at, self._size, self._tint = view, at, size, tint
+        self._cos, self._sin = math.cos(turn), math.sin(turn)
+
+    def _place(self, x: float, y: float) -> Pixel:
+        """Return where a point lies, in widths to the right and heights upwards of a tank that stands upright."""
+        right, down = x * self._size[0], -y * self._size[1]
+        return (
+            self._at[0] + self._cos * right - self._sin * down,
+            self._at[1] + self._sin * right + self._cos * down,
+        )
+
+    def draw(self, gun: GunView) -> None:
+        """Draw barrel, turret, hull, track and wheels, from the back to the front."""
+        view, tint, width = self._view, self._tint, self._size[0]
+        dark, light = mix_colours(tint, BACKGROUND, 0.55), mix_colours(tint, INK, 0.35)
+        turret = self._place(0.0, 0.28)
+        way = math.cos(gun.angle), -math.sin(gun.angle)
+        muzzle = turret[0] + BARREL_WIDTH * width * way[0], turret[1] + BARREL_WIDTH * width * way[1]
+        thick = max(0.10 * width, 2.0)
+        draw_line(
+            view.surface, turret, muzzle, mix_colours(dark, BACKGROUND, 0.4), thick + 2.0 * view.unit, view.antialias
+        )
+        draw_line(view.surface, turret, muzzle, mix_colours(tint, (90, 94, 104), 0.5), thick, view.antialias)
+        brake = turret[0] + 0.86 * BARREL_WIDTH * width * way[0], turret[1] + 0.86 * BARREL_WIDTH * width * way[1]
+        draw_line(view.surface, brake, muzzle, light, thick + 1.0, view.antialias)
+        dome = [
+            self._place(0.21 * math.cos(a), 0.22 + 0.40 * math.sin(a)) for a in np.linspace(0.0, math.pi, 14).tolist()
+        ]
+        fill_polygon(view.surface, dome, mix_colours(tint, INK, 0.12), view.antialias)
+        fill_polygon(view.surface, [self._place(x, y) for x, y in HULL], tint, view.antialias)
+        draw_line(
+            view.surface, self._place(-0.40, 0.16), self._place(0.40, 0.16), light, 1.2 * view.unit, view.antialias
+        )
+        track = [
+            self._place(x + 0.16 * math.cos(a), -0.24 + 0.26 * math.sin(a))
+            for x, begin in ((0.34, -0.5), (-0.34, 0.5))
+            for a in np.linspace(begin * math.pi, (begin + 1.0) * math.pi, 8).tolist()
+        ]
+        fill_polygon(view.surface, track, (32, 32, 38), view.antialias)
+        for x in (-0.32, -0.11, 0.11, 0.32):
+            draw_dot(view.surface, self._place(x, -0.24), 0.075 * width, mix_colours(dark, INK, 0.25))
+
+
+def _setting(view: DrawContext, gunnery: ArtilleryViewState, gun: GunView, at: Pixel, width: float) -> None:
+    """Draw where the gun points, and how far its power goes: dots, and a bar below the tank."""
+    turret = at[0], at[1] - 0.28 * width * gunnery.size[1] / gunnery.size[0]
+    way = math.cos(gun.angle), -math.sin(gun.angle)
+    reach = max(AIM_REACH * view.camera.scale, 90.0 * view.unit)
+    first, count = BARREL_WIDTH * width + 6.0 * view.unit, 14
+    for k in range(count):
+        share = (k + 1) / count
+        lit = share <= gun.power + 0.5 / count
+        far = first + share * reach
+        colour = mix_colours(YELLOW, ORANGE, share) if lit else (150, 150, 164)
+        size = (2.6 if lit else 1.4) * view.unit
+        draw_dot(view.surface, (turret[0] + far * way[0], turret[1] + far * way[1]), size, colour)
+    wide, high = 64.0 * view.unit, 7.0 * view.unit
+    box = pygame.Rect(round(at[0] - 0.5 * wide), round(at[1] + 0.42 * width), round(wide), round(high))
+    pygame.draw.rect(view.surface, BACKGROUND, box.inflate(4, 4), border_radius=round(high))
+    full = pygame.Rect(box.left, box.top, round(box.width * gun.power), box.height)
+    pygame.draw.rect(view.surface, mix_colours(YELLOW, ORANGE, gun.power), full, border_radius=round(0.5 * high))
+    told = f"{math.degrees(gun.angle):.1f}°   {100.0 * gun.power:.1f} %"
+    draw_text(view.surface, told, (box.centerx, box.bottom + 4 * view.unit), 12 * view.unit, INK, "midtop", bold=True)
+
+
+def _label(view: DrawContext, gun: GunView, at: Pixel, tint: Colour) -> None:
+    """Write a name, and draw what health is left under it."""
+    wide, high = 44.0 * view.unit, 4.0 * view.unit
+    box = pygame.Rect(round(at[0] - 0.5 * wide), round(at[1] - high), round(wide), round(high))
+    if gun.health is not None:
+        pygame.draw.rect(view.surface, BACKGROUND, box.inflate(3, 3), border_radius=3)
+        colour = mix_colours(WARNING, GREEN, gun.health)
+        pygame.draw.rect(view.surface, colour, pygame.Rect(box.topleft, (round(box.width * gun.health), box.height)))
+    size = 13.0 * view.unit
+    name = mix_colours(tint, INK, 0.45)
+    draw_text(
+        view.surface, gun.name, (at[0] + 1, box.top - 2 * view.unit + 1), size, BACKGROUND, "midbottom", bold=True
+    )
+    draw_text(view.surface, gun.name, (at[0], box.top - 2 * view.unit), size, name, "midbottom", bold=True)
+
+
+SKY_TONES: tuple[tuple[float, Colour], ...] = (
+    (0.0, (13, 17, 34)),
+    (0.30, (34, 42, 80)),
+    (0.48, (92, 80, 120)),
+    (0.60, (182, 118, 116)),
+    (0.70, (232, 168, 122)),
+    (1.0, (240, 186, 140)),
+)
+"""Shares of the way down the picture, and colours there."""
+RIDGES: tuple[tuple[float, float, Colour], ...] = (
+    (0.56, 0.22, (84, 74, 112)),
+    (0.72, 0.18, (58, 56, 92)),
+)
+"""How far down the picture ridges stand, how far they reach up and down, and their colours; the nearest last."""
+MIST: Colour = (176, 128, 122)
+STARS = 140
+
+
+@lru_cache(maxsize=2)
+def sky_image(size: tuple[int, int]) -> pygame.Surface:
+    """Return the sky of a picture so large, px."""
+    width, height = max(size[0], 1), max(size[1], 1)
+    strip = pygame.Surface((1, height))
+    for y in range(height):
+        strip.set_at((0, y), sky_tone(y / height))
+    whole = pygame.transform.scale(strip, (width, height))
+    random = np.random.Generator(np.random.PCG64(7))
+    for x, y, bright in random.uniform(size=(STARS, 3)).tolist():
+        down = 0.6 * y * y
+        colour = mix_colours(sky_tone(down), (240, 240, 255), 0.25 + 0.55 * bright * (1.0 - y))
+        whole.set_at((int(x * (width - 1)), int(down * height)), colour)
+    for k, (level, reach, colour) in enumerate(RIDGES):
+        line = displaced(96, 0.5, k + 3)
+        line = (line - line.mean()) / max(float(np.abs(line - line.mean()).max()), 1e-9)
+        tops = np.interp(np.linspace(0.0, 95.0, width), np.arange(96), (level - 0.5 * reach * line) * height)
+        _ridge(whole, tops, colour)
+    return whole
+
+
+def sky_tone(share: float) -> Colour:
+    """Return the colour of the sky so far down the picture."""
+    for (above, first), (below, second) in pairwise(SKY_TONES):
+        if share <= below:
+            return mix_colours(first, second, (share - above) / (below - above))
+    return SKY_TONES[-1][1]
+
+
+def _ridge(surface: pygame.Surface, tops: FloatArray, colour: Colour) -> None:
+    """Draw a ridge, whose foot is lost in mist, a column of pixels at a time."""
+    height = surface.get_height()
+    strip = pygame.Surface((1, height), 0, surface)
+    for y in range(height):
+        strip.set_at((0, y), mix_colours(colour, MIST, 0.75 * (1.0 - math.exp(-3.0 * y / height))))
+    surface.blits([(strip, (x, top)) for x, top in enumerate(np.floor(tops).astype(int).tolist())], doreturn=False)
+    pygame.draw.aalines(surface, mix_colours(colour, MIST, 0.3), False, list(enumerate(tops.tolist())))
+
+
+SOIL: Colour = (122, 92, 62)
+GRASS: Colour = (150, 190, 96)
+DEEP: Colour = (24, 21, 27)
+DARKENS = 16.0
+"""m below the surface, at which ground is half as dark as at all"""
+BAND = 3.2
+"""m, between layers that are a little lighter"""
+
+
+def soil_of(scene: Scene) -> Colour:
+    """Return the colour of ground near its surface."""
+    wall = next((wall for wall in scene.walls if wall.name == GROUND), None)
+    return SOIL if wall is None or wall.colour is None else hex_colour(wall.colour)
+
+
+def draw_land(surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True) -> None:
+    """Draw sky, ground, and what else is fixed, as far as it is in sight."""
+    surface.blit(sky_image(surface.get_size()), (0, 0))
+    others = tuple(wall for wall in scene.walls if wall.name != GROUND)
+    for wall in scene.walls:
+        if wall.name == GROUND:
+            _ground(surface, camera, wall, soil_of(scene), unit, antialias)
+            _sides(surface, camera, scene, wall, unit, antialias)
+    draw_static_bodies(surface, camera, scene.model_copy(update={"walls": others}), unit, antialias)
+
+
+def _ground(surface: pygame.Surface, camera: Camera, wall: Wall, soil: Colour, unit: float, antialias: bool) -> None:
+    """Fill what lies below a wall, a column of pixels at a time, each cut from one strip."""
+    places = camera.to_screen(np.asarray(wall.points))
+    width, height = surface.get_size()
+    left, right = max(int(np.ceil(places[0, 0])), 0), min(int(np.ceil(places[-1, 0])), width)
+    if left >= right:
+        return
+    tops = np.interp(np.arange(left, right) + 0.5, places[:, 0], places[:, 1])
+    strip = terrain_strip(soil, camera.scale, height, surface)
+    first = np.clip(np.floor(tops), -height, height).astype(np.int64).tolist()
+    surface.blits([(strip, (x, top)) for x, top in zip(range(left, right), first, strict=True)], doreturn=False)
+    edge = mix_colours(GRASS, soil, 0.35)
+    near = np.flatnonzero((places[:, 0] >= -50.0) & (places[:, 0] <= width + 50.0))
+    if len(near) > 1:
+        shown = places[max(int(near[0]) - 1, 0) : int(near[-1]) + 2]
+        shown = np.column_stack((np.clip(shown[:, 0], -1e4, 1e4), np.clip(shown[:, 1], -1e4, 1e4)))
+        corners = shown.tolist()
+        for shift, colour in ((1.5 * unit, mix_colours(edge, soil, 0.5)), (0.0, edge)):
+            moved = [(x, y + shift) for x, y in corners]
+            if antialias:
+                pygame.draw.aalines(surface, colour, False, moved)
+            pygame.draw.lines(surface, colour, False, moved, max(round(1.6 * unit), 1))
+        if antialias:
+            pygame.draw.aalines(
+                surface, mix_colours(edge, (255, 255, 240), 0.35), False, [(x, y - 1.0) for x, y in corners]
+            )
+
+
+def terrain_strip(soil: Colour, scale: float, height: int, like: pygame.Surface) -> pygame.Surface:
+    """Return one column of ground from its surface down, two pictures high, at a scale, px/m."""
+    strip = pygame.Surface((1, max(2 * height, 1)), 0, like)
+    for y in range(strip.get_height()):
+        depth = y / scale
+        tint = mix_colours(DEEP, soil, 0.5 ** (depth / DARKENS))
+        layer = 0.10 if int(depth / BAND) % 2 else 0.0
+        strip.set_at((0, y), mix_colours(mix_colours(tint, (0, 0, 0), layer), GRASS, 0.35 * 0.5 ** (depth / 0.7)))
+    return strip
+
+
+def _sides(surface: pygame.Surface, camera: Camera, scene: Scene, wall: Wall, unit: float, antialias: bool) -> None:
+    """Draw what stands at the sides: walls of rubber, or where one side is the other."""
+    artillery = table_of(scene, Artillery)
+    if artillery is None or artillery.edges == "open":
+        return
+    rubber = artillery.edges == "rubber"
+    for x in (wall.points[0][0], wall.points[-1][0]):
+        px, foot = float(camera.to_screen(np.array((x, 0.0)))[0]), surface.get_height() + 1.0  # as far as dirt is seen
+        if rubber:
+            draw_line(surface, (px, foot), (px, -1.0), (58, 62, 92), 5.0 * unit, antialias)
+            draw_line(surface, (px, foot), (px, -1.0), FAINT, 1.5 * unit, antialias)
+        else:
+            draw_dashes(surface, [((px, foot), (px, -1.0))], FAINT, 9.0 * unit, antialias)
+
+
+EXPLOSION_DURATION = 0.7
+"""s that a blast is seen"""
+TRACER_STEPS = 0.03
+"""s between two points of a tracer"""
+MAX_TRACER_POINTS = 10.0
+"""s, of a shot that comes down nowhere"""
+
+
+def add_artillery(rules: Rules, sight: Snapshot, present: bool = True) -> Snapshot:
+    """Return a sight with what a game adds to it; of other games than artillery the sight as it is.
+
+    Args:
+        rules: as they stand.
+        sight: of the scene.
+        present: the sight is of now. The rules know no other time: then all that they add is what tanks look like.
+    """
+    if not isinstance(rules, ArtilleryRules):
+        return sight
+    if present:
+        return replace(sight, gunnery=artillery_view_state(rules, sight.frame.time))
+    tanks = rules.field.tanks
+    guns = tuple(GunView(tank.number, tank.name, tank.angle, tank.power, None, aiming=False) for tank in tanks.every)
+    return replace(sight, gunnery=ArtilleryViewState(guns, tanks.size, wind=None))
+
+
+def artillery_view_state(rules: ArtilleryRules, time: float) -> ArtilleryViewState:
+    """Return what is drawn at a time, s."""
+    field, barrage = rules.field, rules.barrage
+    aiming = rules.phase == "aim" and rules.over is None
+    guns = tuple(
+        GunView(
+            number=tank.number,
+            name=tank.name,
+            angle=tank.angle,
+            power=tank.power,
+            health=tank.health / WHOLE,
+            aiming=aiming and tank is rules.shooter,
+        )
+        for tank in field.tanks.alive
+    )
+    shot = rules.shots[-1] if rules.shots else None
+    landed = None if shot is None or shot.place is None or shot.exact is None else (shot.place, shot.exact)
+    return ArtilleryViewState(
+        guns=guns,
+        size=field.tanks.size,
+        wind=rules.world.wind[0],
+        ways=tuple(np.asarray(way) for way in barrage.ways.values() if len(way) > 1),
+        flying=tuple(shell.number for shell in barrage.shells if shell.number is not None),
+        bursts=tuple(
+            ExplosionView(max(time - each.time, 0.0), each.place, each.radius, each.dirt)
+            for each in field.blasts
+            if time - each.time <= EXPLOSION_DURATION
+        ),
+        clods=_clods(rules, time),
+        tracer=_tracer(rules) if aiming and rules.artillery.tracer else None,
+        landed=landed,
+    )
+
+
+def _clods(rules: ArtilleryRules, time: float) -> tuple[FallingDirt, ...]:
+    """Return the dirt that is in the air: it falls freely, whatever the air."""
+    ground, pull = rules.field.ground, math.hypot(*rules.world.gravity)
+    clods = []
+    for since, loose in rules.field.falling:
+        fallen = 0.5 * pull * max(time - since, 0.0) ** 2
+        for each in loose:
+            if fallen < each.drop:
+                left = each.column * ground.each
+                bottom, top = each.bottom - fallen, each.top - fallen
+                clods.append(FallingDirt(left, left + ground.each, bottom, top, each.bottom - each.drop))
+    return tuple(clods)
+
+
+def _tracer(rules: ArtilleryRules) -> FloatArray | None:
+    """Return the way of a shot as the gun is set now, as far as the first side or the ground."""
+    tank, field = rules.shooter, rules.field
+    start = field.tanks.muzzle(tank).at(np.array([tank.angle]))[0]
+    velocity = rules.speed(tank) * np.array([math.cos(tank.angle), math.sin(tank.angle)])
+    flight, down = Flight(rules.world, start, velocity), landing(rules.world, start, velocity, field.ground)
+    until = down.time if down is not None else MAX_TRACER_POINTS
+    return np.stack([flight.at(float(time))[0] for time in np.arange(0.0, until, TRACER_STEPS)])
+
+
+SMOKE: Colour = (214, 206, 200)
+FLAME: tuple[Colour, ...] = ((255, 250, 222), (255, 204, 92), (238, 116, 48), (96, 62, 58))
+"""From the beginning of a blast to its end."""
+OFF_SCREEN_MARGIN = 1e4
+"""px from a picture's corner, beyond which nothing is seen"""
+FARTHEST_EMBER = 400
+"""Points of a way that are drawn."""
+
+
+def draw_below(view: DrawContext, gunnery: ArtilleryViewState) -> None:
+    """Draw what lies behind tanks: dirt in the air, the wind, ways."""
+    for clod in gunnery.clods:
+        _clod(view, clod)
+    for way in gunnery.ways:
+        _way(view, way, bool(gunnery.flying))
+    if gunnery.tracer is not None:
+        for x, y in view.camera.to_screen(gunnery.tracer[::4]).tolist():
+            draw_dot(view.surface, (x, y), 1.3 * view.unit, mix_colours(SKY, INK, 0.4))
+
+
+def draw_above(view: DrawContext, gunnery: ArtilleryViewState) -> None:
+    """Draw what lies in front of all: shells, blasts, where the last shot came down, and the wind."""
+    frame = view.sight.frame
+    for number in gunnery.flying:
+        if number < len(frame.position) and frame.present[number]:
+            x, y = view.camera.to_screen(frame.position[number]).tolist()
+            draw_glow(view.surface, (x, y), 7.0 * view.unit, (255, 190, 90), 90)
+            draw_dot(view.surface, (x, y), max(2.6 * view.unit, 2.0), (255, 246, 214))
+    for burst in gunnery.bursts:
+        _burst(view, burst)
+    if gunnery.landed is not None and not gunnery.flying:
+        _landed(view, gunnery.landed)
+    if gunnery.wind is not None:
+        _wind(view, gunnery.wind)
+
+
+def _way(view: DrawContext, way: FloatArray, flying: bool) -> None:
+    """Draw where a shell has been: the older the fainter, or, once it is over, thin all along."""
+    points = way[:: max(len(way) // FARTHEST_EMBER, 1)]
+    places = view.camera.to_screen(np.vstack((points, way[-1:]))).tolist()
+    for k in range(len(places) - 1):
+        age = 1.0 - k / len(places)
+        share = max(0.75 - age, 0.16) if flying else 0.22
+        if not flying and k % 3 == 2:
+            continue  # a way that is over is dotted
+        colour = mix_colours((70, 72, 104), SMOKE, share)
+        (ax, ay), (bx, by) = places[k], places[k + 1]
+        draw_line(view.surface, (ax, ay), (bx, by), colour, (1.0 + 1.4 * share) * view.unit, view.antialias)
+
+
+def _clod(view: DrawContext, clod: FallingDirt) -> None:
+    """Draw a column of dirt that falls, and the air that it has left where it is to lie."""
+    surface = view.surface
+    ends = np.array([(clod.left, clod.top), (clod.right, clod.bottom), (clod.right, clod.floor)])
+    places = np.clip(view.camera.to_screen(ends), -OFF_SCREEN_MARGIN, OFF_SCREEN_MARGIN)
+    (left, top), (right, bottom), (_, floor) = places.tolist()
+    lies = floor - (bottom - top)
+    air = pygame.Rect(math.floor(left), math.floor(lies) - 4, math.ceil(right) - math.floor(left) + 1, 1)
+    air.height = max(math.ceil(floor) - air.top, 1)
+    air = air.clip(surface.get_rect())
+    if air.width and air.height:
+        surface.blit(sky_image(surface.get_size()), air.topleft, air)
+    dirt = pygame.Rect(math.floor(left), math.floor(top), air.width, max(math.ceil(bottom) - math.floor(top), 1))
+    dirt = dirt.clip(surface.get_rect())
+    if dirt.width and dirt.height:
+        soil = soil_of(view.sight.scene)
+        surface.fill(mix_colours(soil, (0, 0, 0), 0.12), dirt)
+        surface.fill(mix_colours(GRASS, soil, 0.4), pygame.Rect(dirt.left, dirt.top, dirt.width, min(2, dirt.height)))
+
+
+def _burst(view: DrawContext, burst: ExplosionView) -> None:
+    """Draw a blast: a ball of fire that grows, cools, and thins out."""
+    share = min(burst.age / EXPLOSION_DURATION, 1.0)
+    x, y = view.camera.to_screen(np.asarray(burst.place)).tolist()
+    radius = burst.radius * view.camera.scale * (0.35 + 0.75 * share**0.4)
+    tones = ((150, 118, 84), (120, 94, 70), (96, 78, 62), (80, 70, 62)) if burst.dirt else FLAME
+    place = share * (len(tones) - 1)
+    k = min(int(place), len(tones) - 2)
+    colour = mix_colours(tones[k], tones[k + 1], place - k)
+    for part, opacity in ((1.0, 0.45), (0.72, 0.6), (0.4, 0.8)):
+        hidden = round(255 * opacity * (1.0 - share))
+        draw_glow(view.surface, (x, y), radius * part, mix_colours(colour, tones[0], 1.0 - part), hidden)
+
+
+def _landed(view: DrawContext, landed: tuple[tuple[float, float], tuple[float, float]]) -> None:
+    """Mark where the last shot came down, and, as a ring, where it would have exactly."""
+    (x, y), (ex, ey) = view.camera.to_screen(np.asarray(landed)).tolist()
+    if all(abs(each) < 1e4 for each in (x, y, ex, ey)):
+        size = 4.0 * view.unit
+        for sign in (-1.0, 1.0):
+            draw_line(view.surface, (x - size, y - sign * size), (x + size, y + sign * size), INK, 1.6 * view.unit)
+        draw_dot(view.surface, (ex, ey), 7.0 * view.unit, YELLOW, 1.4 * view.unit)
+
+
+def _back(view: DrawContext, middle: tuple[float, float], size: tuple[float, float]) -> None:
+    """Darken what lies behind words."""
+    box = pygame.Rect(0, 0, round(size[0]), round(size[1]))
+    shade = pygame.Surface(box.size, pygame.SRCALPHA)
+    pygame.draw.rect(shade, (*BACKGROUND, 120), box, border_radius=round(6.0 * view.unit))
+    box.center = round(middle[0]), round(middle[1])
+    view.surface.blit(shade, box)
+
+
+def _wind(view: DrawContext, wind: float) -> None:
+    """Draw which way the wind blows, and how hard, at the left, below what is told of the run."""
+    size = 13.0 * view.unit
+    middle, top = 96.0 * view.unit, max(view.sight.below, 24.0 * view.unit) + 20.0 * view.unit
+    half = min(max(7.0 * abs(wind), 8.0), 84.0) * view.unit
+    told = f"wind {abs(wind):.1f} m/s" if wind else "no wind"
+    _back(view, (middle, top + 7.0 * view.unit), (172.0 * view.unit, 44.0 * view.unit))
+    draw_text(view.surface, told, (middle + 1, top + 9 * view.unit + 1), size, BACKGROUND, "midtop", bold=True)
+    draw_text(view.surface, told, (middle, top + 9 * view.unit), size, INK, "midtop", bold=True)
+    if wind:
+        ends = (middle - half, top), (middle + half, top)
+        begin, end = ends if wind > 0 else ends[::-1]
+        draw_arrow(
+            view.surface, begin, end, mix_colours(SKY, INK, 0.35), 4.0 * view.unit, view.antialias, edge=BACKGROUND
+        )

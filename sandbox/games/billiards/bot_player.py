@@ -1,0 +1,94 @@
+"""Opponent: a bot at the window's table. It thinks beside the picture, takes aim to be seen, and strokes."""
+
+import math
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+from typing import NamedTuple
+
+from sandbox.games.billiards.aiming import CueState
+from sandbox.games.billiards.bot import BilliardsBot
+from sandbox.games.billiards.headless import FramePlan
+from sandbox.games.billiards.match import Match
+from sandbox.games.billiards.rules.base import Decision
+from sandbox.scene.description.surface import Stroke
+
+TURNING, DRAWING = 0.9, 0.45
+"""s that it takes to aim, and to draw the cue back"""
+STROKE_ANIMATION = 0.02
+"""m that the cue is drawn back, for each m/s"""
+
+
+class BotThought(NamedTuple):
+    """What it has come to."""
+
+    decision: Decision | None
+    """before the stroke"""
+    plan: FramePlan | None
+    """none where what it decided leaves the table to the other"""
+
+
+class BotPlayer:
+    """A bot, and where it is with its shot."""
+
+    def __init__(self, skill: float = 0.7, seed: int = 0) -> None:
+        self._bot = BilliardsBot(skill, seed)
+        self._pool = ThreadPoolExecutor(1, "bot")
+        self._future: Future[BotThought] | None = None
+        self._match: Match | None = None
+        self._since = -1.0
+        self._from: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def is_aiming(self) -> bool:
+        """Whether it has found a shot, and moves the cue to it."""
+        return self._since >= 0.0
+
+    def thought(self, match: Match) -> BotThought | None:
+        """Return what it does with a table; it begins to think where it has not yet."""
+        if self._match is not match or self._future is None:
+            if self._future is not None and not self._future.done():
+                return None  # of a table that is no more; it cannot be told to stop
+            self._match, self._since = match, -1.0  # it has not yet moved
+            self._future = self._pool.submit(self._think, match)
+        return self._future.result() if self._future.done() else None
+
+    def _think(self, match: Match) -> BotThought:
+        decision: Decision | None = None
+        if match.choices.decisions and match.rules.name != "free":
+            decision = self._bot.decide(match)
+            after = match.decide(decision)
+            if after.over or after.turn != match.turn:
+                return BotThought(decision, None)
+            match = after
+        return BotThought(decision, self._bot.plan(match))
+
+    def moves(self, cue: CueState, stroke: Stroke, elapsed: float) -> bool:
+        """Let the cue come to a stroke while real time passes, s; tell whether it is to be played."""
+        if self._since < 0.0:
+            self._since, self._from = 0.0, (cue.aim, cue.side, cue.height)
+        self._since += elapsed
+        share = min(self._since / TURNING, 1.0)
+        share = share * share * (3.0 - 2.0 * share)
+        aim, side, height = self._from
+        cue.aim = aim + math.remainder(stroke.aim - aim, math.tau) * share
+        cue.tip_at(side + (stroke.side - side) * share, height + (stroke.height - height) * share)
+        cue.speed = stroke.speed
+        drawn = min(max(self._since - TURNING, 0.0) / DRAWING, 1.0)
+        cue.back = STROKE_ANIMATION * stroke.speed * drawn
+        return self._since > TURNING + 1.15 * DRAWING
+
+    def stays(self, match: Match) -> None:
+        """Keep to what it has come to, now that the table is as it wanted it."""
+        if self._future is None:
+            return
+        self._match, thought = match, self._future.result()
+        self._future = Future()
+        self._future.set_result(BotThought(None, thought.plan and replace(thought.plan, place=None)))
+
+    def forget(self) -> None:
+        """Begin anew with the next table."""
+        self._match, self._since = None, -1.0
+
+    def close(self) -> None:
+        """Stop; a thought that is under way is let go of."""
+        self._pool.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,505 @@
+"""Gestures: what the mouse does at a table: it aims, strokes, sets english and power, and carries the cue ball.
+
+Person: what one who plays at the table decides, calls, and does with a cue ball in hand.
+
+Seen: what a game adds to the sight of a moment.
+
+Cue keys: what a table claims of the keyboard.
+
+Seats: who sits at the table that is on, if one is.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Literal, get_args
+
+import pygame
+
+from sandbox.action import ActionError
+from sandbox.games.billiards.aiming import FASTEST, SLOWEST, CueAim, ShotPredictor
+from sandbox.games.billiards.match import Match
+from sandbox.games.billiards.rules.base import Decision, GameError, ShotCall
+from sandbox.games.billiards.table_game import BilliardsGame, Players, plays
+from sandbox.games.billiards.table_geometry import TableGeometry
+from sandbox.games.names import TableGame
+from sandbox.scene.description.base import Point
+from sandbox.scene.scene import Scene
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.snapshot import Snapshot
+
+
+class HumanPlayer:
+    """Who sits at the window."""
+
+    def __init__(self, game: BilliardsGame) -> None:
+        self.game = game
+        self._carried: tuple[int, Point] | None = None  # after how many strokes, and where
+        self.refused = False
+        """the cue ball may not be put where the hand is"""
+        self._chosen: tuple[Match, int] | None = None
+
+    @property
+    def carried(self) -> Point | None:
+        """Where the hand holds the cue ball, m."""
+        if self._carried is None or self._carried[0] != self.game.strokes or not self.game.mine:
+            return None
+        return self._carried[1]
+
+    @property
+    def place(self) -> Point:
+        """Where the ball is that is struck next, m."""
+        return self.carried or self.game.position[self.game.ball]
+
+    @property
+    def choice(self) -> Decision | None:
+        """The decision that Enter would take; none where nothing is to be decided."""
+        match = self.game.match
+        decisions = match.choices.decisions
+        if not decisions:
+            return None
+        chosen = self._chosen[1] if self._chosen is not None and self._chosen[0] is match else 0
+        return decisions[chosen % len(decisions)]
+
+    def choose_next(self) -> None:
+        """Look at the next of the decisions.
+
+        Raises:
+            ActionError: there are none.
+        """
+        self.game.check()
+        now, match = self.choice, self.game.match
+        if now is None:
+            raise ActionError("there is nothing to decide")
+        self._chosen = match, match.choices.decisions.index(now) + 1
+
+    def take_choice(self) -> None:
+        """Take the decision that was looked at last.
+
+        Raises:
+            ActionError: there is none.
+        """
+        self.game.check()
+        if self.choice is None:
+            raise ActionError("there is nothing to decide")
+        self.decide(self.choice)
+
+    def decide(self, decision: Decision) -> None:
+        """Decide what is to be decided before a stroke.
+
+        Raises:
+            ActionError: it cannot be decided now.
+        """
+        self.game.check()
+        try:
+            match = self.game.match.decide(decision)
+        except GameError as error:
+            raise ActionError(str(error)) from None
+        self.game.go_another_way(match)
+
+    def say(self, call: ShotCall) -> None:
+        """Call a ball or a pocket.
+
+        Raises:
+            ActionError: it cannot be called now.
+        """
+        self.game.check()
+        try:
+            self.game.match.choices.check(call)
+        except GameError as error:
+            raise ActionError(str(error)) from None
+        self.game.say(call)
+
+    def call_safety(self) -> None:
+        """Call a safety, or take that back.
+
+        Raises:
+            ActionError: it cannot be called now.
+        """
+        self.say(replace(self.game.call, safety=not self.game.call.safety))
+
+    def shoot(self, speed: float | None = None) -> None:
+        """Play the stroke; a ball in the hand is put down before.
+
+        Raises:
+            ActionError: it cannot be played now.
+        """
+        self.put_down()
+        self.game.shoot(speed)
+
+    def take_in_hand(self) -> None:
+        """Take the cue ball in hand, or put it down.
+
+        Raises:
+            ActionError: the rules do not give it.
+        """
+        if self.carried is not None:
+            self.put_down()
+            return
+        self.game.check()
+        if self.game.match.state.in_hand is None:
+            if "in hand" not in self.game.match.choices.decisions:
+                raise ActionError("the cue ball is not in hand")
+            self.decide("in hand")
+        self._carried, self.refused = (self.game.strokes, self.place), False
+
+    def carry(self, at: Point) -> None:
+        """Move the hand that holds the cue ball, m; the ball goes where it may be put, as near as can be."""
+        match = self.game.match
+        if self.carried is None or match.state.in_hand is None:
+            return
+        self.refused = match.refusal(at) is not None
+        try:
+            self._carried = self.game.strokes, match.nearest(at)
+        except GameError:  # no room at all: it stays
+            self.refused = True
+
+    def put_down(self) -> None:
+        """Put a ball that is carried down.
+
+        Raises:
+            ActionError: it cannot be put there.
+        """
+        at, self._carried = self.carried, None
+        if at is None:
+            return
+        try:
+            match = self.game.match.place(at)
+        except GameError as error:
+            raise ActionError(str(error)) from None
+        self.game.go_another_way(match)
+
+
+class BilliardsOverlay:
+    """Works out what is drawn of the next stroke."""
+
+    def __init__(self, person: HumanPlayer) -> None:
+        self._person = person
+        self._forecaster = ShotPredictor(person.game.match.scene)
+
+    def over(self, sight: Snapshot) -> Snapshot:
+        """Return a sight with the aim of a game, and with the ball that a hand carries where the hand is."""
+        aim = self.aim()
+        if aim is None or not aim.carried:
+            return replace(sight, aim=aim)
+        position = sight.frame.position.copy()
+        position[aim.ball] = aim.place
+        return replace(sight, aim=aim, frame=replace(sight.frame, position=position))
+
+    def aim(self) -> CueAim | None:
+        """Return what is drawn of the next stroke; nothing while balls roll or the bot looks for its shot."""
+        person, game = self._person, self._person.game
+        if not game.aiming or game.bot_is_thinking:
+            return None
+        match, cue, call, ball = game.match, game.cue, game.call, game.ball
+        carried = person.carried is not None
+        pocket = match.layout.pockets.get(call.pocket or "")
+        return CueAim(
+            ball=ball,
+            place=person.place,
+            angle=cue.aim,
+            side=cue.side,
+            back=cue.back,
+            forecast=None if carried else self._forecaster.of(cue.stroke, ball, game.position),
+            carried=carried,
+            refused=person.refused,
+            called=None if pocket is None else ((pocket[0], pocket[1]), pocket[2]),
+            nominated=match.layout.number.get(call.ball or ""),
+        )
+
+
+CueMode = Literal["aim", "stroke", "draw", "english", "power"]
+
+FINE = 0.08
+"""of the turn that the mouse asks for, with Shift"""
+ROOM = 0.5
+"""m that the cue can be drawn back"""
+DRAWN = 0.015
+"""m: a cue drawn back less strokes nothing"""
+RECENT = 0.07
+"""s over which the speed of a stroke is measured"""
+DIAL = 90.0
+"""px at unit 1 that the mouse moves from the ball's middle to its edge, and for half of the power"""
+NEAR = 1.5
+"""radii: nearer to the cue ball the mouse points nowhere"""
+
+
+class CueControls:
+    """What a hand is doing at the table."""
+
+    def __init__(self, person: HumanPlayer) -> None:
+        self.person, self.game = person, person.game
+        self.seen = BilliardsOverlay(person)
+        self.mode: CueMode = "aim"
+        self._offset: float | None = None
+        """rad, from where the mouse points to where the cue does; none before the mouse has moved"""
+        self._strokes = 0
+        self._drawn = 0.0
+        self._deepest = 0.0
+        self._recent: deque[tuple[float, float]] = deque()
+
+    def begin(self, mode: CueMode) -> None:
+        """Begin to stroke, or to set english or power: a key is held."""
+        self._end()
+        self.mode = mode
+
+    def end(self) -> None:
+        """A key was let go of."""
+        self._end()
+
+    def _end(self) -> None:
+        self.mode, self._drawn, self._deepest = "aim", 0.0, 0.0
+        self._recent.clear()
+        self.game.cue.back = 0.0
+
+    def motion(self, before: Point, now: Point, pixels: tuple[float, float], fine: bool, time: float) -> None:
+        """Let the mouse move.
+
+        Args:
+            before: where it pointed, m.
+            now: where it points, m.
+            pixels: how far it has moved, px at unit 1, to the right and downwards.
+            fine: whether it is to move things a little only.
+            time: of the motion, s.
+
+        Raises:
+            ActionError: a stroke cannot be played.
+        """
+        game = self.game
+        if self.person.carried is not None:
+            self.person.carry(now)
+            return
+        if not game.mine:
+            return
+        cue, share = game.cue, FINE if fine else 1.0
+        if self.mode == "english":
+            cue.tip_at(cue.side + share * pixels[0] / DIAL, cue.height - share * pixels[1] / DIAL)
+        elif self.mode == "power":
+            cue.power -= share * pixels[1] / (2.0 * DIAL)
+        elif self.mode == "aim":
+            self._turn(before, now, fine)
+        else:
+            x, y = cue.way
+            self._push((now[0] - before[0]) * x + (now[1] - before[1]) * y, time)
+
+    def _turn(self, before: Point, now: Point, fine: bool) -> None:
+        cue, (x, y) = self.game.cue, self.person.place
+        match = self.game.match
+        if math.dist((x, y), now) < NEAR * match.layout.radius[self.game.ball]:
+            return
+        angle = math.atan2(now[1] - y, now[0] - x)
+        if self._offset is None or self._strokes != self.game.strokes:
+            self._offset, self._strokes = 0.0, self.game.strokes
+        if fine:
+            turned = math.remainder(angle - math.atan2(before[1] - y, before[0] - x), math.tau)
+            self._offset = math.remainder(cue.aim + FINE * turned - angle, math.tau)
+        cue.aim = angle + self._offset
+
+    def nudge(self, by: float) -> None:
+        """Turn the cue a little, rad."""
+        if self.game.mine:
+            self.game.cue.aim += by
+            self._offset = (self._offset or 0.0) + by
+
+    def strengthen(self, by: float) -> None:
+        """Change the power by a share of the greatest."""
+        if self.game.mine:
+            self.game.cue.power += by
+
+    def _push(self, forth: float, time: float) -> None:
+        """Let the cue follow the hand along its way; what passes through the ball is a stroke."""
+        self._drawn = min(self._drawn - forth, ROOM)
+        self._deepest = max(self._deepest, self._drawn)
+        self._recent.append((time, forth))
+        while self._recent and self._recent[0][0] < time - RECENT:
+            self._recent.popleft()
+        self.game.cue.back = max(self._drawn, 0.0)
+        if self.mode == "draw":
+            self.game.cue.power = min(self.game.cue.back / ROOM, 1.0)
+        elif self._drawn <= 0.0 and self._deepest >= DRAWN:
+            speed = sum(each for _, each in self._recent) / RECENT
+            self._end()
+            self.person.shoot(min(max(speed, SLOWEST), FASTEST))
+        self._drawn = max(self._drawn, 0.0)
+
+    def press(self, at: Point, reach: float) -> bool:
+        """Take the left button's press at a place; return whether the table has a use for it.
+
+        On the cue ball, in hand, it takes it; beside all balls it takes the cue, to be drawn back and let go; while
+        the ball is carried it puts it down.
+
+        Raises:
+            ActionError: the ball cannot be put there.
+        """
+        game, person = self.game, self.person
+        if person.carried is not None:
+            person.put_down()
+            return True
+        if not game.mine:
+            return False
+        match = game.match
+        radius = match.layout.radius[game.ball]
+        if math.dist(person.place, at) <= radius + reach:
+            if match.state.in_hand is None:
+                return False
+            person.take_in_hand()
+            return True
+        if any(math.dist((x, y), at) <= r + reach for x, y, r in match.on_table.values()):
+            return False
+        self.begin("draw")
+        return True
+
+    def release(self, at: Point, moved: bool) -> bool:
+        """Take the left button's release; return whether it ended something here.
+
+        Raises:
+            ActionError: a stroke cannot be played, or a ball put down.
+        """
+        if self.person.carried is not None and moved:
+            self.person.put_down()
+            return True
+        if self.mode != "draw":
+            return False
+        drawn = self.game.cue.back
+        self._end()
+        if drawn >= DRAWN:
+            self.person.shoot()
+        elif not moved:
+            self._name(at)
+        return True
+
+    def _name(self, at: Point) -> None:
+        """Call the pocket that was clicked."""
+        match, call = self.game.match, self.game.call
+        pocket = match.layout.pocket_at(at)
+        if pocket is not None and match.choices.pocket:
+            self.person.say(replace(call, pocket=None if pocket == call.pocket else pocket))
+
+    def name_ball(self, number: int) -> bool:
+        """Call the ball that was clicked, where the rules ask for one; return whether they did.
+
+        Raises:
+            ActionError: it cannot be called now.
+        """
+        match, call = self.game.match, self.game.call
+        name = match.layout.names[number]
+        if not self.game.mine or name not in match.choices.balls:
+            return False
+        self.person.say(replace(call, ball=None if name == call.ball else name))
+        return True
+
+
+KeyHandler = Callable[[LiveView], object]
+
+TURN, FINER = 0.002, 0.0001
+"""rad that an arrow key turns the cue, and with Shift"""
+POWER_STEP = 0.02
+"""of the greatest, that an arrow key adds"""
+
+CUE_KEY_HELP = (
+    ("Mouse", "aim; Shift: fine"),
+    ("Left or Right", "fine aim; Shift: finer"),
+    ("Up or Down", "power"),
+    ("S (hold)", "stroke: pull back, push forward"),
+    ("Left-drag", "draw the cue back, release"),
+    ("E (hold)", "english: where the tip hits"),
+    ("X (hold)", "set the power"),
+    ("Space", "shoot"),
+    ("G", "cue ball in hand"),
+    ("Z", "undo shot"),
+    ("Click", "call a ball, or a pocket"),
+    ("C", "call a safety"),
+    ("D", "next choice, if any"),
+    ("Enter", "confirm the choice"),
+)
+"""as help lists them"""
+
+
+def cue_key_handlers(gestures: CueControls) -> tuple[dict[int, KeyHandler], dict[int, KeyHandler]]:
+    """Return what keys do, and what is done when they are let go."""
+    game, person = gestures.game, gestures.person
+    pressed: dict[int, KeyHandler] = {
+        pygame.K_SPACE: lambda _: person.shoot(),
+        pygame.K_g: lambda _: person.take_in_hand(),
+        pygame.K_z: lambda _: game.undo(),
+        pygame.K_LEFT: lambda _: gestures.nudge(_step()),
+        pygame.K_RIGHT: lambda _: gestures.nudge(-_step()),
+        pygame.K_UP: lambda _: gestures.strengthen(POWER_STEP),
+        pygame.K_DOWN: lambda _: gestures.strengthen(-POWER_STEP),
+        pygame.K_c: lambda _: person.call_safety(),
+        pygame.K_d: lambda _: person.choose_next(),
+        pygame.K_RETURN: lambda _: person.take_choice(),
+    }
+    released: dict[int, KeyHandler] = {}
+    modes: tuple[tuple[int, CueMode], ...] = (
+        (pygame.K_s, "stroke"),
+        (pygame.K_e, "english"),
+        (pygame.K_x, "power"),
+    )
+    for key, mode in modes:
+        pressed[key] = partial(_begin, gestures=gestures, mode=mode)
+        released[key] = partial(_end, gestures=gestures)
+    return pressed, released
+
+
+def _begin(_: LiveView, gestures: CueControls, mode: CueMode) -> None:
+    gestures.begin(mode)
+
+
+def _end(_: LiveView, gestures: CueControls) -> None:
+    gestures.end()
+
+
+def _step() -> float:
+    return FINER if pygame.key.get_mods() & pygame.KMOD_SHIFT else TURN
+
+
+def prepared_scene(scene: Scene) -> Scene:
+    """Return a scene as it is played: of one that names a game the shots are the players'."""
+    return TableGeometry.of(scene).scene if scene.play.game in get_args(TableGame) else scene
+
+
+class TableGameHost:
+    """The game that is played, and what a hand does at it; none where what is on is no table."""
+
+    def __init__(self) -> None:
+        self.game: BilliardsGame | None = None
+        """who plays"""
+        self.gestures: CueControls | None = None
+        """what a hand does"""
+        self.players: Players | None = None
+        """who is asked to play, from the next game on; None leaves it to the game"""
+        self.misses = False
+        """whether snooker is played with the foul and a miss, from the next game on"""
+
+    @property
+    def waits(self) -> bool:
+        """Whether time stands still until somebody strikes."""
+        return self.game is not None and self.game.waits
+
+    def take(self, live: LiveView, file: Scene, tell: Callable[[str, str], None]) -> None:
+        """Begin a game, where a session is of a table.
+
+        Args:
+            live: the session.
+            file: its scene, as the file has it.
+            tell: told of what cannot be played, with its level.
+        """
+        if not plays(live.scene):
+            return
+        # A scene that starts by its own shot has been struck already.
+        shot = file.shots[0] if file.shots and not live.scene.shots else None
+        try:
+            self.game = BilliardsGame(live, self.players, shot, self.misses)
+        except GameError as error:
+            tell(str(error), "warning")
+        else:
+            self.gestures = CueControls(HumanPlayer(self.game))
+
+    def leave(self) -> None:
+        """End the game."""
+        if self.game is not None:
+            self.game.close()
+        self.game = self.gestures = None

@@ -1,0 +1,414 @@
+"""Scoreboard: who plays, what for, how it stands, what is to be done; and what may be decided.
+
+Tip: the ball as the player sees it, with where the tip meets it; and the power of the stroke.
+
+Tools: what a player has beside the table: the ball with the tip's mark, the power, the scores.
+"""
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import NamedTuple
+
+import pygame
+
+from sandbox.games.billiards.aiming import FASTEST, CueState
+from sandbox.games.billiards.controls import HumanPlayer
+from sandbox.games.billiards.match import Match
+from sandbox.games.billiards.rules.base import Decision, renamed
+from sandbox.games.billiards.rules.pool import EightBallState
+from sandbox.games.billiards.table_game import BOT, BilliardsGame
+from sandbox.games.billiards.view_balls import IVORY, BallTexture, texture_of
+from sandbox.scene.description.surface import MISCUE
+from sandbox.window.playback.live import LiveView
+from sandbox.window.render.palette import (
+    FAINT,
+    INK,
+    LINE,
+    ORANGE,
+    PANEL,
+    PANEL_RAISED,
+    SKY,
+    VERMILION,
+    Colour,
+    hex_colour,
+    mix_colours,
+)
+from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+from sandbox.window.render.text import draw_box, draw_text, text_size, wrap_text
+from sandbox.window.ui.icons import draw_disc
+
+MAX_SCOREBOARD_WIDTH = 470.0
+"""px at unit 1"""
+MIN_SCOREBOARD_WIDTH = 300.0
+RIGHT = 66.0
+"""px at unit 1 beside it, for how many pictures a second there are"""
+
+
+class ScoreboardText(NamedTuple):
+    """A scoreboard as it was drawn."""
+
+    rect: pygame.Rect
+    choices: tuple[tuple[pygame.Rect, Decision], ...]
+    """where the decisions are that can be clicked"""
+
+
+class ScoreboardLayout(NamedTuple):
+    """Where a scoreboard lies, and what it says."""
+
+    rect: pygame.Rect
+    lines: tuple[str, ...]
+    """what happened, and what is to be done"""
+
+
+def layout_scoreboard(
+    person: HumanPlayer, free: pygame.Rect, left: int, unit: float, aside: int = 0
+) -> ScoreboardLayout:
+    """Lay it at the top of what is free, or where that is too narrow, at the bottom.
+
+    Args:
+        person: who plays.
+        free: px, what it may cover.
+        left: px, what else covers the top.
+        unit: px of a pixel at 1080 lines.
+        aside: px at the right that something else covers at the bottom.
+    """
+    size, pad, margin = 13.0 * unit, round(9 * unit), round(10 * unit)
+    right = free.right - round(RIGHT * unit)
+    above = right - left >= MIN_SCOREBOARD_WIDTH * unit
+    if not above:
+        left, right = free.left + margin, free.right - max(margin, aside)
+    width = min(right - left, round(MAX_SCOREBOARD_WIDTH * unit))
+    lines = wrap_text(status_line(person), size, width - 2 * pad - 1.3 * size, 2)
+    rows = 1 + len(lines) + bool(_down(person.game.match)) + bool(_choices(person))
+    rect = pygame.Rect((left + right - width) // 2, free.top + margin, width, rows * round(1.5 * size) + 2 * pad)
+    if not above:
+        rect.bottomleft = left, free.bottom - margin
+    return ScoreboardLayout(rect, lines)
+
+
+def draw_scoreboard(
+    surface: pygame.Surface, person: HumanPlayer, free: pygame.Rect, left: int, unit: float, aside: int = 0
+) -> ScoreboardText:
+    """Draw it where it is laid; as `lay_scoreboard`."""
+    rect, lines = layout_scoreboard(person, free, left, unit, aside)
+    size, pad, game, match = 13.0 * unit, round(9 * unit), person.game, person.game.match
+    line, choices, down = round(1.5 * size), _choices(person), _down(match)
+    draw_box(surface, rect, 8 * unit)
+    y = rect.top + pad + line / 2
+    _players(surface, game, rect, y, size)
+    y += line
+    if down:
+        _row_of_balls(surface, match, down, rect, y, size)
+        y += line
+    mark = ORANGE if match.verdict is not None and match.verdict.fouls and game.resting else SKY
+    draw_disc(surface, (rect.left + pad + 0.4 * size, y), 0.3 * size, mark)
+    for text in lines:
+        draw_text(surface, text, (rect.left + pad + 1.2 * size, y), size, INK, "midleft")
+        y += line
+    return ScoreboardText(rect, _draw_choices(surface, person.choice, choices, rect, y, size) if choices else ())
+
+
+def _players(surface: pygame.Surface, game: BilliardsGame, rect: pygame.Rect, y: float, size: float) -> None:
+    match = game.match
+    state = match.state
+    cell = (rect.width - 1.4 * size) / state.players
+    for player in range(state.players):
+        left = rect.left + 0.7 * size + player * cell
+        on = player == state.turn and not state.over
+        if on:
+            marked = pygame.Rect(round(left - 0.3 * size), round(y - 0.75 * size), round(cell), round(1.5 * size))
+            pygame.draw.rect(surface, PANEL_RAISED, marked, border_radius=round(0.4 * size))
+        name = game.names[player]
+        if state.players == 1:
+            name = "free play" if match.rules.name == "free" else match.rules.name
+        group = ""
+        if isinstance(state, EightBallState):
+            group = state.groups[player] or "open table"
+        won = state.over and state.winner == player
+        spot = draw_text(surface, name, (left, y), size, INK if on or won else FAINT, "midleft", bold=on or won)
+        if group:
+            draw_text(surface, group, (spot.right + 0.6 * size, y), 0.86 * size, FAINT, "midleft")
+        if not (match.rules.name == "free" and not match.layout.pockets):
+            score = str(state.scores[player])
+            draw_text(surface, score, (left + cell - 0.9 * size, y), size, INK, "midright", bold=True, mono=True)
+
+
+def status_line(person: HumanPlayer) -> str:
+    """Return the line about what happened and what is to be done."""
+    game, match = person.game, person.game.match
+    if not game.resting:
+        return "balls rolling"
+    before = renamed("; ".join(match.messages), game.names)
+    if match.over:
+        return f"{before or 'the frame is over'}; press R for a new frame"
+    who = game.names[match.turn]
+    if game.opponent is not None and match.turn == BOT:
+        now = f"{who} is {'thinking' if game.bot_is_thinking else 'aiming'}"
+    elif person.carried is not None:
+        now = "click to place the cue ball"
+    elif match.choices.needed and game.call.pocket is None:
+        now = f"{who}: click the pocket of the {match.choices.balls[0] if match.choices.balls else 'ball'}"
+    elif match.state.in_hand is not None and match.rules.name != "free":
+        now = f"{who} has the ball in hand {match.state.in_hand}".removesuffix(" anywhere")
+    elif match.state.players == 1:
+        now = _asked(game)
+    else:
+        now = f"{who} shoots{_on(match)}"
+    if game.call.safety:
+        now += " (safety)"
+    return f"{before}; {now}" if before and now not in before else now
+
+
+def _asked(game: BilliardsGame) -> str:
+    return "aim and shoot" if game.strokes == 0 else f"{game.strokes} {'stroke' if game.strokes == 1 else 'strokes'}"
+
+
+def _on(match: Match) -> str:
+    """Return what is on, where that is one ball or one kind."""
+    targets = match.targets
+    if match.rules.name == "snooker":
+        kinds = {"red" if ball.startswith("red-") else ball for ball in targets}
+        return f"; {kinds.pop()} is on" if len(kinds) == 1 else "; a colour is on"
+    return f"; the {next(iter(targets))} is on" if len(targets) == 1 else ""
+
+
+def _down(match: Match) -> tuple[str, ...]:
+    """Return the balls that have been made, in the order of their numbers; reds of snooker are counted."""
+    if not match.layout.pockets:
+        return ()
+    here = {*match.state.table, match.cue}
+    return tuple(name for name in match.layout.names if name not in here)
+
+
+def _row_of_balls(
+    surface: pygame.Surface, match: Match, down: tuple[str, ...], rect: pygame.Rect, y: float, size: float
+) -> None:
+    room = int((rect.width - 1.4 * size) / (1.35 * size))
+    colours = {ball.name: ball.colour for ball in match.scene.balls}
+    for k, name in enumerate(down[-room:]):
+        colour = hex_colour(colours.get(name) or "#808080")
+        at = rect.left + 1.3 * size + k * 1.35 * size, y
+        sprite = _small(texture_of(name, colour, struck=False), round(1.16 * size))
+        surface.blit(sprite, sprite.get_rect(center=(round(at[0]), round(at[1]))))
+
+
+@lru_cache(maxsize=128)
+def _small(coat: BallTexture, side: int) -> pygame.Surface:
+    """Return a little flat picture of a ball."""
+    over = 4
+    large = pygame.Surface((side * over, side * over), pygame.SRCALPHA)
+    middle, radius = (side * over // 2, side * over // 2), side * over // 2 - over // 2
+    pygame.draw.circle(large, IVORY if coat.kind == "stripe" else coat.colour, middle, radius)
+    if coat.kind == "stripe":
+        band = pygame.Surface(large.get_size(), pygame.SRCALPHA)
+        pygame.draw.circle(band, coat.colour, middle, radius)
+        high = round(0.44 * radius)
+        band.fill((0, 0, 0, 0), (0, 0, side * over, middle[1] - high - over))
+        band.fill((0, 0, 0, 0), (0, middle[1] + high + over, side * over, side * over))
+        large.blit(band, (0, 0))
+    if coat.label:
+        pygame.draw.circle(large, IVORY, middle, round(0.58 * radius))
+        draw_text(
+            large,
+            coat.label,
+            (middle[0], middle[1] + over / 2),
+            (0.8 if len(coat.label) == 1 else 0.62) * radius,
+            (20, 20, 24),
+            "center",
+            bold=True,
+        )
+    return pygame.transform.smoothscale(large, (side, side))
+
+
+def _choices(person: HumanPlayer) -> tuple[Decision, ...]:
+    """Return what is to be decided; in free play nothing needs to be."""
+    game = person.game
+    if not game.mine or game.match.over:
+        return ()
+    decisions = game.match.choices.decisions
+    if game.match.rules.name == "free":
+        return decisions if person.choice not in (None, "play") else ()
+    return decisions if len(decisions) > 1 else ()
+
+
+def _draw_choices(
+    surface: pygame.Surface,
+    now: Decision | None,
+    choices: tuple[Decision, ...],
+    rect: pygame.Rect,
+    y: float,
+    size: float,
+) -> tuple[tuple[pygame.Rect, Decision], ...]:
+    """Draw the decisions as plates side by side."""
+    found, x = [], rect.left + 0.7 * size
+    for each in choices:
+        wide = text_size(each, 0.92 * size)[0] + round(1.2 * size)
+        spot = pygame.Rect(round(x), round(y - 0.7 * size), wide, round(1.4 * size))
+        if spot.right > rect.right - 0.5 * size:
+            break
+        chosen = each == now
+        edge: Colour = SKY if chosen else LINE
+        draw_box(surface, spot, 0.4 * size, PANEL_RAISED, 255, edge)
+        draw_text(surface, each, spot.center, 0.92 * size, INK if chosen else FAINT, "center")
+        found.append((spot, each))
+        x = spot.right + 0.5 * size
+    return tuple(found)
+
+
+TIP = 0.22
+"""of the ball's radius, the tip's"""
+MARKS = 5
+"""on the power's scale"""
+
+
+def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: float) -> None:
+    """Draw the ball, the circle beyond which a tip slips, and the tip's mark."""
+    (x, y), radius = (rect.centerx, rect.centery), rect.width / 2.0
+    draw_box(surface, tip_box(rect, unit), 10 * unit, opacity=170)
+    _disc(surface, (x, y), radius, ShapeStyle(IVORY, mix_colours(IVORY, PANEL, 0.45), 1.5 * unit))
+    faint = mix_colours(IVORY, PANEL, 0.28)
+    for a, b in (((x - radius, y), (x + radius, y)), ((x, y - radius), (x, y + radius))):
+        pygame.draw.line(surface, faint, a, b)
+    for k in range(36):  # dashes
+        if k % 2 == 0:
+            turns = [math.tau * (k + part / 3.0) / 36.0 for part in range(4)]
+            points = [(x + MISCUE * radius * math.cos(t), y + MISCUE * radius * math.sin(t)) for t in turns]
+            pygame.draw.aalines(surface, mix_colours(IVORY, VERMILION, 0.75), False, points)
+    at = x + cue.side * radius, y - cue.height * radius
+    _disc(surface, at, TIP * radius, ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * unit, opacity=0.95))
+    if cue.side or cue.height:
+        text = f"{cue.side:+.2f}  {cue.height:+.2f}"
+        draw_text(surface, text, (x, rect.top - 8 * unit), 11 * unit, FAINT, "midbottom", mono=True)
+
+
+def tip_box(rect: pygame.Rect, unit: float) -> pygame.Rect:
+    """Return what a dial covers with its plate."""
+    return rect.inflate(round(10 * unit), round(10 * unit))
+
+
+def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: float) -> None:
+    """Draw the power as a bar, with the speed of the cue above it."""
+    draw_box(surface, tip_box(rect, unit), 10 * unit, opacity=170)
+    round_off = round(0.3 * rect.width)
+    pygame.draw.rect(surface, LINE, rect, border_radius=round_off)
+    high = max(round(rect.height * cue.power), 2)
+    full = pygame.Rect(rect.left, rect.bottom - high, rect.width, high)
+    pygame.draw.rect(surface, mix_colours(SKY, ORANGE, cue.power), full, border_radius=min(round_off, high // 2))
+    for k in range(1, MARKS):
+        level = rect.bottom - rect.height * k / MARKS
+        pygame.draw.line(surface, PANEL, (rect.left, level), (rect.left + rect.width // 3, level))
+    shown = f"{cue.power * FASTEST:.1f}"
+    draw_text(surface, shown, (rect.centerx, rect.top - 8 * unit), 11 * unit, INK, "midbottom", mono=True)
+
+
+def _disc(surface: pygame.Surface, at: tuple[float, float], radius: float, look: ShapeStyle) -> None:
+    side = math.ceil(radius) + 2
+    within = pygame.Rect(math.floor(at[0]) - side, math.floor(at[1]) - side, 2 * side + 1, 2 * side + 1)
+    draw_sdf(surface, disc_distance(*at, radius), look, within)
+
+
+SIDE, GAP = 92.0, 14.0
+"""px at unit 1"""
+POWER_BAR = 18.0
+MIN_HUD = 420, 300
+"""px at unit 1: a smaller picture has no room for them"""
+
+DecisionHandler = Callable[[Callable[[LiveView], object]], bool]
+
+
+class BilliardsHud:
+    """Draws them, and lets the mouse set them."""
+
+    def __init__(self) -> None:
+        self._tip = self._power = pygame.Rect(0, 0, 0, 0)
+        self._choices: tuple[tuple[pygame.Rect, Decision], ...] = ()
+        self.foot = 0
+        """px that they cover at the bottom left, where messages are told"""
+        self.board = pygame.Rect(0, 0, 0, 0)
+        """where the scores stand"""
+        self._held = ""
+
+    def draw(self, surface: pygame.Surface, person: HumanPlayer, free: pygame.Rect, left: int, unit: float) -> None:
+        """Draw all.
+
+        Args:
+            surface: the picture.
+            person: who plays.
+            free: px, what nothing else covers.
+            left: px, what is told at the upper left.
+            unit: px of a pixel at 1080 lines.
+        """
+        self._tip = self._power = pygame.Rect(0, 0, 0, 0)
+        self._choices, self.foot, self.board = (), 0, pygame.Rect(0, 0, 0, 0)
+        if free.width < MIN_HUD[0] * unit or free.height < MIN_HUD[1] * unit:
+            return
+        scale = _scale(free, unit)
+        board = draw_scoreboard(surface, person, free, left, scale, _aside(scale))
+        self._choices, self.board = board.choices, board.rect
+        if board.rect.top > free.centery:
+            self.foot = free.bottom - board.rect.top
+        if not person.game.aiming:
+            return
+        self._tip, self._power = _dials(free, scale)
+        draw_power(surface, self._power, person.game.cue, scale)
+        draw_tip(surface, self._tip, person.game.cue, scale)
+
+    def taken(self, person: HumanPlayer, free: pygame.Rect, left: int, unit: float) -> list[pygame.Rect]:
+        """Return what they cover, or will as soon as somebody aims; as `draw`."""
+        if free.width < MIN_HUD[0] * unit or free.height < MIN_HUD[1] * unit:
+            return []
+        scale = _scale(free, unit)
+        board = layout_scoreboard(person, free, left, scale, _aside(scale)).rect
+        return [board, *(tip_box(dial, scale) for dial in _dials(free, scale))]
+
+    def plates(self, free: pygame.Rect, unit: float) -> dict[str, pygame.Rect]:
+        """Return what each of them covers, as they were last drawn."""
+        scale = _scale(free, unit)
+        dials = {name: tip_box(rect, scale) for name, rect in self._rects() if rect.width}
+        return {"score": self.board, **dials}
+
+    def handle(self, event: pygame.event.Event, person: HumanPlayer, act: DecisionHandler) -> bool:
+        """Take an event in; return whether it was used up."""
+        if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
+            clicked = next((each for rect, each in self._choices if rect.collidepoint(event.pos)), None)
+            if clicked is not None:
+                act(lambda _: person.decide(clicked))
+                return True
+            self._held = next((name for name, rect in self._rects() if rect.collidepoint(event.pos)), "")
+            if self._held and person.game.mine:
+                self._set(event.pos, person.game.cue)
+            return bool(self._held)
+        if event.type == pygame.MOUSEMOTION and self._held:
+            if person.game.mine:
+                self._set(event.pos, person.game.cue)
+            return True
+        if event.type in (pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST):
+            self._held = ""
+        return False
+
+    def _rects(self) -> tuple[tuple[str, pygame.Rect], ...]:
+        return ("tip", self._tip), ("power", self._power)
+
+    def _set(self, at: tuple[int, int], cue: CueState) -> None:
+        if self._held == "tip" and self._tip.width:
+            half = self._tip.width / 2.0
+            cue.tip_at((at[0] - self._tip.centerx) / half, (self._tip.centery - at[1]) / half)
+        elif self._power.height:
+            cue.power = (self._power.bottom - at[1]) / self._power.height
+
+
+def _scale(free: pygame.Rect, unit: float) -> float:
+    return unit * min(1.0, free.width / (640.0 * unit), free.height / (520.0 * unit))
+
+
+def _dials(free: pygame.Rect, scale: float) -> tuple[pygame.Rect, pygame.Rect]:
+    """Return where the tip and the power are set."""
+    side, gap, bar = round(SIDE * scale), round(GAP * scale), round(POWER_BAR * scale)
+    power = pygame.Rect(free.right - gap - bar, free.bottom - gap - side, bar, side)
+    return pygame.Rect(power.left - gap - side, power.top, side, side), power
+
+
+def _aside(scale: float) -> int:
+    """Return what the dials cover at the right, px."""
+    return round(SIDE * scale) + round(POWER_BAR * scale) + 3 * round(GAP * scale)

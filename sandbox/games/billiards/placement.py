@@ -1,0 +1,148 @@
+"""Placing: where a ball in hand may be put, and the nearest place where it may."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.games.billiards.rules.base import Place
+from sandbox.games.billiards.table_geometry import HAIR, PlacedDisc, TableGeometry
+from sandbox.scene.description.base import Point
+
+ROUNDING = 1e-9
+"""m, that a place may be beyond a line"""
+
+AROUND = 72
+"""Places that are tried around each ball, and along each bound."""
+
+
+GRID = 16
+"""Columns and rows of places that are tried all over."""
+
+
+def placement_refusal(
+    layout: TableGeometry, place: Place, at: Point, radius: float, others: Sequence[PlacedDisc]
+) -> str | None:
+    """Return why a ball in hand may not be put somewhere; None where it may.
+
+    Args:
+        layout: of the table.
+        place: where the rules allow it.
+        at: where its centre would be, m.
+        radius: of the ball, m.
+        others: the balls on the table.
+    """
+    point = np.array([at])
+    if not np.all(np.isfinite(point)) or layout.room(point)[0] < radius - ROUNDING:
+        return "the ball would be outside the cushions"
+    if not _within(layout, place, point)[0]:
+        return f"the ball must be placed {place}"
+    if _apart(point, radius, others)[0] < -ROUNDING:
+        return "another ball is there"
+    return None
+
+
+def allowed(
+    layout: TableGeometry, place: Place, points: FloatArray, radius: float, others: Sequence[PlacedDisc]
+) -> BoolArray:
+    """Tell of (M, 2) places, m, whether a ball may be put there, (M,)."""
+    free = (layout.room(points) >= radius - ROUNDING) & (_apart(points, radius, others) >= -ROUNDING)
+    return np.asarray(free & _within(layout, place, points))
+
+
+def nearest(
+    layout: TableGeometry, place: Place, at: Point, radius: float, others: Sequence[PlacedDisc]
+) -> Point | None:
+    """Return the nearest place where a ball may be put; within a millimetre or so of it beside curves.
+
+    None where there is no room at all. Takes the same arguments as `refusal`.
+    """
+    if placement_refusal(layout, place, at, radius, others) is None:
+        return at
+    wanted = np.array([at])
+    found = [_into(layout, place, wanted, radius), np.array(spread(layout, place, radius, others)).reshape(-1, 2)]
+    near = np.array(others, dtype=float).reshape(-1, 3)
+    for x, y, r in near.tolist():
+        away, reach = math.atan2(at[1] - y, at[0] - x), radius + r + HAIR
+        turns = away + np.linspace(-math.pi, math.pi, AROUND + 1)  # the nearest of all among them
+        ring = np.array([x, y]) + reach * np.column_stack((np.cos(turns), np.sin(turns)))
+        found += [ring, _into(layout, place, ring, radius)]
+    found.append(_between(near, radius))
+    points = np.concatenate(found)
+    points = points[allowed(layout, place, points, radius, others)]
+    if not len(points):
+        return None
+    best = points[np.argmin(np.hypot(*(points - wanted).T))]
+    return float(best[0]), float(best[1])
+
+
+def spread(layout: TableGeometry, place: Place, radius: float, others: Sequence[PlacedDisc]) -> list[Point]:
+    """Return places all over where a ball in hand may be put, m."""
+    points = layout.places.get((place, radius))
+    if points is None:
+        points = _bounds(layout, place, radius)
+        points = points[allowed(layout, place, points, radius, ())]
+        layout.places[place, radius] = points
+    free = points[_apart(points, radius, others) >= -ROUNDING]
+    return [(x, y) for x, y in free.tolist()]
+
+
+def _within(layout: TableGeometry, place: Place, points: FloatArray) -> BoolArray:
+    """Tell of (M, 2) points whether they are where the rules say, (M,)."""
+    if place == "anywhere":
+        return np.ones(len(points), dtype=bool)
+    home, along = np.array(layout.home), np.array(layout.along)
+    behind = (points - home) @ along <= ROUNDING
+    if place == "in the D" and layout.d_radius:
+        behind &= np.hypot(*(points - home).T) <= layout.d_radius + ROUNDING
+    return np.asarray(behind)
+
+
+def _into(layout: TableGeometry, place: Place, points: FloatArray, radius: float) -> FloatArray:
+    """Return (M, 2) points moved into the cushions, and into where the rules say."""
+    (x0, y0), (x1, y1) = layout.area
+    inside = np.clip(points, (x0 + radius, y0 + radius), (x1 - radius, y1 - radius))
+    if place == "anywhere":
+        return inside
+    home, along = np.array(layout.home), np.array(layout.along)
+    inside = inside - np.maximum((inside - home) @ along, 0.0)[:, None] * along
+    if place == "in the D" and layout.d_radius:
+        apart = inside - home
+        far = np.hypot(*apart.T)[:, None]
+        inside = home + apart * np.minimum(1.0, layout.d_radius / np.maximum(far, 1e-300))
+    return np.asarray(inside)
+
+
+def _bounds(layout: TableGeometry, place: Place, radius: float) -> FloatArray:
+    """Return points all over where the rules say, (M, 2): a place to fall back on."""
+    (x0, y0), (x1, y1) = layout.area
+    if place == "in the D" and layout.d_radius:
+        (x, y), reach = layout.home, layout.d_radius + radius
+        x0, y0, x1, y1 = max(x0, x - reach), max(y0, y - reach), min(x1, x + reach), min(y1, y + reach)
+    columns, rows = np.linspace(x0 + radius, x1 - radius, GRID), np.linspace(y0 + radius, y1 - radius, GRID)
+    grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    return _into(layout, place, grid, radius)
+
+
+def _apart(points: FloatArray, radius: float, others: Sequence[PlacedDisc]) -> FloatArray:
+    """Return how far a ball at each of (M, 2) points is from the nearest other, (M,) m; negative in overlap."""
+    least = np.full(len(points), np.inf)
+    for x, y, r in others:
+        least = np.minimum(least, np.hypot(points[:, 0] - x, points[:, 1] - y) - radius - r)
+    return least
+
+
+def _between(others: FloatArray, radius: float) -> FloatArray:
+    """Return where a ball would lie against two others, (M, 2)."""
+    found = []
+    for i, (ax, ay, ar) in enumerate(others.tolist()):
+        for bx, by, br in others[i + 1 :].tolist():
+            a, b, d = ar + radius + HAIR, br + radius + HAIR, math.hypot(bx - ax, by - ay)
+            if not 0.0 < d < a + b:
+                continue
+            forth = 0.5 * (a * a - b * b + d * d) / d
+            aside = math.sqrt(max(a * a - forth * forth, 0.0))
+            ux, uy = (bx - ax) / d, (by - ay) / d
+            found += [(ax + ux * forth - s * uy * aside, ay + uy * forth + s * ux * aside) for s in (1.0, -1.0)]
+    return np.array(found).reshape(-1, 2)

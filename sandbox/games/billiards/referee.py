@@ -1,0 +1,279 @@
+"""Upkeep: what a referee does between shots: racks the balls anew, and puts single ones back.
+
+Lying: how the balls lie for the player to shoot: what touches the cue ball, and whether it is snookered.
+
+Spotting: where a ball goes that is put back, once it is known which balls are in the way.
+
+Telling: what an engine saw of a shot, as the rules read it: by names.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from sandbox.games.billiards.rules.base import GameError, Respot, Ruleset, RulesState, ShotEvent, Situation
+from sandbox.games.billiards.table_geometry import HAIR, TOUCH, PlacedDisc, TableGeometry
+from sandbox.scene.description.base import Point
+from sandbox.trajectory import Contacts
+
+
+def touches_ball(cue: PlacedDisc, others: dict[str, PlacedDisc]) -> tuple[str, ...]:
+    """Return the balls that lie against the cue ball."""
+    x, y, radius = cue
+    return tuple(name for name, (bx, by, r) in others.items() if math.hypot(bx - x, by - y) - radius - r <= TOUCH)
+
+
+def situation_of(
+    cues: Iterable[PlacedDisc], others: dict[str, PlacedDisc], targets: frozenset[str], placed: bool
+) -> Situation:
+    """Return how the balls lie.
+
+    Args:
+        cues: where the cue ball lies; of one in hand, the places that it may be put.
+        others: the object balls on the table.
+        targets: those that are on.
+        placed: whether the ball is in hand, so that it touches none.
+
+    Source: WPBSA 2, Snookered: a ball is on where both its edges can be hit straight; the ball in the way that is
+    nearest to the cue ball snookers it.
+    """
+    free = {name: disc for name, disc in others.items() if name not in targets}
+    against: tuple[str, ...] = ()
+    by: tuple[str, ...] = ()
+    looks = 0
+    for cue in cues:
+        looks += 1
+        against = () if placed else touches_ball(cue, others)
+        found = [_hidden(cue, others[name], free) for name in others if name in targets]
+        if not found or any(way is None for way in found) or not targets.isdisjoint(against):
+            return Situation(against)
+        names = {way for way in found if way is not None}
+        by = tuple(names) if len(names) == 1 else ()
+    return Situation(against, looks > 0, by if looks == 1 else ())
+
+
+def _hidden(cue: PlacedDisc, target: PlacedDisc, others: dict[str, PlacedDisc]) -> str | None:
+    """Return the ball that keeps one from hitting some edge of a target, the nearest of them; None where none does."""
+    in_way = {}
+    for edge in _edges(cue, target):
+        for name, disc in others.items():
+            if _beside((cue[0], cue[1]), edge, (disc[0], disc[1])) < cue[2] + disc[2]:
+                in_way[name] = math.hypot(disc[0] - cue[0], disc[1] - cue[1])
+    return min(in_way, key=lambda name: in_way[name]) if in_way else None
+
+
+def _edges(cue: PlacedDisc, target: PlacedDisc) -> tuple[Point, Point]:
+    """Return where the cue ball's centre is when it just touches each edge of a target."""
+    dx, dy, reach = target[0] - cue[0], target[1] - cue[1], cue[2] + target[2]
+    far = math.hypot(dx, dy)
+    reach = min(reach, far)
+    forth = math.sqrt(far * far - reach * reach)
+    turn, heading = math.asin(reach / far) if far else 0.0, math.atan2(dy, dx)
+    left, right = heading + turn, heading - turn
+    return (
+        (cue[0] + forth * math.cos(left), cue[1] + forth * math.sin(left)),
+        (cue[0] + forth * math.cos(right), cue[1] + forth * math.sin(right)),
+    )
+
+
+def _beside(begin: Point, end: Point, point: Point) -> float:
+    """Return how far a point is from a straight way, m."""
+    dx, dy = end[0] - begin[0], end[1] - begin[1]
+    px, py = point[0] - begin[0], point[1] - begin[1]
+    size = dx * dx + dy * dy
+    share = min(1.0, max(0.0, (px * dx + py * dy) / size)) if size else 0.0
+    return math.hypot(px - share * dx, py - share * dy)
+
+
+def respotted_position(layout: TableGeometry, respot: Respot, radius: float, others: Sequence[PlacedDisc]) -> Point:
+    """Return where a ball goes: on the first of its spots that is free, else behind the first, as near as can be.
+
+    Behind is along the table, towards its foot; where that is full up to the cushion, before the spot (WPA 1.4;
+    WPBSA 3, Spotting Colours). Balls are put 0.01 mm from each other: they do not touch.
+
+    Args:
+        layout: of the table.
+        respot: which ball, and its spots.
+        radius: of the ball, m.
+        others: the balls on the table.
+
+    Raises:
+        GameError: the table has none of the spots, or there is no room on the whole line.
+    """
+    spots = [layout.spots[name] for name in respot.spots if name in layout.spots]
+    if not spots:
+        raise GameError(f"the table has no spot {' or '.join(map(repr, respot.spots))} for the {respot.ball}")
+    for spot in spots:
+        if all(math.hypot(spot[0] - x, spot[1] - y) >= radius + r for x, y, r in others):
+            return spot
+    (x, y), (ux, uy) = spots[0], layout.along
+    for way in (1.0, -1.0):
+        far = _is_spot_free(spots[0], (way * ux, way * uy), radius, others)
+        place = (x + way * ux * far, y + way * uy * far)
+        (x0, y0), (x1, y1) = layout.area
+        if x0 + radius <= place[0] <= x1 - radius and y0 + radius <= place[1] <= y1 - radius:
+            return place
+    raise GameError(f"there is no room to spot the {respot.ball}")
+
+
+def _is_spot_free(spot: Point, way: Point, radius: float, others: Sequence[PlacedDisc]) -> float:
+    """Return how far along a way from a spot a ball first finds room, m."""
+    taken = []
+    for x, y, r in others:
+        forth = (x - spot[0]) * way[0] + (y - spot[1]) * way[1]
+        aside = (x - spot[0]) * way[1] - (y - spot[1]) * way[0]
+        reach = radius + r + HAIR
+        if abs(aside) < reach:
+            half = math.sqrt(reach * reach - aside * aside)
+            taken.append((forth - half, forth + half))
+    far = 0.0
+    for low, high in sorted(taken):
+        if low < far < high:
+            far = high
+    return far
+
+
+SIMULTANEOUS = 5e-3
+"""s after a ball was set in motion: a contact with what it touched at the start, seen so soon, was never left"""
+
+
+def shot_events(
+    layout: TableGeometry,
+    contacts: Contacts,
+    began: float = 0.0,
+    against: frozenset[tuple[int, int]] = frozenset(),
+    cue: str | None = None,
+) -> tuple[ShotEvent, ...]:
+    """Return what happened in a shot.
+
+    Args:
+        layout: of the table.
+        contacts: of any engine, since the stroke. What began before it is left out.
+        began: the time of the stroke, s.
+        against: what touched when the shot began, as `touching_pairs` returns it; it counts once it was left (WPA 8.4).
+        cue: the ball that was struck.
+    """
+    names, fixed, solid = layout.names, layout.scene.fixed_names, len(layout.scene.fixed)
+    frozen = any(b < 0 for _, b in against)
+    moved = _set_in_motion(contacts, began, against, None if cue is None else layout.number[cue]) if frozen else {}
+    found = []
+    for time, (a, b) in zip(contacts.time.tolist(), contacts.pair.tolist(), strict=True):
+        since = time - began
+        if since < 0.0:
+            continue
+        if (a, b) in against and since <= SIMULTANEOUS + (0.0 if b >= 0 else moved.get(a, math.inf)):
+            continue
+        if b >= 0:
+            found.append(ShotEvent(since, names[a], "ball", names[b]))
+        else:
+            found.append(ShotEvent(since, names[a], "cushion" if -1 - b < solid else "pocket", fixed[-1 - b]))
+    return tuple(found)
+
+
+def _set_in_motion(
+    contacts: Contacts, began: float, against: frozenset[tuple[int, int]], cue: int | None
+) -> dict[int, float]:
+    """Return when each ball was set in motion, s of the shot: itself, or another through balls that touch it."""
+    group: dict[int, set[int]] = {}
+    for a, b in against:
+        if b >= 0:
+            joined = group.get(a, {a}) | group.get(b, {b})
+            group.update(dict.fromkeys(joined, joined))
+    moved = {} if cue is None else dict.fromkeys(group.get(cue, {cue}), 0.0)
+    for time, (a, b) in zip(contacts.time.tolist(), contacts.pair.tolist(), strict=True):
+        if b >= 0 and time >= began and (a, b) not in against:
+            for ball in group.get(a, {a}) | group.get(b, {b}):
+                moved[ball] = min(moved.get(ball, math.inf), time - began)
+    return moved
+
+
+def touching_pairs(layout: TableGeometry, position: tuple[Point, ...]) -> frozenset[tuple[int, int]]:
+    """Return what touches, as pairs of numbers: of bodies the lower first; fixed things are −1 − k."""
+    found = []
+    ordered = sorted(range(len(position)), key=lambda k: position[k][0])
+    widest = 2.0 * max(layout.radius, default=0.0) + TOUCH
+    for n, i in enumerate(ordered):
+        (x, y), radius = position[i], layout.radius[i]
+        for k in ordered[n + 1 :]:
+            if position[k][0] - x > widest:
+                break
+            if math.hypot(position[k][0] - x, position[k][1] - y) - radius - layout.radius[k] <= TOUCH:
+                found.append((min(i, k), max(i, k)))
+    found += layout.against_fixed(position)
+    return frozenset(found)
+
+
+ASIDE = 1.0
+"""m, from the playing area's corner: where balls wait"""
+
+
+def rerack_moves(layout: TableGeometry, rules: Ruleset[Any], state: RulesState) -> tuple[Point, ...]:
+    """Return where the balls lie when all begins anew, by number, m: as the scene has them.
+
+    Where players strike balls of their own, the one to shoot has the place of the first.
+    """
+    position = list(layout.start)
+    cue, first = rules.cue_ball(state), rules.cue_balls[0]
+    if cue != first and first in layout.number:
+        a, b = layout.number[cue], layout.number[first]
+        position[a], position[b] = position[b], position[a]
+    return tuple(position)
+
+
+def respot_moves(
+    layout: TableGeometry, respots: Sequence[Respot], position: tuple[Point, ...], here: Iterable[int]
+) -> tuple[Point, ...]:
+    """Return where the balls lie once some were put back, one after the other, by number, m.
+
+    Args:
+        layout: of the table.
+        respots: what is put back, in this order.
+        position: where the balls are before, by number, m.
+        here: the numbers of those on the table, which are in the way unless they lie in a pocket.
+
+    Raises:
+        GameError: there is no room.
+    """
+    places, lifted = list(position), {layout.number[each.ball] for each in respots}
+    lying = {k for k in here if k not in lifted and layout.pocket_at(places[k]) is None}
+    for each in respots:
+        number = layout.number[each.ball]
+        others = [(*places[k], layout.radius[k]) for k in sorted(lying)]
+        places[number] = respotted_position(layout, each, layout.radius[number], others)
+        lying.add(number)
+    return tuple(places)
+
+
+def collision_free_moves(layout: TableGeometry, now: Sequence[Point], then: Sequence[Point]) -> list[tuple[int, Point]]:
+    """Return who is put where, one after the other, so that balls go from one position to another, m, by number.
+
+    No ball is put onto another on the way: where they stand in each other's places, one waits beside the table.
+    """
+    at, left, found = list(now), [k for k in range(len(now)) if now[k] != then[k]], list[tuple[int, Point]]()
+    (x0, y0), _ = layout.area
+    while left:
+        # Only who is still to be moved is in the way: where balls are to end is none of our business.
+        ready = next((k for k in left if _are_places_free(layout, k, then[k], at, left)), None)
+        number = left[0] if ready is None else ready
+        far = 4.0 * layout.radius[number] * (number + 1) + ASIDE
+        place = (x0 - far, y0 - far) if ready is None else then[number]
+        at[number] = place
+        found.append((number, place))
+        left.remove(number)
+        if ready is None:
+            left.append(number)
+    return found
+
+
+def _are_places_free(
+    layout: TableGeometry, number: int, place: Point, at: Sequence[Point], others: Sequence[int]
+) -> bool:
+    """Tell whether a ball can be put somewhere, for others; in a pocket it meets nobody."""
+    if layout.pocket_at(place) is not None:
+        return True
+    radius = layout.radius
+    return all(
+        math.dist(place, at[k]) >= radius[number] + radius[k] or layout.pocket_at(at[k]) is not None
+        for k in others
+        if k != number
+    )

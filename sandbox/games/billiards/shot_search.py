@@ -1,0 +1,297 @@
+"""Trial: what strokes lead to, on the exact engine and by the rules.
+
+Ease: how likely a straight shot at a ball on goes into a pocket, by geometry alone.
+
+With the ghost ball: where the cue ball is when it touches the object ball so that this leaves towards the pocket. An
+error δ of the aim moves the touch by δ·d, d being the way to the ghost ball, and turns the object ball's way by
+δ·d / (2R·cos φ), φ being the cut; the pocket takes so many rad as it is wide, less a ball, over the way to it.
+
+Aims: the strokes that are worth a trial.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.engines.contract import Exhaustion
+from sandbox.engines.exact.tabletop.shots import Table
+from sandbox.games.billiards.match import Match
+from sandbox.games.billiards.rules.base import ShotCall, ShotEvent, balls_touched_by
+from sandbox.games.billiards.table_geometry import TableGeometry
+from sandbox.scene.description.surface import Stroke
+
+THINNEST = 0.2
+"""cos of the thinnest cut that is tried: 78°"""
+
+GRAZE = 0.98
+"""of two radii: who stands less in the way may be passed, as jaws and throw are not reckoned with"""
+
+
+@dataclass(frozen=True, eq=False)
+class PotOptions:
+    """T balls times P pockets, straight shots from one place."""
+
+    ghost: FloatArray
+    """(T, P, 2) m, where the cue ball is to touch"""
+    chance: FloatArray
+    """(T, P) that the ball falls; 0 where something is in the way"""
+    distance: FloatArray
+    """(T, P) from the cue ball to the ghost ball, m"""
+
+
+def mouths(layout: TableGeometry, radius: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what is aimed at: a point in each pocket's mouth, (P, 2) m, its way in, (P, 2), and its width, (P,) m."""
+    holes = np.array(list(layout.pockets.values()), dtype=float).reshape(-1, 3)
+    (x0, y0), (x1, y1) = layout.area
+    inset = 0.7 * radius
+    points = np.clip(holes[:, :2], (x0 + inset, y0 + inset), (x1 - inset, y1 - inset))
+    inward = holes[:, :2] - points
+    size = np.hypot(*inward.T)[:, None]
+    return points, inward / np.maximum(size, 1e-12), holes[:, 2]
+
+
+def pot_options(
+    layout: TableGeometry, radius: float, cue: FloatArray, targets: FloatArray, others: FloatArray, sigma: float
+) -> PotOptions:
+    """Return how the straight shots are.
+
+    Args:
+        layout: of the table.
+        radius: of the balls, m.
+        cue: (2,) m, where the cue ball is.
+        targets: (T, 2) m, the balls on.
+        others: (B, 2) m, all object balls, those on too.
+        sigma: rad, the error of the player's aim.
+    """
+    points, inward, width = mouths(layout, radius)
+    to_mouth = points[None] - targets[:, None]
+    far = np.maximum(np.hypot(to_mouth[..., 0], to_mouth[..., 1]), 1e-9)
+    heading = to_mouth / far[..., None]
+    ghost = targets[:, None] - 2.0 * radius * heading
+    to_ghost = ghost - cue
+    distance = np.maximum(np.hypot(to_ghost[..., 0], to_ghost[..., 1]), 1e-9)
+    cut = np.einsum("tpc,tpc->tp", to_ghost / distance[..., None], heading)
+    enters = np.einsum("tpc,pc->tp", heading, inward)
+    opening = np.maximum(width * np.maximum(enters, 0.0) - radius, 0.0)
+    margin = opening / far * 2.0 * radius * np.maximum(cut, 0.0) / distance
+    chance = _erf(margin / (math.sqrt(2.0) * sigma))
+    (x0, y0), (x1, y1) = layout.area
+    inside = (ghost[..., 0] > x0 + 0.9 * radius) & (ghost[..., 0] < x1 - 0.9 * radius)
+    inside &= (ghost[..., 1] > y0 + 0.9 * radius) & (ghost[..., 1] < y1 - 0.9 * radius)
+    open_ = inside & (cut > THINNEST) & (opening > 0.0)
+    for t, p in np.argwhere(open_):
+        itself = np.hypot(*(others - targets[t]).T) < 1e-9
+        rest = others[~itself]
+        if _blocked(cue, ghost[t, p], rest, radius) or _blocked(targets[t], points[p], rest, radius):
+            open_[t, p] = False
+    return PotOptions(ghost, np.where(open_, chance, 0.0), distance)
+
+
+def _blocked(begin: FloatArray, end: FloatArray, others: FloatArray, radius: float) -> bool:
+    """Tell whether a ball stands in the straight way of another."""
+    way, apart = end - begin, others - begin
+    share = np.clip(apart @ way / max(float(way @ way), 1e-18), 0.0, 1.0)
+    away = apart - share[:, None] * way
+    near: BoolArray = np.einsum("kc,kc->k", away, away) < (2.0 * GRAZE * radius) ** 2
+    return bool(near.any())
+
+
+def _erf(x: FloatArray) -> FloatArray:
+    """Return the error function to 5e-4 (Abramowitz & Stegun 7.1.27), which is more than a guess deserves."""
+    return np.asarray(1.0 - (1.0 + 0.278393 * x + 0.230389 * x**2 + 0.000972 * x**3 + 0.078108 * x**4) ** -4)
+
+
+IN_HAND = 0.9
+"""the chance of a pot that a player with the ball in hand is taken to have"""
+
+
+@dataclass(frozen=True, eq=False)
+class ShotEvaluator:
+    """A match as a player looks at it who is to shoot."""
+
+    match: Match
+    table: Table
+    """the same on the exact engine"""
+    sigma: float
+    """rad, the error of the player's aim"""
+
+    @cached_property
+    def radius(self) -> float:
+        """Of the cue ball, m."""
+        return self.match.layout.radius[self.match.layout.number[self.match.cue]]
+
+    @cached_property
+    def place(self) -> FloatArray:
+        """(2,) m, where the cue ball lies."""
+        return np.array(self.match.position[self.match.layout.number[self.match.cue]])
+
+    def outcome(self, stroke: Stroke, call: ShotCall | None = None) -> tuple[Match, ShotCall] | None:
+        """Return what a stroke leads to, and the call that goes with it; None where it cannot be computed.
+
+        Args:
+            stroke: as it is played, without an error.
+            call: what was said; without one, what this very stroke would do is called.
+        """
+        match = self.match
+        try:
+            outcome = self.table.shoot(stroke, match.cue)
+        except Exhaustion:
+            return None
+        contacts = outcome.contacts
+        if call is None:
+            call = called(match, match.happenings(contacts))
+        return match.played(contacts, outcome.position, call), call
+
+    def worth(self, made: tuple[Match, ShotCall] | None) -> float:
+        """Return how good what a stroke led to is for the player, −1 to 1 and a little more for points."""
+        if made is None:
+            return -1.0
+        me, after = self.match.turn, made[0]
+        if after.over:
+            return 0.0 if after.state.winner is None else (1.5 if after.state.winner == me else -1.5)
+        gained = 0.0
+        if after.verdict is not None and after.verdict.points:
+            gained = sum(p if each == me else -p for each, p in enumerate(after.verdict.points))
+        points = UNIT.get(after.rules.name, 0.0) * gained
+        again = after.turn == me
+        return points + (0.3 + 0.5 * ease(after, self.sigma) if again else -0.1 - 0.6 * ease(after, self.sigma))
+
+
+UNIT = {"snooker": 0.04, "three-cushion": 0.5, "straight-rail": 0.4, "free": 0.1}
+"""what a point is worth, against the table"""
+
+
+def ease(match: Match, sigma: float) -> float:
+    """Return the chance of the best straight shot for whoever is to shoot, 0 to 1; in carom a guess by distances."""
+    if match.state.in_hand is not None:
+        return IN_HAND
+    cue, targets, others = standing(match)
+    if not len(targets):
+        return 0.0
+    if not match.layout.pockets:
+        ways = np.hypot(*(others - cue).T)
+        between = float(np.hypot(*(others[0] - others[-1])))
+        return math.exp(-float(ways.min()) - between)
+    return float(straight(match, sigma).chance.max(initial=0.0))
+
+
+def straight(match: Match, sigma: float) -> PotOptions:
+    """Return the straight shots of whoever is to shoot, at the balls on in the order of `match.state.table`."""
+    cue, targets, others = standing(match)
+    radius = match.layout.radius[match.layout.number[match.cue]]
+    return pot_options(match.layout, radius, cue, targets, others, max(sigma, 1e-3))
+
+
+def standing(match: Match) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return where the cue ball, the balls on and all object balls lie, (2,), (T, 2) and (B, 2) m."""
+    number, position, on = match.layout.number, match.position, match.targets
+    cue = match.cue
+    balls = [ball for ball in match.state.table if ball != cue]
+    targets = [position[number[ball]] for ball in balls if ball in on]
+    others = [position[number[ball]] for ball in balls]
+    return np.array(position[number[cue]]), np.array(targets).reshape(-1, 2), np.array(others).reshape(-1, 2)
+
+
+def called(match: Match, happenings: tuple[ShotEvent, ...]) -> ShotCall:
+    """Return the call that goes with what is meant to happen: the ball touched first, the last ball's pocket."""
+    choices = match.choices
+    if not choices.balls:
+        return ShotCall()
+    if choices.pocket:
+        if not choices.needed:
+            return ShotCall()
+        fell = {each.ball: each.other for each in happenings if each.kind == "pocket"}
+        last = choices.balls[0]
+        return ShotCall(ball=last, pocket=fell.get(last, next(iter(match.layout.pockets))))
+    first = next((ball for each in happenings if (ball := balls_touched_by(match.cue, each)) is not None), None)
+    if first in choices.balls:
+        return ShotCall(ball=first)
+    return ShotCall() if match.state.table and first in match.targets else ShotCall(ball=choices.balls[0])
+
+
+SPEEDS = (1.2, 2.0, 3.2)
+"""m/s, of the cue, for a pot"""
+
+HEIGHTS = (-0.3, 0.0, 0.3)
+"""draw, stun, follow"""
+
+THROWS = 7
+"""aims to either side of the ghost ball that are tried, for throw and spin turn the ball's way"""
+
+ASIDE = 0.12
+"""rad, of the object ball's way, that these reach to either side"""
+
+COMBINATIONS = 5
+"""balls and pockets that are looked at closely"""
+
+
+def pot_candidates(trial: ShotEvaluator, most: int = COMBINATIONS) -> list[Stroke]:
+    """Return strokes that pot a ball on: the middle of the aims that do, for each speed and height.
+
+    The likeliest balls and pockets by geometry are tried with a fan of aims each.
+    """
+    match, shots = trial.match, straight(trial.match, trial.sigma)
+    order = np.argsort(-shots.chance, axis=None, kind="stable")[:most]
+    on = [ball for ball in match.state.table if ball in match.targets and ball != match.cue]
+    holes, found = list(match.layout.pockets), []
+    ways = list(product(SPEEDS, HEIGHTS))
+    for t, p in zip(*np.unravel_index(order, shots.chance.shape), strict=True):
+        if shots.chance[t, p] <= 0.0:
+            continue
+        to_ghost = shots.ghost[t, p] - trial.place
+        ahead = math.atan2(to_ghost[1], to_ghost[0])
+        reach = ASIDE * 2.0 * trial.radius / float(shots.distance[t, p])
+        turns = (ahead + np.linspace(-reach, reach, 2 * THROWS + 1)).tolist()
+        strokes = [Stroke(aim=aim, speed=speed, height=height) for speed, height in ways for aim in turns]
+        fan = trial.table.fan(strokes, match.cue)
+        ball, cue = match.layout.number[on[t]], match.layout.number[match.cue]
+        hole = list(match.layout.pockets).index(holes[p])
+        made = (fan.pocket[:, ball] == hole) & (fan.pocket[:, cue] < 0)
+        for k in range(len(ways)):
+            row = made[k * len(turns) : (k + 1) * len(turns)].tolist()
+            middle = _middle(row)
+            if middle is not None:
+                found.append(strokes[k * len(turns) + middle])
+    return found
+
+
+def _middle(row: Sequence[bool]) -> int | None:
+    """Return the middle of the longest run of trues."""
+    best, begin, length = None, 0, 0
+    for k, each in enumerate([*row, False]):
+        if each:
+            continue
+        if k - begin > length:
+            best, length = (begin + k - 1) // 2, k - begin
+        begin = k + 1
+    return best
+
+
+def directions_all_around(
+    trial: ShotEvaluator, count: int, speeds: Sequence[float], sides: Sequence[float] = (0.0,)
+) -> Iterator[Stroke]:
+    """Yield strokes in every direction, and more of them towards the balls: kicks, banks, caroms, safeties."""
+    cue, targets, others = standing(trial.match)
+    aims = list(np.linspace(-math.pi, math.pi, count, endpoint=False))
+    balls = targets if trial.match.layout.pockets else others
+    if len(balls):
+        near = balls[np.argsort(np.hypot(*(balls - cue).T), kind="stable")][:6]
+        for x, y in near - cue:
+            half = math.asin(min(1.0, 2.0 * trial.radius / math.hypot(x, y)))
+            aims += list(math.atan2(y, x) + 0.97 * half * np.linspace(-1.0, 1.0, max(count // 6, 5)))
+    for speed, side, aim in product(speeds, sides, aims):
+        yield Stroke(aim=float(aim), speed=speed, side=side)
+
+
+def break_candidates(trial: ShotEvaluator) -> Iterator[Stroke]:
+    """Yield opening strokes of pool: hard, full or nearly so on what stands nearest."""
+    cue, targets, _ = standing(trial.match)
+    x, y = targets[np.argmin(np.hypot(*(targets - cue).T))] - cue
+    half = 2.0 * trial.radius / math.hypot(x, y)
+    for speed, part in product((7.5, 9.0), (-0.6, -0.3, -0.1, -0.03, 0.0, 0.03, 0.1, 0.3, 0.6)):
+        yield Stroke(aim=math.atan2(y, x) + part * half, speed=speed, height=0.05)

@@ -1,0 +1,175 @@
+"""Layout: a table's geometry as games ask about it: spots, cushions, pockets, and where balls may lie."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+
+from sandbox.arrays import FloatArray
+from sandbox.scene.description.base import Point, Vector
+from sandbox.scene.scene import Scene
+
+TOUCH = 1e-6
+"""m: balls no farther apart touch, for the rules; an engine's own rounding is far below"""
+
+HAIR = 1e-5
+"""m: as close as balls are put to each other, so that none touches that nobody has played there"""
+
+PlacedDisc = tuple[float, float, float]
+"""x, y and radius, m"""
+
+
+@dataclass(frozen=True, eq=False)
+class TableGeometry:
+    """The geometry of a scene with a floor."""
+
+    scene: Scene
+    places: dict[tuple[str, float], FloatArray] = field(default_factory=dict, repr=False)
+    """(M, 2) m, all over where a ball of some radius may be put, by what rules call it; kept for the next time"""
+
+    @classmethod
+    def of(cls, scene: Scene) -> Self:
+        """Return the layout of a scene, its own shots left out: in a game players make them."""
+        return cls(scene.model_copy(update={"shots": ()}))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The bodies, by number."""
+        return self.scene.bodies.names
+
+    @cached_property
+    def number(self) -> dict[str, int]:
+        """Each body's number."""
+        return {name: k for k, name in enumerate(self.names)}
+
+    @cached_property
+    def start(self) -> tuple[Point, ...]:
+        """Where the bodies begin, by number, m."""
+        return tuple((x, y) for x, y in self.scene.bodies.position.tolist())
+
+    @cached_property
+    def radius(self) -> tuple[float, ...]:
+        """Of the bodies, by number, m."""
+        return tuple(self.scene.bodies.radius.tolist())
+
+    @cached_property
+    def pockets(self) -> dict[str, PlacedDisc]:
+        """The pockets by name."""
+        names = self.scene.fixed_names[len(self.scene.fixed) :]
+        return {name: (*each.position, each.radius) for name, each in zip(names, self.scene.pockets, strict=False)}
+
+    @cached_property
+    def spots(self) -> dict[str, Point]:
+        """The spots by name, m."""
+        return {spot.name: spot.position for spot in self.scene.play.spots}
+
+    @cached_property
+    def area(self) -> tuple[Point, Point]:
+        """Lower left and upper right corner of the playing area, m: stated, else what walls and planes enclose."""
+        if self.scene.play.area is not None:
+            return self.scene.play.area
+        points = [point for wall in self.scene.walls for point in wall.points]
+        points += [plane.point for plane in self.scene.planes]
+        points = points or list(self.start) or [(0.0, 0.0)]
+        xs, ys = [x for x, _ in points], [y for _, y in points]
+        return (min(xs), min(ys)), (max(xs), max(ys))
+
+    @cached_property
+    def along(self) -> Vector:
+        """The way from the head of the table to its foot, of length 1; +y where no spots tell."""
+        for head, foot in (("head", "foot"), ("brown", "blue")):
+            if head in self.spots and foot in self.spots and self.spots[head] != self.spots[foot]:
+                (ax, ay), (bx, by) = self.spots[head], self.spots[foot]
+                size = math.hypot(bx - ax, by - ay)
+                return (bx - ax) / size, (by - ay) / size
+        return 0.0, 1.0
+
+    @cached_property
+    def home(self) -> Point:
+        """The head spot, in snooker the brown's, else the middle of the playing area, m."""
+        (x0, y0), (x1, y1) = self.area
+        middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
+        return self.spots.get("head", self.spots.get("brown", middle))
+
+    @cached_property
+    def d_radius(self) -> float:
+        """Radius of the D, m: from the brown spot to the yellow; 0 where there is none."""
+        if "brown" not in self.spots or "yellow" not in self.spots:
+            return 0.0
+        return math.dist(self.spots["brown"], self.spots["yellow"])
+
+    def before_head(self, point: Point) -> float:
+        """Return how far a point is from the head string (the baulk line) towards the foot, m; negative behind it."""
+        x, y = self.home
+        return (point[0] - x) * self.along[0] + (point[1] - y) * self.along[1]
+
+    def discs(self, numbers: Iterable[int], position: tuple[Point, ...]) -> list[PlacedDisc]:
+        """Return bodies as discs."""
+        return [(*position[k], self.radius[k]) for k in numbers]
+
+    def pocket_at(self, point: Point) -> str | None:
+        """Return the pocket in which a centre lies."""
+        for name, (x, y, radius) in self.pockets.items():
+            if math.hypot(point[0] - x, point[1] - y) < radius:
+                return name
+        return None
+
+    def room(self, points: FloatArray) -> FloatArray:
+        """Return how far (M, 2) points are from whatever is fixed, (M,) m; negative outside the playing area."""
+        (x0, y0), (x1, y1) = self.area
+        x, y = points[:, 0], points[:, 1]
+        least = np.minimum(np.minimum(x - x0, x1 - x), np.minimum(y - y0, y1 - y))
+        for apart in (self.from_planes(points), self.from_segments(points)):
+            if apart.shape[1]:
+                least = np.minimum(least, apart.min(axis=1))
+        for px, py, radius in (*self.pockets.values(), *((*post.position, post.radius) for post in self.scene.posts)):
+            least = np.minimum(least, np.hypot(x - px, y - py) - radius)
+        return least
+
+    @cached_property
+    def segments(self) -> tuple[FloatArray, FloatArray, list[int]]:
+        """The walls' segments, (K, 4) m, half their thickness, (K,) m, and which fixed thing each is of, −1 − k."""
+        rows, whose = [], []
+        for k, wall in enumerate(self.scene.walls, len(self.scene.planes)):
+            points = (*wall.points, wall.points[0]) if wall.closed else wall.points
+            rows += [(*a, *b, 0.5 * wall.thickness) for a, b in pairwise(points)]
+            whose += [-1 - k] * (len(points) - 1)
+        table = np.array(rows, dtype=float).reshape(-1, 5)
+        return table[:, :4], table[:, 4], whose
+
+    def from_segments(self, points: FloatArray) -> FloatArray:
+        """Return how far (M, 2) points are from the faces of the walls' segments, (M, K) m."""
+        ends, half, _ = self.segments
+        a, way = ends[:, :2], ends[:, 2:] - ends[:, :2]
+        from_a = points[:, None] - a
+        share = np.einsum("mkc,kc->mk", from_a, way) / np.maximum(np.einsum("kc,kc->k", way, way), 1e-300)
+        apart = from_a - np.clip(share, 0.0, 1.0)[..., None] * way
+        return np.asarray(np.hypot(apart[..., 0], apart[..., 1]) - half)
+
+    def from_planes(self, points: FloatArray) -> FloatArray:
+        """Return how far (M, 2) points are before each plane, (M, K) m."""
+        planes = [(*plane.point, *plane.normal) for plane in self.scene.planes]
+        table = np.array(planes, dtype=float).reshape(-1, 4)
+        normal = table[:, 2:] / np.maximum(np.hypot(table[:, 2], table[:, 3]), 1e-300)[:, None]
+        return np.asarray(np.einsum("mkc,kc->mk", points[:, None] - table[:, :2], normal))
+
+    def against_fixed(self, position: tuple[Point, ...]) -> list[tuple[int, int]]:
+        """Return which bodies touch which planes, walls and posts, as pairs of numbers; fixed things are −1 − k."""
+        points, radius = np.array(position).reshape(-1, 2), np.array(self.radius)[:, None]
+        planes = [-1 - k for k in range(len(self.scene.planes))]
+        found = _those(self.from_planes(points) - radius, planes)
+        found += _those(self.from_segments(points) - radius, self.segments[2])
+        begin = len(self.scene.planes) + len(self.scene.walls)
+        for k, post in enumerate(self.scene.posts, begin):
+            apart = np.hypot(*(points - post.position).T) - post.radius
+            found += _those(apart[:, None] - radius, [-1 - k])
+        return found
+
+
+def _those(apart: FloatArray, whose: list[int]) -> list[tuple[int, int]]:
+    """Return pairs that touch, of (M, K) distances between bodies and fixed things."""
+    return [(i, whose[k]) for i, k in np.argwhere(apart <= TOUCH).tolist()]

@@ -1,0 +1,505 @@
+"""`[billiards]`, dimensions of tables, and sets of balls.
+
+Tables: their figures, each from a governing body's rules where these give one.
+
+WPA: World Pool Association, Tournament Table and Equipment Specifications. BCA: Billiard Congress of America,
+Equipment Specifications. WPBSA: World Professional Billiards and Snooker Association, Official Rules of Snooker,
+section 1. UMB: Union Mondiale de Billard, World Rules of Carom Billiard, articles 11–13 and 23.
+
+Cushions: the walls, jaws and pockets of a table.
+
+A pocket cuts two cushions. Each ends at a lip: its nose line and its facing, the line that leads into the pocket, are
+rounded into each other by a jaw, a post tangent to both. A facing ends where it meets the hole.
+
+Racks: where the balls of a game begin.
+
+Balls of a rack lie on a triangular lattice. With a gap g the lattice is g/2 wider than the balls and each ball lies
+anywhere within g/4 of its place: neighbours are 0 to g apart, and never overlap.
+"""
+
+from __future__ import annotations  # `np.random` in an annotation would import it wherever scenes are read
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from sandbox.games.names import TableGame
+from sandbox.scene.description.base import Friction, Mass, Name, Part, Point, Radius, Restitution, Vector
+from sandbox.scene.description.fixed import Post, Wall
+from sandbox.scene.description.surface import Pocket
+from sandbox.scene.random_streams import Stream, draws
+
+TableName = Literal["pool-7ft", "pool-8ft", "pool-9ft", "snooker-12ft", "carom-10ft"]
+RackName = Literal["8-ball", "9-ball", "snooker", "carom", "none"]
+
+
+class Billiards(Part):
+    """A billiard table by name, a rack of balls, and the game of the window; it is expanded to primitives.
+
+    Other tables of the scene file take precedence: a ball, wall or pocket of the same name, a key of `[surface]`,
+    `[contact_models]`, `[world]`, `[solver]` or `[play]`, a material or a pair. The origin is the corner of the table
+    at the cushion noses; x runs along the width, y along the length towards the rack.
+    """
+
+    table: TableName | None = None
+    """name of the table; without it, the scene's own walls, posts and pockets are the table, and its `[[play.spot]]`s
+    the spots for racking"""
+    game: TableGame = "free"
+    """game that the window plays"""
+    rack: RackName | None = None
+    """rack of balls; default: the rack of the game"""
+    gap: Annotated[float, Field(ge=0, le=0.1)] = 1e-4
+    """largest gap between racked neighbours, m, random by the seed; 0 for touching balls"""
+    place: dict[Name, Point] = Field(default_factory=dict)
+    """positions of balls of the set by name, m, in place of their racked positions or in addition to the rack"""
+    ball_radius: Radius | None = None
+    """m; default: the radius of the set"""
+    ball_mass: Mass | None = None
+    """kg"""
+    ball_restitution: Restitution = 0.95
+    """restitution of two balls; they collide without friction unless `[contact_models]` says otherwise"""
+    cushion_restitution: Restitution = 0.85
+    """restitution of the cushions, 0 to 1"""
+    cushion_friction: Friction = 0.2
+    """Coulomb friction μ of the cushions"""
+    nose: Annotated[float, Field(gt=0, le=1e9)] | None = None
+    """height of the cushion noses above the floor, m"""
+
+
+INCH = 0.0254  # m
+
+NOSE = 0.64
+"""of a ball's diameter, the height of a cushion's nose: WPA, height of the cushion, asks for 62.5 to 64.5 %"""
+
+
+@dataclass(frozen=True)
+class PocketOpening:
+    """How cushions end at a pocket, and the hole behind; m and degrees."""
+
+    mouth: float
+    """between the lips, where the lines of nose and facing would meet if they were not rounded"""
+    angle: float
+    """of the rubber, between nose and facing"""
+    shelf: float
+    """from the middle of the mouth to the edge of the hole"""
+    radius: float
+    """of the hole"""
+    jaw: float
+    """radius of the arc, tangent to nose and facing, that rounds a lip"""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: playing area between the noses, openings, the balls that are played on it, and spots; m."""
+
+    width: float
+    length: float
+    balls: str
+    spots: dict[str, Point]
+    corner: PocketOpening | None = None
+    middle: PocketOpening | None = None
+
+
+def _pool(length: float, corner: PocketOpening, middle: PocketOpening) -> Table:
+    """Return a table twice as long as wide. WPA: head and foot strings lie a quarter of the length from the ends."""
+    width = 0.5 * length
+    return Table(width, length, "pool", _strings(width, length), corner, middle)
+
+
+def _strings(width: float, length: float) -> dict[str, Point]:
+    along = {"head": 0.25, "centre": 0.5, "foot": 0.75}
+    return {name: (0.5 * width, part * length) for name, part in along.items()}
+
+
+# WPA, pocket openings: corner mouth 4.5 to 4.625 in, side mouth 5 to 5.125 in, cut 142° and 104°, shelf 1 to 2.25 in
+# and 0 to 0.375 in. Mouths are in the middle of that; the shelf at the corner lets a ball that is aimed at the hole's
+# middle from the table's pass the jaws. The rules give neither hole nor how round a lip is: holes are as wide as the
+# mouths, and the jaws, 20.95 and 7.95 mm, were measured on a Showood table (Kiefl, pooltool).
+WPA_CORNER = PocketOpening(4.5625 * INCH, 142.0, 1.125 * INCH, 2.28125 * INCH, 0.02095)
+WPA_SIDE = PocketOpening(5.0625 * INCH, 104.0, 0.1875 * INCH, 2.53125 * INCH, 0.00795)
+
+# BCA, for home tables too, the middle of what it allows: corner mouth 4.875 to 5.125 in, side mouth 5.375 to 5.625 in,
+# cut 142° and 103°, shelf 1.625 to 1.875 in and 0 to 0.375 in.
+BCA_CORNER = PocketOpening(5.0 * INCH, 142.0, 1.75 * INCH, 2.5 * INCH, 0.02095)
+BCA_SIDE = PocketOpening(5.5 * INCH, 103.0, 0.1875 * INCH, 2.75 * INCH, 0.00795)
+
+# WPBSA: the openings "conform to the templates authorised", which are not published. Taken are facings that are
+# parallel, 85 mm apart at the corners and 87 mm in the middle, about what is told of tables in play; long arcs as jaws,
+# of 3.6 and 2.5 in, and falls 36 mm behind the mouth (Kiefl, pooltool's generic table), in the middle at the nose line.
+SNOOKER_CORNER = PocketOpening(0.085, 135.0, 0.036, 0.0430, 3.6 * INCH)
+SNOOKER_MIDDLE = PocketOpening(0.087, 90.0, 0.0, 0.0445, 2.5 * INCH)
+
+
+def _snooker_table() -> Table:
+    """WPBSA 1: 3,569 × 1,778 mm; baulk line at 737 mm, D of 292 mm; black 324 mm from the top cushion."""
+    width, length, baulk, d = 1.778, 3.569, 0.737, 0.292
+    middle = 0.5 * width
+    spots = {
+        "yellow": (middle + d, baulk),  # on the right as seen from baulk
+        "green": (middle - d, baulk),
+        "brown": (middle, baulk),
+        "blue": (middle, 0.5 * length),
+        "pink": (middle, 0.75 * length),  # midway between the centre spot and the face of the top cushion
+        "black": (middle, length - 0.324),
+    }
+    return Table(width, length, "snooker", spots, SNOOKER_CORNER, SNOOKER_MIDDLE)
+
+
+def _carom() -> Table:
+    """UMB 11: 2.84 × 1.42 m. UMB 13: spots on the long axis, and two 182.5 mm to the sides of the head spot."""
+    width, length = 1.42, 2.84
+    spots = _strings(width, length)
+    (x, y), aside = spots["head"], 0.1825
+    return Table(width, length, "carom", {**spots, "head-left": (x - aside, y), "head-right": (x + aside, y)})
+
+
+TABLES: dict[TableName, Table] = {
+    "pool-7ft": _pool(78.0 * INCH, BCA_CORNER, BCA_SIDE),  # BCA: 78 × 39 in of a 7 ft table of full size
+    "pool-8ft": _pool(92.0 * INCH, WPA_CORNER, WPA_SIDE),  # WPA, playing surface: 92 × 46 in
+    "pool-9ft": _pool(100.0 * INCH, WPA_CORNER, WPA_SIDE),  # WPA, playing surface: 100 × 50 in
+    "snooker-12ft": _snooker_table(),
+    "carom-10ft": _carom(),
+}
+
+
+def spots_of(table: TableName) -> dict[str, Point]:
+    """Return the spots of a table by name, m."""
+    return dict(TABLES[table].spots)
+
+
+WHITE = "#f4f1e6"
+
+
+@dataclass(frozen=True)
+class BallSet:
+    """Balls that are played with each other, all alike but for name and colour."""
+
+    radius: float
+    """m"""
+    mass: float
+    """kg"""
+    colours: dict[str, str]
+    """by name; the first is struck"""
+    nose: float | None = None
+    """height of the cushions' noses where rules state it in itself, m"""
+    sliding: float = 0.2
+    rolling: float = 0.01
+    spinning: float = 0.444
+    """of the radius, 1/m: μ_sp = 0.444 R, so that every ball loses 10.9 rad/s of its spin about z each second"""
+
+
+SOLIDS = {
+    "1": "#f0c020",
+    "2": "#1c4fa0",
+    "3": "#d02424",
+    "4": "#5b2a86",
+    "5": "#ee7420",
+    "6": "#12703c",
+    "7": "#7c1e26",
+}
+
+
+def _striped(colour: str) -> str:
+    """Return a solid's colour lightened halfway to white: a disc of one colour can have no stripe."""
+    parts = [(int(colour[k : k + 2], 16) + int(WHITE[k : k + 2], 16)) // 2 for k in (1, 3, 5)]
+    return "#" + "".join(f"{part:02x}" for part in parts)
+
+
+POOL = BallSet(
+    # WPA, balls: 2.25 in; 5.5 to 6 oz, here the 6 of which most sets are
+    radius=0.028575,
+    mass=0.170097,
+    colours={
+        "cue": WHITE,
+        **SOLIDS,
+        "8": "#2a2a2e",
+        **{str(int(name) + 8): _striped(colour) for name, colour in SOLIDS.items()},
+    },
+)
+
+SNOOKER = BallSet(
+    # WPBSA 2: 52.5 mm, all of equal weight to 3 g, which it does not give; sets weigh about 140 g
+    radius=0.02625,
+    mass=0.140,
+    colours={
+        "cue": WHITE,
+        **{f"red-{number}": "#b81f24" for number in range(1, 16)},
+        "yellow": "#f0d020",
+        "green": "#0e7a3e",
+        "brown": "#7a4a22",
+        "blue": "#1f5fb8",
+        "pink": "#f08fb0",
+        "black": "#2a2a2e",
+    },
+)
+
+CAROM = BallSet(
+    # UMB 12: 61 to 61.5 mm, 205 to 220 g; UMB 11: noses 37 mm high
+    radius=0.03075,
+    mass=0.210,
+    colours={"white": WHITE, "yellow": "#f0d020", "red": "#c8201f"},
+    nose=0.037,
+)
+
+BALLS = {"pool": POOL, "snooker": SNOOKER, "carom": CAROM}
+
+RACK_SPOTS: dict[RackName, tuple[str, ...]] = {
+    "8-ball": ("head", "foot"),
+    "9-ball": ("head", "foot"),
+    "snooker": ("yellow", "green", "brown", "blue", "pink", "black"),
+    "carom": ("head", "foot"),
+    "none": (),
+}
+"""The spots that place the balls of each rack."""
+
+RACK_BALLS: dict[RackName, str] = {"8-ball": "pool", "9-ball": "pool", "snooker": "snooker", "carom": "carom"}
+"""The set of balls of each rack."""
+
+
+MATERIAL = "cushion"
+
+CUSHIONS = (
+    "lower cushion",
+    "lower right cushion",
+    "upper right cushion",
+    "upper cushion",
+    "upper left cushion",
+    "lower left cushion",
+)
+"""Anti-clockwise, each after the pocket of the same number."""
+
+UP, DOWN, LEFT, RIGHT = (0.0, 1.0), (0.0, -1.0), (-1.0, 0.0), (1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class PocketLip:
+    """One end of a cushion: which way the cushion runs from there, and which way is out of the playing area."""
+
+    along: Vector
+    out: Vector
+
+
+@dataclass(frozen=True)
+class PocketHole:
+    """A pocket's place: where its two nose lines meet, and its lips, anti-clockwise around the table."""
+
+    name: str
+    at: Point
+    lips: tuple[PocketLip, PocketLip]
+    opening: PocketOpening
+
+
+@dataclass(frozen=True)
+class StaticColliders:
+    """What of a table is fixed."""
+
+    walls: tuple[Wall, ...]
+    posts: tuple[Post, ...]
+    pockets: tuple[Pocket, ...]
+
+
+def static_colliders(table: Table, nose: float) -> StaticColliders:
+    """Lay out the cushions and pockets of a table.
+
+    Args:
+        table: its figures.
+        nose: height of the cushions' noses, m.
+    """
+    holes = _holes(table)
+    if not holes:
+        return StaticColliders(_rectangle(table, nose), (), ())
+    walls: list[Wall] = []
+    for k, name in enumerate(CUSHIONS):
+        here, there = holes[k], holes[(k + 1) % len(holes)]
+        walls.append(_wall(name, (_nose_end(here, here.lips[1]), _nose_end(there, there.lips[0])), nose))
+    posts: list[Post] = []
+    for hole in holes:
+        for number, lip in enumerate(hole.lips, 1):
+            jaw = f"{hole.name} jaw {number}"
+            radius = hole.opening.jaw
+            centre = _displaced(_nose_end(hole, lip), lip.out, radius)
+            posts.append(Post(name=jaw, position=centre, radius=radius, height=nose, material=MATERIAL))
+            ends = _facing(hole, lip)
+            if ends is not None:
+                walls.append(_wall(f"{hole.name} facing {number}", ends, nose))
+    pockets = tuple(Pocket(name=h.name, position=_centre(h), radius=h.opening.radius) for h in holes)
+    return StaticColliders(tuple(walls), tuple(posts), pockets)
+
+
+def _holes(table: Table) -> tuple[PocketHole, ...]:
+    """Return the pockets of a table, anti-clockwise from the lower left."""
+    if table.corner is None or table.middle is None:
+        return ()
+    w, length, corner, middle = table.width, table.length, table.corner, table.middle
+    half = 0.5 * length
+    return (
+        PocketHole("lower left pocket", (0.0, 0.0), (PocketLip(UP, LEFT), PocketLip(RIGHT, DOWN)), corner),
+        PocketHole("lower right pocket", (w, 0.0), (PocketLip(LEFT, DOWN), PocketLip(UP, RIGHT)), corner),
+        PocketHole("right pocket", (w, half), (PocketLip(DOWN, RIGHT), PocketLip(UP, RIGHT)), middle),
+        PocketHole("upper right pocket", (w, length), (PocketLip(DOWN, RIGHT), PocketLip(LEFT, UP)), corner),
+        PocketHole("upper left pocket", (0.0, length), (PocketLip(RIGHT, UP), PocketLip(DOWN, LEFT)), corner),
+        PocketHole("left pocket", (0.0, half), (PocketLip(UP, LEFT), PocketLip(DOWN, LEFT)), middle),
+    )
+
+
+def _rectangle(table: Table, nose: float) -> tuple[Wall, ...]:
+    w, length = table.width, table.length
+    corners = ((0.0, 0.0), (w, 0.0), (w, length), (0.0, length))
+    names = ("lower cushion", "right cushion", "upper cushion", "left cushion")
+    return tuple(_wall(name, (corners[k], corners[(k + 1) % 4]), nose) for k, name in enumerate(names))
+
+
+def _wall(name: str, ends: tuple[Point, Point], nose: float) -> Wall:
+    return Wall(name=name, points=ends, height=nose, material=MATERIAL)
+
+
+def _lip(hole: PocketHole, lip: PocketLip) -> Point:
+    """Return where the lines of nose and facing meet."""
+    (ax, ay), (bx, by) = (each.along for each in hole.lips)
+    half_angle = 0.5 * math.acos(ax * bx + ay * by)  # between the pocket's axis and its nose lines
+    return _displaced(hole.at, lip.along, 0.5 * hole.opening.mouth / math.sin(half_angle))
+
+
+def _rounded(opening: PocketOpening) -> float:
+    """Return how far from a lip the jaw touches nose and facing, m."""
+    return opening.jaw * math.tan(0.5 * math.radians(180.0 - opening.angle))
+
+
+def _nose_end(hole: PocketHole, lip: PocketLip) -> Point:
+    return _displaced(_lip(hole, lip), lip.along, _rounded(hole.opening))
+
+
+def _centre(hole: PocketHole) -> Point:
+    """Return the middle of the hole: straight out from the middle of the mouth."""
+    (ax, ay), (bx, by) = (_lip(hole, lip) for lip in hole.lips)
+    x, y = (sum(lip.out[k] for lip in hole.lips) for k in (0, 1))
+    size = math.hypot(x, y)
+    return _displaced(
+        (0.5 * (ax + bx), 0.5 * (ay + by)), (x / size, y / size), hole.opening.shelf + hole.opening.radius
+    )
+
+
+def _facing(hole: PocketHole, lip: PocketLip) -> tuple[Point, Point] | None:
+    """Return the ends of a facing, from the jaw to the hole; None where the jaw reaches as far itself."""
+    turn = math.radians(hole.opening.angle)
+    (ax, ay), (ox, oy) = lip.along, lip.out
+    cos, sin = math.cos(turn), math.sin(turn)
+    way = (ax * cos + ox * sin, ay * cos + oy * sin)
+    (x, y), (px, py) = _lip(hole, lip), _centre(hole)
+    toward = (px - x) * way[0] + (py - y) * way[1]
+    aside = (px - x) * way[1] - (py - y) * way[0]
+    length = toward - math.sqrt(hole.opening.radius**2 - aside**2)
+    begins = _rounded(hole.opening)
+    return (_displaced((x, y), way, begins), _displaced((x, y), way, length)) if length > begins else None
+
+
+def _displaced(point: Point, way: Vector, distance: float) -> Point:
+    return point[0] + way[0] * distance, point[1] + way[1] * distance
+
+
+HAIR = 1e-10
+"""m, between balls that are frozen: less than touching allows, more than rounding takes away"""
+
+ASIDE = 0.1825
+"""m, from the head spot to the ball with which a game of carom begins: UMB 13"""
+
+BREAK = 0.5
+"""of the way from brown to yellow, where the cue ball lies for a break-off"""
+
+
+def rack_positions(rack: RackName, spots: dict[str, Point], radius: float, gap: float, seed: int) -> dict[str, Point]:
+    """Return where the balls of a rack lie, by name, m.
+
+    Args:
+        rack: which.
+        spots: of the table, m; those that the rack needs.
+        radius: of the balls, m.
+        gap: the most that neighbours are apart, m.
+        seed: the scene's.
+    """
+    random = draws(Stream.RACK, seed)
+    match rack:
+        case "8-ball":
+            return {"cue": spots["head"], **_pyramid(_eight_ball(random), spots, radius, gap, random)}
+        case "9-ball":
+            return {"cue": spots["head"], **_pyramid(_nine_ball(random), spots, radius, gap, random)}
+        case "snooker":
+            return _snooker_rack(spots, radius, gap, random)
+        case "carom":
+            (x, y), along = spots["head"], _way(spots["head"], spots["foot"])
+            white = (x + along[1] * ASIDE, y - along[0] * ASIDE)
+            return {"white": white, "yellow": spots["head"], "red": spots["foot"]}
+        case "none":
+            return {}
+
+
+def _eight_ball(random: np.random.Generator) -> list[list[str]]:
+    """WPA, 8-ball rack: the 8 in the middle, a ball of each group in the rear corners, the others at random."""
+    solids, stripes = _shuffled(range(2, 8), random), _shuffled(range(9, 16), random)
+    corners = _shuffled((solids.pop(), stripes.pop()), random)
+    rest = _shuffled((*solids, *stripes), random)
+    order = [1, *rest[:3], 8, *rest[3:8], corners[0], *rest[8:], corners[1]]
+    return _rows(order, (1, 2, 3, 4, 5))
+
+
+def _nine_ball(random: np.random.Generator) -> list[list[str]]:
+    """WPA, 9-ball rack: a diamond, the 1 at the top on the foot spot, the 9 in the middle, the others at random."""
+    rest = _shuffled(range(2, 9), random)
+    return _rows([1, *rest[:3], 9, *rest[3:]], (1, 2, 3, 2, 1))
+
+
+def _snooker_rack(spots: dict[str, Point], radius: float, gap: float, random: np.random.Generator) -> dict[str, Point]:
+    """WPBSA, position of balls: colours on their spots, reds in a triangle behind the pink, near but not touching."""
+    along = _way(spots["blue"], spots["pink"])
+    begin = _shifted(spots["pink"], along, 2.0 * radius + max(gap, 1e-3))
+    reds = _rows(range(1, 16), (1, 2, 3, 4, 5))
+    places = _lattice([[f"red-{number}" for number in row] for row in reds], begin, along, radius, gap, random)
+    (bx, by), (yx, yy) = spots["brown"], spots["yellow"]
+    cue = (bx + BREAK * (yx - bx), by + BREAK * (yy - by))
+    return {"cue": cue, **places, **{name: spots[name] for name in RACK_SPOTS["snooker"]}}
+
+
+def _pyramid(
+    rows: list[list[str]], spots: dict[str, Point], radius: float, gap: float, random: np.random.Generator
+) -> dict[str, Point]:
+    return _lattice(rows, spots["foot"], _way(spots["head"], spots["foot"]), radius, gap, random)
+
+
+def _lattice(
+    rows: list[list[str]], begin: Point, along: Vector, radius: float, gap: float, random: np.random.Generator
+) -> dict[str, Point]:
+    """Lay rows of balls, the first at a point, the others behind it."""
+    pitch, loose = 2.0 * radius + max(0.5 * gap, HAIR), 0.25 * gap
+    places: dict[str, Point] = {}
+    for k, row in enumerate(rows):
+        for n, name in enumerate(row):
+            forth, aside = k * pitch * math.sqrt(0.75), (n - 0.5 * (len(row) - 1)) * pitch
+            far, turn = loose * math.sqrt(random.random()), 2.0 * math.pi * random.random()
+            forth, aside = forth + far * math.cos(turn), aside + far * math.sin(turn)
+            places[name] = (
+                begin[0] + along[0] * forth - along[1] * aside,
+                begin[1] + along[1] * forth + along[0] * aside,
+            )
+    return places
+
+
+def _rows(order: list[int] | range, sizes: tuple[int, ...]) -> list[list[str]]:
+    names = [str(number) for number in order]
+    return [[names.pop(0) for _ in range(size)] for size in sizes]
+
+
+def _shuffled(numbers: range | tuple[int, ...], random: np.random.Generator) -> list[int]:
+    """Return numbers in an order of chance, by uniform doubles alone: their stream is stable in numpy."""
+    return [number for _, number in sorted((float(random.random()), number) for number in numbers)]
+
+
+def _way(begin: Point, end: Point) -> Vector:
+    size = math.dist(begin, end)
+    return (end[0] - begin[0]) / size, (end[1] - begin[1]) / size
+
+
+def _shifted(point: Point, way: Vector, distance: float) -> Point:
+    return point[0] + way[0] * distance, point[1] + way[1] * distance

@@ -1,0 +1,178 @@
+"""Aiming: the ways that a stroke would lead to, the ghost of the cue ball at its first touch, and the cue."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pygame
+
+from sandbox.arrays import FloatArray
+from sandbox.games.billiards.aiming import CueAim
+from sandbox.games.billiards.view_table import felt_of
+from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.lines import Pixel, draw_line
+from sandbox.window.render.palette import (
+    BACKGROUND,
+    INK,
+    ORANGE,
+    SKY,
+    WARNING,
+    YELLOW,
+    Colour,
+    ColourArray,
+    mix_colours,
+)
+from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+
+FADE = 3.0
+"""m along a way after which it is half as bright"""
+FAINTEST = 0.16
+LENGTH = 1.47
+"""m, of a cue; for balls of another size, in proportion"""
+BALL = 0.028575
+"""m, the radius of the balls that such a cue is for"""
+PARTS: tuple[tuple[float, float, float, Colour], ...] = (
+    (0.000, 0.008, 0.0064, (64, 128, 190)),
+    (0.008, 0.030, 0.0066, (238, 234, 222)),
+    (0.030, 0.740, 0.0068, (214, 176, 120)),
+    (0.740, 0.775, 0.0108, (30, 26, 26)),
+    (0.775, 1.130, 0.0112, (92, 52, 34)),
+    (1.130, 1.420, 0.0136, (34, 32, 38)),
+    (1.420, 1.470, 0.0146, (22, 20, 22)),
+)
+"""From the tip to the butt: from, to, half the width where it begins, colour; m. Widths grow evenly."""
+BUTT = 0.0148
+"""m, half the width at the end"""
+
+
+def draw_paths(view: DrawContext, aim: CueAim, colours: ColourArray) -> None:
+    """Draw where the cue ball and the first ball that it hits would go; below the balls."""
+    found = aim.forecast
+    if found is None:
+        return
+    if found.onward is not None and found.hit is not None:
+        red, green, blue = colours[found.hit].tolist()
+        _way(view, found.onward, mix_colours((red, green, blue), INK, 0.45), 2.0)
+        _end(view, found.onward, aim, found.hit in found.falls, mix_colours((red, green, blue), INK, 0.45))
+    _way(view, found.way, INK, 1.6)
+    _end(view, found.way, aim, aim.ball in found.falls, INK)
+
+
+def _faded(view: DrawContext, colour: Colour, share: float) -> Colour:
+    """Return a colour of which so much is seen, on what is below."""
+    scene = view.sight.scene
+    return mix_colours(BACKGROUND if scene.play.area is None else felt_of(scene).bed, colour, share)
+
+
+def _way(view: DrawContext, points: FloatArray, colour: Colour, width: float) -> None:
+    """Draw a way, the fainter the farther along."""
+    pixels = view.camera.to_screen(points).tolist()
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    bright = np.maximum(0.5 ** (np.cumsum(steps) / FADE), FAINTEST).tolist()
+    for (a, b), share in zip(pairwise(pixels), bright, strict=True):
+        draw_line(view.surface, a, b, _faded(view, colour, share), width * view.unit, view.antialias)
+
+
+def _end(view: DrawContext, points: FloatArray, aim: CueAim, falls: bool, colour: Colour) -> None:
+    """Draw where a ball comes to rest, or that it falls."""
+    radius = float(view.sight.bodies.radius[aim.ball])
+    tint = colour if falls else _faded(view, colour, 0.45)
+    _ring(view, points[-1], (0.55 if falls else 1.0) * radius, tint, 2.2 if falls else 1.2)
+
+
+def _ring(view: DrawContext, at: FloatArray, radius: float, colour: Colour, line: float, opacity: float = 1.0) -> None:
+    (x, y), size = view.camera.to_screen(at).tolist(), radius * view.camera.scale
+    side = math.ceil(size) + 3
+    within = pygame.Rect(math.floor(x) - side, math.floor(y) - side, 2 * side + 1, 2 * side + 1)
+    look = ShapeStyle(None, colour, line * view.unit, opacity, antialias=view.antialias)
+    draw_sdf(view.surface, disc_distance(x, y, size), look, within)
+
+
+def draw_aim(view: DrawContext, aim: CueAim) -> None:
+    """Draw what lies above the balls: the ghost of the cue ball, what was called, the hand or the cue."""
+    radius = float(view.sight.bodies.radius[aim.ball])
+    if aim.called is not None:
+        _ring(view, np.asarray(aim.called[0]), aim.called[1] + 0.25 * radius, YELLOW, 2.5)
+    if aim.nominated is not None:
+        _ring(view, view.sight.frame.position[aim.nominated], 1.35 * radius, YELLOW, 2.0)
+    if aim.carried:
+        _ring(view, np.asarray(aim.place), 1.5 * radius, WARNING if aim.refused else SKY, 2.0)
+        return
+    if aim.forecast is not None and aim.forecast.ghost is not None:
+        _ring(view, np.asarray(aim.forecast.ghost), radius, INK, 1.5, opacity=0.9)
+    elif aim.forecast is None:
+        _straight(view, aim)
+    _cue(view, aim, radius)
+
+
+def _straight(view: DrawContext, aim: CueAim) -> None:
+    """Draw a line along the cue, where nobody can tell what it would lead to."""
+    x, y = aim.place
+    ends = np.asarray([(x, y), (x + 10.0 * math.cos(aim.angle), y + 10.0 * math.sin(aim.angle))])
+    a, b = view.camera.to_screen(ends).tolist()
+    draw_line(view.surface, a, b, ORANGE, 1.2 * view.unit, view.antialias)
+
+
+def _cue(view: DrawContext, aim: CueAim, radius: float) -> None:
+    """Draw the cue behind the ball, and its shadow."""
+    size = radius / BALL
+    x, y = aim.place
+    cos, sin = math.cos(aim.angle), math.sin(aim.angle)
+    # Side to the right is where the player sees it, who looks along the cue.
+    start = x + sin * aim.side * radius, y - cos * aim.side * radius
+    off = math.sqrt(max(1.0 - aim.side**2, 0.0)) * radius + 0.006 * size + aim.back
+
+    def at(along: float, across: float) -> tuple[float, float]:
+        back = off + along * size
+        return start[0] - cos * back - sin * across * size, start[1] - sin * back + cos * across * size
+
+    def corners(first: float, last: float, wide: float, wider: float, shift: Pixel) -> list[Pixel]:
+        world = np.asarray([at(first, wide), at(last, wider), at(last, -wider), at(first, -wide)])
+        return [(px + shift[0], py + shift[1]) for px, py in view.camera.to_screen(world).tolist()]
+
+    far = 0.012 * size * view.camera.scale
+    shade = corners(0.0, LENGTH, PARTS[0][2], BUTT, (0.8 * far, far))
+    _dim(view, shade)
+    ends = [*(part[2] for part in PARTS[1:]), BUTT]
+    scale = view.camera.scale * size
+    for (first, last, wide, colour), wider in zip(PARTS, ends, strict=True):
+        a, b = view.camera.to_screen(np.asarray([at(first, 0.0), at(last, 0.0)])).tolist()
+        thin, thick = (max(half * scale, 0.8 * view.unit) for half in (wide, wider))
+        _taper(view, a, b, (thin, thick), colour)
+        if thin > 2.0:
+            _taper(view, a, b, (0.3 * thin, 0.3 * thick), mix_colours(colour, INK, 0.12))
+
+
+def _taper(view: DrawContext, a: Pixel, b: Pixel, halves: tuple[float, float], colour: Colour) -> None:
+    """Draw a piece that grows from one half width to another, px, with flat ends."""
+    length = math.hypot(b[0] - a[0], b[1] - a[1])
+    if length < 1e-3:
+        return
+    along = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+    slope = (halves[1] - halves[0]) / length
+
+    def distance(px: FloatArray, py: FloatArray) -> FloatArray:
+        x, y = px - a[0], py - a[1]
+        t = x * along[0] + y * along[1]
+        across = np.abs(y * along[0] - x * along[1]) - halves[0] - slope * t
+        return np.asarray(np.maximum(across, np.maximum(-t, t - length) - 0.5))  # half a pixel over the next piece
+
+    reach = math.ceil(max(halves)) + 2
+    left, top = math.floor(min(a[0], b[0])) - reach, math.floor(min(a[1], b[1])) - reach
+    wide, high = abs(b[0] - a[0]) + 2 * reach + 1, abs(b[1] - a[1]) + 2 * reach + 1
+    within = pygame.Rect(left, top, math.ceil(wide), math.ceil(high))
+    draw_sdf(view.surface, distance, ShapeStyle(colour, colour, 0.0, antialias=view.antialias), within)
+
+
+def _dim(view: DrawContext, corners: list[Pixel]) -> None:
+    """Darken a polygon."""
+    xs, ys = [x for x, _ in corners], [y for _, y in corners]
+    seen = view.surface.get_rect()
+    rect = pygame.Rect(math.floor(min(xs)), math.floor(min(ys)), 1, 1)
+    rect.width, rect.height = math.ceil(max(xs)) - rect.left + 1, math.ceil(max(ys)) - rect.top + 1
+    rect = rect.clip(seen)
+    if not rect.width or not rect.height:
+        return
+    layer = pygame.Surface(rect.size, pygame.SRCALPHA)
+    pygame.draw.polygon(layer, (*BACKGROUND, 90), [(x - rect.left, y - rect.top) for x, y in corners])
+    view.surface.blit(layer, rect)

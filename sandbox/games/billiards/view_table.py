@@ -1,0 +1,346 @@
+"""Cloth: a table as it stands, with wood, cushions, pockets, spots and strings; it changes with the camera alone.
+
+Cushions: the outlines of a table's rubber, worked out from walls, jaws and facings; in metres, no pygame.
+
+A cushion is a wall along an edge of the playing area. At each end it may be rounded by a jaw, a post that touches it
+where it ends, and go on along a facing, a wall that touches the same jaw.
+"""
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+
+from sandbox.scene.description.base import Point, Vector
+from sandbox.scene.description.fixed import Post, Wall
+from sandbox.scene.scene import Scene
+from sandbox.window.camera import Box, Camera
+from sandbox.window.render.lines import Pixel, clip_segment, draw_line, fill_polygon
+from sandbox.window.render.palette import BACKGROUND, Colour, mix_colours
+from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+from sandbox.window.render.static_geometry import draw_static_bodies
+
+DEPTH = 0.036
+"""of a table's width, from the nose of a cushion to the wood"""
+RIM = 0.115
+"""likewise, to the outside of the wood"""
+TOUCH = 1e-6
+"""m: what is nearer touches"""
+ARC = math.radians(6.0)
+"""from point to point of a jaw"""
+
+
+class CushionOutline(NamedTuple):
+    """One piece of rubber."""
+
+    outline: tuple[Point, ...]
+    """all around, m"""
+    nose: tuple[Point, ...]
+    """the part of it that balls meet, m"""
+    out: Vector
+    """away from the playing area"""
+
+
+def rail_width(area: Box) -> float:
+    """Return the shorter side of a playing area, m."""
+    (left, bottom), (right, top) = area
+    return min(right - left, top - bottom)
+
+
+def table_bounds(area: Box) -> Box:
+    """Return the box of a whole table, with its wood, m."""
+    rim = RIM * rail_width(area)
+    (left, bottom), (right, top) = area
+    return (left - rim, bottom - rim), (right + rim, top + rim)
+
+
+def cushion_outlines(scene: Scene, area: Box) -> tuple[CushionOutline, ...]:
+    """Return the cushions of a table, as far as its fixed things are such."""
+    depth = DEPTH * rail_width(area)
+    noses = {k: out for k, wall in enumerate(scene.walls) if (out := _out(wall, area)) is not None}
+    facings = [wall for k, wall in enumerate(scene.walls) if k not in noses and len(wall.points) == 2]
+    return tuple(_cushion(scene.walls[k], out, scene, facings, depth) for k, out in noses.items())
+
+
+def walls_that_are_no_cushions(scene: Scene, area: Box) -> tuple[tuple[Wall, ...], tuple[Post, ...]]:
+    """Return the walls and posts that are no part of the cushions."""
+    noses = [(wall, out) for wall in scene.walls if (out := _out(wall, area)) is not None]
+    jaws = [jaw for wall, out in noses for end in wall.points if (jaw := _jaw(end, out, scene)) is not None]
+    known = [wall for wall, _ in noses] + [
+        wall for wall in scene.walls if len(wall.points) == 2 and any(_from_jaw(wall, jaw) for jaw in jaws)
+    ]
+    walls = tuple(wall for wall in scene.walls if not any(wall is each for each in known))
+    return walls, tuple(post for post in scene.posts if not any(post is each for each in jaws))
+
+
+def _jaw(end: Point, out: Vector, scene: Scene) -> Post | None:
+    """Return the post that a nose touches where it ends."""
+    return next((post for post in scene.posts if math.dist(post.position, _moved(end, out, post.radius)) < TOUCH), None)
+
+
+def _out(wall: Wall, area: Box) -> Vector | None:
+    """Return the way out of the area, of a wall along one of its edges."""
+    if len(wall.points) != 2 or wall.closed:
+        return None
+    (left, bottom), (right, top) = area
+    (ax, ay), (bx, by) = wall.points
+    for edge, a, b, out in (
+        (left, ax, bx, (-1.0, 0.0)),
+        (right, ax, bx, (1.0, 0.0)),
+        (bottom, ay, by, (0.0, -1.0)),
+        (top, ay, by, (0.0, 1.0)),
+    ):
+        if abs(a - edge) < TOUCH and abs(b - edge) < TOUCH:
+            return out
+    return None
+
+
+def _cushion(wall: Wall, out: Vector, scene: Scene, facings: list[Wall], depth: float) -> CushionOutline:
+    a, b = wall.points
+    length = max(math.dist(a, b), TOUCH)
+    along = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+    back = -along[0], -along[1]
+    first, last = _end(a, back, out, scene, facings, depth), _end(b, along, out, scene, facings, depth)
+    nose = (*reversed(first), *last)
+    height = [(x - a[0]) * out[0] + (y - a[1]) * out[1] for x, y in (nose[0], nose[-1])]
+    corners = [_moved(nose[-1], out, max(depth - height[1], 0.0)), _moved(nose[0], out, max(depth - height[0], 0.0))]
+    if len(last) == 1:  # no jaw: it meets the next cushion in a mitre
+        corners[0] = _moved(corners[0], along, depth)
+    if len(first) == 1:
+        corners[1] = _moved(corners[1], back, depth)
+    return CushionOutline((*nose, *corners), nose, out)
+
+
+def _end(end: Point, along: Vector, out: Vector, scene: Scene, facings: list[Wall], depth: float) -> tuple[Point, ...]:
+    """Return the points from where a nose ends around its jaw and along its facing."""
+    jaw = _jaw(end, out, scene)
+    if jaw is None:
+        return (end,)
+    facing = next((ends for wall in facings if (ends := _from_jaw(wall, jaw)) is not None), None)
+    if facing is not None:
+        x, y = facing[0][0] - jaw.position[0], facing[0][1] - jaw.position[1]
+        turn = math.atan2(x * along[0] + y * along[1], -(x * out[0] + y * out[1]))
+    else:
+        turn = math.acos(max(1.0 - depth / jaw.radius, 0.0))
+    points = [end]
+    count = max(math.ceil(turn / ARC), 1)
+    for k in range(1, count + 1):
+        cos, sin = math.cos(turn * k / count), math.sin(turn * k / count)
+        here = _moved(_moved(jaw.position, out, -jaw.radius * cos), along, jaw.radius * sin)
+        if any(math.dist(here, hole.position) < hole.radius for hole in scene.pockets):
+            break
+        points.append(here)
+    return (*points, facing[1]) if facing is not None else tuple(points)
+
+
+def _from_jaw(wall: Wall, jaw: Post) -> tuple[Point, Point] | None:
+    """Return the ends of a wall that begins on a jaw and leaves it straight, the one on the jaw first."""
+    for near, far in (wall.points, wall.points[::-1]):
+        x, y = near[0] - jaw.position[0], near[1] - jaw.position[1]
+        leaves = abs(x * (far[0] - near[0]) + y * (far[1] - near[1])) < TOUCH
+        if leaves and abs(math.hypot(x, y) - jaw.radius) < TOUCH:
+            return near, far
+    return None
+
+
+def _moved(point: Point, way: Vector, distance: float) -> Point:
+    return point[0] + way[0] * distance, point[1] + way[1] * distance
+
+
+WOOD: Colour = (66, 45, 36)
+WOOD_LIGHT: Colour = (104, 74, 56)
+WOOD_DARK: Colour = (44, 30, 25)
+IRON: Colour = (26, 24, 26)
+HOLE: Colour = (8, 8, 10)
+PEARL: Colour = (206, 200, 184)
+CHALK: Colour = (226, 236, 232)
+LIT, UNLIT = 1.12, 0.80
+"""how bright the cloth is in the middle and at its corners"""
+
+
+class ClothColours(NamedTuple):
+    """The colours of a cloth."""
+
+    bed: Colour
+    rubber: Colour
+    edge: Colour
+
+
+POOL = ClothColours((22, 106, 104), (17, 84, 84), (58, 150, 146))
+SNOOKER = ClothColours((24, 110, 70), (18, 86, 55), (66, 152, 108))
+CAROM = ClothColours((30, 88, 142), (23, 68, 112), (80, 136, 186))
+FELTS = {"snooker": SNOOKER, "three-cushion": CAROM, "straight-rail": CAROM}
+
+
+def felt_of(scene: Scene) -> ClothColours:
+    """Return the colours of a table's cloth, by the game that it is for."""
+    return FELTS.get(scene.play.game or "free", POOL)
+
+
+def draw_table(
+    surface: pygame.Surface, camera: Camera, scene: Scene, area: Box, unit: float = 1.0, antialias: bool = True
+) -> None:
+    """Draw a table, as far as it is in sight."""
+    felt = felt_of(scene)
+    pen = _TablePen(surface, camera, unit, antialias)
+    rubber, width = cushion_outlines(scene, area), rail_width(area)
+    _wood(pen, area, width)
+    for hole in scene.pockets:
+        pen.disc(hole.position, hole.radius + 0.016 * width, IRON, rim=mix_colours(IRON, PEARL, 0.25), line=1.0)
+    pen.box(area, felt.bed)
+    for hole in scene.pockets:
+        _throat(pen, hole.position, hole.radius, rubber, area, felt.bed)
+    _light(surface, camera, area)
+    _marks(pen, scene, area, felt)
+    for cushion in rubber:
+        _shadow(pen, cushion, felt, 0.010 * width)
+    for cushion in rubber:
+        pen.polygon(cushion.outline, felt.rubber)
+        pen.line(cushion.nose, felt.edge, 1.6 * unit)
+        outer = cushion.outline[len(cushion.nose) :]
+        pen.line(outer, mix_colours(felt.rubber, HOLE, 0.55), 1.4 * unit)
+        for corner, end in zip(outer, (cushion.nose[-1], cushion.nose[0]), strict=True):
+            pen.line((corner, end), mix_colours(felt.rubber, HOLE, 0.3), 1.0 * unit)
+    for hole in scene.pockets:
+        pen.disc(hole.position, hole.radius, HOLE, rim=mix_colours(IRON, HOLE, 0.5), line=3.0)
+    _diamonds(pen, scene, area, width)
+    walls, posts = walls_that_are_no_cushions(scene, area)
+    if walls or posts or scene.planes:
+        draw_static_bodies(surface, camera, scene.model_copy(update={"walls": walls, "posts": posts}), unit, antialias)
+
+
+class _TablePen:
+    """Draws in metres."""
+
+    def __init__(self, surface: pygame.Surface, camera: Camera, unit: float, antialias: bool) -> None:
+        self.surface, self.camera, self.unit, self.antialias = surface, camera, unit, antialias
+
+    def at(self, points: tuple[Point, ...]) -> list[Pixel]:
+        return [(x, y) for x, y in self.camera.to_screen(np.asarray(points)).tolist()]
+
+    def polygon(self, points: tuple[Point, ...], colour: Colour) -> None:
+        fill_polygon(self.surface, self.at(points), colour, self.antialias)
+
+    def box(self, box: Box, colour: Colour, rounding: float = 0.0) -> None:
+        """Fill a box; SDL would have its sides at whole pixels, which is what is wanted."""
+        (left, top), (right, bottom) = _corners(self.camera, box)
+        area = self.surface.get_rect().inflate(400, 400)
+        left, right = (min(max(x, area.left), area.right) for x in (left, right))
+        top, bottom = (min(max(y, area.top), area.bottom) for y in (top, bottom))
+        rect = pygame.Rect(round(left), round(top), round(right) - round(left), round(bottom) - round(top))
+        pygame.draw.rect(self.surface, colour, rect, border_radius=round(rounding * self.camera.scale))
+
+    def line(self, points: tuple[Point, ...], colour: Colour, width: float) -> None:
+        places = self.at(points)
+        for a, b in pairwise(places):
+            draw_line(self.surface, a, b, colour, width, self.antialias)
+
+    def disc(self, at: Point, radius: float, colour: Colour, rim: Colour | None = None, line: float = 0.0) -> None:
+        ((x, y),), r = self.at((at,)), radius * self.camera.scale
+        if clip_segment((x, y), (x, y), self.surface.get_rect(), r + 4.0) is None:
+            return
+        within = pygame.Rect(math.floor(x - r) - 2, math.floor(y - r) - 2, math.ceil(2 * r) + 5, math.ceil(2 * r) + 5)
+        look = ShapeStyle(colour, rim or colour, line * self.unit, antialias=self.antialias)
+        draw_sdf(self.surface, disc_distance(x, y, r), look, within)
+
+
+def _corners(camera: Camera, box: Box) -> tuple[Pixel, Pixel]:
+    """Return the upper left and the lower right corner of a box in the picture."""
+    (ax, ay), (bx, by) = camera.to_screen(np.asarray(box)).tolist()
+    return (min(ax, bx), min(ay, by)), (max(ax, bx), max(ay, by))
+
+
+def _wood(pen: _TablePen, area: Box, width: float) -> None:
+    """Draw the rails: dark without, a bevel of light within."""
+    rim, depth = RIM * width, DEPTH * width
+    for out, colour in (
+        (rim, WOOD_DARK),
+        (rim - 0.004 * width, WOOD_LIGHT),
+        (rim - 0.008 * width, WOOD),
+        (depth + 0.006 * width, WOOD_DARK),
+    ):
+        (left, bottom), (right, top) = area
+        rounding = max(out - depth, 0.0) + 0.02 * width if out > 0.05 * width else 0.0
+        pen.box(((left - out, bottom - out), (right + out, top + out)), colour, rounding)
+
+
+def _throat(
+    pen: _TablePen, hole: Point, radius: float, rubber: tuple[CushionOutline, ...], area: Box, colour: Colour
+) -> None:
+    """Draw the cloth between the two cushions that a pocket cuts."""
+    reach = 3.0 * radius + 0.1 * rail_width(area)
+    ends = [nose for each in rubber for nose in (each.nose, each.nose[::-1]) if math.dist(nose[0], hole) < reach]
+    ends.sort(key=lambda nose: math.dist(nose[0], hole))
+    if len(ends) >= 2:
+        # Two fans with the hole's middle: from each lip to where its nose line is straight.
+        a, b = (nose[: max(len(nose) // 2, 2)] for nose in ends[:2])
+        pen.polygon((hole, *a, *reversed(b)), colour)
+
+
+def _light(surface: pygame.Surface, camera: Camera, area: Box) -> None:
+    """Light the bed from above its middle."""
+    (left, top), (right, bottom) = _corners(camera, area)
+    depth = DEPTH * rail_width(area) * camera.scale
+    seen = surface.get_rect()
+    rect = pygame.Rect(0, 0, 0, 0)
+    rect.left, rect.top = max(math.floor(left - depth), 0), max(math.floor(top - depth), 0)
+    rect.width = min(math.ceil(right + depth), seen.right) - rect.left
+    rect.height = min(math.ceil(bottom + depth), seen.bottom) - rect.top
+    if rect.width < 2 or rect.height < 2 or not seen.contains(rect):
+        return
+    grain = min(96, rect.width), min(96, rect.height)
+    x = (rect.left + (np.arange(grain[0]) + 0.5) * rect.width / grain[0] - (left + right) / 2) / (right - left)
+    y = (rect.top + (np.arange(grain[1]) + 0.5) * rect.height / grain[1] - (top + bottom) / 2) / (bottom - top)
+    far = np.clip((x[:, None] ** 2 + y[None, :] ** 2) / 0.5, 0.0, 1.0)
+    bright = LIT + (UNLIT - LIT) * far
+    # SDL cannot multiply by more than 1: what is above is added.
+    dimmed, added = np.clip(bright, 0.0, 1.0) * 255.0, np.clip(bright - 1.0, 0.0, 1.0) * 110.0
+    for tone, flag in ((dimmed, pygame.BLEND_RGB_MULT), (added, pygame.BLEND_RGB_ADD)):
+        layer = pygame.surfarray.make_surface(np.repeat(np.rint(tone)[:, :, None], 3, 2).astype(np.uint8))
+        surface.blit(pygame.transform.smoothscale(layer, rect.size), rect, special_flags=flag)
+
+
+def _marks(pen: _TablePen, scene: Scene, area: Box, felt: ClothColours) -> None:
+    """Draw strings and spots, faintly."""
+    spots = {spot.name: spot.position for spot in scene.play.spots}
+    faint, (left, bottom), (right, top) = mix_colours(felt.bed, CHALK, 0.32), *area
+    tall, thin = top - bottom > right - left, 1.2 * pen.unit
+    if {"yellow", "green", "brown"} <= spots.keys():
+        (x, y), (gx, gy) = spots["brown"], spots["green"]
+        radius = math.dist((x, y), (gx, gy))
+        pen.line(((left, y), (right, y)) if tall else ((x, bottom), (x, top)), faint, thin)
+        side = math.copysign(1.0, (bottom + top) / 2 - y) if tall else math.copysign(1.0, (left + right) / 2 - x)
+        turns = [math.pi * k / 48.0 for k in range(49)]
+        arc = [(radius * math.cos(t), -side * radius * math.sin(t)) for t in turns]
+        pen.line(tuple((x + u, y + v) if tall else (x + v, y + u) for u, v in arc), faint, thin)
+    elif "head" in spots and scene.pockets:
+        x, y = spots["head"]
+        pen.line(((left, y), (right, y)) if tall else ((x, bottom), (x, top)), mix_colours(felt.bed, CHALK, 0.2), thin)
+    size = 0.0042 * rail_width(area)
+    for place in spots.values():
+        pen.disc(place, max(size, 1.2 * pen.unit / pen.camera.scale), mix_colours(felt.bed, CHALK, 0.5))
+
+
+def _shadow(pen: _TablePen, cushion: CushionOutline, felt: ClothColours, reach: float) -> None:
+    """Darken the cloth below a nose."""
+    for share, dark in ((1.0, 0.10), (0.62, 0.20), (0.3, 0.32)):
+        by = reach * share
+        moved = tuple((x - cushion.out[0] * by, y - cushion.out[1] * by) for x, y in cushion.nose)
+        pen.polygon((*moved, *cushion.nose[::-1]), mix_colours(felt.bed, HOLE, dark))
+
+
+def _diamonds(pen: _TablePen, scene: Scene, area: Box, width: float) -> None:
+    """Draw the sights on the rails; snooker has none."""
+    if scene.play.game == "snooker" or not scene.play.spots or any(s.name == "brown" for s in scene.play.spots):
+        return
+    (left, bottom), (right, top) = area
+    tall = top - bottom > right - left
+    off, size = (RIM + DEPTH) / 2.0 * width, 0.0062 * width
+    wide, high = (4, 8) if tall else (8, 4)
+    places = [(left + (right - left) * k / wide, y) for k in range(1, wide) for y in (bottom - off, top + off)]
+    places += [(x, bottom + (top - bottom) * k / high) for k in range(1, high) for x in (left - off, right + off)]
+    for place in places:
+        if all(math.dist(place, hole.position) > hole.radius + 0.03 * width for hole in scene.pockets):
+            pen.disc(place, size, PEARL, rim=mix_colours(WOOD, BACKGROUND, 0.6), line=0.8)

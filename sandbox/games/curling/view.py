@@ -1,0 +1,40 @@
+"""Pucks: flat discs on a floor, of stone, with a coloured top and a handle that shows how they have turned."""
+
+import numpy as np
+
+from sandbox.window.render.circles import SHORTEST_SPOKE, CircleRenderer, darken
+from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.lines import draw_line
+from sandbox.window.render.palette import Colour
+
+GRANITE: Colour = (120, 124, 130)
+TOP, HANDLE, GRIP = 0.66, 0.50, 0.26
+"""Of the radius: how far the top reaches, and half the length of the handle; and the handle's width."""
+PALE = 0.45
+"""How far a handle leans to white."""
+
+
+def draw_stones(view: DrawContext, discs: CircleRenderer) -> None:
+    """Draw the pucks in sight. What meets nothing only marks a place: it is a ring."""
+    bodies = view.sight.bodies
+    marks = np.asarray([element.collides == "none" for element in bodies.elements], np.bool_)[bodies.element]
+    ring = marks[view.shown]
+    centre, radius, colours = view.centre[~ring], view.radius[~ring], view.colours[~ring]
+    stone = np.broadcast_to(np.asarray(GRANITE, np.uint8), colours.shape)
+    discs.draw(view.surface, centre, radius, stone, view.style())
+    discs.draw(view.surface, centre, TOP * radius, colours, view.style(1.0))
+    angle = view.sight.frame.angle[view.shown[~ring]]
+    for k in np.flatnonzero((radius >= SHORTEST_SPOKE) & (radius < 1e6) & np.isfinite(angle)).tolist():
+        (x, y), reach = centre[k].tolist(), float(radius[k])
+        dx, dy = HANDLE * reach * np.cos(angle[k]), -HANDLE * reach * np.sin(angle[k])
+        tone = _pale(colours[k].tolist())
+        draw_line(view.surface, (x - dx, y - dy), (x + dx, y + dy), tone, max(GRIP * reach, 1.0), view.antialias)
+    for k in np.flatnonzero(ring).tolist():
+        (x, y), (red, green, blue) = view.centre[k].tolist(), view.colours[k].tolist()
+        discs.ring(view.surface, (x, y), float(view.radius[k]) + 1.0, darken((red, green, blue)), view.style(4.0))
+        discs.ring(view.surface, (x, y), float(view.radius[k]), (red, green, blue), view.style(2.5))
+
+
+def _pale(colour: list[int]) -> Colour:
+    red, green, blue = (round(part + (255 - part) * PALE) for part in colour)
+    return red, green, blue

@@ -1,0 +1,1 @@
+"""Landing: a lunar lander."""

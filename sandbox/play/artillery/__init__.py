@@ -1,1 +1,0 @@
-"""What a game of artillery adds to the sight of a moment."""

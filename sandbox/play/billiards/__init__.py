@@ -1,1 +1,0 @@
-"""billiards: playing at a table in the window: cue, aim, turns; no pygame, so that it can be tried without."""

@@ -1,1 +1,0 @@
-"""How artillery is drawn: sky and ground, tanks, and what flies."""

@@ -1,1 +1,0 @@
-"""table: how a billiard table, its balls and a cue are drawn."""

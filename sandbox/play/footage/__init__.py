@@ -1,1 +1,0 @@
-"""Footage: pictures and films as files, and stored runs as pictures."""

@@ -1,1 +1,0 @@
-"""hosting: games with rules of their own in the window: keys, gamepads, scores, sounds."""

@@ -1,1 +1,0 @@
-"""Instruments: what surrounds the picture: figures, graph, panel, timeline, help, and the picker of scenes."""

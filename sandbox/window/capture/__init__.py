@@ -1,0 +1,1 @@
+"""Screenshots and films: png, gif and mp4 files."""

@@ -1,0 +1,292 @@
+"""Hulls: convex pieces of bodies where they are now; how far places and one another are from them.
+
+Picking: which body lies under the hand, and which overlap something.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import bits_of
+from sandbox.scene.description.fixed import mask_of
+from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Frame
+
+Distance = Callable[[FloatArray, FloatArray], FloatArray]
+"""Takes x and y, that broadcast, and returns the signed distance there, negative inside."""
+
+
+class Hull(NamedTuple):
+    """The hull of some corners, widened by a radius; in metres or in pixels, whichever way round."""
+
+    corners: FloatArray
+    """(n, 2); one is a disc, two are a capsule"""
+    radius: float
+
+
+def hulls_of(bodies: Bodies, frame: Frame, number: int) -> list[Hull]:
+    """Return the pieces of a body where they are, m."""
+    shapes = bodies.shapes
+    first, last = np.searchsorted(shapes.body, (number, number + 1)).tolist()
+    angle = float(frame.angle[number])
+    cos, sin = math.cos(angle), math.sin(angle)
+    turn, place = np.asarray(((cos, sin), (-sin, cos))), frame.position[number]
+    found = []
+    for piece in range(first, last):
+        corners = shapes.corner[int(shapes.first[piece]) : int(shapes.first[piece + 1])]
+        found.append(Hull(place + corners @ turn, float(shapes.radius[piece])))
+    return found
+
+
+def hull_distance(hull: Hull) -> Distance:
+    """Return the distance from one hull, exact inside and outside."""
+    corners, radius = hull
+    if len(corners) == 1:
+        x, y = corners[0].tolist()
+        return lambda px, py: np.asarray(np.hypot(px - x, py - y) - radius)
+    sides = list(zip(corners.tolist(), np.roll(corners, -1, axis=0).tolist(), strict=True))
+    if len(corners) == 2:
+        away = segment_distance(sides[0])
+        return lambda px, py: away(px, py) - radius
+    turned = 1.0 if _area(corners) >= 0.0 else -1.0
+    lines = []
+    for (ax, ay), (bx, by) in sides:
+        length = max(math.hypot(bx - ax, by - ay), 1e-300) * turned
+        x, y = (by - ay) / length, (ax - bx) / length
+        lines.append((x, y, -(ax * x + ay * y)))
+    rims = [segment_distance(side) for side in sides]
+
+    def distance(px: FloatArray, py: FloatArray) -> FloatArray:
+        most = np.asarray(np.maximum.reduce([px * x + (py * y + offset) for x, y, offset in lines]))
+        beyond = most > 0.0
+        if beyond.any():  # near corners its sides' lines are nearer than the hull itself
+            x, y = (np.broadcast_to(each, most.shape)[beyond] for each in (px, py))
+            most[beyond] = np.minimum.reduce([rim(x, y) for rim in rims])
+        return np.asarray(most - radius)
+
+    return distance
+
+
+def segment_distance(ends: Sequence[Sequence[float]]) -> Distance:
+    """Return the distance from a segment, never negative."""
+    (ax, ay), (bx, by) = ends
+    dx, dy = bx - ax, by - ay
+    squared = max(dx * dx + dy * dy, 1e-300)
+
+    def distance(px: FloatArray, py: FloatArray) -> FloatArray:
+        x, y = px - ax, py - ay
+        share = np.clip(x * (dx / squared) + y * (dy / squared), 0.0, 1.0)
+        return np.asarray(np.sqrt((x - share * dx) ** 2 + (y - share * dy) ** 2))
+
+    return distance
+
+
+def rounded_hull(hull: Hull, steps: int = 6) -> FloatArray:
+    """Return the corners of a polygon that is about a hull, (K, 2): around each corner so many and one more."""
+    corners, radius = hull
+    if radius == 0.0:
+        return corners
+    if len(corners) == 1:
+        spots = np.linspace(0.0, 2.0 * math.pi, 4 * steps, endpoint=False)
+        return np.asarray(corners + radius * np.column_stack((np.cos(spots), np.sin(spots))))
+    way = np.roll(corners, -1, axis=0) - corners
+    sign = 1.0 if _area(corners) >= 0.0 else -1.0
+    out = np.arctan2(-way[:, 0] * sign, way[:, 1] * sign)  # of each side's outward normal
+    before = np.roll(out, 1)
+    turn = np.mod((out - before) * sign, 2.0 * math.pi) * sign
+    spots = before[:, None] + turn[:, None] * np.linspace(0.0, 1.0, steps + 1)
+    return np.asarray((corners[:, None] + radius * np.stack((np.cos(spots), np.sin(spots)), axis=-1)).reshape(-1, 2))
+
+
+def area_of(hull: Hull) -> float:
+    """Return the area of a hull."""
+    corners, radius = hull
+    around = float(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T).sum())  # of a segment, there and back
+    return abs(_area(corners)) / 2.0 + around * radius + math.pi * radius**2
+
+
+def _area(corners: FloatArray) -> float:
+    x, y = (corners - corners[0]).T
+    return float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+
+
+def closest_points(hulls: list[Hull], x: float, y: float) -> float:
+    """Return the signed distance of a place from the nearest of some hulls."""
+    place = np.asarray(x), np.asarray(y)
+    return min((float(hull_distance(hull)(*place)) for hull in hulls), default=math.inf)
+
+
+def hulls_overlap(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, FloatArray]:
+    """Return how far two hulls are apart, negative where they overlap, and where they are nearest, (2,).
+
+    Args:
+        a: one.
+        b: the other.
+        tolerance: places that are farther by no more count as nearest as well; theirs is the mean of all.
+    """
+    gaps, places = [], []
+    for one, other in ((a, b), (b, a)):
+        foot = _foot(one.corners, other.corners)
+        away = one.corners - foot
+        length = np.hypot(away[:, 0], away[:, 1])[:, None]
+        # Between the two surfaces, in the middle of what is left, or of what overlaps.
+        share = 0.5 * (length + other.radius - one.radius)
+        places.append(foot + away / np.maximum(length, 1e-300) * share)
+        gaps.append(length[:, 0])
+    gap, place = np.concatenate(gaps), np.concatenate(places)
+    kept = gap <= float(gap.min()) + tolerance
+    apart = _separation(a.corners, b.corners)
+    least = apart if -math.inf < apart <= 0.0 else float(gap.min())
+    return least - a.radius - b.radius, np.asarray(place[kept].mean(axis=0))
+
+
+def _sides(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return where sides begin and how they go, (n, 2) each; of one corner, a side of no length."""
+    if len(corners) < 3:
+        return corners[:1], corners[-1:] - corners[:1]
+    return corners, np.roll(corners, -1, axis=0) - corners
+
+
+def _foot(places: FloatArray, corners: FloatArray) -> FloatArray:
+    """Return the point on the sides of a hull that is nearest to each of some places, (K, 2)."""
+    start, along = _sides(corners)
+    way = places[:, None] - start[None]
+    share = np.clip((way * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-300), 0.0, 1.0)
+    foot = start + share[..., None] * along
+    best = np.argmin(((places[:, None] - foot) ** 2).sum(-1), axis=1)
+    return np.asarray(foot[np.arange(len(places)), best])
+
+
+def _separation(a: FloatArray, b: FloatArray) -> float:
+    """Return how far two hulls without radius are apart along the side that parts them best; negative: they overlap.
+
+    The separating axis theorem. Of places alone, which have no sides, it knows nothing: −inf.
+    """
+    best = -math.inf
+    for one, other in ((a, b), (b, a)):
+        start, along = _sides(one)
+        length = np.hypot(along[:, 0], along[:, 1])
+        normal = (np.column_stack((along[:, 1], -along[:, 0])) / np.maximum(length, 1e-300)[:, None])[length > 0.0]
+        if not len(normal):
+            continue
+        if len(one) == 2:
+            normal, start = np.vstack((normal, -normal)), np.vstack((start, start))
+        elif _area(one) < 0.0:
+            normal = -normal
+        best = max(best, float(((other[None] - start[:, None]) * normal[:, None]).sum(-1).min(axis=1).max()))
+    return best
+
+
+def pick_body(bodies: Bodies, frame: Frame, place: tuple[float, float], reach: float = 0.0) -> int | None:
+    """Return the body at a place, m; of several the one whose centre is nearest for its size, else one within reach.
+
+    Args:
+        bodies: N of them.
+        frame: where they are.
+        place: m.
+        reach: how far beside a body one may point, m.
+    """
+    count = min(len(bodies), len(frame.position))
+    with np.errstate(all="ignore"):
+        distance = np.hypot(*(frame.position[:count] - np.asarray(place)).T)
+        radius = bodies.radius[:count]
+        able = frame.present[:count] & (distance <= radius + reach)
+        beside = distance - radius
+        for number in np.flatnonzero(able & ~bodies.round[:count]).tolist():
+            beside[number] = closest_points(hulls_of(bodies, frame, number), *place)
+        able &= beside <= reach
+        if not able.any():
+            return None
+        score = np.where(able, np.where(beside <= 0.0, distance / radius, 1.0 + beside), np.inf)
+    return int(np.argmin(score))
+
+
+def overlapping_bodies(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
+    """Tell which bodies overlap a plane, wall, post or one another, (N,); what just touches does not."""
+    position, there = frame.position, frame.present
+    count = min(len(position), len(bodies))
+    radius, lone = bodies.radius[: len(position)], bodies.round[:count]
+    found, layers = np.zeros(len(position), np.bool_), scene.layers
+    lies = bits_of(frame.layer, len(position))
+    sound = there & np.isfinite(position).all(axis=1) & np.isfinite(frame.angle)
+    solids = {number: hulls_of(bodies, frame, number) for number in np.flatnonzero(sound & ~lone).tolist()}
+    with np.errstate(all="ignore"):
+        for plane in scene.planes:
+            normal, on = np.asarray(plane.normal) / np.hypot(*plane.normal), lies & mask_of(plane.layers, layers) != 0
+            found |= on & lone & ((position - np.asarray(plane.point)) @ normal < radius)
+            for number, hulls in solids.items():
+                deep = any(((h.corners - plane.point) @ normal < h.radius).any() for h in hulls)
+                found[number] |= on[number] and deep
+        for wall in (wall for wall in scene.walls if wall.solid):
+            on = lies & mask_of(wall.layers, layers) != 0
+            points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
+            for a, b in pairwise(points):
+                near = on & (_to_segment(position, a, b) < radius + wall.thickness / 2.0)
+                found |= near & lone
+                _meet_fixed(found, near, solids, Hull(np.asarray((a, b)), wall.thickness / 2.0))
+        for post in (post for post in scene.posts if post.solid):
+            near = np.hypot(*(position - np.asarray(post.position)).T) < radius + post.radius
+            near &= lies & mask_of(post.layers, layers) != 0
+            found |= near & lone
+            _meet_fixed(found, near, solids, Hull(np.asarray((post.position,)), post.radius))
+    able = np.flatnonzero(sound)
+    reach = 2.0 * float(radius[able].max()) if len(able) else 0.0
+    for i, j in near_pairs(position[able], reach):
+        a, b = able[i], able[j]
+        over = (np.hypot(*(position[a] - position[b]).T) < radius[a] + radius[b]) & (lies[a] == lies[b])
+        for k in np.flatnonzero(over & ~(lone[a] & lone[b])).tolist():
+            one, other = (solids.get(n) or hulls_of(bodies, frame, n) for n in (int(a[k]), int(b[k])))
+            over[k] = any(hulls_overlap(p, q)[0] < 0.0 for p in one for q in other)
+        found[a[over]] = found[b[over]] = True
+    return found & there
+
+
+def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer: str) -> bool:
+    """Tell whether nothing solid of a layer overlaps some hulls, m; what just touches does not."""
+    bit, layers = 1 << scene.layers.index(layer), scene.layers
+    for plane in scene.planes:
+        normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
+        if mask_of(plane.layers, layers) & bit:
+            depth = min(float(((hull.corners - plane.point) @ normal).min()) - hull.radius for hull in hulls)
+            if depth < 0.0:
+                return False
+    fixed = [
+        Hull(np.asarray(ends), wall.thickness / 2.0)
+        for wall in scene.walls
+        if wall.solid and mask_of(wall.layers, layers) & bit
+        for ends in pairwise((*wall.points, wall.points[0]) if wall.closed else wall.points)
+    ]
+    fixed += [
+        Hull(np.asarray((post.position,)), post.radius)
+        for post in scene.posts
+        if post.solid and mask_of(post.layers, layers) & bit
+    ]
+    low = np.min([hull.corners.min(axis=0) - hull.radius for hull in hulls], axis=0)
+    high = np.max([hull.corners.max(axis=0) + hull.radius for hull in hulls], axis=0)
+    middle, reach = (low + high) / 2.0, float(np.hypot(*(high - low))) / 2.0
+    count = min(len(bodies), len(frame.position))
+    solid = np.asarray([each.collides != "none" for each in bodies.elements], np.bool_)[bodies.element[:count]]
+    with np.errstate(all="ignore"):
+        near = np.hypot(*(frame.position[:count] - middle).T) < reach + bodies.radius[:count]
+    near &= frame.present[:count] & solid & (bits_of(frame.layer, count) & bit != 0)
+    others = [hull for number in np.flatnonzero(near).tolist() for hull in hulls_of(bodies, frame, number)]
+    return all(hulls_overlap(hull, other)[0] >= 0.0 for hull in hulls for other in (*fixed, *others))
+
+
+def _meet_fixed(found: BoolArray, near: BoolArray, solids: dict[int, list[Hull]], fixed: Hull) -> None:
+    """Note which bodies near a fixed thing overlap it."""
+    for number, hulls in solids.items():
+        if near[number] and not found[number]:
+            found[number] = any(hulls_overlap(hull, fixed)[0] < 0.0 for hull in hulls)
+
+
+def _to_segment(position: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    along = b - a
+    share = np.clip((position - a) @ along / (along @ along), 0.0, 1.0)
+    return np.asarray(np.hypot(*(position - a - share[:, None] * along).T))

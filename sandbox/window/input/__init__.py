@@ -1,0 +1,1 @@
+"""Input: key table, gamepads, keys of games, mouse tools on bodies."""

@@ -1,0 +1,204 @@
+"""Keys: the one table of what each key does.
+
+A key is known by its code or by the character it writes, so that `[` is found where a layout hides it behind AltGr,
+and by its place on the board where a layout has no Latin letters.
+"""
+
+from enum import StrEnum
+from typing import NamedTuple
+
+import pygame
+
+from sandbox.window.playback.snapshot import OVERLAYS
+
+
+class Command(StrEnum):
+    """What a key asks the window to do. Those that toggle an overlay are called as in `OVERLAYS`."""
+
+    PAUSE = "pause"
+    STEP = "step"
+    BACK = "back"
+    RESTART = "restart"
+    PREVIOUS = "previous"
+    NEXT = "next"
+    PICKER = "picker"
+    SLOWER = "slower"
+    FASTER = "faster"
+    ENGINE = "engine"
+    GHOST = "ghost"
+    HOME = "home"
+    PANEL = "panel"
+    HELP = "help"
+    SCREENSHOT = "screenshot"
+    RECORD = "record"
+    RELOAD = "reload"
+    SAVE = "save"
+    QUIT = "quit"
+    UNDO = "undo"
+    FOLLOW = "follow"
+    FULL_SCREEN = "full screen"
+    TRUST = "trust"
+    SOUND = "sound"
+    DELETE = "delete"
+    ADD_BALL = "add ball"
+    ADD_BOX = "add box"
+    NUDGE = "nudge"
+    SHAPES = "shapes"
+    VELOCITIES = "velocities"
+    CONTACTS = "contacts"
+    IMPULSES = "impulses"
+    BOUNDS = "bounds"
+    JOINTS = "joints"
+    CENTRES = "centres"
+    NAMES = "names"
+    TRAILS = "trails"
+    ENERGY = "energy"
+
+    @property
+    def overlay(self) -> str | None:
+        """The overlay that it toggles, of `OVERLAYS`."""
+        return self.value if self.value in OVERLAYS else None
+
+
+class Binding(NamedTuple):
+    """Keys that give one command."""
+
+    keys: tuple[int, ...]
+    """codes, `pygame.K_…`"""
+    modifiers: int
+    """`pygame.KMOD_CTRL`, `KMOD_SHIFT`, or 0: neither Ctrl nor Alt; Shift matters only where a binding has it"""
+    command: Command
+    about: str
+    label: str
+    """the keys as help names them"""
+    group: str
+    characters: str = ""
+    """any of these gives it as well, whichever key writes them"""
+    repeats: bool = False
+    """again and again while the key is held"""
+
+
+_TIME, _VIEW, _SCENE, _BODIES, _SHOW, _WINDOW = "Time", "View", "Scene", "Bodies", "Show", "Save and share"
+_CTRL, _SHIFT = pygame.KMOD_CTRL, pygame.KMOD_SHIFT
+_ABOUT_OVERLAYS = (
+    "shapes",
+    "velocities",
+    "contacts and normals",
+    "impulses",
+    "bounds",
+    "joints",
+    "centres of mass",
+    "names",
+    "trails",
+    "energy graph",
+)
+
+BINDINGS: tuple[Binding, ...] = (
+    Binding((pygame.K_p, pygame.K_SPACE), 0, Command.PAUSE, "pause / resume", "P or Space", _TIME),
+    Binding((pygame.K_o, pygame.K_PERIOD), 0, Command.STEP, "step forward", "O or .", _TIME, ".", True),
+    Binding((pygame.K_COMMA,), 0, Command.BACK, "step back", ",", _TIME, ",", True),
+    Binding((pygame.K_r, pygame.K_BACKSPACE), 0, Command.RESTART, "restart", "R or Backspace", _TIME),
+    Binding((pygame.K_MINUS, pygame.K_KP_MINUS), 0, Command.SLOWER, "slower: 100, 80, 63 … %", "-", _TIME, "-", True),
+    Binding((pygame.K_EQUALS, pygame.K_PLUS, pygame.K_KP_PLUS), 0, Command.FASTER, "faster", "=", _TIME, "=+", True),
+    Binding((pygame.K_LEFTBRACKET,), 0, Command.PREVIOUS, "previous scene", "[", _SCENE, "["),
+    Binding((pygame.K_RIGHTBRACKET,), 0, Command.NEXT, "next scene", "]", _SCENE, "]"),
+    Binding((pygame.K_o,), _CTRL, Command.PICKER, "open a scene", "Ctrl+O", _SCENE),
+    Binding((pygame.K_l,), _CTRL, Command.RELOAD, "reload the file", "Ctrl+L", _SCENE),
+    Binding((pygame.K_e,), 0, Command.ENGINE, "next engine", "E", _SCENE),
+    Binding((pygame.K_g,), 0, Command.GHOST, "ghost: another engine's run", "G", _SCENE),
+    Binding((pygame.K_t,), 0, Command.TRUST, "predictability horizon", "T", _SCENE),
+    Binding((pygame.K_HOME,), 0, Command.HOME, "fit the scene; again: fit the bodies", "Home", _VIEW),
+    Binding((pygame.K_f,), 0, Command.FOLLOW, "follow the selected body or all moving bodies", "F", _VIEW),
+    Binding((pygame.K_F11,), 0, Command.FULL_SCREEN, "full screen", "F11", _VIEW),
+    Binding((pygame.K_TAB,), 0, Command.PANEL, "show or hide the panel", "Tab", _VIEW),
+    Binding((pygame.K_b,), 0, Command.ADD_BALL, "add a ball at the cursor", "B", _BODIES),
+    Binding((pygame.K_b,), _SHIFT, Command.ADD_BOX, "add a box at the cursor", "Shift+B", _BODIES),
+    Binding((pygame.K_n,), 0, Command.NUDGE, "nudge the selected body", "N", _BODIES),
+    Binding((pygame.K_DELETE,), 0, Command.DELETE, "remove the selected body", "Delete", _BODIES),
+    Binding((pygame.K_z,), _CTRL, Command.UNDO, "restore the replaced session", "Ctrl+Z", _BODIES),
+    *(
+        Binding((pygame.K_0 + int(digit),), 0, Command(name), about, digit, _SHOW, digit)
+        for digit, name, about in zip("1234567890", OVERLAYS, _ABOUT_OVERLAYS, strict=True)
+    ),
+    Binding((pygame.K_p,), _CTRL, Command.SCREENSHOT, "screenshot", "Ctrl+P", _WINDOW),
+    Binding((pygame.K_r,), _CTRL, Command.RECORD, "start or stop recording", "Ctrl+R", _WINDOW),
+    Binding((pygame.K_s,), _CTRL, Command.SAVE, "save the session", "Ctrl+S", _WINDOW),
+    Binding((pygame.K_m,), 0, Command.SOUND, "sound", "M", _WINDOW),
+    Binding((pygame.K_F1, pygame.K_h), 0, Command.HELP, "this help", "F1 or H", _WINDOW),
+    Binding((pygame.K_ESCAPE,), 0, Command.QUIT, "quit", "Esc", _WINDOW),
+)
+"""Every binding, in the order in which help lists them."""
+
+GLOBAL = frozenset({pygame.K_p, pygame.K_o, pygame.K_F1, pygame.K_ESCAPE})
+"""Keys that no scene can claim."""
+
+REPEATING = frozenset(binding.command for binding in BINDINGS if binding.repeats)
+
+_BY_KEY = {(key, binding.modifiers): binding.command for binding in BINDINGS for key in binding.keys}
+_BY_CHARACTER = {character: binding.command for binding in BINDINGS for character in binding.characters}
+
+_NAMED = 1 << 30
+"""SDL's mark of a key that writes nothing, such as F1"""
+_BOARD = {
+    **{pygame.KSCAN_A + k: pygame.K_a + k for k in range(26)},
+    pygame.KSCAN_LEFTBRACKET: pygame.K_LEFTBRACKET,
+    pygame.KSCAN_RIGHTBRACKET: pygame.K_RIGHTBRACKET,
+    pygame.KSCAN_PERIOD: pygame.K_PERIOD,
+    pygame.KSCAN_COMMA: pygame.K_COMMA,
+}
+"""Keys by their place, as an American board has them."""
+
+
+def command_for(event: pygame.event.Event, claimed: frozenset[int] = frozenset()) -> Command | None:
+    """Return what a pressed key asks for, or None.
+
+    Args:
+        event: any event; only KEYDOWN asks for something.
+        claimed: codes of the keys that the scene takes for itself. Ctrl with a key is never claimed.
+    """
+    if event.type != pygame.KEYDOWN:
+        return None
+    key = _latin(event)
+    modifiers = int(getattr(event, "mod", 0))
+    control, alt = modifiers & pygame.KMOD_CTRL, modifiers & (pygame.KMOD_ALT | pygame.KMOD_MODE)
+    character = str(getattr(event, "unicode", ""))
+    if modifiers & pygame.KMOD_META:
+        return None
+    if control and not alt:
+        return _BY_KEY.get((key, _CTRL))
+    if {key, event.key} & claimed - GLOBAL:
+        return None
+    plain = not (control or alt)
+    if character in _BY_CHARACTER and (plain or ord(character) != key):
+        return _BY_CHARACTER[character]  # first, as `[` may be AltGr and 8, and AltGr may look like Ctrl and Alt
+    shifted = _BY_KEY.get((key, _SHIFT)) if modifiers & _SHIFT else None
+    return (shifted or _BY_KEY.get((key, 0))) if plain else None
+
+
+def _latin(event: pygame.event.Event) -> int:
+    """Return the key's code, or that of its place where the layout writes other letters there."""
+    key = int(event.key)
+    foreign = key > 0x24F and not key & _NAMED  # past the Latin blocks of Unicode
+    return _BOARD.get(int(getattr(event, "scancode", 0)), key) if foreign else key
+
+
+class Keyboard:
+    """Which keys are down, so that a held key gives its command once where it should not repeat."""
+
+    def __init__(self) -> None:
+        self._held: set[int] = set()
+        self.again = False
+        """the last key that came down was down already"""
+
+    def command(self, event: pygame.event.Event, claimed: frozenset[int] = frozenset()) -> Command | None:
+        """Return what an event asks for, or None; pass every event, so that releases are seen."""
+        if event.type == pygame.KEYUP:
+            self._held.discard(event.key)
+        elif event.type == pygame.WINDOWFOCUSLOST:  # releases go elsewhere from now on
+            self._held.clear()
+        if event.type != pygame.KEYDOWN:
+            return None
+        self.again = event.key in self._held
+        self._held.add(event.key)
+        command = command_for(event, claimed)
+        return None if self.again and command not in REPEATING else command

@@ -1,0 +1,281 @@
+"""Knobs: what of a session can be turned while it runs, and by which actions.
+
+Knob: one figure or choice that can be turned while a scene runs, and how positions of a slider become values.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import get_args
+
+from sandbox.action import Action, SetParameter, Switch, heading_of
+from sandbox.engines.registry import ENGINES
+from sandbox.scene.description.base import BodySource
+from sandbox.scene.description.world import Detection, Integrator, Settings
+from sandbox.scene.scene import Scene
+from sandbox.window.format import format_percent, format_si
+from sandbox.window.playback.live import LiveView
+
+ParameterValue = float | str
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What the panel shows of one setting. A value: turning it is reported, never done here."""
+
+    key: str
+    """what `on_change` calls it"""
+    label: str
+    low: float = 0.0
+    high: float = 1.0
+    value: ParameterValue = 0.0
+    """now; one of `choices` where there are some"""
+    log: bool = False
+    """equal ways are equal factors; `low` is then above 0"""
+    step: float = 0.01
+    """what a notch of the wheel adds, and what values are whole multiples of; of a logarithmic knob, in decades"""
+    unit: str = ""
+    """with `%`, shares are shown in percent"""
+    choices: tuple[str, ...] = ()
+    enabled: bool = True
+    why: str = ""
+    """why it cannot be turned"""
+    default: ParameterValue | None = None
+    """the file's, which a double click goes back to"""
+
+    @property
+    def whole(self) -> bool:
+        """Only whole numbers are meant."""
+        return not self.log and self.step >= 1 and self.step == int(self.step)
+
+    def at(self, share: float) -> float:
+        """Return the value at a share of the way from `low` to `high`, snapped; the ends are exact."""
+        if share <= 0 or self.high <= self.low:
+            return self.low
+        if share >= 1:
+            return self.high
+        if self.log:
+            return self._snapped(self.low * (self.high / self.low) ** share)
+        return self._snapped(self.low + share * (self.high - self.low))
+
+    def share(self, value: ParameterValue) -> float:
+        """Return where a value lies, 0 at `low` to 1 at `high`; one beyond lies at the end."""
+        if isinstance(value, str) or not math.isfinite(value) or self.high <= self.low:
+            return 0.0
+        inside = min(max(value, self.low), self.high)
+        if self.log:
+            return math.log(inside / self.low) / math.log(self.high / self.low)
+        return (inside - self.low) / (self.high - self.low)
+
+    def stepped(self, value: ParameterValue, notches: int) -> ParameterValue:
+        """Return the value some notches of the wheel further; choices go round."""
+        if self.choices:
+            present = self.choices.index(str(value)) if value in self.choices else -1 if notches > 0 else 0
+            return self.choices[(present + notches) % len(self.choices)]
+        if isinstance(value, str) or not math.isfinite(value):
+            return self.low
+        if self.log:
+            return self._snapped(value * 10.0 ** (self.step * notches))
+        return self._snapped(value + self.step * notches)
+
+    def _snapped(self, value: float) -> float:
+        if self.log:
+            digits = 1 if self.step >= 0.05 else 2 if self.step >= 0.005 else 12  # a notch is then never lost
+            value = float(f"{value:.{digits}e}")
+        elif self.step > 0:
+            places = max(0, 2 - math.floor(math.log10(self.step)))  # multiples of 0.1 are not 0.30000000000000004
+            value = round(round(value / self.step) * self.step, places)
+        return min(max(value, self.low), self.high)
+
+    def text(self, value: ParameterValue) -> str:
+        """Return a value as it is shown."""
+        if isinstance(value, str):
+            return value.replace("_", " ")
+        if self.unit == "%":
+            return format_percent(value)
+        if self.whole and math.isfinite(value):
+            tail = f" {self.unit}" if self.unit else ""
+            return f"{value:.0f}{tail}".replace("-", "−")
+        return format_si(value, self.unit)
+
+
+SETTING_KINDS = ("ball", "grid", "scatter", "emitter")
+
+
+class SessionParameters:
+    """The knobs of a session. What an engine can do is asked once for a scene and settings."""
+
+    def __init__(self) -> None:
+        self._asked: tuple[Scene, str, Settings] | None = None
+        self._able: dict[str, tuple[str, ...]] = {}
+
+    def of(self, live: LiveView, file: Scene, picked: int | None) -> tuple[Parameter, ...]:
+        """Return the knobs as they now stand.
+
+        Args:
+            live: the session.
+            file: its scene as the file has it, for what a double click goes back to.
+            picked: number of the body that restitution and friction are of; else they are of all balls.
+        """
+        scene, settings = live.scene, live.settings
+        if picked is not None and picked >= len(live.bodies):  # the session has gone back to before it came
+            picked = None
+        return (
+            Parameter(
+                "gravity",
+                "gravity",
+                -30.0,
+                30.0,
+                scene.world.gravity[1],
+                step=0.1,
+                unit="m/s²",
+                default=file.world.gravity[1],
+            ),
+            _surface(live, file, picked, "restitution", 1.0),
+            _surface(live, file, picked, "friction", 2.0),
+            Parameter("engine", "engine", value=live.engine, choices=tuple(ENGINES)),
+            Parameter("dt", "dt", 1e-4, 0.1, settings.dt, log=True, step=0.1, unit="s", default=file.solver.dt),
+            *_counts(live, file),
+            self._choice(live, "integrator", get_args(Integrator)),
+            self._choice(live, "detection", get_args(Detection)),
+        )
+
+    def _choice(self, live: LiveView, key: str, words: tuple[str, ...]) -> Parameter:
+        """Return the knob of a choice, with those that the engine has."""
+        now = live.scene, live.engine, live.session.wanted
+        if self._asked is None or any(a is not b for a, b in zip(self._asked, now, strict=True)):
+            self._asked, self._able = now, {}
+        if key not in self._able:
+            engine = ENGINES[live.engine]
+            self._able[key] = tuple(
+                word
+                for word in words
+                if not engine.missing(live.session.relay.setup, live.session.wanted.replace(**{key: word}))
+            )
+        able, value = self._able[key], getattr(live.settings, key)
+        if len(able) < 2:
+            why = f"{live.engine} offers no other" if able else f"not used by {live.engine}"
+            return Parameter(key, key, value=value or "none", choices=(value or "none",), enabled=False, why=why)
+        return Parameter(key, key, value=value, choices=able)
+
+
+def _counts(live: LiveView, file: Scene) -> tuple[Parameter, ...]:
+    steps = live.settings.integrator is not None
+    why = "" if steps else f"{live.engine} has no time step"
+    settings, own = live.settings, file.solver
+    return (
+        Parameter(
+            "substeps", "substeps", 1, 32, settings.substeps, step=1, enabled=steps, why=why, default=own.substeps
+        ),
+        Parameter(
+            "iterations",
+            "iterations",
+            1,
+            100,
+            settings.iterations,
+            step=1,
+            enabled=steps,
+            why=why,
+            default=own.iterations,
+        ),
+    )
+
+
+def _surface(live: LiveView, file: Scene, picked: int | None, key: str, high: float) -> Parameter:
+    """Return the knob of restitution or friction.
+
+    Where pairs of materials state it, they are turned: they outrank what a ball states.
+    """
+    scene = live.scene
+    place = _place(live, picked)
+    if place >= len(scene.movers) and picked is None:
+        return Parameter(key, key, 0.0, high, 0.0, enabled=False, why="the scene has no body")
+    disc = live.bodies.elements[live.bodies.element[picked or 0]] if place >= len(scene.movers) else scene.movers[place]
+    name = disc.name if picked is None or place < len(scene.movers) else live.bodies.names[picked]
+    label = key if picked is None else f"{key} of {name or 'this body'}"
+    default = None
+    pairs = _pairs(scene, disc if picked is not None else None)
+    if pairs:
+        value = getattr(scene.pairs[pairs[0]], key) or 0.0
+        if pairs[0] < len(file.pairs):
+            default = getattr(file.pairs[pairs[0]], key) or 0.0
+        if picked is not None:
+            label = f"{key} of {disc.material}"
+        return Parameter(key, label, 0.0, high, value, default=default)
+    if place < len(file.movers):
+        default = stated(file, file.movers[place], key)
+    return Parameter(key, label, 0.0, high, stated(scene, disc, key), default=default)
+
+
+def _place(live: LiveView, picked: int | None) -> int:
+    """Return the place among the scene's movers of a picked body's, or else of the first."""
+    return 0 if picked is None else live.scene.mover_of(int(live.bodies.element[picked]))
+
+
+def _pairs(scene: Scene, disc: BodySource | None) -> list[int]:
+    """Return the numbers of the pairs that a ball's material is in; without a ball, of all."""
+    return [n for n, pair in enumerate(scene.pairs) if disc is None or disc.material in pair.between]
+
+
+def stated(scene: Scene, disc: BodySource, key: str) -> float:
+    """Return the restitution or friction that a ball states itself, or its material; 0 for none."""
+    own: float | None = getattr(disc, key)
+    if own is None and disc.material is not None:
+        own = next((getattr(each, key) for each in scene.materials if each.name == disc.material), None)
+    return own or 0.0
+
+
+def turned(live: LiveView, key: str, value: ParameterValue, picked: int | None) -> list[Action]:
+    """Return the actions that a knob's new value asks for; those that are the engine's are `Live.switch`'s."""
+    if key == "gravity":
+        return [SetParameter(time=0.0, path="world.gravity", value=[live.scene.world.gravity[0], float(value)])]
+    if key in ("restitution", "friction"):
+        return [SetParameter(time=0.0, path=path, value=float(value)) for path in _paths(live, key, picked)]
+    if key in ("substeps", "iterations"):
+        return [Switch(time=0.0, settings={key: round(float(value))})]
+    return [Switch(time=0.0, settings={key: value})]
+
+
+def _paths(live: LiveView, key: str, picked: int | None) -> list[str]:
+    """Return where a figure stands: of the picked body or its material, or of all pairs, balls and generators."""
+    scene = live.scene
+    place = _place(live, picked)
+    if picked is not None and place >= len(scene.movers):
+        element = live.bodies.elements[int(live.bodies.element[picked])]
+        pairs = _pairs(scene, element)
+        if pairs:
+            return [f"pair.{n}.{key}" for n in pairs]
+        return [f"{heading_of(element)}.{_quoted(live.bodies.names[picked])}.{key}"]
+    if place < len(scene.movers):
+        pairs = _pairs(scene, scene.movers[place] if picked is not None else None)
+        if pairs:
+            return [f"pair.{n}.{key}" for n in pairs] if picked is not None else [f"pair.*.{key}"]
+    lists: list[tuple[str, Sequence[BodySource]]] = list(scene.kinds.items())
+    if picked is None:
+        return [f"{kind}.{each}.{key}" for kind, discs in lists if discs for each in _every(discs)]
+    for kind, discs in lists:
+        if place < len(discs):
+            return [f"{kind}.{_part(discs, place)}.{key}"]
+        place -= len(discs)
+    return []
+
+
+def _every(discs: Sequence[BodySource]) -> list[str]:
+    """Return what addresses all elements of a list: `*`, unless one is called so."""
+    return [_part(discs, k) for k in range(len(discs))] if any(disc.name == "*" for disc in discs) else ["*"]
+
+
+def _part(discs: Sequence[BodySource], index: int) -> str:
+    """Return what addresses an element of a list: its number, unless another is called so, as names go first."""
+    name = discs[index].name
+    if name is None or all(disc.name != str(index) for disc in discs):
+        return str(index)
+    return _quoted(name)
+
+
+def _quoted(name: str) -> str:
+    """Return a name as a part of a path."""
+    if "." not in name and name[0] not in "\"'":
+        return name
+    quote = "'" if '"' in name else '"'
+    return f"{quote}{name}{quote}"

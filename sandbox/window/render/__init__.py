@@ -1,0 +1,1 @@
+"""Drawing: a snapshot of one frame onto a pygame surface."""

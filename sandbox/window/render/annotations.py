@@ -1,0 +1,185 @@
+"""Marks: centres, names, boxes, the picked body, the hand that pulls, missed contacts, words on contact."""
+
+import math
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+import pygame
+
+from sandbox.window.render.body_geometry import ScreenPose
+from sandbox.window.render.circles import CircleRenderer, CircleStyle
+from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.lines import draw_line
+from sandbox.window.render.palette import BACKGROUND, FAINT, INK, WARNING, YELLOW
+from sandbox.window.render.polygons import PolygonRenderer
+from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+from sandbox.window.render.text import draw_text, text_size
+
+MOST_NAMES, MOST_BOXES, MOST_CENTRES, MOST_FLASHES = 60, 1000, 4000, 24
+FLASH = 1.5
+"""s, how long a missed contact is shown"""
+
+
+def draw_boxes(view: DrawContext, polygons: PolygonRenderer) -> None:
+    """Draw the box around each body."""
+    some = view.first(MOST_BOXES)
+    lone = some.sight.bodies.round[some.shown]
+    if not lone.all():
+        for left, top, right, bottom in polygons.boxes(some)[~lone].tolist():
+            if max(abs(left), abs(top), abs(right), abs(bottom)) < 16_000.0:
+                box = pygame.Rect(math.floor(left), math.floor(top), math.ceil(right - left), math.ceil(bottom - top))
+                pygame.draw.rect(view.surface, FAINT, box, max(1, round(view.unit)))
+    for (x, y), radius in zip(some.centre[lone].tolist(), some.radius[lone].tolist(), strict=True):
+        if radius < 8000.0:
+            side = math.ceil(2.0 * radius)
+            box = pygame.Rect(math.floor(x - radius), math.floor(y - radius), side, side)
+            pygame.draw.rect(view.surface, FAINT, box, max(1, round(view.unit)))
+
+
+def draw_centres(view: DrawContext) -> None:
+    """Draw each centre of mass as a quartered circle, or as a point where a body is small."""
+    some = view.first(MOST_CENTRES)
+    size = 5.0 * view.unit
+    mark = _quartered(size)
+    half = mark.get_width() / 2.0
+    quartered, dots = [], []
+    for (x, y), radius in zip(some.centre.tolist(), some.radius.tolist(), strict=True):
+        if abs(x) > 30_000 or abs(y) > 30_000:
+            continue
+        if radius >= 1.6 * size:
+            quartered.append((mark, (round(x - half), round(y - half))))
+        else:
+            dots.append((math.floor(x - 0.5), math.floor(y - 0.5)))
+    view.surface.blits(quartered, False)
+    for x, y in dots:
+        view.surface.fill(INK, (x, y, 2, 2))
+
+
+@lru_cache(maxsize=8)
+def _quartered(size: float) -> pygame.Surface:
+    """Return the mark of a centre of mass."""
+    side = 2 * math.ceil(size) + 2
+    mark = pygame.Surface((side, side), pygame.SRCALPHA)
+    middle = side / 2.0
+    paint_on = disc_distance(middle, middle, size)
+    draw_sdf(mark, paint_on, ShapeStyle(BACKGROUND, INK, 1.0))
+    for column in (0, 1):
+        quarter = pygame.Rect(column * side // 2, column * side // 2, side // 2, side // 2)
+        draw_sdf(mark, paint_on, ShapeStyle(INK, INK, 0.0), quarter)
+    return mark
+
+
+def draw_names(view: DrawContext, polygons: PolygonRenderer) -> None:
+    """Write the names of bodies above them, as many as fit without covering one another."""
+    taken: list[pygame.Rect] = []
+    size = 12 * view.unit
+    some = view.first(4 * MOST_NAMES)
+    area = view.surface.get_rect()
+    bodies = some.sight.bodies
+    lone = bodies.round[some.shown]
+    tops = some.centre[:, 1] - some.radius if lone.all() else polygons.boxes(some)[:, 1]
+    room = bodies.core[some.shown] * some.camera.scale
+    rows = zip(some.shown.tolist(), some.centre.tolist(), tops.tolist(), room.tolist(), strict=True)
+    for number, (x, y), top, radius in rows:
+        name = view.sight.bodies.names[number]
+        name = name if len(name) <= 24 else name[:23] + "…"
+        width, height = text_size(name, size)
+        above = top - 3.0 * view.unit
+        if not (abs(x) < 30_000 and abs(above) < 30_000):
+            continue
+        place = pygame.Rect(round(x - width / 2), round(above - height), width, height)
+        if place.top < 0 or radius > 3 * height:
+            place.center = round(x), round(y + 0.45 * min(radius, 1e4))
+        if area.contains(place) and place.collidelist(taken) < 0 and len(taken) < MOST_NAMES:
+            taken.append(place.inflate(6, 2))
+            draw_text(view.surface, name, (place.centerx + 1, place.centery + 1), size, BACKGROUND, "center")
+            draw_text(view.surface, name, place.center, size, INK, "center")
+
+
+def draw_verdicts(view: DrawContext) -> None:
+    """Say of each body whether it overlaps something, so that it does not rest on colour alone."""
+    overlapping = view.sight.overlapping
+    assert overlapping is not None
+    some = view.first(MOST_NAMES)
+    room = some.sight.bodies.core[some.shown] * some.camera.scale
+    for number, (x, y), radius in zip(some.shown.tolist(), some.centre.tolist(), room.tolist(), strict=True):
+        touching = number < len(overlapping) and bool(overlapping[number])
+        word, size = "overlap" if touching else "clear", min(max(0.28 * radius, 11.0 * view.unit), 26.0 * view.unit)
+        place = y - 0.4 * radius  # above the mark of its centre and its name
+        if text_size(word, size, bold=True)[0] > 1.6 * radius:
+            place = y
+            word, size = "!", min(max(1.2 * radius, 9.0 * view.unit), 20.0 * view.unit)
+            if not touching:
+                continue
+        draw_text(view.surface, word, (x, place), size, INK, "center", bold=True)
+
+
+def draw_flashes(view: DrawContext) -> None:
+    """Draw a ring that grows and fades about each contact that was missed a moment ago."""
+    for flash in view.sight.flashes[-MOST_FLASHES:]:
+        share = flash.age / FLASH
+        with np.errstate(invalid="ignore", over="ignore"):
+            x, y = view.camera.to_screen(np.asarray(flash.position)).tolist()
+        if not (0.0 <= share < 1.0 and abs(x) < 30_000 and abs(y) < 30_000):
+            continue
+        radius = (8.0 + 40.0 * math.sqrt(share)) * view.unit
+        look = ShapeStyle(None, WARNING, 3.0 * view.unit, opacity=1.0 - share, antialias=view.antialias)
+        side = 2 * math.ceil(radius + 1.0)
+        within = pygame.Rect(round(x) - side // 2, round(y) - side // 2, side, side)
+        draw_sdf(view.surface, disc_distance(x, y, radius), look, within)
+
+
+def draw_picked(view: DrawContext, discs: CircleRenderer, polygons: PolygonRenderer) -> None:
+    """Draw a bright line around the picked body."""
+    number, frame = view.sight.picked, view.sight.frame
+    if number is None or not 0 <= number < min(len(frame.position), len(view.sight.bodies)):
+        return
+    radius = float(view.sight.bodies.radius[number])
+    with np.errstate(invalid="ignore", over="ignore"):
+        place = frame.position[number : number + 1]
+        if not frame.present[number] or not view.camera.in_sight(place, radius)[0]:
+            return
+    (x, y), size = view.camera.to_screen(place)[0].tolist(), max(radius * view.camera.scale, 2.0) + 4.0 * view.unit
+    angle = float(frame.angle[number])
+    if not view.sight.bodies.round[number] and size > 8.0 * view.unit and math.isfinite(angle):
+        spot = ScreenPose(x, y, angle, view.camera.scale)
+        polygons.ring(view.surface, view.sight.bodies, number, spot, 4.0 * view.unit, YELLOW, 2.0 * view.unit)
+        return
+    discs.ring(view.surface, (x, y), size, YELLOW, CircleStyle(2.0 * view.unit, antialias=view.antialias))
+
+
+def draw_pull(view: DrawContext, discs: CircleRenderer) -> None:
+    """Draw the spring between the held place and the hand."""
+    if view.sight.pull is None:
+        return
+    with np.errstate(invalid="ignore", over="ignore"):
+        (ax, ay), (bx, by) = view.camera.to_screen(np.asarray(view.sight.pull)).tolist()
+        length = math.hypot(bx - ax, by - ay)
+    if not length < 30_000.0 or not (abs(ax) < 30_000.0 and abs(ay) < 30_000.0):
+        return
+    unit = view.unit
+    if length > 30.0 * unit:
+        ux, uy = (bx - ax) / length, (by - ay) / length
+        turns = 12
+        width = min(8.0 * unit, 1200.0 * unit * unit / length)
+        ends = 0.12
+        spots = [(ax, ay)]
+        for k in range(turns + 1):
+            along = length * (ends + (1.0 - 2.0 * ends) * k / turns)
+            side = 0.0 if k in (0, turns) else width * (1 if k % 2 else -1)
+            spots.append((ax + ux * along - uy * side, ay + uy * along + ux * side))
+        spots.append((bx, by))
+    else:
+        spots = [(ax, ay), (bx, by)]
+    for a, b in pairwise(spots):
+        draw_line(view.surface, a, b, INK, 1.5 * unit, view.antialias)
+    for (x, y), size in (((ax, ay), 3.0), ((bx, by), 6.0)):
+        tint = np.asarray([YELLOW], np.uint8)
+        discs.draw(
+            view.surface,
+            np.asarray([(x, y)]),
+            np.asarray([size * unit]),
+            tint,
+            CircleStyle(0.0, antialias=view.antialias),
+        )

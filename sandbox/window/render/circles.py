@@ -1,0 +1,181 @@
+"""Discs: many balls at once, from sprites that are made when first needed and kept."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.window.render.lines import draw_line
+from sandbox.window.render.palette import BACKGROUND, Colour, ColourArray
+from sandbox.window.render.particles import packed_pixels
+from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf, sdf_surface, shade_sdf
+
+LARGEST = 96.0
+"""px, the radius up to which discs are sprites; larger ones are painted, only where they are in the picture"""
+FINEST = 128
+"""Radii of sprites are told apart by 1/128 px."""
+OFFSETS = 4
+"""A sprite lies at quarters of a pixel, across and down, so that slow balls do not jerk."""
+SPRITE_BUDGET = 8_000_000
+"""px of sprites that are kept, 32 MB"""
+SPRITE_CROWD = 48
+"""So many painted discs at once are drawn plainly: they cover each other anyway."""
+SHORTEST_SPOKE = 4.0
+"""px, the radius from which a spoke is drawn"""
+THIN = 14.0
+"""px, the radius up to which a spoke is one pixel wide"""
+THICK = 300
+"""Of more spokes, all are one pixel wide."""
+DARK = 0.5
+"""How far a rim or spoke leans to the background."""
+
+
+class CircleStyle(NamedTuple):
+    """How discs are drawn."""
+
+    line: float = 1.5
+    """width of the rim, px"""
+    hollow: bool = False
+    antialias: bool = True
+
+
+class CircleRenderer:
+    """Draws discs and rings, and keeps their sprites between pictures."""
+
+    def __init__(self) -> None:
+        self._sprites: dict[CircleStyle, dict[int, pygame.Surface]] = {}
+        self._pixels = 0
+
+    def draw(
+        self, surface: pygame.Surface, centre: FloatArray, radius: FloatArray, colours: ColourArray, style: CircleStyle
+    ) -> None:
+        """Draw discs in their order, small ones first.
+
+        Args:
+            surface: where.
+            centre: (K, 2) px, finite.
+            radius: (K,) px, of any size.
+            colours: (K, 3).
+            style: of all of them; a hollow disc is its rim alone, in its own colour.
+        """
+        small = radius <= LARGEST
+        if small.all():
+            self._blit(surface, centre, radius, colours, style)
+            return
+        self._blit(surface, centre[small], radius[small], colours[small], style)
+        large = np.flatnonzero(~small).tolist()
+        for k in large:
+            x, y = centre[k].tolist()
+            red, green, blue = colours[k].tolist()
+            _paint(surface, x, y, float(radius[k]), (red, green, blue), style, len(large) > SPRITE_CROWD)
+
+    def ring(
+        self, surface: pygame.Surface, centre: tuple[float, float], radius: float, colour: Colour, style: CircleStyle
+    ) -> None:
+        """Draw one ring."""
+        ring = style._replace(hollow=True)
+        self.draw(surface, np.asarray([centre]), np.asarray([radius]), np.asarray([colour], np.uint8), ring)
+
+    def _blit(
+        self, surface: pygame.Surface, centre: FloatArray, radius: FloatArray, colours: ColourArray, style: CircleStyle
+    ) -> None:
+        size = np.maximum(np.rint(radius * FINEST), 1.0).astype(np.int64)
+        steps = OFFSETS if style.antialias else 1
+        place = np.floor(centre * steps + 0.5).astype(np.int64)
+        corner = place // steps - (np.ceil(size / FINEST).astype(np.int64) + 1)[:, None]
+        keys = _keys(size, colours, place % steps).tolist()
+        if self._pixels > SPRITE_BUDGET:
+            self._sprites.clear()
+            self._pixels = 0
+        known = self._sprites.setdefault(style, {})
+        for key in set(keys).difference(known):
+            known[key] = sprite = _sprite(key, style)
+            self._pixels += sprite.get_width() * sprite.get_height()
+        places = zip(corner[:, 0].tolist(), corner[:, 1].tolist(), strict=True)
+        surface.blits(list(zip(map(known.__getitem__, keys), places, strict=True)), False)
+
+
+def _keys(size: IntArray, colours: ColourArray, offset: IntArray) -> IntArray:
+    """Return a number for each sprite: radius, red, green, blue, and the offsets of its middle."""
+    key = size
+    for channel in range(3):
+        key = key << 8 | colours[:, channel]
+    return (key << 2 | offset[:, 0]) << 2 | offset[:, 1]
+
+
+def _sprite(key: int, style: CircleStyle) -> pygame.Surface:
+    down, across = key & 3, key >> 2 & 3
+    blue, green, red = key >> 4 & 255, key >> 12 & 255, key >> 20 & 255
+    radius = (key >> 28) / FINEST
+    half = math.ceil(radius) + 1
+    along = np.arange(2 * half + 1, dtype=np.float64) + 0.5
+    # Coverage that falls off linearly over a pixel adds 1/12 px² to a disc's squared radius; tiny ones would show it.
+    true = math.sqrt(max(radius**2 - 1.0 / 12.0, 0.04)) if style.antialias else radius
+    distance = disc_distance(half + across / OFFSETS, half + down / OFFSETS, true)
+    return sdf_surface(shade_sdf(distance(along[:, None], along[None, :]), _look(radius, (red, green, blue), style)))
+
+
+def _look(radius: float, colour: Colour, style: CircleStyle) -> ShapeStyle:
+    if style.hollow:
+        return ShapeStyle(None, colour, style.line, antialias=style.antialias)
+    rim = min(0.16 * radius, style.line * min(1.0 + radius / 80.0, 2.5))
+    return ShapeStyle(colour, darken(colour), rim, antialias=style.antialias)
+
+
+def _paint(
+    surface: pygame.Surface, x: float, y: float, radius: float, colour: Colour, style: CircleStyle, plain: bool
+) -> None:
+    """Draw a disc that is too large for a sprite."""
+    area = surface.get_clip()
+    if plain and radius < 16_000.0:
+        pygame.draw.circle(surface, colour, (round(x), round(y)), round(radius), 2 if style.hollow else 0)
+        return
+    low = max(x - radius - 1.0, -1.0), max(y - radius - 1.0, -1.0)
+    high = min(x + radius + 2.0, area.right + 1.0), min(y + radius + 2.0, area.bottom + 1.0)
+    if low[0] < high[0] and low[1] < high[1]:
+        within = pygame.Rect(int(low[0]), int(low[1]), math.ceil(high[0] - low[0]), math.ceil(high[1] - low[1]))
+        draw_sdf(surface, disc_distance(x, y, radius), _look(radius, colour, style), within)
+
+
+def darken(colour: Colour) -> Colour:
+    """Return the colour of the rim and spoke of a ball."""
+    red, green, blue = (round(c + (b - c) * DARK) for c, b in zip(colour, BACKGROUND, strict=True))
+    return red, green, blue
+
+
+def draw_rotation_marks(
+    surface: pygame.Surface,
+    centre: FloatArray,
+    radius: FloatArray,
+    angle: FloatArray,
+    colours: ColourArray,
+    antialias: bool,
+) -> None:
+    """Draw the line that shows how far a disc has turned; its middle is left free.
+
+    Args:
+        surface: where.
+        centre: (K, 2) px.
+        radius: (K,) px; below `SHORTEST_SPOKE` and beyond 1e6 none is drawn.
+        angle: (K,) rad, counted as in the world, where y is up.
+        colours: (K, 3) of the discs.
+        antialias: whether edges are smooth.
+    """
+    shown = np.flatnonzero((radius >= SHORTEST_SPOKE) & (radius < 1e6) & np.isfinite(angle))
+    way = np.stack((np.cos(angle[shown]), -np.sin(angle[shown])), 1)
+    middle, reach = centre[shown] - 0.5, radius[shown, None]  # SDL has a pixel's middle at a whole number
+    ends = np.concatenate((middle + way * reach * 0.35, middle + way * (reach * 0.95 - 1.0)), 1)
+    tones = np.rint(colours[shown] * (1.0 - DARK) + np.asarray(BACKGROUND) * DARK).astype(np.uint8)
+    thin = (reach[:, 0] <= THIN) | (len(shown) > THICK)
+    line = pygame.draw.aaline if antialias else pygame.draw.line
+    # Flat lists of numbers: thousands of small ones would keep the garbage collector busy.
+    columns = (column.tolist() for column in (packed_pixels(tones[thin], surface), *ends[thin].T))
+    for tone, ax, ay, bx, by in zip(*columns, strict=True):
+        line(surface, tone, (ax, ay), (bx, by))
+    for k in np.flatnonzero(~thin).tolist():
+        ax, ay, bx, by = (ends[k] + 0.5).tolist()
+        red, green, blue = tones[k].tolist()
+        width = min(0.08 * float(reach[k, 0]), 6.0)
+        draw_line(surface, (ax, ay), (bx, by), (red, green, blue), width, antialias)

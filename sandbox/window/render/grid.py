@@ -1,0 +1,67 @@
+"""Grid: faint lines at round distances, and a bar that tells how long one of them is."""
+
+import math
+
+import numpy as np
+import pygame
+
+from sandbox.window.camera import Camera
+from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG
+from sandbox.window.render.text import draw_text
+
+NARROWEST = 56.0
+"""px, the least distance of two lines"""
+STRONG = 5
+"""Every so many lines one is stronger."""
+UNITS = ((1e3, "km"), (1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"), (1e-12, "pm"))
+
+
+def step_of(camera: Camera, unit: float = 1.0) -> float:
+    """Return the distance of two lines, m: 1, 2 or 5 times a power of ten."""
+    least = NARROWEST * unit / camera.scale
+    power = 10.0 ** math.floor(math.log10(least))
+    return next((k * power for k in (1.0, 2.0, 5.0) if k * power >= least), 10.0 * power)
+
+
+def length_text(metres: float) -> str:
+    """Return a length in the unit that suits it, such as "20 cm"."""
+    size, name = next((u for u in UNITS if metres >= u[0] * 0.999), UNITS[-1])
+    if metres >= 1e7:
+        return f"{metres:.0e} m".replace("e+0", "e").replace("e+", "e")
+    return f"{metres / size:.6g} {name}"
+
+
+def draw_grid(surface: pygame.Surface, camera: Camera, unit: float = 1.0) -> None:
+    """Draw the lines; where places are too large for floats to tell neighbouring lines apart, none."""
+    step = step_of(camera, unit)
+    thickness = max(1, round(unit))
+    lines: list[tuple[bool, pygame.Rect]] = []
+    for axis in (0, 1):
+        low, high = (corner[axis] for corner in camera.box)
+        if max(abs(low), abs(high)) / step > 1e12:
+            continue
+        numbers = np.arange(math.ceil(low / step), math.floor(high / step) + 1)
+        places = np.zeros((len(numbers), 2))
+        places[:, axis] = numbers * step
+        for number, pixel in zip(numbers.tolist(), np.floor(camera.to_screen(places)[:, axis]).tolist(), strict=True):
+            if axis == 0:
+                rect = pygame.Rect(int(pixel), 0, thickness, camera.size[1])
+            else:
+                rect = pygame.Rect(0, int(pixel), camera.size[0], thickness)
+            lines.append((number % STRONG == 0, rect))
+    for strong, rect in sorted(lines, key=lambda line: line[0]):  # strong ones last: they cross the others
+        surface.fill(GRID_STRONG if strong else GRID, rect)
+
+
+def draw_scale(surface: pygame.Surface, camera: Camera, unit: float = 1.0, foot: float = 0.0) -> None:
+    """Draw the bar in the lower left corner, `foot` px above the lower edge."""
+    step = step_of(camera, unit)
+    length, thick = round(step * camera.scale), max(1, round(1.5 * unit))
+    left, base = round(18 * unit), round(camera.size[1] - 18 * unit - foot)
+    tick = round(5 * unit)
+    surface.fill(FAINT, pygame.Rect(left, base - thick, length, thick))
+    for x in (left, left + length - thick):
+        surface.fill(FAINT, pygame.Rect(x, base - thick - tick, thick, tick))
+    text, middle, above = length_text(step), left + length / 2.0, base - tick - 3 * unit
+    draw_text(surface, text, (middle + 1, above + 1), 12 * unit, BACKGROUND, "midbottom")  # it may lie on a bright ball
+    draw_text(surface, text, (middle, above), 12 * unit, FAINT, "midbottom")

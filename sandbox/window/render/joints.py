@@ -1,0 +1,476 @@
+"""Joints: those that are part of what one sees, rods, strings and springs, as thin lines below the bodies.
+
+A spring's colour tells how far it is stretched: blue is short, grey at rest, orange long. Many of them, as those of a
+cloth, are plain lines.
+
+Fittings: the overlay of joints, each kind in its own way: where it holds, how far it lets go, what it drives.
+
+Drives: the hinges of what they turn, and in the overlay of joints, how far they let their bodies go.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.compile.drives import Mount, mounts
+from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.description.forces import PlungerDrive
+from sandbox.window.render.body_geometry import clipped_box, outline_distance
+from sandbox.window.render.circles import CircleRenderer, CircleStyle
+from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.lines import Pixel, draw_arrow, draw_dashes, draw_line, draw_thin_lines
+from sandbox.window.render.palette import (
+    BACKGROUND,
+    GREEN,
+    INK,
+    ORANGE,
+    SKY,
+    SURFACE,
+    YELLOW,
+    Colour,
+    ColourArray,
+    mix_colours,
+)
+from sandbox.window.render.particles import packed_pixels
+from sandbox.window.render.sdf import ShapeStyle, draw_sdf
+
+COILED = 500
+"""Springs up to which each is a zigzag."""
+SOLID_RODS = 500
+"""Rods up to which each is more than a thread wide."""
+NAIL = 3.2
+"""px, radius of what the world holds a joint by"""
+ZIGS = 18
+"""Half turns of a spring."""
+SHORTEST = 20.0
+"""px: a shorter spring is a line"""
+STRAINED = 0.1
+"""of its length at rest: a spring so much longer has half of its colour"""
+_REST = mix_colours(BACKGROUND, SURFACE, 0.75)
+ROD = mix_colours(BACKGROUND, SURFACE, 0.9)
+STRING = mix_colours(BACKGROUND, SURFACE, 0.7)
+SHADES = np.asarray(
+    [
+        mix_colours(_REST, SKY, (32 - k) / 32) if k < 32 else mix_colours(_REST, ORANGE, (k - 32) / 32)
+        for k in range(65)
+    ],
+    np.uint8,
+)
+"""From shortest to longest."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointSegments:
+    """The joints in sight, J of them, and where they hold their bodies."""
+
+    links: Links
+    ends: FloatArray
+    """(J, 4) px: of the first body, or the world, and of the second"""
+
+    def of(self, *kinds: LinkKind) -> "JointSegments":
+        """Return those of some kinds."""
+        which = np.isin(self.links.kind, kinds)
+        return JointSegments(self.links.some(which), self.ends[which])
+
+    @property
+    def length(self) -> FloatArray:
+        """(J,) px."""
+        return np.asarray(np.hypot(self.ends[:, 2] - self.ends[:, 0], self.ends[:, 3] - self.ends[:, 1]))
+
+
+def joint_segments(view: DrawContext) -> JointSegments:
+    """Return the joints that are whole and whose bodies are present, those about the picture."""
+    links, frame = view.sight.links, view.sight.frame
+    count = min(len(frame.position), len(view.sight.bodies))
+    if not len(links):
+        return JointSegments(links, np.empty((0, 4)))
+    there = frame.present[:count]
+    known = (links.b < count) & (links.a < count)
+    if not known.all():
+        links = links.some(known)
+    sound = there[links.b] & ((links.a < 0) | there[links.a])
+    with np.errstate(invalid="ignore", over="ignore"):
+        a, b = links.ends(frame.position, frame.angle)
+        ends = np.hstack((view.camera.to_screen(a), view.camera.to_screen(b)))
+        width, height = view.camera.size
+        margin = 100.0 * view.unit
+        low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
+        sound &= (high > -margin).all(axis=1) & (low < (width + margin, height + margin)).all(axis=1)
+        sound &= np.isfinite(ends).all(axis=1)
+    return JointSegments(links if sound.all() else links.some(sound), ends[sound])
+
+
+def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer) -> None:
+    """Draw rods, strings and springs, and where the world holds them."""
+    fast = joints.of(LinkKind.ROD, LinkKind.SLIDE, LinkKind.SPRING)
+    nails = fast.ends[fast.links.a < 0, :2]
+    tint = np.broadcast_to(np.asarray(SURFACE, np.uint8), (len(nails), 3))
+    size = np.full(len(nails), (NAIL if len(nails) <= SOLID_RODS else 0.5 * NAIL) * view.unit)
+    discs.draw(view.surface, nails, size, tint, CircleStyle(0.0, antialias=view.antialias))
+    _solid_rods(view, joints.of(LinkKind.ROD), ROD, 2.4)
+    _solid_rods(view, joints.of(LinkKind.SLIDE), STRING, 1.4)
+    springs = joints.of(LinkKind.SPRING)
+    if not len(springs.links):
+        return
+    shade = strain(springs, view.camera.scale)
+    if len(springs.links) > COILED:
+        draw_thin_lines(view.surface, springs.ends, packed_pixels(SHADES[shade], view.surface), view.antialias)
+        return
+    rest = springs.links.figures[:, 0] * view.camera.scale
+    for k, row in enumerate(springs.ends.tolist()):
+        red, green, blue = SHADES[shade[k]].tolist()
+        _coil(view, (row[0], row[1]), (row[2], row[3]), float(rest[k]), (red, green, blue))
+
+
+def strain(springs: JointSegments, scale: float) -> IntArray:
+    """Return which of `SHADES` tells how far each spring is stretched, (J,)."""
+    rest = springs.links.figures[:, 0] * scale
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        stretch = np.where(rest > 0.0, springs.length / rest - 1.0, 1.0)
+        share = stretch / (np.abs(stretch) + STRAINED)
+    return np.rint(32.0 + 32.0 * np.nan_to_num(share, nan=1.0)).astype(np.int64)
+
+
+def _solid_rods(view: DrawContext, rods: JointSegments, colour: tuple[int, int, int], width: float) -> None:
+    if len(rods.links) > SOLID_RODS:
+        tones: ColourArray = np.broadcast_to(np.asarray(colour, np.uint8), (len(rods.links), 3))
+        draw_thin_lines(view.surface, rods.ends, packed_pixels(tones, view.surface), view.antialias)
+        return
+    for ax, ay, bx, by in rods.ends.tolist():
+        draw_line(view.surface, (ax, ay), (bx, by), colour, width * view.unit, view.antialias)
+
+
+def _coil(view: DrawContext, a: Pixel, b: Pixel, rest: float, colour: tuple[int, int, int]) -> None:
+    """Draw a spring: the wire of its zigzag is as long as ever, so its pitch widens and its width shrinks."""
+    length, unit = float(np.hypot(b[0] - a[0], b[1] - a[1])), view.unit
+    reach = 4.0 * max(view.camera.size)
+    far = max(map(abs, (*a, *b))) > reach
+    if not SHORTEST * unit <= length or far:
+        draw_line(view.surface, a, b, colour, 1.4 * unit, view.antialias)
+        return
+    ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+    lead = min(0.1 * length, 14.0 * unit)
+    pitch = (length - 2.0 * lead) / ZIGS
+    widest = min(max(0.09 * rest, 3.0 * unit), 9.0 * unit)
+    wire = np.hypot(2.0 * widest, 0.8 * rest / ZIGS)
+    width = min(max(0.5 * float(np.sqrt(max(wire**2 - pitch**2, 0.0))), 0.35 * widest), 1.3 * widest)
+    spots = [a]
+    for k in range(ZIGS + 1):
+        along, side = lead + pitch * k, 0.0 if k in (0, ZIGS) else width if k % 2 else -width
+        spots.append((a[0] + ux * along - uy * side, a[1] + uy * along + ux * side))
+    spots.append(b)
+    if view.antialias:
+        for shift in (-0.75, -0.25) if unit < 1.5 else (-1.0, -0.5, 0.0):
+            pygame.draw.aalines(view.surface, colour, False, [(x + shift, y + shift) for x, y in spots])
+        return
+    for p, q in pairwise(spots):
+        draw_line(view.surface, p, q, colour, 1.5 * unit, antialias=False)
+
+
+MAX_SYMBOLS = 600
+"""Joints of one kind that are drawn each in its way; of more, only lines from body to body."""
+MAX_DIALS = 60
+"""Of what turns, as their arcs take longer."""
+SMALL_SYMBOL, LARGE_SYMBOL = 12.0, 34.0
+"""px: radii of the arcs of what turns"""
+_TINTS: dict[LinkKind, Colour] = {
+    LinkKind.ROD: INK,
+    LinkKind.PIVOT: YELLOW,
+    LinkKind.SLIDE: SKY,
+    LinkKind.GROOVE: SKY,
+    LinkKind.ROTARY_LIMIT: GREEN,
+    LinkKind.MOTOR: ORANGE,
+    LinkKind.GEAR: INK,
+    LinkKind.SPRING: INK,
+    LinkKind.ROTARY_SPRING: SKY,
+}
+
+
+class AngleDial(NamedTuple):
+    """Where and how a joint that turns is drawn."""
+
+    place: Pixel
+    size: float
+    """px, its radius"""
+    base: float
+    """rad, the angle of the first body"""
+    turned: float
+    """rad, that of the second from there"""
+    figures: tuple[float, float, float]
+    """of the link"""
+
+
+def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRenderer) -> None:
+    """Draw all joints about the picture."""
+    ways: dict[LinkKind, Callable[[DrawContext, JointSegments], None]] = {
+        LinkKind.ROD: _rod_symbols,
+        LinkKind.GEAR: _gears,
+        LinkKind.SLIDE: _slides,
+        LinkKind.GROOVE: _grooves,
+        LinkKind.ROTARY_LIMIT: _limits,
+        LinkKind.ROTARY_SPRING: _turning_springs,
+        LinkKind.MOTOR: _motors,
+    }
+    for kind in (*ways, LinkKind.SPRING, LinkKind.PIVOT):
+        some = joints.of(kind)
+        if len(some.links) > MAX_SYMBOLS:
+            tint = np.broadcast_to(
+                np.asarray(mix_colours(BACKGROUND, _TINTS[kind], 0.7), np.uint8), (len(some.links), 3)
+            )
+            if kind is LinkKind.SPRING:
+                tint = SHADES[strain(some, view.camera.scale)]
+            draw_thin_lines(view.surface, some.ends, packed_pixels(tint, view.surface), view.antialias)
+        elif len(some.links) and kind in ways:
+            ways[kind](view, some)
+        if kind in (LinkKind.ROD, LinkKind.SLIDE, LinkKind.SPRING) and 0 < len(some.links) <= MAX_SYMBOLS:
+            _dots(view, np.vstack((some.ends[:, :2], some.ends[:, 2:])), 2.6, _TINTS[kind], discs)
+        if kind in (LinkKind.PIVOT, LinkKind.GROOVE) and 0 < len(some.links) <= MAX_SYMBOLS:
+            _rings(view, some.ends[:, 2:], _TINTS[kind], discs)
+
+
+def _dots(view: DrawContext, places: FloatArray, size: float, colour: Colour, discs: CircleRenderer) -> None:
+    kept = view.inside(places, 10.0 * view.unit)
+    for wide, tone in ((size + 1.2, BACKGROUND), (size, colour)):
+        radius = np.full(len(kept), wide * view.unit)
+        tint = np.broadcast_to(np.asarray(tone, np.uint8), (len(kept), 3))
+        discs.draw(view.surface, places[kept], radius, tint, CircleStyle(0.0, antialias=view.antialias))
+
+
+def _rings(view: DrawContext, places: FloatArray, colour: Colour, discs: CircleRenderer) -> None:
+    """Draw what lets turn: a ring on a dark ground."""
+    _dots(view, places, 5.0, BACKGROUND, discs)
+    kept = view.inside(places, 10.0 * view.unit)
+    radius = np.full(len(kept), 5.0 * view.unit)
+    tint = np.broadcast_to(np.asarray(colour, np.uint8), (len(kept), 3))
+    style = CircleStyle(1.8 * view.unit, hollow=True, antialias=view.antialias)
+    discs.draw(view.surface, places[kept], radius, tint, style)
+
+
+def _rod_symbols(view: DrawContext, rods: JointSegments) -> None:
+    for ax, ay, bx, by in rods.ends.tolist():
+        draw_line(view.surface, (ax, ay), (bx, by), INK, 1.4 * view.unit, view.antialias)
+
+
+def _gears(view: DrawContext, gears: JointSegments) -> None:
+    rows = _from_bodies(view, gears)
+    draw_dashes(view.surface, [((ax, ay), (bx, by)) for ax, ay, bx, by in rows.tolist()], INK, 2.0 * view.unit)
+    places = rows[:, 2:]
+    for x, y in places[view.inside(places, 2.0 * LARGE_SYMBOL)][:MAX_DIALS].tolist():
+        arc(view, (x, y), 0.7 * SMALL_SYMBOL * view.unit, 0.0, math.tau, INK, 1.2)
+
+
+def _slides(view: DrawContext, slides: JointSegments) -> None:
+    """Draw strings dashed; a tick at each end lies across, both bright where the string is taut."""
+    scale, unit = view.camera.scale, view.unit
+    rows = zip(slides.ends.tolist(), slides.links.figures.tolist(), slides.length.tolist(), strict=True)
+    for (ax, ay, bx, by), (least, most, _), length in rows:
+        taut = length >= 0.998 * most * scale or length <= 1.002 * least * scale
+        colour = INK if taut else SKY
+        draw_dashes(view.surface, [((ax, ay), (bx, by))], colour, 6.0 * unit, view.antialias)
+        if length > 0.0:
+            x, y = -(by - ay) / length * 6.0 * unit, (bx - ax) / length * 6.0 * unit
+            for px, py in ((ax, ay), (bx, by)):
+                draw_line(view.surface, (px - x, py - y), (px + x, py + y), colour, 1.6 * unit, view.antialias)
+
+
+def _grooves(view: DrawContext, grooves: JointSegments) -> None:
+    """Draw tracks: two lines and their round ends."""
+    links, frame = grooves.links, view.sight.frame
+    angle = np.where(links.a < 0, 0.0, frame.angle[links.a])
+    place = np.where((links.a < 0)[:, None], 0.0, frame.position[links.a])
+    (x, y, _), cos, sin = links.figures.T, np.cos(angle), np.sin(angle)
+    with np.errstate(invalid="ignore", over="ignore"):
+        far = view.camera.to_screen(place + np.column_stack((cos * x - sin * y, sin * x + cos * y)))
+    half = 5.0 * view.unit
+    for (ax, ay, *_), (bx, by) in zip(grooves.ends.tolist(), far.tolist(), strict=True):
+        length = math.hypot(bx - ax, by - ay)
+        if not 0.0 < length < 30_000.0 or max(abs(ax), abs(ay)) > 30_000.0:
+            continue
+        ux, uy = (bx - ax) / length, (by - ay) / length
+        for side in (-half, half):
+            shift = -uy * side, ux * side
+            start, end = (ax + shift[0], ay + shift[1]), (bx + shift[0], by + shift[1])
+            draw_line(view.surface, start, end, SKY, 1.4 * view.unit, view.antialias)
+        turned = math.atan2(-uy, ux)
+        arc(view, (ax, ay), half, turned + 0.5 * math.pi, math.pi, SKY, 1.4)
+        arc(view, (bx, by), half, turned - 0.5 * math.pi, math.pi, SKY, 1.4)
+
+
+def _limits(view: DrawContext, limits: JointSegments) -> None:
+    """Draw the arc within which the second body may turn, and a hand that shows where it is."""
+    for (x, y), size, base, turned, (least, most, _) in _dials(view, limits):
+        first, span = base + least, min(max(most - least, 0.0), math.tau)
+        arc(view, (x, y), size, first, span, INK, 2.0)
+        for stop in (first, first + span):
+            inner, outer = spot((x, y), 0.8 * size, stop), spot((x, y), 1.2 * size, stop)
+            path(view, [inner, outer], INK, 2.0)
+        tip, foot = spot((x, y), 1.1 * size, base + turned), spot((x, y), 0.45 * size, base + turned)
+        path(view, [foot, tip], YELLOW, 2.0)
+
+
+def _turning_springs(view: DrawContext, springs: JointSegments) -> None:
+    """Draw a spiral that winds up as the spring does."""
+    for (x, y), size, base, turned, (rest, _, _) in _dials(view, springs):
+        strained = max(min(turned - rest, 2.0 * math.tau), -2.0 * math.tau)
+        wound = 1.5 * math.tau + strained
+        colour = tuple(SHADES[round(32.0 + 32.0 * strained / (abs(strained) + 0.5))].tolist())
+        count = 28
+        spots = [
+            spot((x, y), size * (0.25 + 0.75 * k / count), base + turned - wound * (1.0 - k / count))
+            for k in range(count + 1)
+        ]
+        path(view, spots, (colour[0], colour[1], colour[2]), 1.4)
+
+
+def _motors(view: DrawContext, motors: JointSegments) -> None:
+    """Draw three quarters of a circle, with an arrow the way it drives."""
+    for (x, y), size, base, _, (rate, _, _) in _dials(view, motors):
+        way = 1.0 if rate >= 0.0 else -1.0
+        first, span = base - way * 0.75 * math.pi, way * 1.35 * math.pi
+        arc(view, (x, y), 1.15 * size, first, span, INK, 2.2)
+        last = first + span
+        neck, tip = spot((x, y), 1.15 * size, last - way * 0.15), spot((x, y), 1.15 * size, last + way * 0.35)
+        draw_arrow(view.surface, neck, tip, INK, 2.2 * view.unit, view.antialias, BACKGROUND)
+
+
+def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:
+    """Return where joints that turn are drawn: where a pivot holds the same two, else in the second body's middle."""
+    frame, bodies, links = view.sight.frame, view.sight.bodies, joints.links
+    every, pivots = view.sight.links, {}
+    for k in np.flatnonzero(every.kind == LinkKind.PIVOT).tolist():
+        pivots[int(every.a[k]), int(every.b[k])] = k
+    _, hinge = every.ends(frame.position, frame.angle)
+    found = []
+    rows = zip(links.a.tolist(), links.b.tolist(), links.figures.tolist(), strict=True)
+    for a, b, figures in list(rows)[:MAX_DIALS]:
+        own = pivots.get((a, b), pivots.get((b, a)))
+        place = frame.position[b] if own is None else hinge[own]
+        x, y = view.camera.to_screen(place).tolist()
+        base = 0.0 if a < 0 else float(frame.angle[a])
+        turned = float(frame.angle[b]) - base
+        if max(abs(x), abs(y)) < 30_000.0 and math.isfinite(base) and math.isfinite(turned):
+            room = float(bodies.core[b]) * view.camera.scale
+            size = min(max(0.6 * room, SMALL_SYMBOL * view.unit), LARGE_SYMBOL * view.unit)
+            found.append(AngleDial((x, y), size, base, turned, (figures[0], figures[1], figures[2])))
+    return found
+
+
+def _from_bodies(view: DrawContext, joints: JointSegments) -> FloatArray:
+    """Return the centres of the bodies that joints hold, (J, 4) px; of the world, the place where it is held."""
+    first = np.where((joints.links.a < 0)[:, None], 0.0, view.sight.frame.position[joints.links.a])
+    ends = np.hstack((view.camera.to_screen(first), view.camera.to_screen(view.sight.frame.position[joints.links.b])))
+    ends[:, :2] = np.where((joints.links.a < 0)[:, None], joints.ends[:, :2], ends[:, :2])
+    return np.asarray(ends[np.isfinite(ends).all(axis=1)])
+
+
+def spot(centre: Pixel, radius: float, angle: float) -> Pixel:
+    """Return the place on a circle at an angle that counts as in the world, px."""
+    return centre[0] + radius * math.cos(angle), centre[1] - radius * math.sin(angle)
+
+
+def arc(
+    view: DrawContext, centre: Pixel, radius: float, first: float, span: float, colour: Colour, width: float
+) -> None:
+    """Draw part of a circle, counted as in the world, with a dark edge that sets it off."""
+    low, half = min(first, first + span), min(0.5 * abs(span), math.pi)
+    middle = low + half
+    row = [1.0, *centre, radius, math.cos(middle), -math.sin(middle), math.cos(half)]
+    tips = [[0.0, *tip, *tip, 0.0, 0.0] for tip in (spot(centre, radius, low), spot(centre, radius, low + 2 * half))]
+    _traced(view, np.asarray([row, *tips]), colour, width)
+
+
+def path(view: DrawContext, spots: list[Pixel], colour: Colour, width: float) -> None:
+    """Draw a line through places, with a dark edge."""
+    rows = [[0.0, *a, *b, 0.0, 0.0] for a, b in pairwise(spots)]
+    _traced(view, np.asarray(rows), colour, width)
+
+
+def _traced(view: DrawContext, edge: FloatArray, colour: Colour, width: float) -> None:
+    """Draw a line along an outline in px."""
+    half, halo = 0.5 * width * view.unit, 1.2 * view.unit
+    distance = outline_distance(edge)
+    reach = edge[:, 3].max() if edge[0, 0] == 1.0 else 0.0
+    spots = np.vstack((edge[:, 1:3], edge[edge[:, 0] == 0.0, 3:5]))  # of straight lines both ends
+    low, high = spots.min(axis=0) - reach, spots.max(axis=0) + reach
+    margin = half + halo + 1.0
+    box = float(low[0] - margin), float(low[1] - margin), float(high[0] + margin), float(high[1] + margin)
+    within = clipped_box(box, view.surface.get_clip())
+    if within.width:
+        look = ShapeStyle(colour, BACKGROUND, halo, antialias=view.antialias)
+        draw_sdf(view.surface, lambda x, y: np.asarray(distance(x, y) - half - halo), look, within)
+
+
+PIN = 4.0
+"""px, radius of a hinge"""
+SHARE = 0.45
+"""of the largest disc in its body that a hinge covers at most"""
+SMALL_PIN, LARGE_PIN = 14.0, 90.0
+"""px: radii of the arcs of what turns"""
+BEYOND = 1.0
+"""of the largest disc in a body, so far beyond its centre its arc is"""
+
+
+def draw_hinges(view: DrawContext, discs: CircleRenderer) -> None:
+    """Draw the hinges on which drives turn bodies, where those are in sight."""
+    bodies = view.sight.bodies
+    for mount, number, place in _seen(view):
+        if not isinstance(mount.drive, PlungerDrive):
+            size = min(PIN * view.unit, SHARE * float(bodies.core[number]) * view.camera.scale)
+            for share, colour in ((1.0, BACKGROUND), (0.55, mix_colours(BACKGROUND, INK, 0.85))):
+                tint = np.asarray([colour], np.uint8)
+                style = CircleStyle(0.0, antialias=view.antialias)
+                discs.draw(view.surface, np.asarray([place]), np.asarray([share * size]), tint, style)
+
+
+def draw_stops(view: DrawContext) -> None:
+    """Draw the stops of drives, the way between them, and on it a hand where the body is."""
+    frame = view.sight.frame
+    for mount, number, place in _seen(view):
+        level = 0.0 if frame.drives is None else float(frame.drives[mount.number, 0])
+        colour = mix_colours(SKY, ORANGE, level)
+        drive = mount.drive
+        if isinstance(drive, PlungerDrive):
+            _slide(view, drive, place, frame.position[number].tolist(), mount.home, colour)
+            continue
+        (x, y), (rest, end) = mount.hinge, drive.stops
+        own = math.atan2(-y, -x) if x or y else 0.0  # of the arm from the hinge to the body's centre
+        length = (math.hypot(x, y) + BEYOND * float(view.sight.bodies.core[number])) * view.camera.scale
+        size = min(max(length, SMALL_PIN * view.unit), LARGE_PIN * view.unit)
+        arc(view, place, size, own + rest, max(min(end - rest, math.tau), -math.tau), INK, 1.4)
+        for stop in (rest, end):
+            path(view, [spot(place, 0.92 * size, own + stop), spot(place, 1.08 * size, own + stop)], INK, 1.4)
+        turned = own + float(frame.angle[number])
+        path(view, [spot(place, 0.25 * size, turned), spot(place, 1.04 * size, turned)], colour, 2.0)
+
+
+def _slide(
+    view: DrawContext, drive: PlungerDrive, place: Pixel, now: list[float], home: tuple[float, float], colour: Colour
+) -> None:
+    """Draw the line along which a plunger is drawn, across its ends a tick, and how far it is."""
+    length = math.hypot(*drive.direction)
+    ux, uy = drive.direction[0] / length, -drive.direction[1] / length  # the screen's y is down
+    far = drive.travel * view.camera.scale
+    pulled = math.dist(now, home) * view.camera.scale
+    tick = 5.0 * view.unit
+    back = place[0] - far * ux, place[1] - far * uy
+    path(view, [place, back], INK, 1.6)
+    for (x, y), tone in ((place, INK), (back, INK), ((place[0] - pulled * ux, place[1] - pulled * uy), colour)):
+        path(view, [(x - tick * uy, y + tick * ux), (x + tick * uy, y - tick * ux)], tone, 2.2)
+
+
+def _seen(view: DrawContext) -> Iterator[tuple[Mount, int, Pixel]]:
+    """Yield how each driven body in sight is held, its number, and where its hinge or its stop is, px."""
+    names = view.sight.bodies.names
+    numbers = {names[number]: number for number in view.shown.tolist()}
+    for name, mount in mounts(view.sight.scene).items():
+        if name in numbers:
+            drive = mount.drive
+            seat = mount.home if isinstance(drive, PlungerDrive) else drive.pivot
+            x, y = view.camera.to_screen(np.asarray(seat)).tolist()
+            yield mount, numbers[name], (x, y)

@@ -1,0 +1,461 @@
+"""Stencil: bodies of convex pieces into pixels in one pass, compiled where it can be; antialiased by their distance.
+
+Blend: colours between two, as surfaces of four bytes a pixel hold them, compiled where it can be.
+
+Scatter: particles into pixels in one pass, and their fading in another, compiled where it can be.
+
+Spans: the part of a row of pixels that lies in a piece, compiled where it can be.
+
+A piece's `room` is (V, 5 or more): x and y of each corner, px, then normal and offset of the side behind it.
+
+Wires: thin antialiased lines into pixels in one pass, thousands a picture, compiled where it can be.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.kernel import bare_kernel, kernel
+from sandbox.window.render.body_geometry import SEAM, ConvexPieces
+
+FULL = 256
+"""A share of all."""
+
+
+@bare_kernel
+def blend_packed(under: int, over: int, share: int) -> int:
+    """Return a pixel with another laid over it by a share of `FULL`, all four bytes alike, two of them at a time."""
+    rest = FULL - share
+    even = ((under & 0xFF00FF) * rest + (over & 0xFF00FF) * share + 0x800080) >> 8 & 0xFF00FF
+    odd = ((under >> 8 & 0xFF00FF) * rest + (over >> 8 & 0xFF00FF) * share + 0x800080) & 0xFF00FF00
+    return even | odd
+
+
+@kernel
+def rasterise_points(
+    pixels: npt.NDArray[np.uint32],
+    stride: int,
+    area: tuple[int, int, int, int],
+    position: FloatArray,
+    colours: npt.NDArray[np.uint32],
+    present: BoolArray,
+    centre: tuple[float, float],
+    scale: float,
+    middle: tuple[float, float],
+    side: int,
+) -> None:
+    """Draw particles as squares.
+
+    Args:
+        pixels: of the surface, flat.
+        stride: of a row, px.
+        area: left, top, right and bottom of what may be drawn on, px.
+        position: (N, 2) m.
+        colours: (N,) as the surface holds them.
+        present: (N,) who is drawn.
+        centre: of the camera, m.
+        scale: of the camera, px/m.
+        middle: of the picture, px.
+        side: of a square, px.
+    """
+    left, top, right, bottom = area
+    back = side // 2
+    for i in range(len(position)):
+        if not present[i]:
+            continue
+        # In the order of Camera.to_screen, so that both say the same pixel.
+        x = (position[i, 0] - centre[0]) * scale + middle[0]
+        y = (position[i, 1] - centre[1]) * -scale + middle[1]
+        # From 0 on, cutting off is rounding down. nan is on no side of anything.
+        if x >= left + back and x < right - side + back + 1 and y >= top + back and y < bottom - side + back + 1:
+            corner = (int(y) - back) * stride + int(x) - back
+            for row in range(side):
+                for column in range(side):
+                    pixels[corner + row * stride + column] = colours[i]
+        elif side > 1 and x > left - side and x < right + side and y > top - side and y < bottom + side:
+            first, above = int(np.floor(x)) - back, int(np.floor(y)) - back
+            for row in range(max(above, top), min(above + side, bottom)):
+                for column in range(max(first, left), min(first + side, right)):
+                    pixels[row * stride + column] = colours[i]
+
+
+@kernel
+def rasterise_faded_points(
+    tones: npt.NDArray[np.uint32],
+    shades: npt.NDArray[np.uint32],
+    time: float,
+    born: FloatArray,
+    rate: FloatArray,
+    first: IntArray,
+    steps: int,
+) -> None:
+    """Give particles the tones of their ages.
+
+    Args:
+        tones: (F,) as the surface holds them.
+        shades: (S,) all there are.
+        time: s.
+        born: (F,) s.
+        rate: (F,) shades a second.
+        first: (F,) the shade that each begins with.
+        steps: how many each has.
+    """
+    for i in range(len(tones)):
+        age = (time - born[i]) * rate[i]
+        tones[i] = shades[first[i] + int(min(max(age, 0.0), steps - 1.0))]
+
+
+@bare_kernel
+def span(
+    y: float, room: FloatArray, first: int, last: int, offset: float, left: float, right: float
+) -> tuple[float, float]:
+    """Return from where to where a row lies no farther than an offset outside all sides of a polygon."""
+    from_x, to_x = left, right
+    for k in range(first, last):
+        across, bound = room[k, 2], offset - (room[k, 3] * y + room[k, 4])
+        if across > 1e-9:
+            to_x = min(to_x, bound / across)
+        elif across < -1e-9:
+            from_x = max(from_x, bound / across)
+        elif bound < 0.0:
+            to_x = left - 1.0
+    return from_x, to_x
+
+
+@bare_kernel
+def inner_span(
+    y: float, room: FloatArray, first: int, last: int, radius: float, left: float, right: float
+) -> tuple[float, float]:
+    """Return from where to where a row surely lies within a piece whose radius is this, which may be negative."""
+    if last - first > 2:
+        return span(y, room, first, last, min(radius, 0.0), left, right)
+    if radius <= 0.0:
+        return left, left - 1.0
+    if last - first == 1:
+        under = radius * radius - (y - room[first, 1]) ** 2
+        half = math.sqrt(max(under, 0.0))
+        return max(left, room[first, 0] - half), min(right, room[first, 0] + half) if under > 0.0 else left - 1.0
+    from_x, to_x = span(y, room, first, last, radius, left, right)
+    for k in range(first, last):  # no farther than the ends
+        after = 2 * first + 1 - k
+        dx, dy = room[after, 0] - room[k, 0], room[after, 1] - room[k, 1]
+        bound = dy * (room[k, 1] - y)
+        if dx > 1e-9:
+            from_x = max(from_x, room[k, 0] + bound / dx)
+        elif dx < -1e-9:
+            to_x = min(to_x, room[k, 0] + bound / dx)
+        elif bound > 0.0:
+            to_x = left - 1.0
+    return from_x, to_x
+
+
+@bare_kernel
+def outer_span(
+    y: float, room: FloatArray, first: int, last: int, radius: float, left: float, right: float
+) -> tuple[float, float]:
+    """Return from where to where a row may lie within a piece whose radius is this: beyond, it surely does not."""
+    low_x, high_x, low_y, high_y = math.inf, -math.inf, math.inf, -math.inf
+    for k in range(first, last):
+        low_x, high_x = min(low_x, room[k, 0]), max(high_x, room[k, 0])
+        low_y, high_y = min(low_y, room[k, 1]), max(high_y, room[k, 1])
+    if y < low_y - radius or y > high_y + radius:
+        return left, left - 1.0
+    from_x, to_x = max(left, low_x - radius), min(right, high_x + radius)
+    if last - first == 1:
+        return from_x, to_x
+    return span(y, room, first, last, radius, from_x, to_x)
+
+
+class PolygonPose(NamedTuple):
+    """Where a body is in the picture."""
+
+    x: float
+    """px"""
+    y: float
+    cos: float
+    """of its angle, counted as in the world"""
+    sin: float
+    scale: float
+    """px/m"""
+
+
+@bare_kernel
+def _side_distance2(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Return the square of the distance from a segment."""
+    dx, dy, px, py = bx - ax, by - ay, x - ax, y - ay
+    share = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-300), 0.0), 1.0)
+    px, py = px - share * dx, py - share * dy
+    return px * px + py * py
+
+
+@bare_kernel
+def _piece_distance(x: float, y: float, room: FloatArray, first: int, last: int, radius: float) -> float:
+    """Return the signed distance from a piece that `_place` has put into the picture; some lower bound beyond ½ px."""
+    if last - first > 2:
+        most, side = -np.inf, first
+        for k in range(first, last):
+            away = room[k, 2] * x + room[k, 3] * y + room[k, 4]
+            if away > most:
+                most, side = away, k
+        if most <= 0.0 or most - radius >= 0.5:
+            return most - radius
+        after = first if side + 1 == last else side + 1
+        nx, ny = room[side, 2], room[side, 3]
+        behind = (room[side, 1] - y) * nx - (room[side, 0] - x) * ny
+        beyond = (room[after, 1] - y) * nx - (room[after, 0] - x) * ny
+        if behind * beyond <= 0.0:  # its foot lies between the ends of the side
+            return most - radius
+    best = np.inf
+    for k in range(first, last if last - first > 2 else first + 1):
+        after = first if k + 1 == last else k + 1
+        best = min(best, _side_distance2(x, y, room[k, 0], room[k, 1], room[after, 0], room[after, 1]))
+    return math.sqrt(best) - radius
+
+
+@bare_kernel
+def _outline_distance(x: float, y: float, edge: FloatArray, first: int, last: int, far: float) -> float:
+    """Return the distance from an outline, in its own units; some greater one where it is farther than `far`."""
+    best = np.inf
+    for k in range(first, last):
+        if edge[k, 0] == 0.0:
+            if x < min(edge[k, 1], edge[k, 3]) - far or x > max(edge[k, 1], edge[k, 3]) + far:
+                continue  # most of a long outline
+            away2 = _side_distance2(x, y, edge[k, 1], edge[k, 2], edge[k, 3], edge[k, 4])
+            best = min(best, away2)
+        else:
+            px, py = x - edge[k, 1], y - edge[k, 2]
+            length = math.sqrt(px * px + py * py)
+            if px * edge[k, 4] + py * edge[k, 5] >= length * edge[k, 6]:
+                best = min(best, (length - edge[k, 3]) ** 2)
+    return math.sqrt(best)
+
+
+@bare_kernel
+def _body_distance(
+    x: float,
+    y: float,
+    body: int,
+    pieces: ConvexPieces,
+    room: FloatArray,
+    pose: PolygonPose,
+    edges: tuple[int, int],
+    deep: float,
+) -> float:
+    """Return the signed distance from a body, px: `deep` where it is deeper than its rim, inf where it is not near."""
+    begin, end = pieces.piece[body], pieces.piece[body + 1]
+    away = np.inf
+    for piece in range(begin, end):
+        first, last = pieces.first[piece], pieces.first[piece + 1]
+        if x < room[first, 7] or x > room[first, 8]:
+            continue
+        away = min(away, _piece_distance(x, y, room, first, last, pieces.radius[piece] * pose.scale))
+        if away <= deep:
+            return deep
+    if end - begin > 1 and away < 0.5:
+        if edges[0] == edges[1]:  # of too many pieces there is no outline, and no rim
+            return deep if away <= SEAM else away
+        px, py = (x - pose.x) / pose.scale, (pose.y - y) / pose.scale
+        along, across = pose.cos * px + pose.sin * py, pose.cos * py - pose.sin * px
+        far = (1.0 - deep) / pose.scale
+        near = pose.scale * _outline_distance(along, across, pieces.edge, edges[0], edges[1], far)
+        return -near if away <= SEAM else near
+    return away
+
+
+@bare_kernel
+def _place(pieces: ConvexPieces, body: int, pose: PolygonPose, room: FloatArray) -> tuple[float, float, float, float]:
+    """Put a body's corners into the picture, each with the line of the side behind it: normal, outwards, and offset.
+
+    Returns:
+        Left, top, right and bottom of what the body covers, with a margin of 1, px.
+    """
+    left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
+    for piece in range(pieces.piece[body], pieces.piece[body + 1]):
+        wide = pieces.radius[piece] * pose.scale + 1.0
+        first, last = pieces.first[piece], pieces.first[piece + 1]
+        for k in range(first, last):
+            x, y = pieces.corner[k, 0], pieces.corner[k, 1]
+            px = pose.x + (pose.cos * x - pose.sin * y) * pose.scale
+            py = pose.y - (pose.sin * x + pose.cos * y) * pose.scale
+            room[k, 0], room[k, 1] = px, py
+            left, right = min(left, px - wide), max(right, px + wide)
+            top, bottom = min(top, py - wide), max(bottom, py + wide)
+        for k in range(first, last):
+            after = first if k + 1 == last else k + 1
+            nx, ny = room[k, 1] - room[after, 1], room[after, 0] - room[k, 0]
+            length = max(math.sqrt(nx * nx + ny * ny), 1e-300)
+            room[k, 2], room[k, 3] = nx / length, ny / length
+            room[k, 4] = -(nx * room[k, 0] + ny * room[k, 1]) / length
+    return left, top, right, bottom
+
+
+@bare_kernel
+def _shaded(pixel: int, away: float, deep: float, fill: int, rim: int, hollow: bool, antialias: bool) -> int:
+    """Return a pixel with what a body covers of it, so far from its edge, laid over it."""
+    cover, shade = min(max(0.5 - away, 0.0), 1.0), min(max(away - deep, 0.0), 1.0)
+    if not antialias:
+        cover, shade = math.floor(cover + 0.5), math.floor(shade + 0.5)
+    if hollow:
+        cover, shade = cover * shade, 1.0
+    tone = blend_packed(fill, rim, int(shade * FULL + 0.5)) if shade < 1.0 else rim
+    part = int(cover * FULL + 0.5)
+    return tone if part == FULL else blend_packed(pixel, tone, part)
+
+
+@bare_kernel
+def _polygon_row(
+    pixels: npt.NDArray[np.uint32],
+    start: int,
+    y: float,
+    room: FloatArray,
+    corners: tuple[int, int],
+    ends: tuple[float, float],
+    deep: float,
+    fill: int,
+    rim: int,
+    hollow: bool,
+    antialias: bool,
+) -> None:
+    """Draw a row of a lone polygon: most are such, and it need not look for the other pieces of each pixel's body."""
+    first, last = corners
+    from_x, to_x = span(y, room, first, last, 0.5, ends[0], ends[1])
+    from_in, to_in = span(y, room, first, last, deep, ends[0], ends[1])
+    column, stop = int(from_x), math.ceil(to_x)
+    inner, outer = stop, stop
+    if from_in <= to_in:
+        inner, outer = max(math.ceil(from_in - 0.5), column), min(math.floor(to_in - 0.5) + 1, stop)
+    while column < stop:
+        if column == inner and inner < outer:
+            if not hollow:
+                pixels[start + inner : start + outer] = fill
+            column = outer
+            continue
+        away = _piece_distance(column + 0.5, y, room, first, last, 0.0)
+        if away < 0.5:
+            pixels[start + column] = _shaded(int(pixels[start + column]), away, deep, fill, rim, hollow, antialias)
+        column += 1
+
+
+@bare_kernel
+def rasterise_polygons(
+    pixels: npt.NDArray[np.uint32],
+    stride: int,
+    area: tuple[int, int, int, int],
+    pieces: ConvexPieces,
+    room: FloatArray,
+    who: IntArray,
+    pose: FloatArray,
+    line: FloatArray,
+    fill: npt.NDArray[np.uint32],
+    rim: npt.NDArray[np.uint32],
+    hollow: bool,
+    antialias: bool,
+) -> None:
+    """Draw bodies in their order.
+
+    Args:
+        pixels: of the surface, flat.
+        stride: of a row, px.
+        area: left, top, right and bottom of what may be drawn on, px.
+        pieces: what they consist of.
+        room: (V, 9) to work in.
+        who: (K,) their numbers.
+        pose: (K, 5) as in `Pose`.
+        line: (K,) widths of their rims, px.
+        fill: (K,) their colours, as the surface holds them.
+        rim: (K,) the colours of their rims.
+        hollow: the rims alone.
+        antialias: whether edges are smooth.
+    """
+    for k in range(len(who)):
+        body, here = who[k], PolygonPose(pose[k, 0], pose[k, 1], pose[k, 2], pose[k, 3], pose[k, 4])
+        begin, end = pieces.piece[body], pieces.piece[body + 1]
+        low, high = pieces.first[begin], pieces.first[end]
+        left, top, right, bottom = _place(pieces, body, here, room)
+        left, top = max(left, float(area[0])), max(top, float(area[1]))
+        right, bottom = min(right, float(area[2])), min(bottom, float(area[3]))
+        if not (left < right and top < bottom):
+            continue
+        polygon = pieces.radius[begin] == 0.0 and end - begin == 1 and high - low > 2
+        element, radius = pieces.element[body], pieces.radius[begin] * here.scale
+        edges = pieces.edge_first[element], pieces.edge_first[element + 1]
+        deep = -(line[k] + 0.5)
+        inner, outer = int(fill[k]), int(rim[k])
+        for row in range(int(top), math.ceil(bottom)):
+            y, start = row + 0.5, row * stride
+            if polygon:
+                _polygon_row(pixels, start, y, room, (low, high), (left, right), deep, inner, outer, hollow, antialias)
+                continue
+            for piece in range(begin, end):
+                first, last, wide = pieces.first[piece], pieces.first[piece + 1], pieces.radius[piece] * here.scale
+                room[first, 5], room[first, 6] = inner_span(y, room, first, last, wide + deep, left, right)
+                room[first, 7], room[first, 8] = outer_span(y, room, first, last, wide + 0.5, left, right)
+            column, stop = int(left), math.ceil(right)
+            while column < stop:
+                x, beyond, empty = column + 0.5, column, stop
+                for piece in range(begin, end):
+                    first = pieces.first[piece]
+                    if room[first, 5] <= x <= room[first, 6]:
+                        beyond = max(beyond, min(int(room[first, 6] - 0.5) + 1, stop))
+                    if x <= room[first, 8]:
+                        empty = min(empty, int(max(room[first, 7] - 0.5, float(column))))
+                if empty > column:  # none of them is there
+                    column = empty
+                    continue
+                if beyond > column:
+                    if not hollow:
+                        pixels[start + column : start + beyond] = inner
+                    column = beyond
+                    continue
+                if end - begin == 1:  # a call with all arrays takes longer than the rest
+                    away = _piece_distance(x, y, room, low, high, radius)
+                else:
+                    away = _body_distance(x, y, body, pieces, room, here, edges, deep)
+                pixel = int(pixels[start + column])
+                pixels[start + column] = _shaded(pixel, away, deep, inner, outer, hollow, antialias)
+                column += 1
+
+
+@bare_kernel
+def rasterise_lines(
+    pixels: npt.NDArray[np.uint32],
+    stride: int,
+    area: tuple[int, int, int, int],
+    ends: FloatArray,
+    tones: npt.NDArray[np.uint32],
+) -> None:
+    """Draw lines of 1 px in their order, as Wu did, 1991: in each step along a line two pixels share it.
+
+    Args:
+        pixels: of the surface, flat.
+        stride: of a row, px.
+        area: left, top, right and bottom of what may be drawn on, px.
+        ends: (K, 4) px, x and y of both ends, in an area not much larger than the picture.
+        tones: (K,) as the surface holds them.
+    """
+    left, top, right, bottom = area
+    for k in range(len(ends)):
+        ax, ay, bx, by = ends[k, 0] - 0.5, ends[k, 1] - 0.5, ends[k, 2] - 0.5, ends[k, 3] - 0.5
+        steep = abs(by - ay) > abs(bx - ax)
+        if steep:
+            ax, ay, bx, by = ay, ax, by, bx
+        if ax > bx:
+            ax, ay, bx, by = bx, by, ax, ay
+        slope = (by - ay) / (bx - ax) if bx > ax else 0.0
+        first, last = math.floor(ax + 0.5), math.floor(bx + 0.5)
+        along_low, along_high = (top, bottom) if steep else (left, right)
+        across_low, across_high = (left, right) if steep else (top, bottom)
+        tone = int(tones[k])
+        for along in range(max(first, along_low), min(last + 1, along_high)):
+            share = min(along + 0.5, bx) - max(along - 0.5, ax) if last > first else max(bx - ax, 0.5)
+            across = ay + slope * (along - ax)
+            row = math.floor(across)
+            part = across - row
+            for side in range(2):
+                cover = share * (part if side else 1.0 - part)
+                if across_low <= row + side < across_high:
+                    place = along * stride + row + side if steep else (row + side) * stride + along
+                    pixels[place] = blend_packed(int(pixels[place]), tone, int(cover * FULL + 0.5))

@@ -1,0 +1,51 @@
+"""Canvas: pictures of states as arrays, without a window."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pygame
+
+from sandbox.action import Throttle
+from sandbox.games.artillery.view import add_artillery
+from sandbox.games.contract import HasLamps, Rules
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Frame
+from sandbox.window.camera import Camera
+from sandbox.window.playback.snapshot import Snapshot, active_thrusters
+from sandbox.window.render.renderer import InsetRenderer, Renderer
+from sandbox.window.view_bounds import view_bounds
+
+
+class OffscreenRenderer:
+    """Draws one picture after the other."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        """Take a size, px."""
+        pygame.font.init()
+        self._surface = pygame.Surface(size)
+        self._picture, self._inset = Renderer(), InsetRenderer()
+
+    def picture(
+        self, scene: Scene, bodies: Bodies, frame: Frame, rules: Rules, throttles: Mapping[str, Throttle]
+    ) -> npt.NDArray[np.uint8]:
+        """Return a picture of a game as the window shows it, without the words: (height, width, 3).
+
+        Args:
+            scene: as it is now.
+            bodies: with those that were spawned.
+            frame: their state.
+            rules: of the game; guns, blasts and lamps are known to them alone.
+            throttles: that were set, by the names of their thrusts.
+        """
+        camera = Camera.fitting(view_bounds(scene), self._surface.get_size())
+        lit = rules.lit() if isinstance(rules, HasLamps) else frozenset[str]()
+        seen = Snapshot(scene, bodies, frame, flames=active_thrusters(scene, bodies, throttles, frame.time), lit=lit)
+        sight = add_artillery(rules, seen)
+        if sight.gunnery is not None:
+            sight = replace(sight, gunnery=replace(sight.gunnery, wind=None))  # its sign is the window's
+        self._picture.draw(self._surface, camera, sight)
+        self._inset.draw(self._surface, camera, sight, self._surface.get_rect())
+        return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))

@@ -1,0 +1,217 @@
+"""Overlays: everything that is drawn about bodies besides their shapes, each part when it is asked for.
+
+Flames: the thrusts that fire, each as a flame within a flame.
+
+Trails: where bodies have been, fading with age; for a crowd as points.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pygame
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.annotations import (
+    draw_boxes,
+    draw_centres,
+    draw_flashes,
+    draw_names,
+    draw_picked,
+    draw_pull,
+    draw_verdicts,
+)
+from sandbox.window.render.circles import CircleRenderer
+from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.joints import draw_hinges, draw_joint_symbols, draw_joints, draw_stops, joint_segments
+from sandbox.window.render.lines import draw_line
+from sandbox.window.render.palette import BACKGROUND, FAINT, INK, ORANGE, YELLOW, Colour, ColourArray, mix_colours
+from sandbox.window.render.particles import ParticleRenderer, packed_pixels
+from sandbox.window.render.polygons import PolygonRenderer
+from sandbox.window.render.vectors import draw_contacts, draw_impulses, draw_velocities
+
+OUTLINE = ((0.0, -0.13), (0.12, -0.19), (0.3, -0.17), (0.6, -0.09), (1.0, 0.0))
+"""One side of a flame: shares of its length along it, and across"""
+INNER = 0.55
+"""of the outer flame's size, the one inside"""
+MIN_FLAME = 2.0
+"""px, the shortest that is drawn"""
+
+
+def draw_flames(view: DrawContext) -> None:
+    """Draw all flames, which bodies cover where they begin."""
+    frame, camera = view.sight.frame, view.camera
+    for number, place, way in view.sight.flames:
+        if number >= len(frame.position) or not frame.present[number]:
+            continue
+        angle, (x, y) = float(frame.angle[number]), frame.position[number].tolist()
+        if not math.isfinite(x + y + angle):
+            continue
+        sine, cosine = math.sin(angle), math.cos(angle)
+        root = x + place[0] * cosine - place[1] * sine, y + place[0] * sine + place[1] * cosine
+        out = way[0] * cosine - way[1] * sine, way[0] * sine + way[1] * cosine
+        begin, end = camera.to_screen(np.array((root, (root[0] + out[0], root[1] + out[1])))).tolist()
+        along = end[0] - begin[0], end[1] - begin[1]
+        if math.hypot(*along) >= MIN_FLAME and max(map(abs, (*begin, *end))) < 30_000.0:
+            _tongue(view, begin, along, 1.0, ORANGE)
+            _tongue(view, begin, along, INNER, YELLOW)
+
+
+def _tongue(view: DrawContext, begin: list[float], along: tuple[float, float], size: float, colour: Colour) -> None:
+    (x, y), (dx, dy) = begin, along
+    sides = [*OUTLINE, *((share, -across) for share, across in reversed(OUTLINE[:-1]))]
+    points = [(x + size * (a * dx - b * dy), y + size * (a * dy + b * dx)) for a, b in sides]
+    pygame.draw.polygon(view.surface, colour, points)
+    if view.antialias:
+        pygame.draw.aalines(view.surface, colour, True, points)
+
+
+LINES = 300
+"""Bodies whose trails are lines."""
+PLACES = 96
+"""The most places of one body that are joined."""
+SHADES = 8
+"""Steps in which a trail fades."""
+MAX_DRAWN_POINTS = 200_000
+
+
+def draw_trails(view: DrawContext, points: ParticleRenderer) -> None:
+    """Draw the last places of the bodies in sight, the older the fainter."""
+    if not len(view.shown) or sum(len(piece) for piece in view.sight.trails) < 2:
+        return
+    crowd = len(view.shown) > LINES
+    some = view.first(MAX_DRAWN_POINTS // 16)
+    places = _joined(view.sight.trails, some.shown, max(MAX_DRAWN_POINTS // len(some.shown), 1) if crowd else PLACES)
+    shades = np.linspace(0.15, 0.85, SHADES)
+    tints = [np.rint(np.asarray(BACKGROUND) * (1 - s) + some.colours * s).astype(np.uint8) for s in shades]
+    bounds = np.linspace(0, len(places), SHADES + 1).astype(int).tolist()
+    for shade, (first, last) in enumerate(pairwise(bounds)):
+        if crowd:
+            tones = np.tile(packed_pixels(tints[shade], view.surface), last - first)
+            points.draw(view.surface, view.camera, places[first:last].reshape(-1, 2), tones)
+        elif last > first:
+            _lines(view, places[first : last + 1], tints[shade])
+
+
+def _joined(pieces: tuple[FloatArray, ...], shown: IntArray, most: int) -> FloatArray:
+    """Return the places of some bodies, (T, K, 2) m, thinned out to `most`; nan for a body that a piece knows not."""
+    total = sum(len(piece) for piece in pieces)
+    every = -(-total // most)
+    rows = []
+    skip = (total - 1) % every  # so that the newest place is among them
+    for piece in pieces:
+        kept = piece[skip::every]
+        skip = (skip - len(piece)) % every
+        known = shown < piece.shape[1]
+        part = np.full((len(kept), len(shown), 2), np.nan)
+        part[:, known] = kept[:, shown[known]]
+        rows.append(part)
+    return np.concatenate(rows)
+
+
+def _lines(view: DrawContext, places: FloatArray, tints: ColourArray) -> None:
+    """Draw one shade of every trail; a trail is broken where its body was nowhere, or far out of the picture."""
+    if len(places) < 2:
+        return
+    width, height = view.camera.size
+    with np.errstate(invalid="ignore", over="ignore"):
+        pixels = view.camera.to_screen(places) - 0.5
+        x, y = pixels[..., 0], pixels[..., 1]
+        near = (np.abs(x - width / 2) < 4 * width + 100) & (np.abs(y - height / 2) < 4 * height + 100)
+    draw = pygame.draw.aalines if view.antialias and len(tints) <= LINES // 4 else pygame.draw.lines
+    whole = np.asarray(near.all(axis=0), np.bool_)
+    for k, (tint, trail) in enumerate(zip(tints.tolist(), pixels.transpose(1, 0, 2).tolist(), strict=True)):
+        if whole[k]:
+            draw(view.surface, tint, False, trail)
+            continue
+        sound = near[:, k]
+        turns = np.concatenate(([0], np.flatnonzero(np.diff(sound)) + 1, [len(sound)])).tolist()
+        for first, last in pairwise(turns):
+            if sound[first] and last - first > 1:
+                draw(view.surface, tint, False, trail[first:last])
+
+
+BODILY = frozenset({"velocities", "bounds", "centres", "names", "trails"})
+"""Overlays that need to know which bodies are in sight."""
+APART = 3.0
+"""px between a body and its ghost from which a line joins them"""
+MAX_GHOSTS = 4000
+
+
+class OverlayRenderer:
+    """Draws the overlays of a picture, what lies below the bodies and what lies above them."""
+
+    def __init__(self, discs: CircleRenderer, points: ParticleRenderer, polygons: PolygonRenderer) -> None:
+        self._discs = discs
+        self._points = points
+        self._polygons = polygons
+
+    def need_bodies(self, sight: Snapshot) -> bool:
+        """Tell whether the bodies in sight must be known, even those that are mere points."""
+        return not BODILY.isdisjoint(sight.overlays) or sight.overlapping is not None
+
+    def below(self, view: DrawContext) -> None:
+        """Draw what bodies cover."""
+        if "trails" in view.sight.overlays:
+            draw_trails(view, self._points)
+        if "shapes" in view.sight.overlays and view.sight.flames:
+            draw_flames(view)
+        if "shapes" in view.sight.overlays and len(view.sight.links):
+            draw_joints(view, joint_segments(view), self._discs)
+
+    def above(self, view: DrawContext) -> None:
+        """Draw what covers bodies."""
+        overlays, drives = view.sight.overlays, view.sight.scene.drives
+        if drives and "shapes" in overlays:
+            draw_hinges(view, self._discs)
+        if view.sight.ghost is not None:
+            self._ghost(view)
+        if "bounds" in overlays:
+            draw_boxes(view, self._polygons)
+        if "joints" in overlays and len(view.sight.links):
+            draw_joint_symbols(view, joint_segments(view), self._discs)
+        if drives and "joints" in overlays:
+            draw_stops(view)
+        if "centres" in overlays:
+            draw_centres(view)
+        if view.sight.overlapping is not None:
+            draw_verdicts(view)
+        if "velocities" in overlays:
+            draw_velocities(view)
+        if "impulses" in overlays:
+            draw_impulses(view)
+        if "contacts" in overlays:
+            draw_contacts(view, self._discs)
+        draw_flashes(view)
+        draw_picked(view, self._discs, self._polygons)
+        draw_pull(view, self._discs)
+        if "names" in overlays:
+            draw_names(view, self._polygons)
+
+    def _ghost(self, view: DrawContext) -> None:
+        """Draw the bodies of the other engine hollow, and join each to its own where they are apart."""
+        ghost, frame, camera = view.sight.ghost, view.sight.frame, view.camera
+        assert ghost is not None
+        count = min(len(ghost.position), len(frame.position), len(view.sight.bodies))
+        place, radius = ghost.position[:count], view.sight.bodies.radius[:count]
+        with np.errstate(invalid="ignore", over="ignore"):
+            there = camera.in_sight(place, radius) & ghost.present[:count]
+        seen = np.flatnonzero(there & ~view.sight.bodies.fixed[:count])  # what never moves never differs
+        if len(seen) > MAX_GHOSTS:
+            seen = seen[np.linspace(0, len(seen) - 1, MAX_GHOSTS).astype(np.intp)]
+        if not len(seen):
+            return
+        centre, own = camera.to_screen(place[seen]), camera.to_screen(frame.position[seen])
+        tint = np.broadcast_to(np.asarray(INK, np.uint8), (len(seen), 3))
+        style = view.style(1.5)._replace(hollow=True)
+        size, bodies = radius[seen] * camera.scale, view.sight.bodies
+        lone = bodies.round[seen] | (size < 2.0 * view.unit)
+        self._discs.draw(view.surface, centre[lone], np.maximum(size[lone], 2.0 * view.unit), tint[lone], style)
+        who, angle = seen[~lone], ghost.angle[seen[~lone]]
+        self._polygons.draw(view.surface, bodies, who, centre[~lone], angle, camera.scale, tint[~lone], style)
+        with np.errstate(invalid="ignore", over="ignore"):
+            gap = np.hypot(*(centre - own).T)
+        for k in np.flatnonzero((gap > APART * view.unit) & frame.present[seen]).tolist():
+            (ax, ay), (bx, by) = own[k].tolist(), centre[k].tolist()
+            draw_line(view.surface, (ax, ay), (bx, by), mix_colours(FAINT, INK, 0.3), 1.0 * view.unit, view.antialias)

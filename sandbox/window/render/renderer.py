@@ -1,0 +1,370 @@
+"""Picture: one moment of a scene, drawn. It touches only what is in sight, and keeps what does not change.
+
+Inset: a part of a scene that is drawn larger in a corner of the picture, where the picture shows it small.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+
+from sandbox.arrays import BoolArray, IntArray
+from sandbox.games.artillery.scene import Artillery
+from sandbox.games.artillery.view import draw_above, draw_below, draw_land, draw_tanks
+from sandbox.games.billiards.view_aim import draw_aim, draw_paths
+from sandbox.games.billiards.view_balls import BallRenderer
+from sandbox.games.billiards.view_table import draw_table
+from sandbox.games.curling.view import draw_stones
+from sandbox.games.pinball.view import LampRenderer, draw_lamps, draw_playfield
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.description.game_tables import table_of
+from sandbox.scene.scene import Scene
+from sandbox.window.camera import Box, Camera
+from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.circles import CircleRenderer, draw_rotation_marks
+from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.grid import draw_grid, draw_scale
+from sandbox.window.render.overlays import OverlayRenderer
+from sandbox.window.render.palette import BACKGROUND, CLEAR, INK, SKY, TOUCHING, ColourArray, colour_of, mix_colours
+from sandbox.window.render.particles import MAX_POINT_SIZE, LifetimeColours, Packed, ParticleRenderer, packed_pixels
+from sandbox.window.render.polygons import PolygonRenderer
+from sandbox.window.render.static_geometry import (
+    LayerRenderer,
+    draw_bounds,
+    draw_markings,
+    draw_static_bodies,
+    draw_zones,
+    layers_among,
+    on_layer,
+)
+
+POINT = 1.2
+"""px, the radius below which a ball is a point"""
+CROWD = 20_000
+"""Bodies, of which many are points."""
+ROUNDISH = 0.9
+"""Share of its radius that the disc within a body has at least, if only a spoke shows how it has turned."""
+
+
+class CachedBackground(NamedTuple):
+    """What a background was drawn for; `scene` is compared by identity."""
+
+    scene: Scene
+    camera: Camera
+    bounds: bool
+    antialias: bool
+    unit: float
+    format: tuple[object, ...]
+
+
+class BodySizes(NamedTuple):
+    """Which bodies are points at a scale; N of them."""
+
+    bodies: Bodies
+    scale: float
+    unit: float
+    tiny: BoolArray
+    """(N,)"""
+    all_tiny: bool
+    large: IntArray
+    """numbers of those that are discs"""
+    side: int
+    """px, of a point: about the diameter of the median of them; 0 where there is none"""
+
+
+class Renderer:
+    """Draws pictures of scenes. One of them serves a window for its whole life; its caches are bounded."""
+
+    def __init__(self) -> None:
+        self._discs = CircleRenderer()
+        self._points = ParticleRenderer()
+        self._polygons = PolygonRenderer()
+        self._balls = BallRenderer()
+        self._decks = LayerRenderer()
+        self._lamps = LampRenderer()
+        self._overlays = OverlayRenderer(self._discs, self._points, self._polygons)
+        self._background: tuple[CachedBackground, pygame.Surface] | None = None
+        self._sizes: BodySizes | None = None
+        self._known: tuple[Bodies, Scene] | None = None
+        self._colours: ColourArray = np.empty((0, 3), np.uint8)
+        self._turning: BoolArray = np.empty(0, np.bool_)
+        self._tones: tuple[ColourArray, tuple[object, ...], Packed] | None = None
+        self._ageing: LifetimeColours | None = None
+
+    def draw(
+        self,
+        surface: pygame.Surface,
+        camera: Camera,
+        sight: Snapshot,
+        *,
+        antialias: bool = True,
+        unit: float = 1.0,
+        foot: float = 0.0,
+        scale: bool = True,
+    ) -> None:
+        """Draw one moment over the whole of a surface.
+
+        Args:
+            surface: of any format; `camera.size` is its size.
+            camera: what it shows.
+            sight: the moment. Bodies at nan or inf, and those not present, are left out.
+            antialias: whether edges are smooth; without, it takes about half the time.
+            unit: px, of a line that is one pixel wide on a 1080p display; all widths and letters grow with it.
+            foot: px at the lower edge that something else will cover.
+            scale: draw the bar that tells how long things are.
+        """
+        self._blit_background(surface, camera, sight, antialias, unit)
+        if sight.lit:
+            self._lamps.draw(surface, camera, sight.scene, sight.lit)
+        self._know(sight)
+        sizes = self._sized(sight.bodies, camera.scale, unit)
+        colours, ageing = self._colours, self._ageing
+        if sight.overlapping is not None:
+            colours, ageing = _by_contact(sight.overlapping, len(sight.bodies)), None
+        if "shapes" in sight.overlays and sizes.side:
+            self._draw_points(surface, camera, sight, sizes, colours, ageing)
+
+        shown = _in_sight(camera, sight, None if self._overlays.need_bodies(sight) else sizes.large)
+        tint = colours[shown] if ageing is None else ageing.over(colours[shown], shown, sight.frame.time)
+        view = DrawContext(
+            surface=surface,
+            camera=camera,
+            sight=sight,
+            unit=unit,
+            antialias=antialias,
+            shown=shown,
+            centre=camera.to_screen(sight.frame.position[shown]),
+            radius=sight.bodies.radius[shown] * camera.scale,
+            colours=tint,
+        )
+        self._overlays.below(view)
+        if sight.aim is not None:
+            draw_paths(view, sight.aim, self._colours)
+        if sight.gunnery is not None:
+            draw_below(view, sight.gunnery)
+        if "shapes" in sight.overlays and sight.scene.surface is not None and not sizes.side:
+            if sight.scene.surface.bodies == "pucks" and sight.bodies.round.all():
+                draw_stones(view, self._discs)
+            else:
+                self._balls.draw(view)
+        elif "shapes" in sight.overlays:
+            own = _drawn_otherwise(sight)
+            large = np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None
+            if len(own):
+                others = np.flatnonzero(~np.isin(shown, own))
+                large = others if large is None else np.intersect1d(large, others)
+            self._draw_layers(view, large)
+            if sight.gunnery is not None:
+                draw_tanks(view, sight.gunnery, {n: tuple(self._colours[n].tolist()) for n in own.tolist()})
+        self._overlays.above(view)
+        if sight.aim is not None:
+            draw_aim(view, sight.aim)
+        if sight.gunnery is not None:
+            draw_above(view, sight.gunnery)
+        if scale:
+            draw_scale(surface, camera, unit, foot)
+
+    def _draw_layers(self, view: DrawContext, which: IntArray | None) -> None:
+        """Draw the bodies that are no points, from the ground up, with what is fixed on each layer above it."""
+        scene = view.sight.scene
+        if len(scene.layers) == 1:
+            self._draw_bodies(view, which)
+            return
+        which = np.arange(len(view.shown)) if which is None else which
+        layer = layers_among(view.sight.frame, view.shown[which])
+        for k in range(len(scene.layers)):
+            if k > 0:
+                self._decks.draw(view.surface, view.camera, scene, k, view.unit, view.antialias)
+            self._draw_bodies(view, which[layer == k])
+
+    def _draw_bodies(self, view: DrawContext, which: IntArray | None) -> None:
+        """Draw the bodies that are no points: all, or those at some places of the view."""
+        centre, radius, colours, shown = view.centre, view.radius, view.colours, view.shown
+        if which is not None:
+            centre, radius, colours, shown = centre[which], radius[which], colours[which], shown[which]
+        bodies, frame = view.sight.bodies, view.sight.frame
+        turning, lone = self._turning[shown], bodies.round[shown]
+        if lone.all():
+            self._discs.draw(view.surface, centre, radius, colours, view.style())
+        else:
+            those, angle = shown[~lone], frame.angle[shown[~lone]]
+            self._polygons.draw(
+                view.surface, bodies, those, centre[~lone], angle, view.camera.scale, colours[~lone], view.style()
+            )
+            self._discs.draw(view.surface, centre[lone], radius[lone], colours[lone], view.style())
+            turning &= lone | (bodies.core[shown] > ROUNDISH * bodies.radius[shown])
+            radius = bodies.core[shown] * view.camera.scale
+        if not turning.all():
+            centre, radius, colours, shown = centre[turning], radius[turning], colours[turning], shown[turning]
+        if len(shown):
+            draw_rotation_marks(view.surface, centre, radius, frame.angle[shown], colours, view.antialias)
+
+    def _draw_points(
+        self,
+        surface: pygame.Surface,
+        camera: Camera,
+        sight: Snapshot,
+        sizes: "BodySizes",
+        colours: ColourArray,
+        ageing: LifetimeColours | None,
+    ) -> None:
+        """Draw the bodies that are too small for discs, those who fade as they do at their ages."""
+        form = (surface.get_masks(), surface.get_bytesize())
+        if self._tones is None or self._tones[0] is not colours or self._tones[1] != form:
+            self._tones = colours, form, packed_pixels(colours, surface)
+        if ageing is not None:
+            ageing.fade(self._tones[2], packed_pixels(ageing.shades, surface), sight.frame.time)
+        frame = sight.frame
+        count = min(len(frame.position), len(colours))
+        who = None if sizes.all_tiny and frame.present.all() else frame.present[:count] & sizes.tiny[:count]
+        self._points.draw(surface, camera, frame.position[:count], self._tones[2], who, sizes.side)
+
+    def _sized(self, bodies: Bodies, scale: float, unit: float) -> "BodySizes":
+        """Return who is drawn how at a scale; it is worked out when that changes."""
+        known = self._sizes
+        if known is None or known.bodies is not bodies or known.scale != scale or known.unit != unit:
+            tiny = bodies.radius * scale < POINT * max(unit, 1.0)
+            side = 0
+            if tiny.any():
+                diameter = 2.0 * float(np.median(bodies.radius[tiny])) * scale
+                # Of a crowd one sees the gaps rather than the points: they are drawn no larger than they are.
+                side = int(diameter) if len(tiny) > CROWD else round(diameter)
+                side = min(max(side, round(unit), 1), MAX_POINT_SIZE)
+            self._sizes = known = BodySizes(bodies, scale, unit, tiny, bool(tiny.all()), np.flatnonzero(~tiny), side)
+        return known
+
+    def _know(self, sight: Snapshot) -> None:
+        """Work out what holds for bodies as long as they stay the same: their colours, and who can turn."""
+        bodies, scene = sight.bodies, sight.scene
+        if self._known is not None and self._known[0] is bodies and self._known[1] is scene:
+            return
+        self._known, self._colours = (bodies, scene), colour_of(bodies)
+        ageing = LifetimeColours(bodies)
+        self._ageing = ageing if len(ageing) else None
+        turned = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
+        self._turning = turned | contact_matrix(sight.setup or scene, bodies).turnable
+
+    def _blit_background(
+        self, surface: pygame.Surface, camera: Camera, sight: Snapshot, antialias: bool, unit: float
+    ) -> None:
+        form = (surface.get_size(), surface.get_masks(), surface.get_bytesize())
+        wanted = CachedBackground(sight.scene, camera, "bounds" in sight.overlays, antialias, unit, form)
+        known = self._background
+        if known is None or known[0].scene is not wanted.scene or known[0][1:] != wanted[1:]:
+            drawn = pygame.Surface(surface.get_size(), 0, surface)
+            drawn.fill(BACKGROUND)
+            area = sight.scene.play.area
+            if sight.scene.play.ground == "playfield":
+                draw_playfield(drawn, camera, sight.scene, unit, antialias)
+            elif table_of(sight.scene, Artillery) is not None:
+                draw_land(drawn, camera, sight.scene, unit, antialias)
+            elif area is None:
+                draw_grid(drawn, camera, unit)
+                draw_markings(drawn, camera, sight.scene, unit, antialias)
+                draw_lamps(drawn, camera, sight.scene, unit, antialias)
+                draw_zones(drawn, camera, sight.scene, unit, antialias)
+                ground = sight.scene if len(sight.scene.layers) == 1 else on_layer(sight.scene, 0)
+                draw_static_bodies(drawn, camera, ground, unit, antialias)
+            else:
+                draw_table(drawn, camera, sight.scene, area, unit, antialias)
+            if wanted.bounds:
+                draw_bounds(drawn, camera, sight.scene.world.bounds, unit, antialias)
+            self._background = known = (wanted, drawn)
+        surface.blit(known[1], (0, 0))
+
+
+def _in_sight(camera: Camera, sight: Snapshot, among: IntArray | None) -> IntArray:
+    """Return the numbers of the bodies that are present and at least partly in the picture."""
+    frame = sight.frame
+    count = min(len(frame.position), len(sight.bodies))
+    position, radius, present = frame.position[:count], sight.bodies.radius[:count], frame.present[:count]
+    if among is not None and len(among) < count:
+        among = among[among < count]
+        position, radius, present = position[among], radius[among], present[among]
+    else:
+        among = None
+    with np.errstate(invalid="ignore", over="ignore"):  # what is far out of sight may overflow, or be nan
+        seen = np.flatnonzero(camera.in_sight(position, radius) & present)
+    return seen if among is None else among[seen]
+
+
+def _drawn_otherwise(sight: Snapshot) -> IntArray:
+    """Return the numbers of the bodies that are more than their shapes: tanks."""
+    return np.asarray([] if sight.gunnery is None else [gun.number for gun in sight.gunnery.guns], np.int64)
+
+
+def _by_contact(overlapping: BoolArray, count: int) -> ColourArray:
+    """Return the colours of a scene that shows contact by colour."""
+    touching = np.zeros(count, np.bool_)
+    touching[: len(overlapping)] = overlapping[:count]
+    return np.where(touching[:, None], np.asarray(TOUCHING, np.uint8), np.asarray(CLEAR, np.uint8))
+
+
+WIDE, HIGH = 0.72, 0.38
+"""Of the picture, that an inset takes at most."""
+MARGIN = 10
+"""px at unit 1 to the edges of the picture"""
+LARGER = 1.5
+"""An inset is of use that shows things so many times as large as the picture."""
+EDGE = mix_colours(SKY, INK, 0.25)
+
+
+class InsetRenderer:
+    """Draws the inset of a scene that states one."""
+
+    def __init__(self) -> None:
+        self._picture = Renderer()
+        self._surface: pygame.Surface | None = None
+
+    def draw(
+        self,
+        surface: pygame.Surface,
+        camera: Camera,
+        sight: Snapshot,
+        free: pygame.Rect,
+        *,
+        antialias: bool = True,
+        unit: float = 1.0,
+        aside: int = 0,
+    ) -> pygame.Rect | None:
+        """Draw it into the lower right corner, and mark what it is of; return where it is, None where there is none.
+
+        Args:
+            surface: the picture, drawn already.
+            camera: what that shows.
+            sight: the moment.
+            free: what nothing else covers.
+            antialias: whether edges are smooth.
+            unit: px, of a line that is one pixel wide on a 1080p display.
+            aside: px at the lower right that something else takes.
+        """
+        box = sight.scene.play.inset
+        if box is None:
+            return None
+        place = _place(box, free, round(MARGIN * unit), aside)
+        near = Camera.fitting(box, place.size, margin=0.0)
+        if min(place.size) < 1 or near.scale < LARGER * camera.scale or camera.turned:
+            return None
+        if self._surface is None or self._surface.get_size() != place.size:
+            self._surface = pygame.Surface(place.size, 0, surface)
+        self._picture.draw(self._surface, near, sight, antialias=antialias, unit=unit, scale=False)
+        surface.blit(self._surface, place)
+        thick = max(round(1.5 * unit), 1)
+        pygame.draw.rect(surface, EDGE, place, thick)
+        (left, bottom), (right, top) = camera.to_screen(np.asarray(box)).tolist()
+        seen = pygame.Rect(round(left), round(top), round(right - left), round(bottom - top)).clip(surface.get_rect())
+        if not place.colliderect(seen):
+            pygame.draw.rect(surface, EDGE, seen, thick)
+        return place
+
+
+def _place(box: Box, free: pygame.Rect, margin: int, aside: int) -> pygame.Rect:
+    """Return where a box is drawn as large as it may be."""
+    (left, bottom), (right, top) = box
+    room = free.width - 2 * margin - (aside + margin if aside else 0)
+    scale = min(min(WIDE * free.width, room) / (right - left), HIGH * free.height / (top - bottom))
+    size = max(round(scale * (right - left)), 0), max(round(scale * (top - bottom)), 0)
+    place = pygame.Rect((0, 0), size)
+    place.bottomright = free.right - margin - (aside + margin if aside else 0), free.bottom - margin
+    return place

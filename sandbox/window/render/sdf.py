@@ -1,0 +1,137 @@
+"""Shade: shapes given by their signed distance, with antialiased edges, as sprites or straight onto a picture.
+
+A distance is in pixels, negative inside; pixel (i, j) is sampled at its middle (i + ½, j + ½).
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pygame
+
+from sandbox.arrays import FloatArray
+from sandbox.window.render.palette import Colour
+
+SignedDistance = Callable[[FloatArray, FloatArray], FloatArray]
+"""Takes x and y, px, that broadcast, and returns the signed distance there; it changes by no more than 1 a pixel."""
+
+TILE = 16
+"""px; edges are shaded in squares of this side, the rest is filled"""
+FAR_OUTSIDE = 1e6
+
+
+class ShapeStyle(NamedTuple):
+    """How a shape is painted: a filling, or none, and a rim that lies inside the edge."""
+
+    fill: Colour | None
+    rim: Colour
+    line: float
+    """width of the rim, px"""
+    opacity: float = 1.0
+    antialias: bool = True
+
+
+def shade_sdf(distance: FloatArray, look: ShapeStyle) -> npt.NDArray[np.uint32]:
+    """Return the pixels (…) of a shape as 0xAARRGGBB; where the distance is nan there is nothing."""
+    near = np.nan_to_num(distance, nan=FAR_OUTSIDE, posinf=FAR_OUTSIDE, neginf=-FAR_OUTSIDE).astype(np.float32)
+    inside = np.clip(0.5 - near, 0.0, 1.0)
+    rim = np.clip(near + np.float32(look.line + 0.5), 0.0, 1.0) if look.line > 0 else np.zeros_like(near)
+    if not look.antialias:
+        inside, rim = np.rint(inside), np.rint(rim)
+    if look.fill is None:
+        inside = inside * rim
+        rim = np.ones_like(rim)
+    pixels = np.rint(inside * np.float32(255.0 * look.opacity)).astype(np.uint32)
+    for edge, middle in zip(look.rim, look.fill or look.rim, strict=True):
+        pixels = pixels << 8 | np.rint(middle + (edge - middle) * rim).astype(np.uint32)
+    return np.asarray(pixels, np.uint32)
+
+
+def sdf_surface(pixels: npt.NDArray[np.uint32], encoded: bool = True) -> pygame.Surface:
+    """Return a surface of pixels (W, H), 0xAARRGGBB; run-length encoded it is blitted several times as fast."""
+    surface = pygame.Surface(pixels.shape, pygame.SRCALPHA, 32, (0xFF0000, 0xFF00, 0xFF, 0xFF000000))
+    pygame.surfarray.pixels2d(surface)[:] = pixels
+    if encoded:
+        surface.set_alpha(255, pygame.RLEACCEL)
+    return surface
+
+
+def disc_distance(x: float, y: float, radius: float) -> SignedDistance:
+    """Return the distance from a circle; one too large for its curvature to be seen is a straight line."""
+    if radius < 1e12:
+        return lambda px, py: np.asarray(np.sqrt((px - x) ** 2 + (py - y) ** 2) - radius)
+    far = float(np.hypot(x, y))
+    if far == 0.0:
+        return lambda px, py: np.broadcast_to(-radius, np.broadcast_shapes(px.shape, py.shape))
+    return lambda px, py: (far - radius) - (px * (x / far) + py * (y / far))
+
+
+def capsule_distance(a: tuple[float, float], b: tuple[float, float], radius: float) -> SignedDistance:
+    """Return the distance from a segment with round ends."""
+    along = b[0] - a[0], b[1] - a[1]
+    squared = max(along[0] ** 2 + along[1] ** 2, 1e-12)
+
+    def distance(px: FloatArray, py: FloatArray) -> FloatArray:
+        x, y = px - a[0], py - a[1]
+        share = np.clip((x * along[0] + y * along[1]) / squared, 0.0, 1.0)
+        return np.asarray(np.sqrt((x - share * along[0]) ** 2 + (y - share * along[1]) ** 2) - radius)
+
+    return distance
+
+
+def line_distance(offset: float, normal: tuple[float, float]) -> SignedDistance:
+    """Return the distance from a half-plane whose normal (a unit vector, y down) points out of it."""
+    return lambda px, py: offset + px * normal[0] + py * normal[1]
+
+
+def draw_sdf(
+    surface: pygame.Surface, distance: SignedDistance, look: ShapeStyle, within: pygame.Rect | None = None
+) -> None:
+    """Paint a shape onto a picture, of whatever size and however far outside.
+
+    Args:
+        surface: of any format.
+        distance: of the shape.
+        look: how.
+        within: px, where the shape can be at all.
+    """
+    area = surface.get_clip() if within is None else surface.get_clip().clip(within)
+    if not area.width or not area.height:
+        return
+    left, top = np.arange(area.left, area.right, TILE), np.arange(area.top, area.bottom, TILE)
+    across, along = (np.asarray(corner + TILE / 2.0, np.float64) for corner in (left, top))
+    middle = distance(across[:, None], along[None, :])
+    reach = TILE / 2.0 * np.sqrt(2.0) + 1.0
+    full = middle < -reach - look.line
+    if look.fill is not None and look.opacity == 1.0:
+        _fill(surface, full, area, look.fill)
+        edge = ~full & (middle < reach)
+    else:
+        edge = (middle < reach) if look.fill is not None else (middle < reach) & ~full
+    column, row = np.nonzero(edge)
+    if not len(column):
+        return
+    x = np.asarray(left[column, None] + np.arange(TILE) + 0.5, np.float64)[:, :, None]
+    y = np.asarray(top[row, None] + np.arange(TILE) + 0.5, np.float64)[:, None, :]
+    pixels = shade_sdf(distance(x, y), look)
+    strip = sdf_surface(pixels.reshape(-1, TILE), encoded=False)
+    clip = surface.get_clip()
+    surface.set_clip(area)
+    places = zip(left[column].tolist(), top[row].tolist(), strict=True)
+    surface.blits([(strip, place, (k * TILE, 0, TILE, TILE)) for k, place in enumerate(places)], False)
+    surface.set_clip(clip)
+
+
+def _fill(surface: pygame.Surface, full: npt.NDArray[np.bool_], area: pygame.Rect, colour: Colour) -> None:
+    """Fill the tiles that lie wholly inside, a run of them at once."""
+    if full.all():
+        surface.fill(colour, area)
+        return
+    padded = np.zeros((full.shape[0] + 2, full.shape[1]), np.int8)
+    padded[1:-1] = full
+    change = np.diff(padded, axis=0).T  # (rows, columns + 1): +1 where a run starts, −1 behind its end
+    starts, ends = np.argwhere(change == 1), np.argwhere(change == -1)
+    for (row, first), (_, last) in zip(starts.tolist(), ends.tolist(), strict=True):
+        run = pygame.Rect(area.left + first * TILE, area.top + row * TILE, (last - first) * TILE, TILE)
+        surface.fill(colour, run.clip(area))

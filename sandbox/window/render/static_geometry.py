@@ -1,0 +1,430 @@
+"""StaticColliders: planes, walls, posts and the world's bounds, which change with the camera alone.
+
+Decks: what is on other layers than the ground, drawn above the bodies there, and see-through.
+
+Markings: what a scene has painted on the ground, which changes with the camera alone.
+
+Zones: faint tinted areas beneath everything that moves, with a thin outline.
+"""
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.fixed import Plane, Post, Wall, Zone, mask_of
+from sandbox.scene.description.play import Marking
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Frame
+from sandbox.window.camera import Box, Camera
+from sandbox.window.render.lines import Pixel, clip_polygon, clip_segment, draw_dashes, draw_line, fill_polygon
+from sandbox.window.render.palette import (
+    BACKGROUND,
+    FAINT,
+    GREEN,
+    NEUTRAL,
+    ORANGE,
+    SKY,
+    SOLID,
+    SURFACE,
+    Colour,
+    colour_of_fixed,
+    hex_colour,
+    mix_colours,
+)
+from sandbox.window.render.sdf import (
+    ShapeStyle,
+    SignedDistance,
+    capsule_distance,
+    disc_distance,
+    draw_sdf,
+    line_distance,
+)
+
+HATCH, HATCHES = 9.0, 600
+"""px between two hatches of a plane, and the most of them"""
+WAYS = 60.0
+"""px between two arrows through a wall that lets pass from one side"""
+CAP = 5.0
+"""px, the least radius at which a post that kicks shows its ring"""
+ABSENT = 0.4
+"""How much of its colour is left of what is not solid"""
+MAX_ROUND_POINTS = 300
+"""Segments of thick walls in sight that get round, shaded ends; where there are more, all are plain lines."""
+
+
+def draw_static_bodies(
+    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
+) -> None:
+    """Draw what is fixed in a scene, as far as it is in sight."""
+    for plane in scene.planes:
+        _plane(surface, camera, plane, unit, antialias)
+    for wall in scene.walls:
+        _wall(surface, camera, wall, unit, antialias)
+    for post in scene.posts:
+        _post(surface, camera, post, unit, antialias)
+
+
+def draw_bounds(
+    surface: pygame.Surface, camera: Camera, bounds: Box | None, unit: float = 1.0, antialias: bool = True
+) -> None:
+    """Draw the box outside which bodies are retired, dashed."""
+    if bounds is not None:
+        draw_dashes(surface, outline(camera, bounds), FAINT, 8.0 * unit, antialias)
+
+
+def outline(camera: Camera, box: Box) -> list[tuple[Pixel, Pixel]]:
+    """Return the sides of a box, px."""
+    (left, bottom), (right, top) = box
+    world = np.asarray([(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)])
+    return list(pairwise((x, y) for x, y in camera.to_screen(world).tolist()))
+
+
+def _plane(surface: pygame.Surface, camera: Camera, plane: Plane, unit: float, antialias: bool) -> None:
+    length = math.hypot(*plane.normal)
+    nx, ny = plane.normal[0] / length, plane.normal[1] / length
+    middle = camera.size[0] / 2.0, camera.size[1] / 2.0
+    # The height of the picture's middle above the plane is worked out in metres: the plane's own point may be so far
+    # away that its place in pixels says nothing.
+    height = ((camera.centre[0] - plane.point[0]) * nx + (camera.centre[1] - plane.point[1]) * ny) * camera.scale
+    down = nx, -ny
+    offset = height - middle[0] * down[0] - middle[1] * down[1]
+    edge = colour_of_fixed(plane, SURFACE)
+    filling = SOLID if plane.colour is None else mix_colours(BACKGROUND, edge, 0.25)
+    draw_sdf(surface, line_distance(offset, down), ShapeStyle(filling, edge, 2.0 * unit, antialias=antialias))
+
+    foot = middle[0] - height * down[0], middle[1] - height * down[1]
+    along = -down[1], down[0]
+    reach = camera.size[0] + camera.size[1]
+    if abs(height) < reach:
+        phase = math.fmod(
+            ((plane.point[0] - camera.centre[0]) * along[0] - (plane.point[1] - camera.centre[1]) * along[1])
+            * camera.scale,
+            HATCH * unit,
+        )
+        _hatch(surface, foot, along, down, phase, reach, mix_colours(filling, edge, 0.3), unit, antialias)
+
+
+def _hatch(
+    surface: pygame.Surface,
+    foot: Pixel,
+    along: Pixel,
+    out: Pixel,
+    phase: float,
+    reach: float,
+    colour: Colour,
+    unit: float,
+    antialias: bool,
+) -> None:
+    """Draw short slanted lines behind a plane's edge; they move with the plane's point."""
+    ends = (
+        (foot[0] - along[0] * reach, foot[1] - along[1] * reach),
+        (foot[0] + along[0] * reach, foot[1] + along[1] * reach),
+    )
+    part = clip_segment(*ends, surface.get_clip(), 20.0 * unit)
+    if part is None:
+        return
+    step = HATCH * unit
+    low, high = sorted((p[0] - foot[0]) * along[0] + (p[1] - foot[1]) * along[1] for p in part)
+    first = math.ceil((low - phase) / step)
+    for k in range(first, min(math.floor((high - phase) / step) + 1, first + HATCHES)):
+        s = phase + k * step
+        x, y = foot[0] + along[0] * s - out[0] * 3.0 * unit, foot[1] + along[1] * s - out[1] * 3.0 * unit
+        slant = (along[0] - out[0]) * 6.0 * unit, (along[1] - out[1]) * 6.0 * unit
+        draw_line(surface, (x, y), (x + slant[0], y + slant[1]), colour, 1.0, antialias)
+
+
+def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, antialias: bool) -> None:
+    points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
+    half = wall.thickness / 2.0 * camera.scale
+    thin = half <= 1.0 * unit
+    half = max(half, 1.0 * unit)
+    edge = colour_of_fixed(wall, SURFACE)
+    filling = edge if thin else SOLID if wall.colour is None else mix_colours(BACKGROUND, edge, 0.4)
+    area = surface.get_clip()
+    pixels = camera.to_screen(points).tolist()
+    parts = [part for a, b in pairwise(pixels) if (part := clip_segment((a[0], a[1]), (b[0], b[1]), area, half + 4.0))]
+    if not wall.solid:
+        ends = (((a[0], a[1]), (b[0], b[1])) for a, b in pairwise(pixels))
+        draw_dashes(surface, ends, mix_colours(BACKGROUND, edge, ABSENT), 5.0 * unit, antialias)
+        return
+    if wall.one_way:
+        for a, b in pairwise(pixels):
+            _ways_through(surface, (a[0], a[1]), (b[0], b[1]), half, edge, unit, antialias)
+    plain = len(parts) > MAX_ROUND_POINTS
+    rim = 0.0 if thin else min(1.5 * unit, half)
+    # The outline of all segments first and then the filling of all, so that no outline shows inside a corner.
+    for inset, colour in ((0.0, edge), (rim, filling)) if rim else ((0.0, edge),):
+        for a, b in parts:
+            if plain and half < 4000.0:
+                draw_line(surface, a, b, colour, 2.0 * (half - inset), antialias)
+            else:
+                look = ShapeStyle(colour, colour, 0.0, antialias=antialias)
+                draw_sdf(surface, capsule_distance(a, b, half - inset), look, _around(a, b, half, area))
+
+
+def _ways_through(
+    surface: pygame.Surface, a: Pixel, b: Pixel, half: float, colour: Colour, unit: float, antialias: bool
+) -> None:
+    """Draw small arrows out of a wall's left, the way that it lets pass; they stay where they are on it."""
+    part, length = clip_segment(a, b, surface.get_clip(), half + 12.0 * unit), math.dist(a, b)
+    if part is None or length < 2.0:
+        return
+    ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+    out = uy, -ux  # on the screen y points down: so it is to the left
+    step = length / max(1, round(length / (WAYS * unit)))
+    first = math.floor(math.dist(a, part[0]) / step)
+    for k in range(first, min(math.ceil(math.dist(a, part[1]) / step), first + HATCHES)):
+        s = (k + 0.5) * step
+        x, y = a[0] + s * ux + half * out[0], a[1] + s * uy + half * out[1]
+        tip = x + 10.0 * unit * out[0], y + 10.0 * unit * out[1]
+        draw_line(surface, (x, y), tip, colour, 1.5 * unit, antialias)
+        for side in (-4.0 * unit, 4.0 * unit):
+            barb = tip[0] - 4.0 * unit * out[0] + side * ux, tip[1] - 4.0 * unit * out[1] + side * uy
+            draw_line(surface, tip, barb, colour, 1.5 * unit, antialias)
+
+
+def _around(a: Pixel, b: Pixel, reach: float, area: pygame.Rect) -> pygame.Rect:
+    """Return the part of an area that is no farther than `reach` from the box of two points."""
+    left, top = max(min(a[0], b[0]) - reach - 2.0, area.left), max(min(a[1], b[1]) - reach - 2.0, area.top)
+    right, bottom = min(max(a[0], b[0]) + reach + 2.0, area.right), min(max(a[1], b[1]) + reach + 2.0, area.bottom)
+    if right <= left or bottom <= top:
+        return pygame.Rect(0, 0, 0, 0)
+    return pygame.Rect(int(left), int(top), math.ceil(right) - int(left), math.ceil(bottom) - int(top))
+
+
+def _post(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
+    place = np.asarray([post.position])
+    radius = max(post.radius * camera.scale, 1.0 * unit)
+    if not camera.in_sight(place, radius / camera.scale)[0]:
+        return
+    x, y = camera.to_screen(place)[0].tolist()
+    edge = colour_of_fixed(post, NEUTRAL)
+    around = _around((x, y), (x, y), radius, surface.get_clip())
+    if not post.solid:
+        faint = mix_colours(BACKGROUND, edge, ABSENT)
+        draw_sdf(
+            surface, disc_distance(x, y, radius), ShapeStyle(BACKGROUND, faint, 1.0 * unit, antialias=antialias), around
+        )
+        return
+    look = ShapeStyle(mix_colours(BACKGROUND, edge, 0.55), edge, min(1.5 * unit, radius), antialias=antialias)
+    draw_sdf(surface, disc_distance(x, y, radius), look, around)
+    if post.kick is not None and radius > CAP * unit:  # the ring of a bumper, inside its cap
+        ring = ShapeStyle(mix_colours(BACKGROUND, edge, 0.3), edge, 1.5 * unit, antialias=antialias)
+        draw_sdf(surface, disc_distance(x, y, 0.6 * radius), ring, around)
+
+
+OPACITY = 165
+"""of 255, of what is above the ground"""
+MARGIN = 4
+"""px around what is drawn"""
+
+
+Sprite = tuple[pygame.Surface, tuple[int, int]]
+"""A picture, and where its upper left corner belongs."""
+
+
+class _DrawnLayer(NamedTuple):
+    """A deck as it was drawn."""
+
+    of: tuple[object, ...]
+    picture: Sprite | None
+
+
+def lowest_layer(mask: int) -> int:
+    """Return the number of the lowest of some layers, as bits."""
+    return (mask & -mask).bit_length() - 1
+
+
+def on_layer(scene: Scene, layer: int) -> Scene:
+    """Return a scene with only those walls and posts that have this one for their lowest layer, and planes below."""
+
+    def here(layers: tuple[str, ...]) -> bool:
+        return lowest_layer(mask_of(layers, scene.layers)) == layer
+
+    walls = tuple(wall for wall in scene.walls if here(wall.layers))
+    posts = tuple(post for post in scene.posts if here(post.layers))
+    return scene.model_copy(update={"walls": walls, "posts": posts, "planes": () if layer else scene.planes})
+
+
+def layers_among(frame: Frame, numbers: IntArray) -> IntArray:
+    """Return on which layer each of some bodies is, (K,)."""
+    return np.zeros(len(numbers), np.int64) if frame.layer is None else frame.layer[numbers]
+
+
+class LayerRenderer:
+    """What is above the ground, drawn anew only where it, or the camera, has changed."""
+
+    def __init__(self) -> None:
+        self._scene: Scene | None = None
+        self._decks: tuple[Scene, ...] = ()
+        self._drawn: dict[int, _DrawnLayer] = {}
+
+    def draw(
+        self, surface: pygame.Surface, camera: Camera, scene: Scene, layer: int, unit: float, antialias: bool
+    ) -> None:
+        """Draw the walls and posts of a layer over a picture so that it shines through."""
+        if self._scene is not scene:  # another scene may have the same decks: on the ground a target fell
+            self._scene = scene
+            self._decks = tuple(on_layer(scene, k) for k in range(len(scene.layers)))
+        deck = self._decks[layer]
+        wanted = deck.walls, deck.posts, camera, unit, antialias
+        known = self._drawn.get(layer)
+        if known is None or known.of != wanted:
+            self._drawn[layer] = known = _DrawnLayer(wanted, _deck(surface, camera, deck, unit, antialias))
+        if known.picture is not None:
+            surface.blit(*known.picture)
+
+
+def _deck(surface: pygame.Surface, camera: Camera, deck: Scene, unit: float, antialias: bool) -> Sprite | None:
+    """Return a see-through picture of a layer and where it belongs; several parts that overlap look like one."""
+    places = [(point, wall.thickness / 2.0) for wall in deck.walls for point in wall.points]
+    places += [(post.position, post.radius) for post in deck.posts]
+    if not places:
+        return None
+    pixels = np.asarray(camera.to_screen(np.asarray([place for place, _ in places])))
+    reach = np.asarray([[size * camera.scale] for _, size in places]) + MARGIN * unit
+    low, high = (pixels - reach).min(axis=0).clip(-1e6, 1e6), (pixels + reach).max(axis=0).clip(-1e6, 1e6)
+    box = pygame.Rect(*low.astype(int).tolist(), *(high - low + 2.0).astype(int).tolist()).clip(surface.get_rect())
+    if not box.width or not box.height:
+        return None
+    # Of fixtures on black and of the same on white, the difference tells how much they cover.
+    dark, light = (pygame.Surface(surface.get_size(), 0, 32) for _ in range(2))
+    for ground, colour in ((dark, (0, 0, 0)), (light, (255, 255, 255))):
+        ground.fill(colour)
+        ground.set_clip(box)
+        draw_static_bodies(ground, camera, deck, unit, antialias)
+    black, white = (pygame.surfarray.array3d(each.subsurface(box)).astype(np.int32) for each in (dark, light))
+    cover = (255 - (white - black).mean(axis=2)).clip(0, 255)
+    picture = pygame.Surface(box.size, pygame.SRCALPHA, 32)
+    own = black * (255.0 / np.maximum(cover, 1.0))[:, :, None]
+    pygame.surfarray.pixels3d(picture)[:] = own.clip(0, 255).astype(np.uint8)
+    pygame.surfarray.pixels_alpha(picture)[:] = (cover * (OPACITY / 255.0)).astype(np.uint8)
+    return picture, box.topleft
+
+
+BEYOND = 16_000.0
+"""px to which widths of lines are cut: SDL counts in 32 bits, and draws all of it"""
+
+
+def draw_markings(
+    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
+) -> None:
+    """Draw the markings of a scene, as far as they are in sight."""
+    for marking in scene.play.markings:
+        colour = hex_colour(marking.colour)
+        if marking.position is not None and marking.radius is not None:
+            _circle(surface, camera, marking, (marking.position, marking.radius), colour, unit, antialias)
+        elif marking.filled:
+            corners = camera.to_screen(np.asarray(marking.points)).tolist()
+            kept = clip_polygon([(x, y) for x, y in corners], surface.get_clip())
+            if kept:
+                fill_polygon(surface, kept, colour, antialias)
+        else:
+            places: list[Pixel] = [(x, y) for x, y in camera.to_screen(np.asarray(marking.points)).tolist()]
+            width = min(max(marking.width * camera.scale, unit), BEYOND)
+            for a, b in pairwise(places):
+                draw_line(surface, a, b, colour, width, antialias)
+
+
+def _circle(
+    surface: pygame.Surface,
+    camera: Camera,
+    marking: Marking,
+    circle: tuple[Point, float],
+    colour: Colour,
+    unit: float,
+    antialias: bool,
+) -> None:
+    place = np.asarray([circle[0]])
+    wide = 0.0 if marking.filled else max(marking.width * camera.scale, unit)
+    radius = max(circle[1] * camera.scale, unit) + 0.5 * wide
+    if not camera.in_sight(place, np.asarray([radius / camera.scale]))[0]:
+        return
+    x, y = camera.to_screen(place)[0].tolist()
+    area = surface.get_clip()
+    left, top = max(x - radius - 2.0, area.left), max(y - radius - 2.0, area.top)
+    right, bottom = min(x + radius + 2.0, area.right), min(y + radius + 2.0, area.bottom)
+    if left < right and top < bottom:
+        within = pygame.Rect(int(left), int(top), math.ceil(right) - int(left), math.ceil(bottom) - int(top))
+        look = ShapeStyle(colour if marking.filled else None, colour, wide, antialias=antialias)
+        draw_sdf(surface, disc_distance(x, y, radius), look, within)
+
+
+FILLED, LINED = 0.13, 0.55
+"""opacity of the area, and of its outline"""
+LINE = 1.5
+"""px, of the outline"""
+
+
+def draw_zones(
+    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
+) -> None:
+    """Draw the zones of a scene, as far as they are in sight."""
+    for zone in scene.zones:
+        distance, within = _distance(zone, camera)
+        box = within.inflate(4, 4).clip(surface.get_clip())
+        colour = colour_of_zone(zone)
+        draw_sdf(surface, distance, ShapeStyle(colour, colour, 0.0, FILLED, antialias), box)
+        draw_sdf(surface, distance, ShapeStyle(None, colour, LINE * unit, LINED, antialias), box)
+
+
+def colour_of_zone(zone: Zone) -> Colour:
+    """Return the colour of a zone: its own, or one by what it does."""
+    if zone.colour is not None:
+        return hex_colour(zone.colour)
+    if zone.holds:
+        return ORANGE
+    if zone.to_layer is not None:
+        return GREEN
+    return FAINT if zone.gravity is None else SKY
+
+
+def _distance(zone: Zone, camera: Camera) -> tuple[SignedDistance, pygame.Rect]:
+    """Return the distance from a zone, px, and the part of the picture that it may be in."""
+    if zone.points is None:
+        assert zone.position is not None and zone.radius is not None
+        corners, reach = _pixels((zone.position,), camera), zone.radius * camera.scale
+        x, y = corners[0].tolist()
+        return disc_distance(x, y, reach), _box(corners, reach)
+    corners = _pixels(zone.points, camera)
+    if zone.thickness is None:
+        return _outline(corners), _box(corners, 0.0)
+    half = 0.5 * zone.thickness * camera.scale
+    ends = [(x, y) for x, y in corners.tolist()]
+    parts = [capsule_distance(a, b, half) for a, b in pairwise(ends)]
+
+    def nearest(px: FloatArray, py: FloatArray) -> FloatArray:
+        return np.asarray(np.minimum.reduce([part(px, py) for part in parts]))
+
+    return nearest, _box(corners, half)
+
+
+def _outline(corners: FloatArray) -> SignedDistance:
+    """Return the distance from a simple polygon (K, 2), px; inside, a ray crosses an odd number of sides."""
+    sides = list(zip(corners.tolist(), np.roll(corners, -1, axis=0).tolist(), strict=True))
+
+    def distance(px: FloatArray, py: FloatArray) -> FloatArray:
+        px, py = np.broadcast_arrays(px, py)
+        apart, inside = np.full(px.shape, np.inf), np.zeros(px.shape, np.bool_)
+        for (ax, ay), (bx, by) in sides:
+            apart = np.minimum(apart, capsule_distance((ax, ay), (bx, by), 0.0)(px, py))
+            if ay != by:
+                inside ^= ((ay > py) != (by > py)) & (px < ax + (bx - ax) * (py - ay) / (by - ay))
+        return np.where(inside, -apart, apart)
+
+    return distance
+
+
+def _pixels(points: tuple[Point, ...], camera: Camera) -> FloatArray:
+    return np.asarray(camera.to_screen(np.asarray(points, dtype=np.float64)), dtype=np.float64)
+
+
+def _box(corners: FloatArray, reach: float) -> pygame.Rect:
+    """Return the box of places (K, 2) and so much around them, px, cut to what SDL can count."""
+    low, high = (corners.min(axis=0) - reach).clip(-1e6, 1e6), (corners.max(axis=0) + reach).clip(-1e6, 1e6)
+    return pygame.Rect(*np.floor(low).astype(int).tolist(), *np.ceil(high - low + 1.0).astype(int).tolist())

@@ -1,0 +1,202 @@
+"""Text: words on a surface, in DejaVu Sans where it is installed, rendered once and kept.
+
+Plates: translucent backings that keep words readable over any picture, and lines fitted to a width.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib.util import find_spec
+from itertools import product
+from pathlib import Path
+
+import pygame
+
+from sandbox.window.render.palette import INK, LINE, PANEL, Colour
+
+MAX_TEXT_LENGTH = 400
+"""Letters of one line that are rendered; no surface grows beyond what SDL takes."""
+SMALLEST, MAX_TEXT_SIZE = 4, 128
+"""px, the sizes that are rendered"""
+FARTHEST = 30_000
+"""px, how far outside a picture a place may be for its text to be tried at all"""
+
+
+def draw_text(
+    surface: pygame.Surface,
+    text: str,
+    at: tuple[float, float],
+    size: float,
+    colour: Colour,
+    anchor: str = "topleft",
+    bold: bool = False,
+    mono: bool = False,
+) -> pygame.Rect:
+    """Write one line of text.
+
+    Args:
+        surface: where.
+        text: what; it is cut after `LONGEST` letters, and a control character becomes a space.
+        at: the place of the anchor, px; at one that is not finite nothing is written.
+        size: of the letters, px.
+        colour: of the letters.
+        anchor: which point of the text lies there, as a `pygame.Rect` calls it: `topleft`, `midright`, `center` …
+        bold: in a heavier weight.
+        mono: all letters equally wide, for figures that change.
+
+    Returns:
+        The place that the text covers, whether in the picture or not.
+    """
+    x, y = at
+    if not (abs(x) < FARTHEST and abs(y) < FARTHEST):  # nor where it is nan
+        return pygame.Rect(0, 0, 0, 0)
+    words = _rendered(renderable(text), _whole(size), colour, bold, mono)
+    rect = words.get_rect(**{anchor: (round(x), round(y))})
+    surface.blit(words, rect)
+    return rect
+
+
+def text_size(text: str, size: float, bold: bool = False, mono: bool = False) -> tuple[int, int]:
+    """Return the width and height of a line of text, px."""
+    return _font(_whole(size), bold, mono).size(renderable(text))
+
+
+def _whole(size: float) -> int:
+    return round(min(max(size, SMALLEST), MAX_TEXT_SIZE)) if math.isfinite(size) else SMALLEST
+
+
+def renderable(text: str) -> str:
+    """Return a text that can be rendered, or be a caption: a zero letter or half a surrogate pair would raise."""
+    text = text[:MAX_TEXT_LENGTH]
+    if text.isprintable():
+        return text
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+@lru_cache(maxsize=512)
+def _rendered(text: str, size: int, colour: Colour, bold: bool, mono: bool) -> pygame.Surface:
+    if not text:
+        return pygame.Surface((0, _font(size, bold, mono).get_height()), pygame.SRCALPHA)
+    return _font(size, bold, mono).render(text, True, colour)
+
+
+@lru_cache(maxsize=64)
+def _font(size: int, bold: bool, mono: bool) -> pygame.font.Font:
+    if not pygame.font.get_init():
+        pygame.font.init()
+    pygame.register_quit(_forget)  # fonts do not outlive pygame
+    path = font_file(bold, mono)
+    return pygame.font.Font(None if path is None else str(path), size)
+
+
+def _forget() -> None:
+    _rendered.cache_clear()
+    _font.cache_clear()
+
+
+@lru_cache(maxsize=4)
+def font_file(bold: bool, mono: bool) -> Path | None:
+    """Return where a DejaVu font lies, among matplotlib's files, which are looked up and not imported."""
+    spec = find_spec("matplotlib")
+    if spec is None or spec.origin is None:
+        return None
+    name = f"DejaVuSans{'Mono' if mono else ''}{'-Bold' if bold else ''}.ttf"
+    path = Path(spec.origin).parent / "mpl-data" / "fonts" / "ttf" / name
+    return path if path.is_file() else None
+
+
+OPACITY = 214
+MAX_BOX = 16_384
+"""px, of a plate's side"""
+
+
+def draw_box(
+    surface: pygame.Surface,
+    rect: pygame.Rect,
+    radius: float,
+    colour: Colour = PANEL,
+    opacity: int = OPACITY,
+    edge: Colour | None = LINE,
+) -> None:
+    """Lay a rounded translucent plate; one without an area is not drawn."""
+    if rect.width <= 0 or rect.height <= 0 or max(rect.size) > MAX_BOX:
+        return
+    surface.blit(_plate(rect.size, round(radius), colour, opacity, edge), rect)
+
+
+@lru_cache(maxsize=64)
+def _plate(size: tuple[int, int], radius: int, colour: Colour, opacity: int, edge: Colour | None) -> pygame.Surface:
+    made = pygame.Surface(size, pygame.SRCALPHA)
+    pygame.draw.rect(made, (*colour, opacity), made.get_rect(), border_radius=radius)
+    if edge is not None:
+        pygame.draw.rect(made, (*edge, opacity), made.get_rect(), 1, border_radius=radius)
+    return made
+
+
+def largest_area(shape: tuple[float, float], free: pygame.Rect, taken: Sequence[pygame.Rect]) -> pygame.Rect:
+    """Return the part of what is free, beside all that is taken, in which a rectangle of a shape is largest.
+
+    Args:
+        shape: width and height, in any unit.
+        free: px.
+        taken: px; where nothing else is left, they are not minded.
+    """
+    taken = [each.clip(free) for each in taken if each.clip(free).size > (0, 0) and free.colliderect(each)]
+    lefts, rights = {free.left, *(each.right for each in taken)}, {free.right, *(each.left for each in taken)}
+    tops, bottoms = {free.top, *(each.bottom for each in taken)}, {free.bottom, *(each.top for each in taken)}
+    best, most = free, 0.0
+    for left, right in product(sorted(lefts), sorted(rights, reverse=True)):
+        for top, bottom in product(sorted(tops), sorted(bottoms, reverse=True)):
+            scale = min((right - left) / shape[0], (bottom - top) / shape[1])
+            room = pygame.Rect(left, top, max(right - left, 0), max(bottom - top, 0))
+            if scale > most and room.collidelist(taken) < 0:
+                best, most = room, scale
+    return best
+
+
+@lru_cache(maxsize=1024)
+def ellipsis(text: str, size: float, width: float, bold: bool = False, mono: bool = False) -> str:
+    """Return as much of a text as fits a width in px, with `…` where something is missing; "" where nothing fits."""
+    text = text[:MAX_TEXT_LENGTH]
+    if text_size(text, size, bold, mono)[0] <= width:
+        return text
+    fits, cut = 0, len(text)
+    while cut - fits > 1:  # `fits` letters and … fit, or nothing does; `cut` do not
+        middle = (fits + cut) // 2
+        if text_size(f"{text[:middle].rstrip()}…", size, bold, mono)[0] <= width:
+            fits = middle
+        else:
+            cut = middle
+    return f"{text[:fits].rstrip()}…" if fits else ""
+
+
+@lru_cache(maxsize=256)
+def wrap_text(
+    text: str, size: float, width: float, most: int = 3, bold: bool = False, mono: bool = False
+) -> tuple[str, ...]:
+    """Return a text as lines that fit a width in px, broken at spaces; the last of `most` is shortened."""
+    words = text[: MAX_TEXT_LENGTH * most].split()
+    lines: list[str] = []
+    while words and len(lines) < most:
+        count = 1
+        while count < len(words) and text_size(" ".join(words[: count + 1]), size, bold, mono)[0] <= width:
+            count += 1
+        whole = " ".join(words) if len(lines) == most - 1 else " ".join(words[:count])
+        lines.append(ellipsis(whole, size, width, bold, mono))
+        words = words[count:]
+    return tuple(lines)
+
+
+def draw_hint(surface: pygame.Surface, text: str, pointer: tuple[int, int], unit: float) -> None:
+    """Draw what is told about the thing under the pointer, below it and inside the picture."""
+    size = 12 * unit
+    lines = wrap_text(text, size, min(280 * unit, 0.9 * surface.get_width()), 4)
+    wide = max((text_size(line, size)[0] for line in lines), default=0)
+    step = round(1.4 * size)
+    box = pygame.Rect(0, 0, wide + round(1.4 * size), len(lines) * step + round(0.8 * size))
+    box.topright = pointer[0], pointer[1] + round(20 * unit)
+    box.clamp_ip(surface.get_rect())
+    draw_box(surface, box, 4 * unit, opacity=246)
+    for k, line in enumerate(lines):
+        at = box.left + 0.7 * size, box.top + 0.4 * size + (k + 0.5) * step
+        draw_text(surface, line, at, size, INK, "midleft")

@@ -1,0 +1,219 @@
+"""Arrows: velocities, contacts with their normals, and impulses as mean forces.
+
+Touches: where contacts are now. A contact's row tells where it began, and its bodies have moved on since.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.window.hit_test import Hull, hulls_of, hulls_overlap
+from sandbox.window.render.circles import CircleRenderer, CircleStyle
+from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.lines import draw_arrow, draw_line
+from sandbox.window.render.palette import BACKGROUND, INK, ORANGE, SKY, YELLOW, Colour, mix_colours
+from sandbox.window.render.text import draw_text
+
+MOST_CURVED = 400
+"""Contacts with walls and posts whose normals are worked out anew."""
+SLACK = 0.02
+"""Radii by which places that touch may be farther apart than the nearest."""
+MAX_CURVE = 256
+"""Points of a wall for which that is done."""
+
+
+def contact_points(view: DrawContext) -> tuple[FloatArray, FloatArray]:
+    """Return place (C, 2) m and normal (C, 2) of all contacts, from where their bodies are in the frame.
+
+    Where a contact's bodies are unknown, or nowhere, its row is taken at its word.
+    """
+    contacts, position, bodies = view.sight.contacts, view.sight.frame.position, view.sight.bodies
+    count = min(len(position), len(bodies))
+    first, second = contacts.pair[:, 0], contacts.pair[:, 1]
+    known = (first >= 0) & (first < count)
+    a = np.where(known, first, 0)
+    if not count:
+        return contacts.point, contacts.normal
+    normal = contacts.normal.copy()
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        balls = known & (second >= 0) & (second < count)
+        way = position[second[balls]] - position[a[balls]]
+        normal[balls] = way / np.hypot(way[:, 0], way[:, 1])[:, None]
+        _round(view, normal, np.flatnonzero(known & (second < 0))[:MOST_CURVED])
+        normal = np.where(np.isfinite(normal).all(axis=1, keepdims=True), normal, contacts.normal)
+        place = position[a] + normal * bodies.radius[a][:, None]
+        lone = np.append(bodies.round, True)
+        b = np.where((second >= 0) & (second < count), second, len(bodies))
+        rows = np.flatnonzero(known & ~(lone[a] & lone[b]))
+        place[rows], normal[rows] = contacts.point[rows], contacts.normal[rows]
+        _solid(view, place, normal, rows[:MOST_CURVED])
+    sound = known[:, None] & np.isfinite(place).all(axis=1, keepdims=True)
+    return np.where(sound, place, contacts.point), normal
+
+
+def _round(view: DrawContext, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]") -> None:
+    """Turn the normals of contacts with walls and posts, which change as a ball rolls around them."""
+    fixed, position = view.sight.scene.fixed, view.sight.frame.position
+    for row, (number, thing) in zip(rows.tolist(), view.sight.contacts.pair[rows].tolist(), strict=True):
+        if -1 - thing >= len(fixed):
+            continue
+        solid, centre = fixed[-1 - thing], position[number]
+        if isinstance(solid, Post):
+            way = np.asarray(solid.position) - centre
+        elif isinstance(solid, Wall) and len(solid.points) <= MAX_CURVE:
+            way = _nearest(solid, centre) - centre
+        else:
+            continue
+        normal[row] = way / np.hypot(*way)
+
+
+def _solid(
+    view: DrawContext, place: FloatArray, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]"
+) -> None:
+    """Find anew where bodies touch of which one is no lone disc: in the middle of where they are nearest."""
+    bodies, frame, fixed = view.sight.bodies, view.sight.frame, view.sight.scene.fixed
+    for row, (number, other) in zip(rows.tolist(), view.sight.contacts.pair[rows].tolist(), strict=True):
+        if not np.isfinite(frame.position[number]).all() or not math.isfinite(float(frame.angle[number])):
+            continue
+        own = hulls_of(bodies, frame, number)
+        if other >= 0:
+            others = hulls_of(bodies, frame, other) if np.isfinite(frame.position[other]).all() else []
+        else:
+            others = _hulls_of_fixed(fixed[-1 - other], frame.position[number]) if -1 - other < len(fixed) else []
+        tolerance = SLACK * float(bodies.radius[number])
+        found = [hulls_overlap(one, two, tolerance) for one in own for two in others]
+        if found:
+            place[row] = min(found, key=lambda each: each[0])[1]
+        for disc, way in ((number, 1.0), (other, -1.0)):
+            if disc >= 0 and bodies.round[disc]:  # the normal goes through its centre
+                out = (place[row] - frame.position[disc]) * way
+                normal[row] = out / np.hypot(*out)
+
+
+def _hulls_of_fixed(thing: Plane | Wall | Post, near: FloatArray) -> list[Hull]:
+    """Return a fixed thing as hulls; of a plane, what lies about a place."""
+    if isinstance(thing, Post):
+        return [Hull(np.asarray([thing.position]), thing.radius)]
+    if isinstance(thing, Wall):
+        ends = (*thing.points, thing.points[0]) if thing.closed else thing.points
+        return [Hull(np.asarray(pair), thing.thickness / 2.0) for pair in pairwise(ends[:MAX_CURVE])]
+    normal = np.asarray(thing.normal) / math.hypot(*thing.normal)
+    foot = near - ((near - thing.point) @ normal) * normal
+    along = np.asarray((-normal[1], normal[0])) * 1e3 * max(1.0, float(np.abs(near - foot).max()))
+    return [Hull(np.asarray((foot - along, foot + along)), 0.0)]
+
+
+def _nearest(wall: Wall, centre: FloatArray) -> FloatArray:
+    """Return the point of a wall's middle line that is nearest to a place, m."""
+    ends = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
+    start, along = ends[:-1], np.diff(ends, axis=0)
+    share = np.clip(((centre - start) * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
+    nearest = start + share[:, None] * along
+    return np.asarray(nearest[np.argmin(np.hypot(*(nearest - centre).T))])
+
+
+MAX_ARROWS = 1000
+"""Arrows of one kind; of more bodies or contacts, so many of them spread over all, or of forces the strongest"""
+ARROW_CROWD = 300
+"""Contacts from which their marks become smaller, and arrows are drawn without a dark edge."""
+SPAN = 0.1
+"""s: an arrow reaches to where its body would be after so long"""
+NORMAL = 16.0
+"""px, of a contact's normal"""
+WEIGHT = 26.0
+"""px, of a force of one weight m·g"""
+LONGEST_ARROW = 80.0
+"""px, of the largest force where weights would make it longer"""
+_COOL = mix_colours(BACKGROUND, SKY, 0.8)
+HEAT: tuple[Colour, ...] = tuple(
+    mix_colours(_COOL, YELLOW, k / 16) if k < 16 else mix_colours(YELLOW, (255, 255, 255), k / 16 - 1.0)
+    for k in range(33)
+)
+"""For a line's length, in 32nds of the largest: from blue through yellow to white."""
+LABELS = 12
+"""Up to so many forces are told in newtons."""
+
+
+def draw_velocities(view: DrawContext) -> None:
+    """Draw v · 0.1 s as arrows; one longer than a third of the picture is cut to that."""
+    some = view.first(MAX_ARROWS)
+    longest = max(min(view.camera.size) / 3.0, 1.0)
+    with np.errstate(invalid="ignore", over="ignore"):
+        way = view.camera.ways(view.sight.frame.velocity[some.shown] * SPAN)
+        length = np.hypot(way[:, 0], way[:, 1])
+        way = way * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
+    for k in np.flatnonzero((length > 2.0 * view.unit) & np.isfinite(length)).tolist():
+        (x, y), (dx, dy) = some.centre[k].tolist(), way[k].tolist()
+        edge = BACKGROUND if len(some.shown) <= ARROW_CROWD and length[k] > 16.0 * view.unit else None
+        draw_arrow(view.surface, (x, y), (x + dx, y + dy), ORANGE, 2.0 * view.unit, view.antialias, edge)
+
+
+def _in_sight(view: DrawContext, most: int) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return which contacts are in sight, (K,), where, (K, 2) px, and their normals there, (K, 2)."""
+    place, normal = contact_points(view)
+    with np.errstate(invalid="ignore", over="ignore"):
+        pixels = view.camera.to_screen(place)
+    seen = view.inside(pixels, 20.0 * view.unit)
+    if len(seen) > most:
+        seen = seen[np.linspace(0, len(seen) - 1, most).astype(np.intp)]
+    return seen, pixels[seen], view.camera.ways(normal[seen]) / view.camera.scale
+
+
+def draw_contacts(view: DrawContext, discs: CircleRenderer) -> None:
+    """Draw where bodies touch, and the normal from the first to the second."""
+    seen, place, normal = _in_sight(view, MAX_ARROWS)
+    if not len(seen):
+        return
+    crowded = len(seen) > ARROW_CROWD
+    reach = (0.5 if crowded else 1.0) * NORMAL * view.unit
+    for (x, y), (nx, ny) in zip(place.tolist(), normal.tolist(), strict=True):
+        draw_line(view.surface, (x, y), (x + nx * reach, y + ny * reach), INK, 1.0 * view.unit, view.antialias)
+    tint = np.broadcast_to(np.asarray(ORANGE, np.uint8), (len(seen), 3))
+    size = np.full(len(seen), (1.8 if crowded else 3.0) * view.unit)
+    discs.draw(view.surface, place, size, tint, CircleStyle(0.0, antialias=view.antialias))
+
+
+def draw_impulses(view: DrawContext) -> None:
+    """Draw mean forces, |impulse| / seconds, as lines along the normal, half to each side of the contact.
+
+    A force of one weight of the lighter body has a fixed length; where the largest in sight would become too long by
+    that, or there is no gravity, it is that one which has.
+    """
+    seen, place, normal = _in_sight(view, 4 * MAX_ARROWS)
+    if not len(seen) or not view.sight.seconds > 0.0:
+        return
+    contacts, gravity = view.sight.contacts, math.hypot(*view.sight.scene.world.gravity)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        force = np.hypot(*contacts.impulse[seen].T) / view.sight.seconds
+        force[~np.isfinite(force)] = 0.0
+        share = force / max(float(force.max()), 1e-300)
+        weights = (
+            force / (_lighter(view, contacts.pair[seen]) * gravity) if gravity > 0.0 else np.full_like(force, np.inf)
+        )
+        length = np.minimum(WEIGHT * float(np.max(weights)), LONGEST_ARROW) * share * view.unit
+    drawn = np.flatnonzero(length > 1.0)
+    drawn = drawn[np.argsort(force[drawn], kind="stable")][-MAX_ARROWS:]  # the strongest last: they are looked for
+    for k in drawn.tolist():
+        (x, y), (nx, ny), half = place[k].tolist(), normal[k].tolist(), float(length[k]) / 2.0
+        ends = (x - nx * half, y - ny * half), (x + nx * half, y + ny * half)
+        strength = min(2.0 * half / (LONGEST_ARROW * view.unit), 1.0)
+        width = (1.0 + 2.6 * strength) * view.unit
+        draw_line(view.surface, *ends, HEAT[int(32.0 * strength)], width, view.antialias)
+        if len(drawn) <= LABELS:
+            text, (right, down) = f"{float(force[k]):.3g} N", (10.0 * view.unit, 12.0 * view.unit)
+            draw_text(
+                view.surface, text, (x + right + 1, y + down + 1), 12 * view.unit, BACKGROUND, "midleft", mono=True
+            )
+            draw_text(view.surface, text, (x + right, y + down), 12 * view.unit, INK, "midleft", mono=True)
+
+
+def _lighter(view: DrawContext, pair: IntArray) -> FloatArray:
+    """Return the mass of the lighter of two that can move, kg, (K,)."""
+    bodies = view.sight.bodies
+    mass = np.append(np.where(bodies.fixed, np.inf, bodies.mass), np.inf)  # the last stands for all fixed things
+    sides = np.where((pair >= 0) & (pair < len(bodies)), pair, len(bodies))
+    lighter = np.min(mass[sides], axis=1, initial=np.inf)
+    return np.asarray(np.where(np.isfinite(lighter), lighter, 1.0))

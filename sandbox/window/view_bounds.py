@@ -1,0 +1,311 @@
+"""Framing: the part of the world that a scene is about, for the camera to begin with.
+
+Crowd: the place where a run happens, for a camera to show it whole.
+"""
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal
+from sandbox.engines.registry import UnknownEngineError, start
+from sandbox.games.billiards.view_table import table_bounds
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.description.world import Settings
+from sandbox.scene.scene import Scene
+from sandbox.window.camera import Box
+
+LOOK_STEPS, LOOK_WORK = 12_000, 30_000
+"""Steps, and steps times moving bodies, that a look ahead takes at most: about half a second on pymunk."""
+LOOKS = 17
+"""Moments of free flight that are looked at."""
+ROLLING = 1.2
+"""s: where balls on a floor fly for longer says little, as the floor brakes them and they meet each other"""
+BESIDE = 0.12
+"""of its size, so much is seen beside where balls on a floor are"""
+OUTLIERS = 0.5
+"""Per cent of the places at each side that need not be seen, where there are many."""
+MANY = 1000
+ANCHORED = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.SPRING)
+"""Joints that hold in a point."""
+MAX_VIEW = 1e15
+"""m: what lies beyond does not count"""
+NEAR = 0.1
+"""Fixed things count so near to where bodies are or fly, as a share of its size."""
+FAR = 20.0
+"""Fixed things, and where bodies fly, count up to so many times the size of what is there at the start."""
+
+
+def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
+    """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there.
+
+    Of a table that is the table; a scene may state its own.
+
+    Args:
+        scene: what is seen.
+        reach: where the bodies are known to come, m; by `look_ahead`, or from a stored run.
+    """
+    if scene.play.view is not None:
+        return scene.play.view
+    if scene.play.area is not None:
+        return table_bounds(scene.play.area)
+    bodies = scene.bodies
+    things = [corners for corners in _things(scene) if (np.abs(corners) < MAX_VIEW).all()]
+    discs = bodies.round | ~bodies.fixed  # what turns is anywhere within its circle; what stands is where it is
+    seen = bounding_box(bodies.position[discs], bodies.radius[discs])
+    stands = [(corners.min(axis=0), corners.max(axis=0)) for corners in _solids(bodies)]
+    if seen is None and not stands:
+        stands = [(corners.min(axis=0), corners.max(axis=0)) for corners in things] or [(-UNIT_BOX, UNIT_BOX)]
+    start = _union([*stands, *([] if seen is None else [seen])])
+    start = _union([start, *_swings(scene, bodies, start)])
+    flown = _union([start, *(_orbits(scene, bodies, start) if scene.attractions else _flight(scene, bodies))])
+    met = [(corners.min(axis=0), corners.max(axis=0)) for corners in things]
+    if reach is not None:
+        start = _union([start, (np.asarray(reach[0]), np.asarray(reach[1]))])
+        flown = _union([start, flown])
+    near = NEAR * float((flown[1] - flown[0]).max())
+    met = [each for each in met if (each[0] <= flown[1] + near).all() and (each[1] >= flown[0] - near).all()]
+    low, high = _union([start, *met]) if met else flown
+    if scene.surface is not None:  # room to roll on
+        low, high = low - BESIDE * (high - low).max(), high + BESIDE * (high - low).max()
+    if scene.play.arrows is not None:  # room to move it
+        low, high = low - 2.0 * scene.play.arrow_step, high + 2.0 * scene.play.arrow_step
+    if not (high - low).max() > 0.0:
+        low, high = low - UNIT_BOX, high + UNIT_BOX
+    for plane in scene.planes:  # the nearest bit of its surface, if it is not far
+        normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
+        middle = (low + high) / 2.0
+        foot = middle - ((middle - np.asarray(plane.point)) @ normal) * normal
+        if np.abs(foot - middle).max() <= FAR * float((high - low).max()):
+            low, high = np.minimum(low, foot), np.maximum(high, foot)
+    return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+
+
+def predict_bounds(scene: Scene, engine: str, settings: Settings | None = None) -> Box | None:
+    """Return the box in which the moving bodies stay when a scene runs without a hand, by running it.
+
+    The look is bounded by counted work, so that it is the same on every machine: `LOOK_STEPS` steps, and `LOOK_WORK`
+    steps times bodies. It ends early where the scene ends, and where a body flies off `FAR` times the size of what is
+    there at the start. None where nothing moves, the view is stated, or the engine cannot run the scene.
+    """
+    bodies, world, solver = scene.bodies, scene.world, scene.solver if settings is None else settings
+    moving = np.flatnonzero(~bodies.fixed)
+    if scene.play.view is not None or scene.play.area is not None or not len(moving):
+        return None
+    steps = min(round(world.duration / solver.dt), LOOK_STEPS, LOOK_WORK // len(moving))
+    try:
+        simulation = start(scene, engine, settings)
+    except (Refusal, UnknownEngineError):
+        return None
+    found = seen = bounding_box(bodies.position[moving], bodies.radius[moving])
+    (left, bottom), (right, top) = view_bounds(scene)
+    farthest = FAR * max(right - left, top - bottom)
+    try:
+        for _ in range(steps):
+            simulation.step()
+            frame = simulation.frame()
+            there = moving[frame.present[moving]]
+            seen = bounding_box(frame.position[there], bodies.radius[there])
+            if seen is None or found is None:
+                continue
+            union = _union([found, seen])
+            if not float((union[1] - union[0]).max()) <= farthest:
+                break
+            found = union
+    except (Divergence, Exhaustion):
+        pass
+    finally:
+        simulation.close()
+    if found is None:
+        return None
+    low, high = found
+    return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+
+
+def should_rotate(scene: Scene, free: tuple[int, int]) -> bool:
+    """Tell whether a scene is a table that is seen larger when turned, in a picture of so many px."""
+    if scene.play.area is None or scene.planes:
+        return False
+    (left, bottom), (right, top) = scene.play.area
+    return (top - bottom > right - left) == (free[0] > free[1])
+
+
+UNIT_BOX = np.ones(2)
+Corners = tuple[FloatArray, FloatArray]
+"""Lower left and upper right, (2,) m each."""
+
+
+def _union(boxes: list[Corners]) -> Corners:
+    return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+
+
+def bounding_box(position: FloatArray, radius: FloatArray) -> Corners | None:
+    """Return the box around circles at (M, 2) m; of many, without the outermost."""
+    counts = (np.abs(position) < MAX_VIEW).all(axis=1)
+    position, radius = position[counts], radius[counts]
+    if not len(position):
+        return None
+    if len(position) > MANY:
+        size = float(np.median(radius))
+        low, high = np.percentile(position, (OUTLIERS, 100.0 - OUTLIERS), axis=0)
+        return low - size, high + size
+    return (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
+
+
+def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
+    """Return the box in which the bodies fly, as far as planes and bounds let them."""
+    world = scene.world
+    chosen = np.flatnonzero(~_tethered(scene, bodies))
+    chosen = chosen[:: max(1, len(chosen) // 5000)]  # so many are enough to tell
+    duration = world.duration if scene.surface is None else min(world.duration, ROLLING)
+    time = np.linspace(0.0, duration, LOOKS)[:, None, None]
+    start, velocity = bodies.position[chosen], bodies.velocity[chosen]
+    with np.errstate(all="ignore"):
+        place = start + velocity * time + 0.5 * np.asarray(world.gravity) * time**2
+    radius = np.broadcast_to(bodies.radius[chosen], place.shape[:2])
+    with np.errstate(all="ignore"):
+        counts = (np.abs(place) < MAX_VIEW).all(axis=2)
+        for plane in scene.planes:
+            normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
+            counts &= (place - np.asarray(plane.point)) @ normal >= -radius
+        if world.bounds is not None:
+            counts &= ((place >= world.bounds[0]) & (place <= world.bounds[1])).all(axis=2)
+        counts &= ~_falls(scene, bodies, place)
+    # Once stopped, it does not come out on the far side.
+    counts = np.logical_and.accumulate(counts, axis=0)
+    found = bounding_box(place[counts], radius[counts])
+    return [] if found is None else [found]
+
+
+def _orbits(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
+    """Return the boxes around what attracts, as far out as the bodies can come that are bound to it alone."""
+    found, size = [], float((start[1] - start[0]).max())
+    for each in scene.attractions:
+        if isinstance(each.toward, str):
+            body = bodies.names.index(each.toward)
+            centre, drift = bodies.position[body], bodies.velocity[body]
+        else:
+            centre, drift = np.asarray(each.toward), np.zeros(2)
+        offset, motion = bodies.position - centre, bodies.velocity - drift
+        with np.errstate(all="ignore"):
+            away = np.hypot(*offset.T)
+            size = max(size, float(away.max(initial=0.0)))
+            bound = each.strength / away - 0.5 * (motion * motion).sum(axis=1)  # J/kg short of escaping
+            spin = offset[:, 0] * motion[:, 1] - offset[:, 1] * motion[:, 0]
+            oval = np.maximum(1.0 - 2.0 * bound * (spin / each.strength) ** 2, 0.0)  # eccentricity squared
+            farthest = np.where(bound > 0.0, 0.5 * each.strength / bound * (1.0 + np.sqrt(oval)), np.nan)
+        farthest = farthest[~bodies.fixed & (farthest <= FAR * size)]
+        if len(farthest):
+            reach = float(farthest.max())
+            found.append((centre - reach, centre + reach))
+    return found
+
+
+def _falls(scene: Scene, bodies: Bodies, place: FloatArray) -> BoolArray:
+    """Return which places (T, M, 2) are past everything fixed that the bodies could have fallen on, (T, M)."""
+    gravity = np.asarray(scene.world.gravity)
+    fixed = [*_things(scene), *_solids(bodies)]
+    if not fixed or not gravity.any():
+        return np.zeros(place.shape[:2], np.bool_)
+    down = gravity / np.hypot(*gravity)
+    ground = max(float((corners @ down).max()) for corners in fixed)
+    with np.errstate(all="ignore"):
+        depth = place @ down
+    return np.asarray((depth > ground) & (depth[0] <= ground))  # one that starts below it does not fall on it
+
+
+def _solids(bodies: Bodies) -> list[FloatArray]:
+    """Return the corners (P, 2), m, of each fixed body that is no ball, as it stands."""
+    shapes, found = bodies.shapes, []
+    for piece in np.flatnonzero((bodies.fixed & ~bodies.round)[shapes.body]).tolist():
+        body, radius = int(shapes.body[piece]), float(shapes.radius[piece])
+        x, y = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]].T
+        cos, sin = np.cos(bodies.angle[body]), np.sin(bodies.angle[body])
+        corners = bodies.position[body] + np.column_stack((cos * x - sin * y, sin * x + cos * y))
+        if (np.abs(corners) < MAX_VIEW).all():
+            found.append(np.concatenate((corners - radius, corners + radius)))
+    return found
+
+
+def _tethered(scene: Scene, bodies: Bodies) -> BoolArray:
+    """Return which bodies are fixed, or joined to the world or to such a body, or to one joined so, (N,)."""
+    links, found = scene.links.of(*ANCHORED), bodies.fixed.copy()
+    found[links.b[links.a < 0]] = True
+    a, b = links.a[links.a >= 0], links.b[links.a >= 0]
+    count = -1
+    while (now := int(found.sum())) != count:
+        count, either = now, found[a] | found[b]
+        found[a[either]] = found[b[either]] = True
+    return found
+
+
+def _swings(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
+    """Return the boxes of where the world holds bodies, and of how far those on rods and strings swing to and fro."""
+    links = scene.links
+    if not len(links):
+        return []
+    nails = links.some((links.a < 0) & np.isin(links.kind, ANCHORED))
+    anchor, held = nails.anchor_a, bodies.position[nails.b]
+    size = float((start[1] - start[0]).max())
+    near = ((anchor >= start[0] - FAR * size) & (anchor <= start[1] + FAR * size)).all(axis=1)
+    places = [anchor[near]]
+    if scene.world.gravity[0] == 0.0 and scene.world.gravity[1] < 0.0:
+        swing = near & np.isin(nails.kind, (LinkKind.ROD, LinkKind.SLIDE)) & ~bodies.fixed[nails.b]
+        anchor, held, radius = anchor[swing], held[swing], bodies.radius[nails.b[swing]][:, None]
+        length = np.hypot(*(held - anchor).T)
+        other = np.column_stack((2.0 * anchor[:, 0] - held[:, 0], held[:, 1]))
+        lowest = anchor - np.column_stack((np.zeros(len(length)), length))
+        places += [each + sign * radius for each in (other, lowest) for sign in (-1.0, 1.0)]
+    found = np.concatenate(places)
+    return [(found.min(axis=0), found.max(axis=0))] if len(found) else []
+
+
+def _things(scene: Scene) -> list[FloatArray]:
+    """Return two or more corners (P, 2), m, of each wall and post."""
+    found = []
+    for wall in scene.walls:
+        points, half = np.asarray(wall.points), wall.thickness / 2.0
+        found.append(np.concatenate((points - half, points + half)))
+    sides = np.asarray([[-1.0, -1.0], [1.0, 1.0]])
+    found += [np.asarray(post.position) + post.radius * sides for post in scene.posts]
+    return found
+
+
+STRAY_FRACTION = 3.0
+"""Sizes of the middle of a crowd that a body may go beyond it and still be shown."""
+
+
+def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) -> Box:
+    """Return the box that a crowd moves in, m, leaving out those who stray.
+
+    Args:
+        position: (T, N, 2) m; what is not finite counts nothing.
+        radius: (N,) m
+        anchors: (K, 2) m, places of fixed things, shown where they are not far from the crowd.
+    """
+    lower, upper = np.fmin.reduce(position, axis=0), np.fmax.reduce(position, axis=0)
+    fine = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
+    lower, upper = lower[fine] - radius[fine, None], upper[fine] + radius[fine, None]
+    if not len(lower) and not len(anchors):
+        return (-1.0, -1.0), (1.0, 1.0)
+    corners = np.concatenate((lower, upper)) if len(lower) else anchors
+    middle = np.percentile(corners, (10.0, 90.0), axis=0)
+    with np.errstate(over="ignore"):  # of a run that diverged
+        reach = STRAY_FRACTION * max(float((middle[1] - middle[0]).max()), 1e-9)
+    both = np.concatenate((corners, anchors))
+    kept = both[((both >= middle[0] - reach) & (both <= middle[1] + reach)).all(axis=1)]
+    if not len(kept):
+        kept = middle
+    (left, bottom), (right, top) = kept.min(axis=0).tolist(), kept.max(axis=0).tolist()
+    return (left, bottom), (right, top)
+
+
+def anchor_points(scene: Scene) -> FloatArray:
+    """Return the places of fixed things, (K, 2) m: ends of walls, edges of posts, nails of joints; of planes none."""
+    places = [point for wall in scene.walls for point in wall.points]
+    for post in scene.posts:
+        (x, y), r = post.position, post.radius
+        places += [(x - r, y - r), (x + r, y + r)]
+    links = scene.links.some((scene.links.a < 0) & np.isin(scene.links.kind, ANCHORED))
+    places += [(x, y) for x, y in links.anchor_a.tolist()]
+    return np.asarray(places, np.float64).reshape(-1, 2)
