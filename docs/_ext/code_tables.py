@@ -17,7 +17,7 @@ from sandbox.batch.store import StoredRun
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import ENGINES
-from sandbox.games.billiards.controls import CUE_KEY_HELP
+from sandbox.games.billiards.view.controls import CUE_KEY_HELP
 from sandbox.games.registry import RULES, required_rules
 from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.resource_limits import LIMITS

@@ -14,7 +14,7 @@ from types import FrameType
 import pygame
 
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
-from sandbox.games.billiards.controls import KeyHandler
+from sandbox.games.billiards.view.controls import KeyHandler
 from sandbox.window.app_state import AppState
 from sandbox.window.commands import Commands
 from sandbox.window.context import TITLE, WindowContext

@@ -17,8 +17,8 @@ from typing import Any
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, USUAL, able, engine_named, usual
-from sandbox.games.billiards.controls import CueControls, TableGameHost, prepared_scene
-from sandbox.games.billiards.table_game import PLAYERS, BilliardsGame, Players
+from sandbox.games.billiards.view.controls import CueControls, TableGameHost, prepared_scene
+from sandbox.games.billiards.view.table_game import PLAYERS, BilliardsGame, Players
 from sandbox.games.registry import is_real_time, rules_of
 from sandbox.games.session import GameSession
 from sandbox.recording import Recording

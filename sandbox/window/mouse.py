@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pygame
 
-from sandbox.games.billiards.controls import CueControls
+from sandbox.games.billiards.view.controls import CueControls
 from sandbox.window.context import WindowContext
 from sandbox.window.playback.live import LiveView
 

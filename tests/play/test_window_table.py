@@ -11,8 +11,8 @@ from pressing import key, key_up, move, press, release
 
 from sandbox.action import Move, Strike
 from sandbox.games.billiards.rules.snooker import SnookerState
-from sandbox.games.billiards.table_game import BilliardsGame
 from sandbox.games.billiards.tables import INCH
+from sandbox.games.billiards.view.table_game import BilliardsGame
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState

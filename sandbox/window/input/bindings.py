@@ -10,8 +10,8 @@ from typing import NamedTuple
 import pygame
 
 from sandbox.action import Action, Drive, Throttle
-from sandbox.games.billiards import controls as cue_keys
-from sandbox.games.billiards.controls import CueControls, KeyHandler
+from sandbox.games.billiards.view import controls as cue_keys
+from sandbox.games.billiards.view.controls import CueControls, KeyHandler
 from sandbox.games.contract import Control
 from sandbox.scene.compile.drives import names_of
 from sandbox.scene.description.scene import default_name

@@ -16,7 +16,7 @@ import numpy as np
 from sandbox.action import Throttle
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.games.artillery.view_state import ArtilleryViewState
-from sandbox.games.billiards.aiming import CueAim
+from sandbox.games.billiards.view.prediction import CueAim
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.joint_arrays import Links
 from sandbox.scene.compile.potential import parted

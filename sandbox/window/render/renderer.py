@@ -11,9 +11,9 @@ import pygame
 from sandbox.arrays import BoolArray, IntArray
 from sandbox.games.artillery.scene import Artillery
 from sandbox.games.artillery.view import draw_above, draw_below, draw_land, draw_tanks
-from sandbox.games.billiards.view_aim import draw_aim, draw_paths
-from sandbox.games.billiards.view_balls import BallRenderer
-from sandbox.games.billiards.view_table import draw_table
+from sandbox.games.billiards.view.aim import draw_aim, draw_paths
+from sandbox.games.billiards.view.balls import BallRenderer
+from sandbox.games.billiards.view.table import draw_table
 from sandbox.games.curling.view import draw_stones
 from sandbox.games.pinball.view import LampRenderer, draw_lamps, draw_playfield
 from sandbox.scene.compile.bodies import Bodies

@@ -6,8 +6,8 @@ from pathlib import Path
 import pygame
 
 from sandbox.games.artillery.view import add_artillery
-from sandbox.games.billiards.hud import BilliardsHud
-from sandbox.games.billiards.table_game import PLAYERS
+from sandbox.games.billiards.view.hud import BilliardsHud
+from sandbox.games.billiards.view.table_game import PLAYERS
 from sandbox.window.app_state import AppState, scenes_to_pick
 from sandbox.window.camera import Camera
 from sandbox.window.input.bindings import KeyBindings, key_bindings

@@ -1,7 +1,7 @@
 """Tables for tests: few balls, so that strokes are short."""
 
-from sandbox.games.billiards.table_game import BilliardsGame, Players
 from sandbox.games.billiards.table_geometry import TableGeometry
+from sandbox.games.billiards.view.table_game import BilliardsGame, Players
 from sandbox.scene.files.load import loads
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.session import Session

@@ -8,9 +8,9 @@ import pytest
 from seated import FREE, NINE, RADIUS, game_of, roll_out, turn
 
 from sandbox.action import ActionError, Strike
-from sandbox.games.billiards.controls import BilliardsOverlay, HumanPlayer
-from sandbox.games.billiards.hud import status_line
 from sandbox.games.billiards.rules.base import ShotResult
+from sandbox.games.billiards.view.controls import BilliardsOverlay, HumanPlayer
+from sandbox.games.billiards.view.hud import status_line
 from sandbox.measure.replay import rerun
 
 

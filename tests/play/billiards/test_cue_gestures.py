@@ -5,9 +5,9 @@ import math
 import pytest
 from seated import FREE, NINE, game_of
 
-from sandbox.games.billiards.aiming import EDGE, FASTEST
-from sandbox.games.billiards.controls import DIAL, FINE, ROOM, CueControls, HumanPlayer
-from sandbox.games.billiards.table_game import BilliardsGame
+from sandbox.games.billiards.view.controls import DIAL, FINE, ROOM, CueControls, HumanPlayer
+from sandbox.games.billiards.view.prediction import EDGE, FASTEST
+from sandbox.games.billiards.view.table_game import BilliardsGame
 
 CUE = (0.5, 0.5)
 AWAY = (0.9, 0.2)

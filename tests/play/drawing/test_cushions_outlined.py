@@ -5,7 +5,7 @@ import math
 import pytest
 
 from sandbox.games.billiards.tables import TABLES
-from sandbox.games.billiards.view_table import (
+from sandbox.games.billiards.view.table import (
     DEPTH,
     cushion_outlines,
     rail_width,

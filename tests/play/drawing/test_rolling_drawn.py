@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sandbox.games.billiards.view_balls import BallOrientations
+from sandbox.games.billiards.view.balls import BallOrientations
 from sandbox.trajectory import Frame
 
 RADIUS = 0.03

@@ -4,9 +4,9 @@ import numpy as np
 import pygame
 import pytest
 
-from sandbox.games.billiards.aiming import CueAim
-from sandbox.games.billiards.view_balls import IVORY, paint_texture, texture_of
-from sandbox.games.billiards.view_table import CAROM, HOLE, POOL, SNOOKER
+from sandbox.games.billiards.view.balls import IVORY, paint_texture, texture_of
+from sandbox.games.billiards.view.prediction import CueAim
+from sandbox.games.billiards.view.table import CAROM, HOLE, POOL, SNOOKER
 from sandbox.scene.files.load import loads
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame

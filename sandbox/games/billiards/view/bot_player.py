@@ -5,11 +5,11 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple
 
-from sandbox.games.billiards.aiming import CueState
 from sandbox.games.billiards.bot import BilliardsBot
 from sandbox.games.billiards.headless import FramePlan
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision
+from sandbox.games.billiards.view.prediction import CueState
 from sandbox.scene.description.surface import Stroke
 
 TURNING, DRAWING = 0.9, 0.45

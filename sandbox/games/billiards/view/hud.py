@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import pygame
 
-from sandbox.games.billiards.aiming import FASTEST, CueState
-from sandbox.games.billiards.controls import HumanPlayer
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, renamed
 from sandbox.games.billiards.rules.pool import EightBallState
-from sandbox.games.billiards.table_game import BOT, BilliardsGame
-from sandbox.games.billiards.view_balls import IVORY, BallTexture, texture_of
+from sandbox.games.billiards.view.balls import IVORY, BallTexture, texture_of
+from sandbox.games.billiards.view.controls import HumanPlayer
+from sandbox.games.billiards.view.prediction import FASTEST, CueState
+from sandbox.games.billiards.view.table_game import BOT, BilliardsGame
 from sandbox.scene.description.surface import MISCUE
 from sandbox.window.playback.live import LiveView
 from sandbox.window.render.palette import (

@@ -19,11 +19,11 @@ from typing import Literal, get_args
 import pygame
 
 from sandbox.action import ActionError
-from sandbox.games.billiards.aiming import FASTEST, SLOWEST, CueAim, ShotPredictor
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, GameError, ShotCall
-from sandbox.games.billiards.table_game import BilliardsGame, Players, plays
 from sandbox.games.billiards.table_geometry import TableGeometry
+from sandbox.games.billiards.view.prediction import FASTEST, SLOWEST, CueAim, ShotPredictor
+from sandbox.games.billiards.view.table_game import BilliardsGame, Players, plays
 from sandbox.games.names import TableGame
 from sandbox.scene.description.base import Point
 from sandbox.scene.scene import Scene

@@ -16,10 +16,10 @@ import numpy as np
 
 from sandbox.action import ActionError, Strike
 from sandbox.arrays import FloatArray
-from sandbox.games.billiards.aiming import CueState
-from sandbox.games.billiards.bot_player import BotPlayer
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import GameError, ShotCall, player_name
+from sandbox.games.billiards.view.bot_player import BotPlayer
+from sandbox.games.billiards.view.prediction import CueState
 from sandbox.games.names import TableGame
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Shot

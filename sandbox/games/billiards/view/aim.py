@@ -7,8 +7,8 @@ import numpy as np
 import pygame
 
 from sandbox.arrays import FloatArray
-from sandbox.games.billiards.aiming import CueAim
-from sandbox.games.billiards.view_table import felt_of
+from sandbox.games.billiards.view.prediction import CueAim
+from sandbox.games.billiards.view.table import felt_of
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import Pixel, draw_line
 from sandbox.window.render.palette import (
