@@ -62,7 +62,7 @@ def test_snooker_is_played_with_the_miss(monkeypatch: pytest.MonkeyPatch, capfd:
         states.append(match.state)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sandbox.cli.match.play", ended)
+    monkeypatch.setattr("sandbox.cli.match.play_frame", ended)
     for more in ((), ("--misses",)):
         assert lines_of(capfd, "match", "snooker", *more)[0] == 130
     assert [state.misses for state in states] == [False, True]
@@ -125,7 +125,7 @@ def test_interrupt_keeps_the_frames_that_are_finished(
         frames.append(play_frame(*given, **named))
         return frames[0]
 
-    monkeypatch.setattr("sandbox.cli.match.play", interrupted)
+    monkeypatch.setattr("sandbox.cli.match.play_frame", interrupted)
     called = json_of if as_json else lines_of
     status, told, err = called(capfd, *QUICK, "--frames", "3")
     assert (status, err) == (130, ["interrupted: 1 of 3 frames are complete"])

@@ -37,7 +37,7 @@ def overlaps(window: App) -> list[str]:
 
 def opened(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> App:
     # What is laid out does not depend on what flies where: the look ahead is left out.
-    monkeypatch.setattr("sandbox.window.app_state.look_ahead", lambda *_: None)
+    monkeypatch.setattr("sandbox.window.app_state.predict_bounds", lambda *_: None)
     window = App(AppState(), size=(1280, 720), folder=folder, say=lambda _: None)
     assert window.stage.open(find(name))
     pygame.event.clear()

@@ -57,7 +57,7 @@ def test_refusal_of_one_integrator_leaves_the_others(monkeypatch: pytest.MonkeyP
             raise Refusal(engine, ("not this one",), ())
         return Landing(1.0, (1.0, 0.0))
 
-    monkeypatch.setattr(miss, "flown", fly)
+    monkeypatch.setattr(miss, "simulated_landing", fly)
     found = landing_error_table(world(), 50.0, math.radians(45.0), DTS)
     assert {row.integrator for row in found.rows} == {*INTEGRATORS, None} - {"rk4"}
     assert [engine for engine, _ in found.refused].count("exact") == 1

@@ -191,7 +191,7 @@ def test_palette_is_kept_where_it_serves() -> None:
 
 
 def test_gif_has_a_limit_and_keeps_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(capture, "MOST_GIF_PICTURES", 3)
+    monkeypatch.setattr(capture, "MAX_GIF_FRAMES", 3)
     recorder = recorder_for(tmp_path / "film.gif", SIZE, 30.0)
     for k in range(3):
         recorder.add(picture(10 + k), 0.05)

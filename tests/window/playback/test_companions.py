@@ -142,7 +142,7 @@ def test_ghost_that_cannot_follow_says_why_and_another_engine_goes_on() -> None:
 
 def test_exact_ghost_of_a_heap_gives_up_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rigid balls in a heap touch ever more often: it is given up by its own bounds, or its patience."""
-    monkeypatch.setattr(companions, "PATIENCE", 0.02)
+    monkeypatch.setattr(companions, "CATCH_UP_TIME", 0.02)
     session = Session(pile(), "pymunk")
     company = Diagnostics(session)
     company.show_ghost(True)
@@ -205,7 +205,7 @@ def test_what_meets_nothing_is_trusted_without_a_twin() -> None:
 
 
 def test_twin_that_ends_leaves_trust_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(companions, "PATIENCE", 0.0)
+    monkeypatch.setattr(companions, "CATCH_UP_TIME", 0.0)
     scene = load(find("gas"), [("grid.atom.velocity_jitter", 100.0), ("solver.dt", 10.0)])
     session = Session(scene, "exact")
     trust = DivergenceMonitor(session.relay.checkpoint())

@@ -96,7 +96,7 @@ def test_crowds_fade_alike_compiled_and_not(monkeypatch):
     for time in (0.0, 0.7, 3.0):
         seen = []
         for many in (1, 10**9):
-            monkeypatch.setattr(ageing, "MANY", many)
+            monkeypatch.setattr(ageing, "MANY_PARTICLES", many)
             tones = np.zeros(len(bodies), np.uint32)
             made.fade(tones, shades, time)
             seen.append(tones)

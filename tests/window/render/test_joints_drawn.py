@@ -149,7 +149,7 @@ def threads(ends: list, compiled: bool) -> np.ndarray:
     surface = pygame.Surface((200, 120), 0, 32)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernel, "COMPILED", True)  # without numba the same pass runs as plain Python
-        patch.setattr(module, "MANY", 0 if compiled else 10**9)
+        patch.setattr(module, "MANY_LINES", 0 if compiled else 10**9)
         draw_thin_lines(surface, np.asarray(ends, np.float64), np.full(len(ends), 0xFFFFFF, np.uint32))
     return pygame.surfarray.array3d(surface)[..., 0] / 255.0
 

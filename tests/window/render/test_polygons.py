@@ -55,7 +55,7 @@ def white(which: Scene, *, few: int, antialias: bool = True, hollow: bool = Fals
     who = np.arange(len(bodies))
     style = CircleStyle(2.0 if hollow else 0.0, hollow, antialias)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "FEW", few)
+        patch.setattr(module, "FEW_POLYGONS", few)
         patch.setattr(kernel, "COMPILED", True)  # without numba the same pass runs as plain Python
         if few:
             patch.setattr(module, "_in_one_pass", lambda *_: False)

@@ -18,7 +18,7 @@ def drawn(many: int, position: np.ndarray, present: np.ndarray | None, side: int
     surface.set_clip(pygame.Rect(3, 5, 80, 50))
     colours = packed_pixels(np.random.default_rng(1).integers(1, 255, (len(position), 3)).astype(np.uint8), surface)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "MANY", many)
+        patch.setattr(module, "MANY_PARTICLES", many)
         ParticleRenderer().draw(surface, camera, position, colours, present, side)
     return pygame.surfarray.array2d(surface)
 

@@ -56,7 +56,7 @@ def test_pause_of_a_window_without_focus_fits_beside_a_score_panel(unit: float) 
     for status in (
         replace(QUIET, engine="exact", settings="dt 10 ms", **{how: True}) for how in ("paused", "unfocused")
     ):
-        (line,) = [text for row, text in hud.lay_rows(status, free, unit, [panel]).lines if row.mark == "bars"]
+        (line,) = [text for row, text in hud.layout_rows(status, free, unit, [panel]).lines if row.mark == "bars"]
         assert line in texts(status)
 
 
@@ -126,18 +126,18 @@ def drawn(
 ) -> tuple[list[pygame.Rect], pygame.Surface]:
     """Return the plates that were laid, and the picture."""
     laid: list[pygame.Rect] = []
-    original = hud.plate
+    original = hud.draw_box
 
     def noted(surface: pygame.Surface, rect: pygame.Rect, *others: object, **named: object) -> None:
         laid.append(rect.copy())
         original(surface, rect, *others, **named)  # type: ignore[arg-type]  # passed on as they came
 
     surface = pygame.Surface(size)
-    hud.plate = noted
+    hud.draw_box = noted
     try:
         draw_hud(surface, status, unit, right=right)
     finally:
-        hud.plate = original
+        hud.draw_box = original
     return laid, surface
 
 
