@@ -72,5 +72,7 @@ def _edges(scores: FloatArray) -> list[float]:
     if (scores == np.round(scores)).all():
         width = max(width, 1.0)
     first, last = math.floor(least / width), math.floor(most / width) + 1
+    if least < width * first:  # a negative score so small that the quotient is -0
+        first -= 1
     parts = round(1.0 / width)  # of 1, where a bin is narrower: 3 / 10 is 0.3, 3 × 0.1 is not
     return [k / parts if width < 1.0 else width * k for k in range(first, last + 1)]

@@ -28,7 +28,7 @@ restitution = 0.8
 """
 
 RULES_OF_COUNT = """
-from sandbox.games.rules import Control
+from sandbox.games.contract import Control
 
 class Count:
     real_time = True
