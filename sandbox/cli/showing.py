@@ -116,11 +116,11 @@ def show_stage(
         return 1
     try:
         begin()
-        window.desk.overlays |= set(overlays)
+        window.gui.overlays |= set(overlays)
         if ghost:
             stage.toggle_ghost()
         if pick:
-            window.desk.open_picker(None)
+            window.gui.open_picker(None)
         status = window.run()
         if record is not None and not _saved(stage, record):
             status = status or 1

@@ -110,7 +110,7 @@ class App(WindowContext):
         self.commands.settle()
         if self.leaving is not None:
             return
-        self.stage.covered = self.desk.covers or self.stage.question is not None
+        self.stage.covered = self.gui.covers or self.stage.question is not None
         compiled = COMPILE_CLOCK.seconds
         self.stage.go_on(elapsed)
         if COMPILE_CLOCK.seconds > compiled:
@@ -125,8 +125,8 @@ class App(WindowContext):
     def draw(self) -> None:
         """Draw what is on, and what surrounds it."""
         self.make_room()
-        self.desk.out_of_sight = self.loses_sight
-        self.desk.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
+        self.gui.out_of_sight = self.loses_sight
+        self.gui.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
 
     def _wait(self, done: Callable[[float], bool]) -> None:
         """Stay alive until a job of the worker is done: show what is waited for, and close at Esc and the cross.
@@ -139,7 +139,7 @@ class App(WindowContext):
         while not done(1.0 / WAIT_RATE):
             surface = pygame.display.get_surface() or self.surface
             surface.blit(behind, (0, 0))
-            self.desk.draw_wait(surface, wait.told())
+            self.gui.draw_wait(surface, wait.told())
             pygame.display.flip()
             for event in pygame.event.get():
                 escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
@@ -160,7 +160,7 @@ class App(WindowContext):
         self._worker.note_compiling(what)
         if threading.current_thread() is not threading.main_thread():
             return
-        self.desk.draw_wait(self.surface, what)
+        self.gui.draw_wait(self.surface, what)
         pygame.display.flip()
         pygame.event.pump()  # keeps the window manager from marking the window as unresponsive
 
@@ -179,15 +179,15 @@ class App(WindowContext):
             return
         for error in self._gamepads.take(event, self.stage.host, lambda: self.commands.do(Command.PAUSE)):
             self.stage.messages.tell(str(error), "warning")
-        command = self._keyboard.command(event, self.desk.claimed(self.stage))
+        command = self._keyboard.command(event, self.gui.claimed(self.stage))
         self._dismiss(event, command)
         self._let_go(event)
-        if self.desk.handle(event, self.stage):
+        if self.gui.handle(event, self.stage):
             return
         if command is not None:
             self.commands.do(command)
         elif event.type == pygame.KEYDOWN:
-            claims = self.desk.claims(self.stage)
+            claims = self.gui.claims(self.stage)
             deed = claims.deed(event.key, self._keyboard.again)
             waits = self.stage.waits_for_start
             if deed is not None and not waits and not event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
@@ -205,14 +205,14 @@ class App(WindowContext):
         if event.type == pygame.KEYDOWN:
             other = command != asked and event.key not in MODIFIERS and not self._keyboard.again
         else:
-            left = self.surface.get_width() - self.desk.panel.width
+            left = self.surface.get_width() - self.gui.panel.width
             other = event.type == pygame.MOUSEBUTTONDOWN and event.pos[0] < left
         if other:
             self.commands.dismiss()
 
     def _starts(self, event: pygame.event.Event) -> bool:
         """Tell whether an event starts the game that waits for it: Space, or any button of a gamepad."""
-        if not self.stage.waits_for_start or self.desk.covers or self.stage.faults:
+        if not self.stage.waits_for_start or self.gui.covers or self.stage.faults:
             return False
         space = event.type == pygame.KEYDOWN and event.key == pygame.K_SPACE
         return space or event.type == pygame.JOYBUTTONDOWN
@@ -254,7 +254,7 @@ class App(WindowContext):
         """Finish what is being recorded, and close the window."""
         COMPILE_CLOCK.on_begin = None
         self.taking.end_film()
-        self.desk.close()
+        self.gui.close()
         self.stage.compute = compute_here
         if not self._worker.is_busy:  # else the engine is in use, and the process ends anyway
             self.stage.close()

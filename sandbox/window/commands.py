@@ -42,7 +42,7 @@ class Commands:
         self._turned: dict[str, ParameterValue] = {}  # knobs since the last `settle`, the last turned last
         self.asked: Command | None = None
         """what was not done at once, as something would be lost"""
-        stage, desk = seat.stage, seat.desk
+        stage, gui = seat.stage, seat.gui
         self._deeds: dict[Command, Callable[[], object]] = {
             Command.PAUSE: stage.toggle_pause,
             Command.STEP: stage.step,
@@ -63,7 +63,7 @@ class Commands:
             Command.RECORD: self._record,
             Command.SAVE: lambda: seat.taking.session(stage.show, seat.name),
             Command.RELOAD: stage.reload,
-            Command.SOUND: lambda: stage.messages.tell(*desk.toggle_sound()),
+            Command.SOUND: lambda: stage.messages.tell(*gui.toggle_sound()),
             Command.DELETE: lambda: stage.act(stage.hands.remove),
             Command.NUDGE: lambda: stage.act(stage.hands.nudge),
             Command.ADD_BALL: lambda: self._add(box=False),
@@ -73,9 +73,9 @@ class Commands:
             Command.FOLLOW: seat.toggle_follow,
             Command.FULL_SCREEN: seat.toggle_full_screen,
         }
-        desk.panel.on_button = lambda name: self.do(BUTTONS[name])
-        desk.panel.on_toggle = lambda name, _: self.toggle(name)
-        desk.panel.on_change = self._turn
+        gui.panel.on_button = lambda name: self.do(BUTTONS[name])
+        gui.panel.on_toggle = lambda name, _: self.toggle(name)
+        gui.panel.on_change = self._turn
 
     def do(self, command: Command) -> None:
         """Do what a command says, after what came before it."""
@@ -83,7 +83,7 @@ class Commands:
         if self._asks(command):
             return
         if command.overlay is not None:
-            self._seat.desk.overlays ^= {command.overlay}
+            self._seat.gui.overlays ^= {command.overlay}
         else:
             self._deeds[command]()
 
@@ -106,7 +106,7 @@ class Commands:
     def toggle(self, name: str) -> None:
         """Turn one of the panel's switches."""
         if name == "antialias":
-            self._seat.desk.antialias = not self._seat.desk.antialias
+            self._seat.gui.antialias = not self._seat.gui.antialias
         else:
             self.do(Command(name))
 
@@ -124,16 +124,16 @@ class Commands:
     def _let_go(self) -> None:
         """Let go of everything, as something comes that hides the releases."""
         self._mouse.let_go()
-        self._seat.desk.panel.release()
+        self._seat.gui.panel.release()
         self.settle()
 
     def _picker(self) -> None:
         self._let_go()
-        self._seat.desk.open_picker(self._seat.stage.path)
+        self._seat.gui.open_picker(self._seat.stage.path)
 
     def _help(self) -> None:
         self._let_go()
-        self._seat.desk.toggle_help()
+        self._seat.gui.toggle_help()
 
     def _home(self) -> None:
         """Show the scene as it began; where that is seen already, the bodies where they are now."""
@@ -145,8 +145,8 @@ class Commands:
 
     def _panel(self) -> None:
         self._let_go()
-        desk = self._seat.desk
-        desk.panel.visible = not desk.panel.visible
+        gui = self._seat.gui
+        gui.panel.visible = not gui.panel.visible
         if self._seat.at_home:
             self._seat.home()
 

@@ -39,9 +39,9 @@ def laid_out(path: Path) -> Laid:
     try:
         assert stage.open(path)
         window.turn(0.0)
-        left = SIZE[0] - window.desk.panel.width
+        left = SIZE[0] - window.gui.panel.width
         rects = {}
-        for widget in window.desk.panel.widgets:
+        for widget in window.gui.panel.widgets:
             name = widget.knob.key if hasattr(widget, "knob") else widget.name
             rects[name] = widget.rect.move(left, 0)
         return Laid(rects, window.camera)

@@ -31,7 +31,7 @@ FIELD_SCENES = [
 
 def overlaps(window: App) -> list[str]:
     """Return the pairs of plates that lie over each other."""
-    plates = window.desk.plates.items()
+    plates = window.gui.plates.items()
     return [f"{a}{p} {b}{q}" for (a, p), (b, q) in combinations(plates, 2) if p.colliderect(q)]
 
 
@@ -45,7 +45,7 @@ def opened(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> App:
 
 
 def resize(window: App, width: int, height: int, unit: float) -> None:
-    window.desk.unit = unit
+    window.gui.unit = unit
     surface = pygame.display.set_mode((width, height), pygame.RESIZABLE)
     pygame.event.clear()
     window.resize(surface)
@@ -59,14 +59,14 @@ def test_no_two_plates_overlap(name: str, tmp_path: Path, monkeypatch: pytest.Mo
     try:
         window.turn(0.0)
         window.stage.paused = True  # from here on all that can be told at once
-        window.desk.overlays = set(OVERLAYS)
+        window.gui.overlays = set(OVERLAYS)
         window.stage.hands.picked = 0
         window.stage.messages.tell("a message that is long enough to need more than one line of a small window")
         window.stage.messages.tell("another one", "warning")
         for width, height, unit in SIZES:
             resize(window, width, height, unit)
             assert overlaps(window) == [], (width, height, unit)
-            free = window.desk.free
+            free = window.gui.free
             assert 2 * free.width * free.height > width * height, (width, height, unit)
     finally:
         window.close()
@@ -84,7 +84,7 @@ def test_plates_leave_the_field_free(name: str, tmp_path: Path, monkeypatch: pyt
             corners = window.camera.to_screen(np.asarray(view_bounds(scene)))
             (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
             field = pygame.Rect(math.ceil(left), math.ceil(top), int(right - left), int(bottom - top))
-            covering = {k: r for k, r in window.desk.plates.items() if not k.startswith(("message", "rate", "inset"))}
+            covering = {k: r for k, r in window.gui.plates.items() if not k.startswith(("message", "rate", "inset"))}
             assert [k for k, rect in covering.items() if rect.colliderect(field)] == [], (width, height, unit)
             assert field.width * field.height > 0.08 * width * height  # it is not driven into a corner either
     finally:
@@ -100,7 +100,7 @@ def test_last_shot_is_told_whole_beside_four_tanks(tmp_path: Path, monkeypatch: 
         resize(window, 1024, 700, 1.0)
         assert window.stage.host is not None
         assert window.stage.show is not None
-        laid = score_panel.layout_score(window.stage.host.shown().board, window.desk.free, 300, 1.0)
+        laid = score_panel.layout_score(window.stage.host.shown().board, window.gui.free, 300, 1.0)
         texts = [text for cells, _ in laid.rows for _, text in cells]
         assert told in texts
         assert len(laid.rows) <= 4

@@ -199,7 +199,7 @@ def test_many_motions_of_a_turn_are_one_action(window: App) -> None:
 
 def test_many_motions_of_a_knob_are_one_action_before_the_next_command(window: App) -> None:
     turn(window)
-    change = window.desk.panel.on_change
+    change = window.gui.panel.on_change
     for value in (1.0, 2.0, -4.0):
         change("gravity", value, False)
     window.commands.do(Command.PAUSE)
@@ -226,12 +226,12 @@ def test_all_that_is_held_is_let_go_before_something_hides_it(window: App, code:
 def test_nothing_hides_the_timeline_while_it_is_held(window: App) -> None:
     turn(window, elapsed=0.08)
     turn(window)
-    bar = window.surface.get_height() - window.desk.foot // 2
+    bar = window.surface.get_height() - window.gui.foot // 2
     turn(window, press(200, bar))
     step = live(window).step_number
     assert step < 8
     turn(window, key(pygame.K_o, pygame.KMOD_CTRL), key(pygame.K_F1), key(pygame.K_TAB))
-    assert (window.desk.picker, window.desk.manual.open, window.desk.panel.visible) == (None, False, True)
+    assert (window.gui.picker, window.gui.manual.open, window.gui.panel.visible) == (None, False, True)
     turn(window, release(200, bar))
     while live(window).busy is not None:
         turn(window)
@@ -242,7 +242,7 @@ def test_nothing_hides_the_timeline_while_it_is_held(window: App) -> None:
 
 def test_release_reaches_the_mouse_while_the_timeline_is_held(window: App) -> None:
     turn(window, elapsed=0.05)
-    bar = window.surface.get_height() - window.desk.foot // 2
+    bar = window.surface.get_height() - window.gui.foot // 2
     turn(window, press(300, 300, 2), press(200, bar), release(200, bar, 2), release(200, bar))
     home = window.camera
     turn(window, pygame.event.Event(pygame.MOUSEMOTION, pos=(320, 300), rel=(20, 0), buttons=(0, 0, 0)))
@@ -286,9 +286,9 @@ def test_end_is_told_until_one_goes_back(window: App) -> None:
     turn(window, elapsed=0.05)
     session = live(window).session
     session.ended = "at 0.05 s: it broke"
-    assert window.desk.status(window.stage, 60.0, None).ended == session.ended
+    assert window.gui.status(window.stage, 60.0, None).ended == session.ended
     live(window).scrub(0.0)
-    assert window.desk.status(window.stage, 60.0, None).ended is None
+    assert window.gui.status(window.stage, 60.0, None).ended is None
 
 
 def test_press_and_release_within_one_turn_pull_nothing(window: App) -> None:
@@ -414,9 +414,9 @@ def test_window_of_a_stored_run_tells_what_cannot_be_done(opened: Open, tmp_path
     show = RecordedView(RecordedRun(sandbox.run(sandbox.load(tmp_path / "room.toml"))))
     window.stage.put_on(show, None, show.scene)
     show.scrub(show.end)
-    assert window.desk.status(window.stage, 60.0, None).ended == "end of the run"
+    assert window.gui.status(window.stage, 60.0, None).ended == "end of the run"
     show.scrub(show.begin)
-    assert window.desk.status(window.stage, 60.0, None).ended is None
+    assert window.gui.status(window.stage, 60.0, None).ended is None
     for code in (pygame.K_e, pygame.K_g, pygame.K_t, pygame.K_b, pygame.K_n, pygame.K_DELETE):
         turn(window, key(code), key_up(code))
         assert window.stage.messages.shown()[-1][0] == "warning"
@@ -462,9 +462,9 @@ def test_wait_while_the_picture_is_locked(window: App) -> None:
     before = pygame.surfarray.array3d(window.surface)
     lock = memoryview(window.surface.get_buffer())  # type: ignore[arg-type]  # it is a buffer, which its stub leaves out
     assert window.surface.get_locked()
-    window.desk.draw_wait(window.surface, "compiling")
+    window.gui.draw_wait(window.surface, "compiling")
     lock.release()
     locked = pygame.surfarray.array3d(window.surface)
-    window.desk.draw_wait(window.surface, "compiling")
+    window.gui.draw_wait(window.surface, "compiling")
     assert (locked != before).any()
     assert (pygame.surfarray.array3d(window.surface) == locked).all()

@@ -61,7 +61,7 @@ def control(window: App, code: int) -> None:
 def test_any_title_and_name_are_shown_and_saved_under_a_plain_name(window: App, tmp_path: Path, text: str) -> None:
     name = text if text.isprintable() else "a"
     assert window.stage.open(room(tmp_path, text, name))
-    window.desk.overlays |= {"names"}
+    window.gui.overlays |= {"names"}
     control(window, pygame.K_p)
     control(window, pygame.K_s)
     written = sorted(path.name for path in (tmp_path / "out").iterdir())
@@ -75,9 +75,9 @@ def test_any_letters_can_be_typed_for_a_scene(window: App, tmp_path: Path, typed
     control(window, pygame.K_o)
     for letter in typed:
         post(window, pygame.event.Event(pygame.KEYDOWN, key=pygame.K_a, mod=0, unicode=letter))
-    assert window.desk.picker is not None
-    assert len(window.desk.picker.typed) <= 60
-    assert window.desk.picker.typed.isprintable()
+    assert window.gui.picker is not None
+    assert len(window.gui.picker.typed) <= 60
+    assert window.gui.picker.typed.isprintable()
 
 
 @pytest.mark.parametrize("is_file", [False, True], ids=["gone", "a file"])

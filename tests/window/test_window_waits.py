@@ -143,13 +143,13 @@ def test_window_closes_while_something_compiles(window: App, event: pygame.event
 
 def test_scene_is_seen_while_its_session_is_being_started(window: App, tmp_path: Path) -> None:
     seen: list[int] = []
-    drawn = window.desk.draw_wait
+    drawn = window.gui.draw_wait
 
     def look(surface: pygame.Surface, what: str) -> None:
         seen.append(len({surface.get_at((x, 240))[:3] for x in range(0, 360, 4)}))
         drawn(surface, what)
 
-    window.desk.draw_wait = look  # type: ignore[method-assign]
+    window.gui.draw_wait = look  # type: ignore[method-assign]
     other = tmp_path / "other.toml"
     other.write_text(MOVING.replace("Moving", "Other"), encoding="utf-8")
     begin = window.stage.compute

@@ -70,7 +70,7 @@ def _close(opened: App, path: Path, colours: int = COLOURS) -> None:
 def ghost(path: Path) -> None:
     """Play the gas on pymunk, with the ghost of the exact engine."""
     opened = _open("gas", SIZE)
-    opened.desk.overlays |= {"energy"}
+    opened.gui.overlays |= {"energy"}
     opened.stage.toggle_ghost()
     live = opened.stage.live
     assert live is not None
@@ -99,7 +99,7 @@ def artillery_thumbnail(scene: str) -> Callable[[Path], None]:
 
 def _duel(scene: str, size: tuple[int, int]) -> App:
     opened = _open(scene, size)
-    opened.desk.panel.visible = False
+    opened.gui.panel.visible = False
     opened.home()
     opened.stage.start_game()
     host, live = opened.stage.host, opened.stage.live
@@ -115,7 +115,7 @@ def _duel(scene: str, size: tuple[int, int]) -> App:
 def landing(path: Path) -> None:
     """Descend towards the pad by a script of throttles."""
     opened = _open("landing", SIZE, "world.seed=9")
-    opened.desk.overlays |= {"trails"}
+    opened.gui.overlays |= {"trails"}
     opened.stage.start_game()
     host, live = opened.stage.host, opened.stage.live
     assert host is not None
@@ -132,8 +132,8 @@ def landing(path: Path) -> None:
 def pinball(path: Path) -> None:
     """Let a player who watches the ball play for half a minute."""
     opened = _open("pinball/full", UPRIGHT)
-    opened.desk.panel.visible = False
-    opened.desk.overlays |= {"trails"}
+    opened.gui.panel.visible = False
+    opened.gui.overlays |= {"trails"}
     opened.home()
     opened.stage.start_game()
     live, host = opened.stage.live, opened.stage.host
@@ -176,7 +176,7 @@ def table(path: Path) -> None:
 def rolling(path: Path) -> None:
     """Break at 9-ball, and film the table."""
     opened = _open("9-ball", SIZE)
-    opened.desk.panel.visible = False
+    opened.gui.panel.visible = False
     opened.home()
     opened.take(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0))
     frames = []

@@ -89,13 +89,13 @@ def test_who_looks_elsewhere_lets_go(window: App) -> None:
 
 
 def test_help_lists_controls_and_scene_keys_are_theirs(window: App) -> None:
-    claims = window.desk.claims(window.stage)
+    claims = window.gui.claims(window.stage)
     assert claims.told == (
         ("Up or Left Shift", "kick it; gamepad: A, stick up"),
         ("Left", "how far; gamepad: LT"),
         ("Gamepad Start", "pause / resume"),
     )
-    assert {UP, LEFT, pygame.K_LSHIFT} <= window.desk.claimed(window.stage)
+    assert {UP, LEFT, pygame.K_LSHIFT} <= window.gui.claimed(window.stage)
 
 
 def test_help_tells_the_cross_of_a_gamepad_from_its_stick() -> None:
@@ -238,7 +238,7 @@ def lies_clear(window: App) -> bool:
     corners = window.camera.to_screen(np.asarray(view_bounds(window.stage.show.scene)))
     (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     field = pygame.Rect(round(left), round(top), int(right - left), int(bottom - top))
-    return window.desk.free.contains(field) and field.collidelist(window.desk.taken(window.stage)) < 0
+    return window.gui.free.contains(field) and field.collidelist(window.gui.taken(window.stage)) < 0
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (1000, 300), (640, 480)])  # the last has the score at the bottom
