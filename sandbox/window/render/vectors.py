@@ -159,7 +159,8 @@ def _in_sight(view: DrawContext, most: int) -> tuple[IntArray, FloatArray, Float
     seen = view.inside(pixels, 20.0 * view.unit)
     if len(seen) > most:
         seen = seen[np.linspace(0, len(seen) - 1, most).astype(np.intp)]
-    return seen, pixels[seen], view.camera.ways(normal[seen]) / view.camera.scale
+    with np.errstate(over="ignore"):  # a recorded normal may have any length
+        return seen, pixels[seen], view.camera.ways(normal[seen]) / view.camera.scale
 
 
 def draw_contacts(view: DrawContext, discs: CircleRenderer) -> None:

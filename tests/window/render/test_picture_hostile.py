@@ -1,8 +1,8 @@
 import numpy as np
 import pygame
 import pytest
-from drawn import ball, drawn, frame, scene, sight
-from hypothesis import given
+from drawn import ball, contact, drawn, frame, scene, sight
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_numpy
 
@@ -77,6 +77,9 @@ def test_nothing_raises_whatever_is_drawn(what, centre, power, size, antialias, 
 
 
 @given(what=sights(), power=st.floats(-3.0, 4.0), antialias=st.booleans())
+@example(
+    what=sight(WHICH, *OVERLAYS, contacts=contact((COUNT, -5), (0.0, 0.0), (1e308, 0.0))), power=4.0, antialias=True
+)
 def test_nothing_raises_near_the_origin(what, power, antialias):
     assert drawn(what, Camera((0.0, 0.0), 10.0**power, (90, 70)), antialias=antialias).any()
 
