@@ -42,7 +42,7 @@ def laid_out(path: Path) -> Laid:
         left = SIZE[0] - window.gui.panel.width
         rects = {}
         for widget in window.gui.panel.widgets:
-            name = widget.knob.key if hasattr(widget, "knob") else widget.name
+            name = widget.parameter.key if hasattr(widget, "parameter") else widget.name
             rects[name] = widget.rect.move(left, 0)
         return Laid(rects, window.camera)
     finally:

@@ -201,7 +201,7 @@ class SidePanel:
             kind = OptionButton if knob.choices else ParameterSlider
             old = self._dials.get(knob.key)
             dial = old if type(old) is kind else kind(self._sheet, knob)
-            dial.show_knob(knob)
+            dial.show_parameter(knob)
             dials[knob.key] = dial
         lay_out = any(self._dials.get(key) is not dial for key, dial in dials.items())
         self._dials = dials
@@ -233,8 +233,8 @@ class SidePanel:
         """Place the widgets as far as the content is scrolled."""
         self._scroll = min(max(self._scroll, 0), max(self._layout.height - self.size[1], 0))
         for widget, place in self._layout.places:
-            widget.win = self._sheet
-            widget.place(place.move(0, -self._scroll), self.unit)
+            widget.surface = self._sheet
+            widget.set_rect(place.move(0, -self._scroll), self.unit)
 
     def release(self) -> None:
         """End whatever is being dragged, with its final report."""
@@ -282,7 +282,7 @@ class SidePanel:
             return
         moved = pygame.event.Event(event.type, {**event.dict, "pos": at})
         for widget in self.widgets:
-            widget.listen([moved])
+            widget.handle_event(moved)
         self._call_back()
 
     def _grab_bar(self, event: pygame.event.Event, at: tuple[int, int]) -> bool:
@@ -301,7 +301,7 @@ class SidePanel:
         if self._pointer is None:
             return False
         notches = int(event.y)
-        if notches and not any(dial.turn(notches, self._pointer) for dial in self._dials.values()):
+        if notches and not any(dial.scroll(notches, self._pointer) for dial in self._dials.values()):
             self._scroll -= round(notches * SCROLL * self.unit)
             self._move()
         self._call_back()
@@ -311,8 +311,8 @@ class SidePanel:
         """Tell what was done since the last call; a callback may show other things meanwhile."""
         reports: list[WidgetEvent] = []
         for widget in self.widgets:
-            reports += widget.reports
-            widget.reports.clear()
+            reports += widget.events
+            widget.events.clear()
         for report in reports:
             if report.kind == "button":
                 self.on_button(report.name)
@@ -325,7 +325,7 @@ class SidePanel:
         """Draw it at the right of the window, if it is visible."""
         if not self.visible:
             return
-        look = (self._scroll, self._bar_held, self._layout.headings, *(widget.look for widget in self.widgets))
+        look = (self._scroll, self._bar_held, self._layout.headings, *(widget.draw_state for widget in self.widgets))
         if look != self._drawn:
             self._draw_sheet()
             self._drawn = look

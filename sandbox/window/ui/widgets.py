@@ -1,18 +1,12 @@
-"""Widgets: what all of the panel's share, switches and buttons; made from the base of pygame-widgets.
+"""Widgets of the side panel: check box, button, slider, and a button that cycles through options.
 
-How they differ from theirs: they live on events, not on the mouse's state once a frame, so that a press and release
-within one frame count; they belong to whoever made them, not to the library's global list; and what happened to one
-is kept in its `reports`, so that it holds nothing of its panel.
-
-Dials: what turns a knob, a slider for figures and a row of words for choices; made from those of pygame-widgets.
+Widgets react to events, not to the state of the mouse once a frame, so that a press and its release within one frame
+count as a click. A widget queues what was done to it in `events`; it holds no reference to its panel.
 """
 
-from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import pygame
-from pygame_widgets.slider import Slider  # type: ignore[import-untyped]  # the library ships no types
-from pygame_widgets.widget import WidgetBase  # type: ignore[import-untyped]  # the library ships no types
 
 from sandbox.window.playback.parameters import Parameter, ParameterValue
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, PANEL_RAISED, SKY, WARNING, Colour, mix_colours
@@ -20,320 +14,317 @@ from sandbox.window.render.text import draw_text, ellipsis, text_size
 from sandbox.window.ui.icons import draw_disc, icon
 
 WIDGET_TEXT_SIZE = 12.5
-"""px at unit 1"""
+"""px at UI scale 1"""
+DOUBLE_CLICK_MS = 400
+"""longest time between the two presses of a double click"""
+DOUBLE_CLICK_DISTANCE = 6
+"""px at UI scale 1, greatest distance between the two presses"""
 
 
 class WidgetEvent(NamedTuple):
-    """What somebody did to a widget."""
+    """A user action on a widget."""
 
     kind: Literal["change", "toggle", "button"]
     name: str
     value: ParameterValue | bool = True
     final: bool = True
-    """not while a slider is still dragged"""
+    """False while a slider is being dragged"""
 
 
-class Widget(WidgetBase):  # type: ignore[misc]  # the library ships no types
-    """What all widgets share. Positions of events are those on the surface that it is drawn on."""
+class Widget:
+    """Base of all widgets: geometry, pointer state and the queue of events. Positions are those on `surface`."""
 
     def __init__(self, surface: pygame.Surface) -> None:
-        super().__init__(surface, 0, 0, 0, 0)
-        self.setIsSubWidget(True)  # out of the library's global list
-        self.unit = 1.0
+        self.surface = surface
+        self.rect = pygame.Rect(0, 0, 0, 0)
+        self.ui_scale = 1.0
+        self.enabled = True
         self.held = False
         self.hovered = False
-        self.reports: list[WidgetEvent] = []
+        self.events: list[WidgetEvent] = []
         self.hint = ""
-        """what is told beside the pointer"""
+        """tooltip"""
 
-    @property
-    def rect(self) -> pygame.Rect:
-        """Where it is."""
-        return pygame.Rect(self.getX(), self.getY(), self.getWidth(), self.getHeight())
+    def set_rect(self, rect: pygame.Rect, ui_scale: float) -> None:
+        """Move and resize the widget."""
+        self.rect, self.ui_scale = rect.copy(), ui_scale
 
-    def place(self, rect: pygame.Rect, unit: float) -> None:
-        """Move it."""
-        for name, value in zip(("x", "y", "width", "height"), rect, strict=True):
-            self.set(name, value)
-        self.unit = unit
+    def contains(self, x: int, y: int) -> bool:
+        """Return whether a position is inside the widget; its edge is outside."""
+        return self.rect.left < x < self.rect.right and self.rect.top < y < self.rect.bottom
 
-    def listen(self, events: Sequence[pygame.event.Event]) -> None:
-        """Take events in: a press and a release within it make a click."""
-        for event in events:
-            if event.type == pygame.MOUSEMOTION:
-                self.hovered = self.rect.collidepoint(event.pos)
-            elif event.type == pygame.MOUSEBUTTONDOWN and event.button in (1, 3):
-                self.held = self.hovered = self.rect.collidepoint(event.pos)
-            elif event.type == pygame.MOUSEBUTTONUP and event.button in (1, 3):
-                clicked = self.held and self.rect.collidepoint(event.pos)
-                self.held = False
-                if clicked and self.isEnabled():
-                    self.click(event)
+    def handle_event(self, event: pygame.event.Event) -> None:
+        """Process a mouse event: a press and a release inside the widget make a click."""
+        if event.type == pygame.MOUSEMOTION:
+            self.hovered = self.rect.collidepoint(event.pos)
+        elif event.type == pygame.MOUSEBUTTONDOWN and event.button in (1, 3):
+            self.held = self.hovered = self.rect.collidepoint(event.pos)
+        elif event.type == pygame.MOUSEBUTTONUP and event.button in (1, 3):
+            clicked = self.held and self.rect.collidepoint(event.pos)
+            self.held = False
+            if clicked and self.enabled:
+                self.click(event)
 
     def click(self, event: pygame.event.Event) -> None:
-        """React to a click, given its release."""
+        """React to a click; `event` is the release of the button."""
 
     def release(self) -> None:
-        """End what is being done, as when the window loses its focus."""
+        """End a press or drag without its mouse event, for example when the window loses focus."""
         self.held = self.hovered = False
 
-    @property
-    def look(self) -> tuple[object, ...]:
-        """All that its drawing depends on."""
-        return (*self.rect, self.unit, self.held, self.hovered, self.isEnabled())
+    def draw(self) -> None:
+        """Draw the widget on its surface."""
 
     @property
-    def ink(self) -> Colour:
-        """The colour of its words."""
-        return INK if self.isEnabled() else mix_colours(FAINT, BACKGROUND, 0.35)
+    def draw_state(self) -> tuple[object, ...]:
+        """All values that the drawing depends on."""
+        return (*self.rect, self.ui_scale, self.held, self.hovered, self.enabled)
+
+    @property
+    def text_colour(self) -> Colour:
+        """The colour of label and value; dimmed while disabled."""
+        return INK if self.enabled else mix_colours(FAINT, BACKGROUND, 0.35)
 
 
 class Checkbox(Widget):
-    """A box that is ticked or not, its label, and the key that does the same."""
+    """A check box with its label and the key that toggles it."""
 
     def __init__(self, surface: pygame.Surface, name: str, on: bool, label: str = "", key: str = "") -> None:
         super().__init__(surface)
         self.name, self.on, self.label, self.key = name, on, label or name, key
 
     @property
-    def look(self) -> tuple[object, ...]:
-        """All that its drawing depends on."""
-        return (*super().look, self.name, self.on, self.label, self.key)
+    def draw_state(self) -> tuple[object, ...]:
+        """All values that the drawing depends on."""
+        return (*super().draw_state, self.name, self.on, self.label, self.key)
 
     def click(self, event: pygame.event.Event) -> None:
-        """Turn it."""
+        """Toggle the box."""
         if event.button == 1:
             self.on = not self.on
-            self.reports.append(WidgetEvent("toggle", self.name, self.on))
+            self.events.append(WidgetEvent("toggle", self.name, self.on))
 
     def draw(self) -> None:
-        """Draw it on its surface."""
-        size, rect = WIDGET_TEXT_SIZE * self.unit, self.rect
-        side = round(14 * self.unit)
+        """Draw the widget on its surface."""
+        size, rect = WIDGET_TEXT_SIZE * self.ui_scale, self.rect
+        side = round(14 * self.ui_scale)
         box = pygame.Rect(rect.left, rect.centery - side // 2, side, side)
-        radius = round(3.5 * self.unit)
-        pygame.draw.rect(self.win, SKY if self.on else PANEL_RAISED, box, border_radius=radius)
+        radius = round(3.5 * self.ui_scale)
+        pygame.draw.rect(self.surface, SKY if self.on else PANEL_RAISED, box, border_radius=radius)
         edge = SKY if self.on or self.hovered else LINE
-        pygame.draw.rect(self.win, edge, box, max(round(self.unit), 1), border_radius=radius)
+        pygame.draw.rect(self.surface, edge, box, max(round(self.ui_scale), 1), border_radius=radius)
         if self.on:
-            corners = [(0.22, 0.52), (0.42, 0.72), (0.78, 0.28)]
-            places = [(box.left + x * side, box.top + y * side) for x, y in corners]
-            pygame.draw.lines(self.win, BACKGROUND, False, places, max(round(2 * self.unit), 1))
+            tick = [(box.left + x * side, box.top + y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))]
+            pygame.draw.lines(self.surface, BACKGROUND, False, tick, max(round(2 * self.ui_scale), 1))
         left = box.right + round(0.5 * size)
-        keyed = text_size(self.key, 0.85 * size, mono=True)[0] + round(0.6 * size) if self.key else 0
-        draw_text(self.win, self.key, (rect.right, rect.centery), 0.85 * size, FAINT, "midright", mono=True)
-        label = ellipsis(self.label, size, rect.right - keyed - left)
-        draw_text(self.win, label, (left, rect.centery), size, INK if self.on else FAINT, "midleft")
+        key_width = text_size(self.key, 0.85 * size, mono=True)[0] + round(0.6 * size) if self.key else 0
+        draw_text(self.surface, self.key, (rect.right, rect.centery), 0.85 * size, FAINT, "midright", mono=True)
+        label = ellipsis(self.label, size, rect.right - key_width - left)
+        draw_text(self.surface, label, (left, rect.centery), size, INK if self.on else FAINT, "midleft")
 
 
 class PushButton(Widget):
-    """A button with an icon, or with its name where there is none."""
+    """A button with an icon, or with its name if no icon has that name."""
 
     def __init__(self, surface: pygame.Surface, name: str, hint: str = "") -> None:
         super().__init__(surface)
         self.name, self.hint = name, hint
 
     @property
-    def look(self) -> tuple[object, ...]:
-        """All that its drawing depends on."""
-        return (*super().look, self.name)
+    def draw_state(self) -> tuple[object, ...]:
+        """All values that the drawing depends on."""
+        return (*super().draw_state, self.name)
 
     def click(self, event: pygame.event.Event) -> None:
-        """Report it."""
+        """Queue a button event."""
         if event.button == 1:
-            self.reports.append(WidgetEvent("button", self.name))
+            self.events.append(WidgetEvent("button", self.name))
 
     def draw(self) -> None:
-        """Draw it on its surface."""
+        """Draw the widget on its surface."""
         rect = self.rect
         colour = mix_colours(PANEL_RAISED, SKY, 0.45) if self.held else LINE if self.hovered else PANEL_RAISED
-        pygame.draw.rect(self.win, colour, rect, border_radius=round(5 * self.unit))
+        pygame.draw.rect(self.surface, colour, rect, border_radius=round(5 * self.ui_scale))
         side = round(0.62 * min(rect.size))
-        picture = icon(self.name, side, WARNING if self.name in ("record", "stop") else INK)
-        if picture is not None:
-            self.win.blit(picture, picture.get_rect(center=rect.center))
+        image = icon(self.name, side, WARNING if self.name in ("record", "stop") else INK)
+        if image is not None:
+            self.surface.blit(image, image.get_rect(center=rect.center))
         else:
-            size = WIDGET_TEXT_SIZE * self.unit
-            draw_text(self.win, ellipsis(self.name, size, rect.width - size), rect.center, size, INK, "center")
-
-
-DOUBLE = 400
-"""ms between the two presses of a double click, at most"""
+            size = WIDGET_TEXT_SIZE * self.ui_scale
+            draw_text(self.surface, ellipsis(self.name, size, rect.width - size), rect.center, size, INK, "center")
 
 
 class ParameterWidget(Widget):
-    """What sliders and choices share: a knob, and the value that is shown."""
+    """Base of the widgets that change a parameter."""
 
-    def __init__(self, surface: pygame.Surface, knob: Parameter) -> None:
+    def __init__(self, surface: pygame.Surface, parameter: Parameter) -> None:
         super().__init__(surface)
-        self.knob = knob
-        self.now: ParameterValue = knob.value
-        self.show_knob(knob)
+        self.parameter = parameter
+        self.value: ParameterValue = parameter.value
+        """the value that is shown; while dragged, ahead of `parameter.value`"""
+        self.show_parameter(parameter)
 
-    def show_knob(self, knob: Parameter) -> None:
-        """Take over what a knob says, without a report; what is being dragged keeps its value."""
-        self.knob = knob
-        (self.enable if knob.enabled else self.disable)()
-        self.hint = "" if knob.enabled else knob.why
-        if not knob.enabled:
+    def show_parameter(self, parameter: Parameter) -> None:
+        """Show a parameter as it is now, without an event; a widget that is being dragged keeps its value."""
+        self.parameter = parameter
+        self.enabled = parameter.enabled
+        self.hint = "" if parameter.enabled else parameter.why
+        if not parameter.enabled:
             self.held = False
         if not self.held:
-            self.now = knob.value
+            self.value = parameter.value
 
     @property
-    def look(self) -> tuple[object, ...]:
-        """All that its drawing depends on."""
-        return (*super().look, self.knob, self.now)
+    def draw_state(self) -> tuple[object, ...]:
+        """All values that the drawing depends on."""
+        return (*super().draw_state, self.parameter, self.value)
 
     def change(self, value: ParameterValue, final: bool) -> None:
-        """Report a new value."""
-        self.now = value
-        self.reports.append(WidgetEvent("change", self.knob.key, value, final))
+        """Set a new value and queue its event."""
+        self.value = value
+        self.events.append(WidgetEvent("change", self.parameter.key, value, final))
 
-    def turn(self, notches: int, at: tuple[int, int]) -> bool:
-        """Change by notches of the wheel where the pointer is on what moves."""
-        if not self.contains(*at) or not self.isEnabled():
+    def scroll(self, notches: int, position: tuple[int, int]) -> bool:
+        """Change the value by notches of the mouse wheel if the pointer is over the track; return whether it is."""
+        if not self.contains(*position) or not self.enabled:
             return False
-        value = self.knob.stepped(self.now, notches)
-        if value != self.now:
+        value = self.parameter.stepped(self.value, notches)
+        if value != self.value:
             self.change(value, final=True)
         return True
 
 
-class ParameterSlider(ParameterWidget, Slider):  # type: ignore[misc]  # the library ships no types
-    """A slider: label and value above, the track below. The library's slider is its track, from 0 to 1."""
+class ParameterSlider(ParameterWidget):
+    """A slider: label and value above the track. `rect` is the track, `row` the whole widget."""
 
-    def __init__(self, surface: pygame.Surface, knob: Parameter) -> None:
-        self.min, self.max, self.value = 0.0, 1.0, 0.0
-        self._changed = False
-        self._gripped, self._grip = False, 0.0
+    def __init__(self, surface: pygame.Surface, parameter: Parameter) -> None:
+        self.fraction = 0.0
+        """position of the handle, 0 at the left end of the track to 1 at its right end"""
         self.row = pygame.Rect(0, 0, 0, 0)
         """label, value and track together"""
-        self._pressed = -DOUBLE - 1, (0, 0)
-        super().__init__(surface, knob)
-        self.min, self.max = 0.0, 1.0
-        self.show_knob(knob)
+        self.handle_radius = 0
+        """px"""
+        self._dragged = False  # the value has changed since the press
+        self._on_handle, self._grip = False, 0.0  # the press hit the handle; its offset from the handle's centre, px
+        self._last_press = -DOUBLE_CLICK_MS - 1, (0, 0)
+        super().__init__(surface, parameter)
 
-    def place(self, rect: pygame.Rect, unit: float) -> None:
-        """Move it: the track lies in the lower part of the rectangle."""
-        high = round(14 * unit)
-        side = round(7 * unit)
-        super().place(pygame.Rect(rect.left + side, rect.bottom - high, rect.width - 2 * side, high), unit)
-        self.row = rect
-        self.handleRadius = side
+    def set_rect(self, rect: pygame.Rect, ui_scale: float) -> None:
+        """Move and resize the widget; the track lies in the lower part of the rectangle."""
+        height = round(14 * ui_scale)
+        radius = round(7 * ui_scale)
+        track = pygame.Rect(rect.left + radius, rect.bottom - height, rect.width - 2 * radius, height)
+        super().set_rect(track, ui_scale)
+        self.row, self.handle_radius = rect.copy(), radius
 
-    def show_knob(self, knob: Parameter) -> None:
-        """Take over what a knob says, without a report; what is being dragged keeps its value."""
-        super().show_knob(knob)
-        self.setValue(knob.share(self.now))
+    def show_parameter(self, parameter: Parameter) -> None:
+        """Show a parameter as it is now, without an event; a widget that is being dragged keeps its value."""
+        super().show_parameter(parameter)
+        self.fraction = parameter.share(self.value)
 
     def change(self, value: ParameterValue, final: bool) -> None:
-        """Report a new value."""
+        """Set a new value and queue its event."""
         super().change(value, final)
-        self.setValue(self.knob.share(value))
+        self.fraction = self.parameter.share(value)
 
-    def listen(self, events: Sequence[pygame.event.Event]) -> None:
-        """Take events in; a drag goes on wherever the pointer goes, and ends with a final report."""
-        for event in events:
-            if event.type == pygame.MOUSEMOTION:
-                self.hovered = self.row.collidepoint(event.pos)
-                if self.held:
-                    self._follow(event.pos[0])
-            elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
-                if self.isEnabled() and self.contains(*event.pos):
-                    self._press(event.pos)
-            elif event.type == pygame.MOUSEBUTTONUP and event.button == 1 and self.held:
-                self._follow(event.pos[0])
-                self.release()
+    def handle_event(self, event: pygame.event.Event) -> None:
+        """Process a mouse event; a drag continues wherever the pointer is, and ends with a final event."""
+        if event.type == pygame.MOUSEMOTION:
+            self.hovered = self.row.collidepoint(event.pos)
+            if self.held:
+                self._drag_to(event.pos[0])
+        elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
+            if self.enabled and self.contains(*event.pos):
+                self._press(event.pos)
+        elif event.type == pygame.MOUSEBUTTONUP and event.button == 1 and self.held:
+            self._drag_to(event.pos[0])
+            self.release()
 
-    def _press(self, at: tuple[int, int]) -> None:
+    def _press(self, position: tuple[int, int]) -> None:
         now = pygame.time.get_ticks()
-        then, where = self._pressed
-        near = max(abs(at[0] - where[0]), abs(at[1] - where[1])) <= 6 * self.unit
-        default = self.knob.default
-        if now - then <= DOUBLE and near and default is not None:
-            self._pressed = -DOUBLE - 1, at
-            if self.now != default:
+        last, (x, y) = self._last_press
+        near = max(abs(position[0] - x), abs(position[1] - y)) <= DOUBLE_CLICK_DISTANCE * self.ui_scale
+        default = self.parameter.default
+        if now - last <= DOUBLE_CLICK_MS and near and default is not None:
+            self._last_press = -DOUBLE_CLICK_MS - 1, position
+            if self.value != default:
                 self.change(default, final=True)
             return
-        self._pressed = now, at
-        self.held, self._changed = True, False
-        handle = self.getX() + self.getValue() * self.getWidth()
-        self._gripped = abs(at[0] - handle) <= self.handleRadius
-        self._grip = at[0] - handle if self._gripped else 0.0  # a gripped handle does not jump
-        if not self._gripped:
-            self._follow(at[0])
+        self._last_press = now, position
+        self.held, self._dragged = True, False
+        handle = self.rect.left + self.fraction * self.rect.width
+        self._on_handle = abs(position[0] - handle) <= self.handle_radius
+        self._grip = position[0] - handle if self._on_handle else 0.0  # a pressed handle does not jump
+        if not self._on_handle:
+            self._drag_to(position[0])
 
-    def _follow(self, x: float) -> None:
-        """Move to where the pointer is; where it has not moved since it gripped the handle, nothing changes."""
-        if x == self._pressed[1][0] and self._gripped and not self._changed:
+    def _drag_to(self, x: float) -> None:
+        """Set the value at a pointer position; a press on the handle without motion changes nothing."""
+        if x == self._last_press[1][0] and self._on_handle and not self._dragged:
             return
-        value = self.knob.at((x - self._grip - self.getX()) / max(self.getWidth(), 1))
-        if value != self.now:
-            self._changed = True
+        value = self.parameter.at((x - self._grip - self.rect.left) / max(self.rect.width, 1))
+        if value != self.value:
+            self._dragged = True
             self.change(value, final=False)
 
     def release(self) -> None:
-        """End a drag, with a final report if anything was changed."""
-        changed = self.held and self._changed
+        """End a drag, with a final event if the value has changed."""
+        dragged = self.held and self._dragged
         super().release()
-        if changed:
-            self.change(self.now, final=True)
+        if dragged:
+            self.change(self.value, final=True)
 
     def draw(self) -> None:
-        """Draw it on its surface."""
-        size, track = WIDGET_TEXT_SIZE * self.unit, self.rect
-        middle = self.row.top + 0.75 * size
-        text = self.knob.text(self.now)
-        taken = draw_text(self.win, text, (self.row.right, middle), size, self.ink, "midright", mono=True).width
-        label = ellipsis(self.knob.label, size, self.row.width - taken - size)
-        draw_text(self.win, label, (self.row.left, middle), size, self.ink, "midleft")
-        thick = max(round(4 * self.unit), 2)
-        bar = pygame.Rect(track.left, track.centery - thick // 2, track.width, thick)
-        pygame.draw.rect(self.win, LINE, bar, border_radius=thick)
-        share = self.getValue()
-        zero = self.knob.share(0.0) if not self.knob.log and self.knob.low < 0 else 0.0
-        ends = sorted(bar.left + round(part * bar.width) for part in (zero, share))
+        """Draw the widget on its surface."""
+        size, track = WIDGET_TEXT_SIZE * self.ui_scale, self.rect
+        y = self.row.top + 0.75 * size
+        text, colour = self.parameter.text(self.value), self.text_colour
+        value_width = draw_text(self.surface, text, (self.row.right, y), size, colour, "midright", mono=True).width
+        label = ellipsis(self.parameter.label, size, self.row.width - value_width - size)
+        draw_text(self.surface, label, (self.row.left, y), size, colour, "midleft")
+        thickness = max(round(4 * self.ui_scale), 2)
+        bar = pygame.Rect(track.left, track.centery - thickness // 2, track.width, thickness)
+        pygame.draw.rect(self.surface, LINE, bar, border_radius=thickness)
+        zero = self.parameter.share(0.0) if not self.parameter.log and self.parameter.low < 0 else 0.0
+        ends = sorted(bar.left + round(part * bar.width) for part in (zero, self.fraction))
         bar.left, bar.width = ends[0], ends[1] - ends[0]
-        live = self.isEnabled()
-        pygame.draw.rect(self.win, SKY if live else PANEL_RAISED, bar, border_radius=thick)
-        at = track.left + round(share * track.width), track.centery
-        radius = self.handleRadius if self.held or self.hovered else self.handleRadius - self.unit
-        draw_disc(self.win, at, radius, SKY if live else LINE)
-        draw_disc(self.win, at, max(radius - 2.4 * self.unit, 1), INK if live else PANEL_RAISED)
+        pygame.draw.rect(self.surface, SKY if self.enabled else PANEL_RAISED, bar, border_radius=thickness)
+        centre = track.left + round(self.fraction * track.width), track.centery
+        radius = self.handle_radius if self.held or self.hovered else self.handle_radius - self.ui_scale
+        draw_disc(self.surface, centre, radius, SKY if self.enabled else LINE)
+        draw_disc(self.surface, centre, max(radius - 2.4 * self.ui_scale, 1), INK if self.enabled else PANEL_RAISED)
 
 
 class OptionButton(ParameterWidget):
-    """One of several words: a click goes to the next, on its left end or with the right button to the one before."""
+    """One of several options: a click selects the next; a click on its left end or a right click, the previous."""
 
     def contains(self, x: int, y: int) -> bool:
-        """Tell whether a place is on the word."""
+        """Return whether a position is on the button, not on its label."""
         return bool(self._box.collidepoint(x, y))
 
     @property
     def _box(self) -> pygame.Rect:
-        rect = self.rect
-        wide = round(0.68 * rect.width)
-        return pygame.Rect(rect.right - wide, rect.top, wide, rect.height)
+        width = round(0.68 * self.rect.width)
+        return pygame.Rect(self.rect.right - width, self.rect.top, width, self.rect.height)
 
     def click(self, event: pygame.event.Event) -> None:
-        """Change to the next word, or the one before."""
-        if self.contains(*event.pos) and self.knob.choices:
+        """Select the next option, or the previous one."""
+        if self.contains(*event.pos) and self.parameter.choices:
             back = event.button == 3 or event.pos[0] < self._box.left + 0.25 * self._box.width
-            self.change(self.knob.stepped(self.now, -1 if back else 1), final=True)
+            self.change(self.parameter.stepped(self.value, -1 if back else 1), final=True)
 
     def draw(self) -> None:
-        """Draw it on its surface."""
-        size, box = WIDGET_TEXT_SIZE * self.unit, self._box
-        label = ellipsis(self.knob.label, size, box.left - self.rect.left - 0.5 * size)
-        draw_text(self.win, label, (self.rect.left, box.centery), size, self.ink, "midleft")
-        lit = self.hovered and self.isEnabled()
-        pygame.draw.rect(self.win, LINE if lit else PANEL_RAISED, box, border_radius=round(4 * self.unit))
-        text = ellipsis(self.knob.text(self.now), 0.95 * size, box.width - 2.2 * size)
-        draw_text(self.win, text, box.center, 0.95 * size, self.ink, "center")
-        reach, x = 0.28 * size, 0.6 * size
-        for end, way in ((box.left + x, -1), (box.right - x, 1)):
-            corners = [(end - way * reach / 2, box.centery - reach), (end + way * reach / 2, box.centery)]
-            corners.append((corners[0][0], box.centery + reach))
-            colour = SKY if self.isEnabled() else LINE
-            pygame.draw.lines(self.win, colour, False, corners, max(round(1.6 * self.unit), 1))
+        """Draw the widget on its surface."""
+        size, box, colour = WIDGET_TEXT_SIZE * self.ui_scale, self._box, self.text_colour
+        label = ellipsis(self.parameter.label, size, box.left - self.rect.left - 0.5 * size)
+        draw_text(self.surface, label, (self.rect.left, box.centery), size, colour, "midleft")
+        lit = self.hovered and self.enabled
+        pygame.draw.rect(self.surface, LINE if lit else PANEL_RAISED, box, border_radius=round(4 * self.ui_scale))
+        text = ellipsis(self.parameter.text(self.value), 0.95 * size, box.width - 2.2 * size)
+        draw_text(self.surface, text, box.center, 0.95 * size, colour, "center")
+        height, x = 0.28 * size, 0.6 * size
+        for end, sign in ((box.left + x, -1), (box.right - x, 1)):
+            tip = end + sign * height / 2, box.centery
+            arrow = [(end - sign * height / 2, box.centery + dy) for dy in (-height, height)]
+            stroke = max(round(1.6 * self.ui_scale), 1)
+            pygame.draw.lines(self.surface, SKY if self.enabled else LINE, False, [arrow[0], tip, arrow[1]], stroke)
