@@ -199,7 +199,7 @@ def test_mixer_that_is_missing_is_no_exception(monkeypatch: pytest.MonkeyPatch) 
 
 
 NO_DEVICE = """
-from sandbox.play.sound import Sounds
+from sandbox.window.sound import Sounds
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
 sounds = Sounds()
