@@ -20,7 +20,7 @@ from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from sandbox.window.capture.film import RecordedRun
+    from sandbox.window.playback.recorded import RecordedRun
 
 
 @click.command(name="export")
@@ -213,7 +213,7 @@ def _between(run: Trajectory, options: Options) -> Trajectory:
 
 def _film(run: str, trajectory: Trajectory) -> "RecordedRun":
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # standard output is for what was asked
-    from sandbox.window.capture.film import RecordedRun
+    from sandbox.window.playback.recorded import RecordedRun
 
     return RecordedRun(trajectory, run)
 

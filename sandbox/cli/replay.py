@@ -69,8 +69,7 @@ def _shown(source: Trajectory | Recording, engine: str | None) -> "LiveView | Re
 
 def _stored(run: Trajectory) -> "RecordedView":
     """Return a stored run to be looked at."""
-    from sandbox.window.capture.film import RecordedRun
-    from sandbox.window.playback.recorded import RecordedView
+    from sandbox.window.playback.recorded import RecordedRun, RecordedView
 
     return RecordedView(RecordedRun(run))
 
@@ -84,8 +83,8 @@ def _computed(source: Trajectory | Recording, engine: str | None) -> "LiveView":
     """
     from sandbox.games.registry import fitting_rules
     from sandbox.games.session import GameSession
-    from sandbox.window.capture.film import RecordedRun
     from sandbox.window.playback.live import LiveView
+    from sandbox.window.playback.recorded import RecordedRun
     from sandbox.window.playback.session import Session
 
     film = None

@@ -254,7 +254,7 @@ class AppState:
             self.show.close()
         self.show, self.path, self.file = show, path, file
         if isinstance(show, RecordedView):
-            self.reach = show.film.box
+            self.reach = show.run.bounds
         elif again is not None and not same:
             self.reach = None
         self._again, self._tried = again, None

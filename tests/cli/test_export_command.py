@@ -26,7 +26,7 @@ from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 from sandbox.window.camera import Camera
 from sandbox.window.capture import recorder as limits
-from sandbox.window.capture.film import RecordedRun
+from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.render.palette import SKY
 
 SCENE = loads(DROP)
@@ -100,7 +100,7 @@ def test_gif_shows_the_ball_where_the_run_has_it(
     frames, shown = gif_frames(target)
     assert (len(frames), sum(shown)) == (10, 500)
     film = RecordedRun(Trajectory.load(stored / f"{id_in(stored)}.npz"))
-    camera = Camera.fitting(film.box, (160, 90))
+    camera = Camera.fitting(film.bounds, (160, 90))
     for k, frame in enumerate(frames):
         x, y = camera.to_screen(film.frame(k / 20).position[0])
         assert np.abs(frame[int(y), int(x)] - SKY).max() <= 40  # of 255: a disc may be shaded
@@ -142,7 +142,7 @@ def test_mp4_decodes_to_the_same_pictures(stored: Path, tmp_path: Path, capfd: p
 
 def test_png_shows_the_end_or_another_moment(stored: Path, tmp_path: Path) -> None:
     film = RecordedRun(Trajectory.load(stored / f"{id_in(stored)}.npz"))
-    camera = Camera.fitting(film.box, (160, 90))
+    camera = Camera.fitting(film.bounds, (160, 90))
     for words, moment in (((), 0.5), (("--at", "0"), 0.0), (("--at", "0.25"), 0.25)):
         target = tmp_path / "a.png"
         assert call(["export", str(stored), "--to", str(target), *words, *SMALL, "--quiet"]) == 0

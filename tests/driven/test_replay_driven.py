@@ -10,7 +10,7 @@ from rooms import FALLING, MOVING, written
 
 import sandbox
 from sandbox.window.camera import Camera
-from sandbox.window.capture.film import RecordedRun
+from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.render.palette import INK, SKY
 from sandbox.window.ui.panel import PANEL_WIDTH
 from sandbox.window.ui.timeline import HEIGHT, Timeline

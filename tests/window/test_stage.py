@@ -11,11 +11,10 @@ from sandbox.measure.run import run
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app_state import AppState
-from sandbox.window.capture.film import RecordedRun
 from sandbox.window.playback import live as live_module
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import SessionParameters, turned
-from sandbox.window.playback.recorded import RecordedView
+from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from sandbox.window.playback.session import Session
 
 GOOD = """

@@ -408,7 +408,7 @@ def test_files_are_told_in_the_window_and_on_the_terminal(window: App, said: lis
 
 def test_window_of_a_stored_run_tells_what_cannot_be_done(opened: Open, tmp_path: Path) -> None:
     import sandbox
-    from sandbox.window.capture.film import RecordedRun
+    from sandbox.window.playback.recorded import RecordedRun
 
     window = opened(ROOM)
     show = RecordedView(RecordedRun(sandbox.run(sandbox.load(tmp_path / "room.toml"))))

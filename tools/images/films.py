@@ -7,8 +7,9 @@ import sandbox
 from sandbox.measure.run import run
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.camera import Camera
-from sandbox.window.capture.film import NARROW, RecordedRun
+from sandbox.window.capture.export import MIN_CAPTION_WIDTH, RunRenderer
 from sandbox.window.capture.image_files import offscreen
+from sandbox.window.playback.recorded import RecordedRun
 
 from .files import image_of, save_gif
 
@@ -31,11 +32,12 @@ def film(
     """
 
     def make(path: Path) -> None:
-        seen = RecordedRun(run(sandbox.load(find(scene), [f"world.duration={until}"]), engine, audit=False), scene)
+        recorded = RecordedRun(run(sandbox.load(find(scene), [f"world.duration={until}"]), engine, audit=False), scene)
+        renderer = RunRenderer(recorded)
         large = size[0] * SHARP, size[1] * SHARP
-        surface, camera, frames = offscreen(large), Camera.fitting(seen.box, large), []
+        surface, camera, frames = offscreen(large), Camera.fitting(recorded.bounds, large), []
         for k in range(round(until * fps) + 1):
-            seen.draw(surface, camera, k / fps, caption=size[0] >= NARROW)
+            renderer.draw(surface, camera, k / fps, caption=size[0] >= MIN_CAPTION_WIDTH)
             frames.append(image_of(surface).reduce(SHARP))
         save_gif(frames, path, fps, colours, 0.8)
 

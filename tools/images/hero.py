@@ -10,8 +10,8 @@ from PIL import Image
 
 import sandbox
 from sandbox.window.camera import Camera
-from sandbox.window.capture.film import RecordedRun
 from sandbox.window.capture.image_files import offscreen
+from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.render.palette import BACKGROUND, FAINT, GREEN, LINE, ORANGE, PANEL, SKY, Colour, mix_colours
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.render.text import draw_text
@@ -121,7 +121,7 @@ def _draw_panel(surface: pygame.Surface, run: Run, time: float, truth: "sandbox.
     """Draw a run at a time, and the exact balls as rings."""
     camera = Camera.fitting(((-0.03, -0.03), (WIDTH + 0.03, HEIGHT)), surface.get_size(), margin=0.0)
     part = offscreen(surface.get_size())
-    sight = run.film.sight(time, frozenset({"shapes"}), ghost=truth)
+    sight = run.film.snapshot(time, frozenset({"shapes"}), ghost=truth)
     _PICTURES.setdefault(run.engine, Renderer()).draw(part, camera, sight, unit=float(SHARP), scale=False)
     _draw_trails(part, camera, run, time)
     surface.blit(part, (0, 0))

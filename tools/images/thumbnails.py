@@ -12,8 +12,8 @@ from sandbox.measure.play_out import play_out
 from sandbox.measure.run import run
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.camera import Box, Camera
-from sandbox.window.capture.film import RecordedRun
 from sandbox.window.capture.image_files import offscreen
+from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.render.palette import BACKGROUND
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.view_bounds import should_rotate
@@ -127,12 +127,12 @@ def thumbnail(name: str, moment: Moment) -> Image.Image:
     scene = sandbox.load(find(name), [f"world.duration={moment.time}"])
     film = RecordedRun(_run(scene, moment), name)
     size = SIZE[0] * SHARP, SIZE[1] * SHARP
-    camera = Camera.fitting(moment.box or film.box, size, turned=should_rotate(scene, size))
+    camera = Camera.fitting(moment.box or film.bounds, size, turned=should_rotate(scene, size))
     overlays = frozenset({"shapes", *(("trails",) if moment.trail else ())})
     picture, surface, shown = Renderer(), offscreen(size), None
     for k in range(moment.strobe + 1):
         time = film.duration * (1.0 - k / max(moment.strobe, 1))
-        picture.draw(surface, camera, film.sight(time, overlays, moment.trail or 1.0), unit=LINES, scale=False)
+        picture.draw(surface, camera, film.snapshot(time, overlays, moment.trail or 1.0), unit=LINES, scale=False)
         image = image_of(surface)
         faint = Image.blend(Image.new("RGB", size, BACKGROUND), image, FAINT)
         shown = image if shown is None else ImageChops.lighter(shown, faint)

@@ -1,18 +1,31 @@
-"""Filming: a stored run to a file, as a still picture or a film."""
+"""Drawing of a recorded run, and its export to a picture or film file."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+import pygame
+
+from sandbox.arrays import FloatArray
 from sandbox.interrupt import uninterrupted
 from sandbox.window.camera import Camera
-from sandbox.window.capture.film import RecordedRun, frame_times
 from sandbox.window.capture.image_files import AtomicFile, Size, offscreen
 from sandbox.window.capture.recorder import Recorder, recorder_for, save_image
+from sandbox.window.playback.recorded import RecordedRun
+from sandbox.window.render.palette import FAINT, INK
+from sandbox.window.render.renderer import InsetRenderer, Renderer
+from sandbox.window.render.text import draw_text, text_size
+from sandbox.window.ui.energy_plot import RunGraph
 from sandbox.window.view_bounds import should_rotate
 
 Progress = Callable[[float], None]
 """Called with the share of the film that is done, 0 to 1."""
+
+
+MIN_CAPTION_WIDTH = 320
+"""px; a caption would cover too much of a narrower picture"""
 
 
 @dataclass(frozen=True)
@@ -32,7 +45,75 @@ class ExportOptions:
     """of `sight.OVERLAYS`"""
 
 
-def export_images(film: RecordedRun, shot: ExportOptions, path: Path, progress: Progress | None = None) -> int:
+class RunRenderer:
+    """Draws a recorded run as the window draws a session."""
+
+    def __init__(self, run: RecordedRun) -> None:
+        self.run = run
+        self._renderer, self._inset = Renderer(), InsetRenderer()
+        self._graph = RunGraph(run.trajectory, run.scene, run.bodies)
+
+    def draw(
+        self,
+        surface: pygame.Surface,
+        camera: Camera,
+        time: float,
+        overlays: frozenset[str] = frozenset({"shapes"}),
+        speed: float = 1.0,
+        caption: bool = True,
+    ) -> None:
+        """Draw the state at a time, s.
+
+        Args:
+            surface: where; it needs no display.
+            camera: which part of the world.
+            time: of the run.
+            overlays: of `snapshot.OVERLAYS`.
+            speed: of the film, as a share of real time.
+            caption: write title, engine and time into the upper left corner, where there is room for them.
+        """
+        unit = ui_scale_of(surface.get_size())
+        snapshot = self.run.snapshot(time, overlays, speed)
+        self._renderer.draw(surface, camera, snapshot, unit=unit)
+        self._inset.draw(surface, camera, snapshot, surface.get_rect(), unit=unit)
+        if "energy" in overlays:
+            self._graph.draw(surface, time, unit)
+        if caption and surface.get_width() >= MIN_CAPTION_WIDTH:
+            self._write_caption(surface, time, unit)
+
+    def _write_caption(self, surface: pygame.Surface, time: float, unit: float) -> None:
+        left, size = 14.0 * unit, 17.0 * unit
+        title = self.run.scene.title or "untitled"
+        draw_text(surface, title, (left, 12.0 * unit), size, INK, bold=True)
+        digits = max(2, len(f"{self.run.duration:.2f}"))
+        words = f"{self.run.trajectory.info['engine']}   {time:{digits}.2f} s"
+        height = text_size(title, size, bold=True)[1]
+        draw_text(surface, words, (left, 12.0 * unit + 1.15 * height), 14.0 * unit, FAINT, mono=True)
+
+
+def ui_scale_of(size: tuple[int, int]) -> float:
+    """Return the factor by which lines and words of a picture are scaled: 1 where it is meant to be seen as it is."""
+    return max(0.75, min(size[0] / 960.0, size[1] / 540.0))
+
+
+def frame_times(start: float, end: float, fps: float, speed: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """Return when a film's pictures are, (K,) s of the run, and how long each is shown, (K,) s, on the whole exactly.
+
+    Args:
+        start: of the film, s of the run.
+        end: of the film, s of the run.
+        fps: pictures a second.
+        speed: seconds of the run a second.
+    """
+    seconds = (end - start) / speed
+    count = max(1, math.ceil(seconds * fps - 0.5 - 1e-9))  # half a picture counts down, however it was rounded
+    shown: FloatArray = np.full(count, 1.0 / fps)
+    if seconds > 0.0:
+        shown[-1] = seconds - (count - 1) / fps
+    return np.asarray(start + np.arange(count) * (speed / fps)), shown
+
+
+def export_images(run: RecordedRun, shot: ExportOptions, path: Path, progress: Progress | None = None) -> int:
     """Write a run to a `.png`, `.gif` or `.mp4`, and return how many pictures it has.
 
     Needs no display, and leaves nothing behind where it is interrupted.
@@ -40,10 +121,11 @@ def export_images(film: RecordedRun, shot: ExportOptions, path: Path, progress: 
     Raises:
         CaptureError: the file cannot be made.
     """
+    renderer = RunRenderer(run)
     surface = offscreen(shot.size)
-    camera = Camera.fitting(film.box, shot.size, turned=should_rotate(film.scene, shot.size))
+    camera = Camera.fitting(run.bounds, shot.size, turned=should_rotate(run.scene, shot.size))
     if path.suffix.lower() == ".png":
-        film.draw(surface, camera, shot.end, shot.overlays, shot.speed)
+        renderer.draw(surface, camera, shot.end, shot.overlays, shot.speed)
         save_image(surface, AtomicFile.at(path))
         return 1
     times, shown = frame_times(shot.start, shot.end, shot.fps, shot.speed)
@@ -52,7 +134,7 @@ def export_images(film: RecordedRun, shot: ExportOptions, path: Path, progress: 
         with uninterrupted():
             recorder = recorder_for(path, shot.size, shot.fps)
         for k, (time, seconds) in enumerate(zip(times.tolist(), shown.tolist(), strict=True)):
-            film.draw(surface, camera, time, shot.overlays, shot.speed)
+            renderer.draw(surface, camera, time, shot.overlays, shot.speed)
             recorder.add(surface, seconds)
             if progress is not None:
                 progress((k + 1) / len(times))

@@ -27,8 +27,8 @@ from sandbox.measure.run import Auditor
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.description.world import COMMON
 from sandbox.trajectory import Frame
-from sandbox.window.capture.film import RecordedRun
 from sandbox.window.playback.history import History, Trails
+from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.playback.session import Session
 from sandbox.window.playback.snapshot import MissedContactMarker
 

@@ -18,11 +18,11 @@ from sandbox.scene.description.scene import zone_visits
 from sandbox.scene.description.world import COMMON, Settings
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
-from sandbox.window.capture.film import RecordedRun
 from sandbox.window.hit_test import overlapping_bodies
 from sandbox.window.playback.action_log import SceneHistory
 from sandbox.window.playback.clock import FixedStepClock, interpolate
 from sandbox.window.playback.diagnostics import Diagnostics
+from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.playback.session import Replaced, Session, WrongWayError
 from sandbox.window.playback.snapshot import BreakNotifier, Snapshot, active_thrusters, broken_joints
 
@@ -393,7 +393,7 @@ class LiveView(DisplayedStep):
         """(level, text) of what happened; whoever tells it empties the list."""
         return self.company.notes
 
-    def sight(
+    def snapshot(
         self,
         overlays: frozenset[str],
         picked: int | None = None,
@@ -402,7 +402,7 @@ class LiveView(DisplayedStep):
         """Return what is drawn now.
 
         Args:
-            overlays: of `sight.OVERLAYS`.
+            overlays: of `snapshot.OVERLAYS`.
             picked: number of the picked body.
             pull: where a body is held, and the hand, m.
         """

@@ -220,7 +220,7 @@ class Gui:
             surface.fill(BACKGROUND)
         else:
             pull = stage.hands.line(show) if isinstance(show, LiveView) else None
-            sight = show.sight(frozenset(self.overlays), stage.hands.picked, pull)
+            sight = show.snapshot(frozenset(self.overlays), stage.hands.picked, pull)
             if stage.gestures is not None:
                 sight = stage.gestures.seen.over(sight)
             if stage.host is not None:

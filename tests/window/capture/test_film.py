@@ -12,8 +12,9 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 from sandbox.window.camera import Camera
-from sandbox.window.capture.film import LINGER, RecordedRun, bodies_of_run, frame_times, scene_of_run
+from sandbox.window.capture.export import RunRenderer, frame_times
 from sandbox.window.capture.image_files import offscreen, rgb_pixels
+from sandbox.window.playback.recorded import CONTACT_DURATION, RecordedRun, bodies_of_run, scene_of_run
 from sandbox.window.playback.snapshot import OVERLAYS
 from sandbox.window.render.palette import BACKGROUND, SKY
 from sandbox.window.view_bounds import crowd_bounds
@@ -140,22 +141,22 @@ def test_contacts_linger_for_a_moment_of_the_film() -> None:
     film = film_of(BOUNCE)
     (first, *_) = film.trajectory.contact_time.tolist()
     everything = frozenset(OVERLAYS)
-    assert len(film.sight(first - 1e-6, everything).contacts) == 0
-    assert film.sight(first, everything).contacts.time.tolist() == [first]
-    assert len(film.sight(first + 0.9 * LINGER, everything).contacts) == 1
-    assert len(film.sight(first + 1.1 * LINGER, everything).contacts) == 0
-    assert len(film.sight(first + 0.5 * LINGER, everything, speed=0.25).contacts) == 0
+    assert len(film.snapshot(first - 1e-6, everything).contacts) == 0
+    assert film.snapshot(first, everything).contacts.time.tolist() == [first]
+    assert len(film.snapshot(first + 0.9 * CONTACT_DURATION, everything).contacts) == 1
+    assert len(film.snapshot(first + 1.1 * CONTACT_DURATION, everything).contacts) == 0
+    assert len(film.snapshot(first + 0.5 * CONTACT_DURATION, everything, speed=0.25).contacts) == 0
 
 
 def test_trails_end_where_the_bodies_are() -> None:
     film = film_of(FALL, Remove(time=0.45, body="b"))
-    past, now = film.sight(0.75, frozenset({"trails"})).trails
+    past, now = film.snapshot(0.75, frozenset({"trails"})).trails
     assert np.array_equal(past[:, 0], film.trajectory.position[: len(past), 0])
     assert len(past) == 8
     assert np.isnan(past[5:, 1]).all()
     assert np.isnan(now[0, 1]).all()
     assert np.array_equal(now[0, 0], film.frame(0.75).position[0])
-    assert film.sight(0.75, frozenset({"shapes"})).trails == ()
+    assert film.snapshot(0.75, frozenset({"shapes"})).trails == ()
 
 
 def test_missed_contact_flashes_where_it_was_missed() -> None:
@@ -165,17 +166,17 @@ def test_missed_contact_flashes_where_it_was_missed() -> None:
     )
     film = film_of(text)
     (missed,) = film.trajectory.missed_time.tolist()
-    (flash,) = film.sight(missed + 0.02, frozenset()).flashes
+    (flash,) = film.snapshot(missed + 0.02, frozenset()).flashes
     assert flash.age == pytest.approx(0.02)
     assert flash.position == tuple(film.frame(missed).position[0])
-    assert film.sight(missed - 1e-9, frozenset()).flashes == ()
+    assert film.snapshot(missed - 1e-9, frozenset()).flashes == ()
 
 
 @pytest.mark.parametrize("time", [0.0, 0.33, 1.0])
 def test_pixels_of_a_body_are_where_the_run_says(time: float) -> None:
     film, size = film_of(), (320, 180)
-    surface, camera = offscreen(size), Camera.fitting(film.box, size)
-    film.draw(surface, camera, time, caption=False)
+    surface, camera = offscreen(size), Camera.fitting(film.bounds, size)
+    RunRenderer(film).draw(surface, camera, time, caption=False)
     seen = rgb_pixels(surface, size).astype(int)
     x, y = camera.to_screen(film.frame(time).position[0])
     reach = 0.5 * camera.scale
@@ -190,11 +191,11 @@ def test_pixels_of_a_body_are_where_the_run_says(time: float) -> None:
 
 def test_caption_is_written_into_the_corner_alone() -> None:
     film, size = film_of(), (480, 270)
-    camera = Camera.fitting(film.box, size)
+    camera = Camera.fitting(film.bounds, size)
     pictures = []
     for caption in (False, True):
         surface = offscreen(size)
-        film.draw(surface, camera, 0.5, caption=caption)
+        RunRenderer(film).draw(surface, camera, 0.5, caption=caption)
         pictures.append(rgb_pixels(surface, size).astype(int))
     rows, columns = np.nonzero(np.abs(pictures[1] - pictures[0]).sum(axis=2))
     assert len(rows) > 100  # a few letters
@@ -204,11 +205,11 @@ def test_caption_is_written_into_the_corner_alone() -> None:
 
 def test_energy_is_drawn_into_its_corner_at_any_time() -> None:
     film, size = film_of(BOUNCE), (960, 540)
-    camera = Camera.fitting(film.box, size)
+    camera = Camera.fitting(film.bounds, size)
     for time in (1.0, 0.0, 0.5):  # also backwards
         plain, graph = offscreen(size), offscreen(size)
-        film.draw(plain, camera, time)
-        film.draw(graph, camera, time, frozenset({"shapes", "energy"}))
+        RunRenderer(film).draw(plain, camera, time)
+        RunRenderer(film).draw(graph, camera, time, frozenset({"shapes", "energy"}))
         rows, columns = np.nonzero((rgb_pixels(plain, size) != rgb_pixels(graph, size)).any(axis=2))
         assert rows.min() > 540 / 2
         assert columns.min() > 960 / 2
@@ -217,9 +218,9 @@ def test_energy_is_drawn_into_its_corner_at_any_time() -> None:
 def test_every_overlay_can_be_drawn() -> None:
     film, size = film_of(BOUNCE, Spawn(time=0.2, ball=Ball(position=(3.0, 3.0), radius=0.25))), (320, 180)
     plain, full = offscreen(size), offscreen(size)
-    camera = Camera.fitting(film.box, size)
-    film.draw(plain, camera, 0.35)
-    film.draw(full, camera, 0.35, frozenset(OVERLAYS))
+    camera = Camera.fitting(film.bounds, size)
+    RunRenderer(film).draw(plain, camera, 0.35)
+    RunRenderer(film).draw(full, camera, 0.35, frozenset(OVERLAYS))
     assert not np.array_equal(rgb_pixels(plain, size), rgb_pixels(full, size))
 
 
@@ -270,7 +271,7 @@ def test_scene_and_bodies_are_those_of_the_run() -> None:
 def test_same_time_is_computed_once() -> None:
     film = film_of()
     frame = film.frame(0.123)
-    assert film.sight(0.123, frozenset(OVERLAYS)).frame is frame
+    assert film.snapshot(0.123, frozenset(OVERLAYS)).frame is frame
     assert film.frame(0.123) is frame
     other = film.frame(0.2)
     assert other.time == 0.2
@@ -281,7 +282,7 @@ def test_contacts_in_sight_are_those_that_are_drawn() -> None:
     film = film_of(BOUNCE)
     (first, *_) = film.trajectory.contact_time.tolist()
     for speed in (0.5, 1.0):
-        time = first + 0.75 * LINGER
+        time = first + 0.75 * CONTACT_DURATION
         found = film.contacts(time, speed)
-        assert found.time.tolist() == film.sight(time, frozenset(), speed).contacts.time.tolist()
+        assert found.time.tolist() == film.snapshot(time, frozenset(), speed).contacts.time.tolist()
         assert (first in found.time.tolist()) == (speed == 1.0)

@@ -13,8 +13,9 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import load
 from sandbox.trajectory import Trajectory
 from sandbox.window.camera import Camera
-from sandbox.window.capture.film import RecordedRun
+from sandbox.window.capture.export import RunRenderer
 from sandbox.window.capture.image_files import offscreen, rgb_pixels
+from sandbox.window.playback.recorded import RecordedRun
 
 CLASSIC = Path(__file__).parents[3] / "scenes" / "pinball" / "classic.toml"
 
@@ -30,13 +31,13 @@ def test_picture_of_a_run_shows_the_lamps_that_were_lit(played: Trajectory, tmp_
     film = RecordedRun(Trajectory.load(tmp_path / "run.npz"))
     dark = RecordedRun(replace(played, info=played.info | {"game": None}))
     time, names = next((time, names) for time, names in played.info["game"]["lamps"] if names)
-    assert film.sight(time, frozenset()).lit == frozenset(names)
+    assert film.snapshot(time, frozenset()).lit == frozenset(names)
     lamps = {part.name: part.light for part in film.scene.play.parts}
     shots = []
     for each in (film, dark):
         surface = offscreen((540, 960))
-        camera = Camera.fitting(each.box, (540, 960))
-        each.draw(surface, camera, time, caption=False)
+        camera = Camera.fitting(each.bounds, (540, 960))
+        RunRenderer(each).draw(surface, camera, time, caption=False)
         shots.append(rgb_pixels(surface, (540, 960)).astype(int).sum(axis=2))
     brighter = np.argwhere(shots[0] > shots[1])
     assert len(brighter)

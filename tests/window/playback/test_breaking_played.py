@@ -11,10 +11,9 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
-from sandbox.window.capture.film import RecordedRun
 from sandbox.window.playback import live as module
 from sandbox.window.playback.live import LiveView
-from sandbox.window.playback.recorded import RecordedView
+from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from sandbox.window.playback.session import Session
 from sandbox.window.playback.snapshot import Snapshot
 
@@ -54,7 +53,7 @@ def cloth() -> Scene:
 
 
 def shown(show: LiveView | RecordedView) -> Snapshot:
-    return show.sight(ALL)
+    return show.snapshot(ALL)
 
 
 def at(show: LiveView, step: int) -> LiveView:

@@ -15,11 +15,10 @@ from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
-from sandbox.window.capture.film import RecordedRun
 from sandbox.window.playback import live as journey
 from sandbox.window.playback import live as module
 from sandbox.window.playback.live import LiveView
-from sandbox.window.playback.recorded import RecordedView
+from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from sandbox.window.playback.session import Session
 
 ALL = frozenset({"shapes", "trails", "contacts"})
@@ -51,7 +50,7 @@ def test_real_time_makes_steps() -> None:
     for k in range(1, 61):
         show.go_on(1 / 60, paused=False)
         assert show.session.time == pytest.approx(k / 60, abs=0.001)  # up to a step
-    frame = show.sight(ALL).frame
+    frame = show.snapshot(ALL).frame
     assert show.session.previous.time <= frame.time <= show.session.time
     assert frame.time == pytest.approx(show.session.time - 0.001 + 0.001 * show.between_steps, abs=1e-12)  # rounding
 
@@ -121,7 +120,7 @@ def test_scrub_looks_and_settle_goes_there() -> None:
     assert show.step_number == 50
     assert show.frame.time == pytest.approx(0.05, rel=1e-12)  # rounding
     assert show.session.frame is here
-    assert show.sight(ALL).frame is show.frame
+    assert show.snapshot(ALL).frame is show.frame
     show.scrub(-9.0)
     assert show.step_number == 0
     show.scrub(99.0)
@@ -156,13 +155,13 @@ def test_scrub_shows_walls_as_they_were_then() -> None:
         seen = []
         for step in (0, 1, 2, 3, 0):
             show.scrub(step * dt)
-            seen.append(show.sight(ALL).scene)
+            seen.append(show.snapshot(ALL).scene)
             assert (seen[-1].walls[0].points, seen[-1].walls[0].solid) == (courses[min(step, 2)], step != 1)
         assert seen[0] is seen[-1]
-        assert show.sight(ALL).scene is seen[0]
+        assert show.snapshot(ALL).scene is seen[0]
     show.settle()
     arrived(show)
-    assert show.sight(ALL).scene is show.scene
+    assert show.snapshot(ALL).scene is show.scene
 
 
 def test_scrub_shows_bodies_that_have_not_come_yet() -> None:
@@ -177,7 +176,7 @@ def test_scrub_shows_bodies_that_have_not_come_yet() -> None:
     assert (len(show.bodies), show.bodies.names) == (2, ("ball", "spawned-2"))
     for time, count in ((1.0, 4), (0.002, 3), (0.0, 1), (1.0, 4)):
         show.scrub(time)
-        sight = show.sight(ALL)
+        sight = show.snapshot(ALL)
         assert len(sight.frame.position) == count
         assert len(sight.bodies) >= count
         assert sight.bodies.radius[1:].tolist() == [0.25] * (len(sight.bodies) - 1)
@@ -279,12 +278,12 @@ def test_switch_while_pulling_goes_on_pulling() -> None:
 
 def test_overlap_colours_are_those_of_the_scene_that_asks_for_them() -> None:
     show = live("circle_half_plane")
-    assert show.sight(ALL).overlapping is not None
+    assert show.snapshot(ALL).overlapping is not None
     show.act(Move(time=0.0, body="circle", position=(0.0, 0.5)))
-    over = show.sight(ALL).overlapping
+    over = show.snapshot(ALL).overlapping
     assert over is not None
     assert over.tolist() == [True]
-    assert live().sight(ALL).overlapping is None
+    assert live().snapshot(ALL).overlapping is None
 
 
 ODD: list[dict[str, Any]] = [
@@ -342,7 +341,7 @@ def test_odd_scenes_can_be_played_in_any_order(which: int, plan: list[tuple[str,
                     show.act(DEEDS[int(number)])
         except ActionError as error:
             assert str(error)
-        sight = show.sight(ALL)
+        sight = show.snapshot(ALL)
         assert len(sight.frame.position) <= len(show.bodies) or show.session.frame is not show.frame
         assert np.isfinite(sight.frame.position).all()
         assert all(np.isfinite(show.energy()))
@@ -369,13 +368,13 @@ def test_stored_run_is_gone_through_by_frames() -> None:
     for k in range(1, 5):
         show.step()
         assert show.step_number == k
-        assert show.frame.position[0].tolist() == show.film.trajectory.position[k, 0].tolist()
+        assert show.frame.position[0].tolist() == show.run.trajectory.position[k, 0].tolist()
     show.back()
     assert show.step_number == 3
     show.scrub(0.034)
     assert show.step_number == 3
     show.back()  # to the frame that was just passed
-    assert show.frame.time == show.film.trajectory.time[3]
+    assert show.frame.time == show.run.trajectory.time[3]
     show.scrub(-5.0)
     assert show.frame.time == 0.0
     show.scrub(99.0)
@@ -409,7 +408,7 @@ def test_stored_run_of_one_frame_stands_still() -> None:
     show.go_on(1.0, paused=False)
     assert show.step_number == 0
     assert show.begin == show.end == 0.0
-    assert show.sight(ALL).frame.position.tolist() == [[0.0, 5.5]]
+    assert show.snapshot(ALL).frame.position.tolist() == [[0.0, 5.5]]
 
 
 def first_frame(session: Session) -> Trajectory:

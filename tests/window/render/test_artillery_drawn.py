@@ -23,9 +23,9 @@ from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 from sandbox.window.app import App
 from sandbox.window.camera import Camera
-from sandbox.window.capture.film import RecordedRun
 from sandbox.window.capture.image_files import offscreen
 from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.renderer import Renderer
 
@@ -163,10 +163,10 @@ def test_films_show_the_ground_as_it_was() -> None:
     scene = duel()
     pit = Reshape(time=1.0, thing="terrain", points=course_of([2.0] * 100, 100.0))
     film = RecordedRun(run(scene, actions=[pit]))
-    before, after = film.sight(0.5, frozenset()).scene, film.sight(1.5, frozenset()).scene
+    before, after = film.snapshot(0.5, frozenset()).scene, film.snapshot(1.5, frozenset()).scene
     assert before.walls == scene.walls
     assert after.walls[0].points == pit.points
-    assert film.sight(1.6, frozenset()).scene is after  # one object, so that its picture is kept
+    assert film.snapshot(1.6, frozenset()).scene is after  # one object, so that its picture is kept
 
 
 @pytest.fixture
