@@ -128,10 +128,10 @@ def test_high_scores_list_ten_however_many_a_file_has(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("typed", ["é\0../👩", "\ud800\n", "xyzzy" * 100])
 def test_initials_are_three_plain_letters_whatever_is_typed(tmp_path: Path, typed: str) -> None:
-    entering = HighScoreEntry(HighScores(tmp_path / "scores.json"), "t", 12, 1)
+    entry = HighScoreEntry(HighScores(tmp_path / "scores.json"), "t", 12, 1)
     for letter in ("a", *typed):
-        entering.type(letter)
-    entering.keep()
-    (row,) = entering.rows()
+        entry.type(letter)
+    entry.save()
+    (row,) = entry.rows()
     assert row.initials.isascii()
     assert 1 <= len(row.initials) <= 3

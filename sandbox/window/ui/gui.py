@@ -24,7 +24,7 @@ from sandbox.window.sound import Sounds
 from sandbox.window.ui import hud
 from sandbox.window.ui.energy_plot import EnergyGraph
 from sandbox.window.ui.help import HelpOverlay
-from sandbox.window.ui.high_score_dialog import HighScoreView
+from sandbox.window.ui.high_score_dialog import HighScoreDialog
 from sandbox.window.ui.hud import hud_width
 from sandbox.window.ui.panel import SidePanel
 from sandbox.window.ui.scene_browser import SceneBrowser
@@ -48,7 +48,7 @@ class Gui:
         self.manual = HelpOverlay()
         self.picker: SceneBrowser | None = None
         self.tools = BilliardsHud()
-        self._honours = HighScoreView()
+        self._high_scores = HighScoreDialog()
         self._timeline = Timeline()
         self._graph = EnergyGraph()
         self._picture, self._inset = Renderer(), InsetRenderer()
@@ -179,7 +179,7 @@ class Gui:
             if path is not None or self.picker.closed:
                 self.picker = None
             return True
-        if stage.host is not None and self._honours.handle(event):
+        if stage.host is not None and self._high_scores.handle_event(event):
             return True
         if self.manual.handle(event) or self._close_faults(event, stage) or self.panel.handle(event):
             return True
@@ -260,7 +260,7 @@ class Gui:
         )
         if show is not None:
             if stage.host is not None and not self.manual.open:
-                self._honours.draw(surface, self._free, self.unit)
+                self._high_scores.draw(surface, self._free, self.unit)
             if self.foot:
                 plates["timeline"] = self._area
                 now = show.frame.time
@@ -293,7 +293,7 @@ class Gui:
             plates |= self.tools.plates(self._free, self.unit)
         elif host is not None:
             plates["score"] = draw_score(surface, host.shown().board, self._free, left, self.unit)
-            for note in self._honours.watch(host):
+            for note in self._high_scores.update(host):
                 stage.messages.tell(note, "warning")
 
     def draw_wait(self, surface: pygame.Surface, what: str) -> None:

@@ -1,7 +1,4 @@
-"""Honours panel: the ten best of a table, and the keys that enter one's initials.
-
-Honours: the high scores at the end of a game, and the initials of who played it; no pygame.
-"""
+"""High-score dialog: at the end of a game with a score among the ten best it asks for initials and lists the scores."""
 
 from dataclasses import dataclass
 
@@ -12,174 +9,142 @@ from sandbox.window.game_host import GameHost
 from sandbox.window.render.palette import FAINT, GREEN, INK
 from sandbox.window.render.text import draw_box, draw_text, text_size
 
+TEXT_SIZE = 15.0
+"""px at UI scale 1"""
+MIN_DELAY_S = 0.8
+"""s after the end of the game in which keys are ignored: the player may still be pressing keys of the game"""
+ENTER_KEYS = (pygame.K_RETURN, pygame.K_KP_ENTER)
+
 
 @dataclass
 class HighScoreEntry:
-    """A score that is among the ten best, while its initials are typed."""
+    """A score among the ten best, and the initials that are being typed for it."""
 
     scores: HighScores
     table: str
     score: int | float
-    place: int
-    """from 1"""
+    rank: int
+    """1 is the best"""
+    others: tuple[Entry, ...] = ()
+    """the scores in the file before this one is entered"""
     letters: str = ""
-    kept: bool = False
+    saved: tuple[Entry, ...] | None = None
+    """the scores in the file after this one was entered; None before"""
 
     def type(self, text: str) -> None:
-        """Add a letter; what is none is ignored."""
+        """Append a letter; any other text is ignored."""
         letter = text.upper()
         if len(letter) == 1 and len(self.letters) < LETTERS and initials_of(letter) == letter:
             self.letters += letter
 
-    def rub(self) -> None:
-        """Take the last letter back."""
+    def backspace(self) -> None:
+        """Remove the last letter."""
         self.letters = self.letters[:-1]
 
-    def keep(self) -> None:
-        """Enter the score.
+    def save(self) -> None:
+        """Enter the score into the file.
 
         Raises:
-            OSError: the file cannot be written.
-            ValueError: somebody has damaged it meanwhile.
+            OSError: the file cannot be read or written.
+            ValueError: the file has been damaged since the dialog opened.
         """
         self.scores.enter(self.table, self.letters, self.score)
-        self.kept = True
+        self.saved = self.scores.of(self.table)
 
     def rows(self) -> tuple[Entry, ...]:
-        """Return the ten best, this one among them.
-
-        Raises:
-            OSError: the file cannot be read.
-            ValueError: it is damaged.
-        """
-        known = self.scores.of(self.table)
-        if self.kept:
-            return known
-        ours = Entry(self.letters.ljust(LETTERS, "_"), self.score)
-        return (*known[: self.place - 1], ours, *known[self.place - 1 :])[:BEST]
+        """Return the ten best, including this one. The file is not read."""
+        if self.saved is not None:
+            return self.saved
+        own = Entry(self.letters.ljust(LETTERS, "_"), self.score)
+        return (*self.others[: self.rank - 1], own, *self.others[self.rank - 1 :])[:BEST]
 
 
 class HighScoreDialog:
-    """Asks for initials once, at the end of a game that hands have played."""
+    """Opens once at the end of a game that was played by hand, and takes the keys that type text while it is open."""
 
     def __init__(self) -> None:
-        self.notes: list[str] = []
-        """what is to be told, by whoever takes them out"""
-        self._host: GameHost | None = None  # whose end was seen
-        self.entering: HighScoreEntry | None = None
+        self.entry: HighScoreEntry | None = None
+        """None while the dialog is closed"""
+        self._ended: GameHost | None = None  # the game whose end has been handled
+        self._opened_at = 0  # ms
+        self._notes: list[str] = []
 
-    def watch(self, host: GameHost | None) -> bool:
-        """See how a game stands; return whether it has just ended with a score that is among the best."""
+    def update(self, host: GameHost | None) -> list[str]:
+        """Open the dialog if the game has just ended with a score among the best; return the messages to show."""
         if host is None or host.rules.over is None:
-            self._host, self.entering = None, None
-            return False
-        if host is self._host:
-            return False
-        self._host, self.entering = host, None
-        if not host.touched:
-            return False
+            self._ended, self.entry = None, None
+        elif host is not self._ended:
+            self._ended = host
+            self.entry = self._new_entry(host) if host.touched else None
+            self._opened_at = pygame.time.get_ticks()
+        notes, self._notes = self._notes, []
+        return notes
+
+    def _new_entry(self, host: GameHost) -> HighScoreEntry | None:
         try:
             scores = opened()
             if scores.told is not None:
-                self.notes.append(scores.told)
+                self._notes.append(scores.told)
             table, score = table_of(host.live.scene), host.rules.score
-            place = scores.rank(table, score)
+            rank = scores.rank(table, score)
+            return None if rank is None else HighScoreEntry(scores, table, score, rank, scores.of(table))
         except (OSError, ValueError) as error:
-            self.notes.append(f"no high scores: {error}")
+            self._notes.append(f"high scores unavailable: {error}")
+            return None
+
+    def handle_event(self, event: pygame.event.Event) -> bool:
+        """Process a key press; return whether it was consumed."""
+        entry = self.entry
+        if entry is None or event.type != pygame.KEYDOWN or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
             return False
-        if place is not None:
-            self.entering = HighScoreEntry(scores, table, score, place)
-        return place is not None
-
-    def keep(self) -> None:
-        """Enter the score; tell why where it cannot be."""
-        if self.entering is None:
-            return
-        try:
-            self.entering.keep()
-        except (OSError, ValueError) as error:
-            self.notes.append(f"no high scores: {error}")
-            self.entering = None
-
-    def leave(self) -> None:
-        """Enter nothing, or close the list."""
-        self.entering = None
-
-
-TEXT_SIZE = 15.0
-"""px at unit 1"""
-
-DEAF = 0.8
-"""s, at first: whoever has just lost a ball still plays"""
-
-ENTER = (pygame.K_RETURN, pygame.K_KP_ENTER)
-
-
-class HighScoreView:
-    """Shows honours while there are some, and takes all keys that write."""
-
-    def __init__(self) -> None:
-        self.honours = HighScoreDialog()
-        self._since = 0
-
-    def watch(self, host: GameHost | None) -> list[str]:
-        """See how a game stands, and open once it has ended well; return what is to be told."""
-        if self.honours.watch(host):
-            self._since = pygame.time.get_ticks()
-        notes, self.honours.notes = self.honours.notes, []
-        return notes
-
-    def handle(self, event: pygame.event.Event) -> bool:
-        """Let it take a key; return whether it was used up."""
-        entering = self.honours.entering
-        if entering is None or event.type != pygame.KEYDOWN or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
-            return False
-        if entering.kept:
-            if event.key not in (*ENTER, pygame.K_ESCAPE):
+        if entry.saved is not None:
+            if event.key not in (*ENTER_KEYS, pygame.K_ESCAPE):
                 return False
-            self.honours.leave()
+            self.entry = None
             return True
-        if pygame.time.get_ticks() - self._since < 1000 * DEAF:
+        if pygame.time.get_ticks() - self._opened_at < 1000 * MIN_DELAY_S:
             return True
-        if event.key in ENTER:
-            if entering.letters:  # Enter may be a key of the game, which hands still press
-                self.honours.keep()
+        if event.key in ENTER_KEYS:
+            if entry.letters:  # Enter may be a key of the game that is still being pressed
+                self._save(entry)
         elif event.key == pygame.K_ESCAPE:
-            self.honours.leave()
+            self.entry = None
         elif event.key == pygame.K_BACKSPACE:
-            entering.rub()
+            entry.backspace()
         elif event.unicode and event.unicode.isprintable():
-            entering.type(event.unicode)
+            entry.type(event.unicode)
         else:
             return False
         return True
 
-    def draw(self, surface: pygame.Surface, free: pygame.Rect, unit: float) -> None:
-        """Draw it in the middle of what is free, px; a list that can no longer be read closes."""
-        entering = self.honours.entering
-        if entering is None:
-            return
+    def _save(self, entry: HighScoreEntry) -> None:
+        """Save the entry; close the dialog with a message if that fails."""
         try:
-            rows = entering.rows()
-        except (OSError, ValueError):
-            self.honours.leave()
+            entry.save()
+        except (OSError, ValueError) as error:
+            self._notes.append(f"high score not saved: {error}")
+            self.entry = None
+
+    def draw(self, surface: pygame.Surface, area: pygame.Rect, ui_scale: float) -> None:
+        """Draw the dialog in the middle of an area, px."""
+        entry = self.entry
+        if entry is None:
             return
-        size = TEXT_SIZE * min(unit, free.width / 420.0, free.height / 420.0)
-        title = "High scores" if entering.kept else f"Place {entering.place}: type your initials"
-        foot = "Enter or Esc: close" if entering.kept else "Enter: save · Esc: discard"
-        texts = [
-            f"{k:>2}  {each.initials.ljust(3)}  {each.score:>15,}".replace(",", " ") for k, each in enumerate(rows, 1)
-        ]
-        wide = max(text_size(text, 1.2 * size, mono=True)[0] for text in texts)
-        wide = max(wide, text_size(title, size, bold=True)[0], text_size(foot, 0.85 * size)[0])
-        rect = pygame.Rect(0, 0, round(wide + 3 * size), round((1.9 * len(rows) + 5.4) * size))
-        rect.center = free.center
+        size = TEXT_SIZE * min(ui_scale, area.width / 420.0, area.height / 420.0)
+        title = f"Rank {entry.rank}: type your initials" if entry.saved is None else "High scores"
+        hint = "Enter: save · Esc: discard" if entry.saved is None else "Enter or Esc: close"
+        lines = [f"{k:>2}  {row.initials.ljust(3)}  {row.score:>15,}" for k, row in enumerate(entry.rows(), 1)]
+        width = max(
+            text_size(title, size, bold=True)[0],
+            text_size(hint, 0.85 * size)[0],
+            *(text_size(line, 1.2 * size, mono=True)[0] for line in lines),
+        )
+        rect = pygame.Rect(0, 0, round(width + 3 * size), round((1.9 * len(lines) + 5.4) * size))
+        rect.center = area.center
         draw_box(surface, rect, 0.6 * size)
         draw_text(surface, title, (rect.centerx, rect.top + 1.4 * size), size, INK, "center", bold=True)
-        for k, text in enumerate(texts):
-            ours = k + 1 == entering.place
-            middle = rect.top + (3.4 + 1.9 * k) * size
-            draw_text(
-                surface, text, (rect.centerx, middle), 1.2 * size, GREEN if ours else INK, "center", ours, mono=True
-            )
-        draw_text(surface, foot, (rect.centerx, rect.bottom - 1.2 * size), 0.85 * size, FAINT, "center")
+        for k, line in enumerate(lines):
+            own, y = k + 1 == entry.rank, rect.top + (3.4 + 1.9 * k) * size
+            colour = GREEN if own else INK
+            draw_text(surface, line, (rect.centerx, y), 1.2 * size, colour, "center", bold=own, mono=True)
+        draw_text(surface, hint, (rect.centerx, rect.bottom - 1.2 * size), 0.85 * size, FAINT, "center")

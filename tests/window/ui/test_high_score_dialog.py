@@ -1,0 +1,164 @@
+"""High-score dialog: when it opens, what its keys do, and that drawing reads no file."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pygame
+import pytest
+
+from sandbox.games.high_scores import FILE, HighScores, opened
+from sandbox.window.ui import high_score_dialog
+from sandbox.window.ui.high_score_dialog import HighScoreDialog
+
+TABLE = "pinball: Test"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("SANDBOX_DATA", str(tmp_path))
+    monkeypatch.setattr(high_score_dialog, "MIN_DELAY_S", 0.0)
+    return tmp_path
+
+
+@dataclass
+class Hosted:
+    """The part of a host that the dialog uses."""
+
+    over: str | None = "game over"
+    score: int = 5_000
+    touched: bool = True
+    rules: Any = field(init=False)
+    live: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.rules = self
+        self.live = SimpleNamespace(scene=SimpleNamespace(title="Test", play=SimpleNamespace(game="pinball")))
+
+
+def press(dialog: HighScoreDialog, *keys: int | str) -> list[bool]:
+    found = []
+    for key in keys:
+        code, text = (key, "") if isinstance(key, int) else (ord(key.lower()), key)
+        found.append(dialog.handle_event(pygame.event.Event(pygame.KEYDOWN, key=code, unicode=text, mod=0)))
+    return found
+
+
+def ended(host: Hosted | None = None) -> HighScoreDialog:
+    """A dialog that has just been shown the end of a game."""
+    dialog = HighScoreDialog()
+    dialog.update(host or Hosted())
+    return dialog
+
+
+def test_initials_are_asked_for_at_the_end_and_kept() -> None:
+    host, dialog = Hosted(over=None), HighScoreDialog()
+    dialog.update(host)
+    assert dialog.entry is None
+    assert press(dialog, "a") == [False]
+    host.over = "game over"
+    dialog.update(host)
+    assert press(dialog, "a", "b", "*", "d", pygame.K_BACKSPACE, "c", "x", pygame.K_RETURN) == [True] * 8
+    (best,) = opened().of(TABLE)
+    assert (best.initials, best.score) == ("ABC", 5_000)
+    assert press(dialog, "r") == [False]  # the list still shows, but keys are the window's again
+    assert press(dialog, pygame.K_RETURN, pygame.K_RETURN) == [True, False]
+    dialog.update(host)
+    assert dialog.entry is None  # one game is entered once
+
+
+def test_enter_without_letters_keeps_nothing() -> None:
+    dialog = ended()
+    assert press(dialog, pygame.K_RETURN) == [True]
+    assert opened().of(TABLE) == ()
+    assert dialog.entry is not None
+
+
+def test_escape_keeps_nothing() -> None:
+    dialog = ended()
+    assert press(dialog, "a", pygame.K_ESCAPE, pygame.K_ESCAPE) == [True, True, False]
+    assert opened().of(TABLE) == ()
+
+
+@pytest.mark.parametrize("host", [Hosted(score=0), Hosted(touched=False)], ids=["nothing scored", "a recording"])
+def test_who_has_not_earned_it_is_not_asked(host: Hosted) -> None:
+    assert ended(host).entry is None
+
+
+def test_eleventh_is_not_asked() -> None:
+    for k in range(10):
+        opened().enter(TABLE, "abc", 6_000 + k)
+    assert ended().entry is None
+
+
+def test_own_row_shows_where_it_will_stand() -> None:
+    for score in (9_000, 1_000):
+        opened().enter(TABLE, "abc", score)
+    dialog = ended()
+    press(dialog, "x")
+    entry = dialog.entry
+    assert entry is not None
+    assert [(each.initials, each.score) for each in entry.rows()] == [("ABC", 9_000), ("X__", 5_000), ("ABC", 1_000)]
+
+
+def test_going_back_asks_anew() -> None:
+    host = Hosted()
+    dialog = ended(host)
+    host.over = None
+    dialog.update(host)
+    assert dialog.entry is None
+    host.over = "again"
+    dialog.update(host)
+    assert dialog.entry is not None
+
+
+def test_damage_is_told(folder: Path) -> None:
+    (folder / FILE).write_text("{", encoding="utf-8")
+    dialog = HighScoreDialog()
+    (note,) = dialog.update(Hosted())
+    assert "damaged" in note
+    assert dialog.entry is not None
+
+
+def test_file_that_cannot_be_written_is_told(folder: Path) -> None:
+    host = Hosted()
+    dialog = ended(host)
+    (folder / FILE).mkdir()
+    press(dialog, "a", pygame.K_RETURN)
+    (note,) = dialog.update(host)
+    assert note.startswith("high score not saved: ")
+    assert dialog.entry is None
+
+
+def test_hands_that_still_play_type_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(high_score_dialog, "MIN_DELAY_S", 60.0)
+    dialog = ended()
+    assert press(dialog, "z", pygame.K_RETURN) == [True, True]
+    assert dialog.entry is not None
+    assert dialog.entry.letters == ""
+
+
+def test_list_is_drawn_and_marks_its_own_row() -> None:
+    for k in range(10):
+        opened().enter(TABLE, "abc", 1_000 * (k + 1) ** 3)
+    dialog, surface = ended(), pygame.Surface((800, 600))
+    press(dialog, "j", "l")
+    dialog.draw(surface, surface.get_rect(), 1.0)
+    shown = pygame.surfarray.array3d(surface).astype(int)
+    assert (shown.sum(axis=2) > 0).mean() > 0.1
+    assert ((shown[..., 1] - shown[..., 0]) > 60).sum() > 100  # the green of the own row
+
+
+def test_score_file_is_read_when_the_dialog_opens_and_not_when_it_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    reads = []
+    original = HighScores._read
+    monkeypatch.setattr(HighScores, "_read", lambda self: reads.append(1) or original(self))
+    dialog, surface = ended(), pygame.Surface((800, 600))
+    assert reads
+    for _ in range(2):  # while initials are typed, and while the saved list is shown
+        reads.clear()
+        for _ in range(5):
+            dialog.draw(surface, surface.get_rect(), 1.0)
+        assert not reads
+        press(dialog, "a", pygame.K_RETURN)
