@@ -11,7 +11,7 @@ from calling import json_of, lines_of
 
 from sandbox.cli.main import call
 from sandbox.engines.contract import Divergence, Exhaustion
-from sandbox.games.billiards.headless import FrameRecord, NoRestError, play_frame
+from sandbox.games.billiards.headless import FrameRecord, FrameTable, NoRestError, play_frame
 from sandbox.games.billiards.match import Match
 
 QUICK = ("match", "straight-rail", "--distance", "2", "--players", "bot:0.9,bot:0.8")
@@ -91,10 +91,10 @@ def test_frame_without_an_end_is_given_up_and_counted(tmp_path: Path, capfd: pyt
 def test_shot_without_an_end_gives_the_frame_up(
     error: Exception, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    def failing(_: object) -> None:
+    def failing(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("sandbox.games.billiards.headless.run_until_rest", failing)
+    monkeypatch.setattr(FrameTable, "play", failing)
     status, document, (line,) = json_of(capfd, *QUICK)
     assert (status, document["unfinished"]) == (1, 1)
     assert str(error) in document["frames"][0]["unfinished"]

@@ -5,14 +5,15 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any, Protocol
 
-import numpy as np
 from pydantic import TypeAdapter
 
-from sandbox.action import Action
-from sandbox.engines.contract import Divergence, Exhaustion, Simulation
+from sandbox.action import Action, Move
+from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.switching import start
+from sandbox.games.billiards.game import BilliardsRules
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, GameError, ShotCall
+from sandbox.games.session import GameSession
 from sandbox.recording import Recording
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Stroke
@@ -23,9 +24,6 @@ MAX_SHOT_TIME = 300.0
 
 MAX_TURNS = 1000
 """of a frame, decisions and shots: one that has no end by then is given up, without a winner"""
-
-REST_SPEED = 1e-9
-"""m/s and rad/s: what is slower rests"""
 
 
 class NoRestError(GameError):
@@ -162,75 +160,118 @@ def play_frame(
     """
     if len(players) != match.state.players:
         raise GameError(f"the match has {match.state.players} players, not {len(players)}")
-    simulation = start(match.scene, engine)
-    simulation.contacts()  # the recording begins
-    first, actions, turns = match, list[Action](), list[FrameTurn]()
-
-    def act(some: Sequence[Action]) -> None:
-        for action in some:
-            simulation.apply(action)
-        actions.extend(some)
-
+    table = FrameTable(match, engine)
+    first, turns = match, list[FrameTurn]()
     unfinished: str | None = None
     began_at = perf_counter()
-    while not match.over:
+    while not table.match.over:
         if len(turns) >= most:
             unfinished = f"not finished after {len(turns):,} turns"
         elif time_limit is not None and perf_counter() - began_at > time_limit:
             unfinished = f"not finished after {time_limit:g} s and {len(turns):,} turns"
         if unfinished is not None:
             break
-        player, who = players[match.turn], match.turn
+        match = table.match
+        player, number = players[match.turn], match.turn
         decision: Decision | None = None
         plan: FramePlan | None = None
-        if match.choices.decisions and not (turns and turns[-1].decision is not None and turns[-1].player == who):
+        if match.choices.decisions and not (turns and turns[-1].decision is not None and turns[-1].player == number):
             decision = player.decide(match)
-            match = match.decide(decision)
+            table.decide(decision)
         else:
             plan = player.plan(match)
-            if plan.place is not None:
-                match = match.place(plan.place)
-            # Not before: an action counts from the step that it is followed by.
-            act(match.moves(simulation.frame().position, simulation.time))
-            began = simulation.time
-            act((match.strike(plan.stroke, began),))
             try:
-                contacts = run_until_rest(simulation)
+                table.play(plan)
             except (NoRestError, Divergence, Exhaustion) as error:
                 unfinished = f"turn {len(turns) + 1}: {error}"
                 break
-            match = match.played(contacts, simulation.frame().position, plan.call, began)
-        verdict = match.verdict
-        told_of = ((), (), ()) if verdict is None else (verdict.fouls, verdict.points, verdict.messages)
-        turns.append(FrameTurn(who, decision, plan, *told_of))
+        verdict = table.match.verdict
+        outcome = ((), (), ()) if verdict is None else (verdict.fouls, verdict.points, verdict.messages)
+        turns.append(FrameTurn(number, decision, plan, *outcome))
         if told is not None:
-            told(turns[-1], match)
-    session = Recording(
-        match.scene, engine, match.scene.solver, tuple(actions), simulation.time, simulation.state_hash()
-    )
-    simulation.close()
-    return FrameRecord(first, match, tuple(turns), session, unfinished)
+            told(turns[-1], table.match)
+    recording = table.recording()
+    table.close()
+    return FrameRecord(first, table.match, tuple(turns), recording, unfinished)
 
 
-def run_until_rest(simulation: Simulation) -> Contacts:
-    """Step until everything rests; return the contacts since they were last asked for.
+class FrameTable:
+    """A simulation of the table, and the game on it. Time advances only while a shot is in progress."""
 
-    Raises:
-        NoRestError: it does not come to rest.
-        Divergence: a ball left all bounds.
-        Exhaustion: the engine cannot go on.
-    """
-    until = simulation.time + MAX_SHOT_TIME
-    while True:
-        simulation.step()
-        frame = simulation.frame()
-        roll = 0.0 if frame.roll is None else float(np.abs(frame.roll).max(initial=0.0))
-        fastest = max(float(np.abs(frame.velocity).max(initial=0.0)), float(np.abs(frame.angular_velocity).max()), roll)
-        if fastest <= REST_SPEED:
-            break
-        if simulation.time > until:
-            raise NoRestError(f"a shot does not come to rest within {MAX_SHOT_TIME:g} s")
-    return simulation.contacts()
+    def __init__(self, match: Match, engine: str) -> None:
+        self._scene, self._engine = match.scene, engine
+        self._simulation = start(match.scene, engine)
+        self._simulation.contacts()  # the recording begins
+        self._rules = BilliardsRules(match)
+        self._game = GameSession(self._rules)
+        self._actions: list[Action] = []
+        self._pending = list(self._look(Contacts.none()))  # actions of the rules, for the next step
+
+    @property
+    def match(self) -> Match:
+        """The match between two shots."""
+        return self._rules.match
+
+    def decide(self, decision: Decision) -> None:
+        """Take a decision.
+
+        Raises:
+            GameError: it is not offered now.
+        """
+        options = self.match.choices.decisions
+        if decision not in options:
+            raise GameError(f"{decision!r} is not offered now; options: {', '.join(options) or 'none'}")
+        self._press(self._rules.decision_input(decision))
+
+    def play(self, plan: FramePlan) -> None:
+        """Place the cue ball, make the call, play the stroke, and step until every ball is at rest.
+
+        Raises:
+            GameError: the place or the call is not allowed.
+            NoRestError: the balls do not come to rest.
+            Divergence: a ball left all bounds.
+            Exhaustion: the engine cannot continue.
+        """
+        time, match = self._simulation.time, self.match
+        match.choices.check(plan.call)
+        acts: list[Action] = []
+        if plan.place is not None:
+            match = match.place(plan.place)
+            acts.append(Move(time=time, body=match.cue, position=plan.place, velocity=(0.0, 0.0)))
+        for control in self._rules.call_inputs(plan.call):
+            self._press(control)
+        acts.append(match.strike(plan.stroke, time))
+        # Not before: an action counts from the step that follows it.
+        for action in (*self._pending, *acts):
+            self._simulation.apply(action)
+        self._actions += [*self._pending, *acts]
+        self._pending = []
+        self._game.saw(acts)
+        limit = time + MAX_SHOT_TIME
+        while True:
+            self._simulation.step()
+            self._pending = list(self._look(self._simulation.contacts()))
+            if self._rules.waiting or self.match.over:
+                break
+            if self._simulation.time > limit:
+                raise NoRestError(f"a shot does not come to rest within {MAX_SHOT_TIME:g} s")
+
+    def recording(self) -> Recording:
+        """Return the scene and the actions up to now."""
+        scene, simulation = self._scene, self._simulation
+        return Recording(
+            scene, self._engine, scene.solver, tuple(self._actions), simulation.time, simulation.state_hash()
+        )
+
+    def close(self) -> None:
+        """Release the engine."""
+        self._simulation.close()
+
+    def _press(self, control: tuple[str, float]) -> None:
+        self._pending += self._game.press(self._simulation.time, *control)
+
+    def _look(self, contacts: Contacts) -> Sequence[Action]:
+        return self._game.look(self._simulation.time, self._simulation.frame(), contacts)
 
 
 _TURNS = TypeAdapter(tuple[FrameTurn, ...])

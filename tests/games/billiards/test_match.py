@@ -4,12 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from tables_by_hand import lying, match, table
+from tables_by_hand import lying, match, run_until_rest, table
 
 import sandbox
 from sandbox.arrays import FloatArray
 from sandbox.engines.exact.tabletop.shots import Table
-from sandbox.games.billiards.headless import run_until_rest
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.placement import placement_refusal
 from sandbox.games.billiards.rules.base import GameError, ShotCall

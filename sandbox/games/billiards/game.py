@@ -1,0 +1,349 @@
+"""Billiards as a game: fulfils the `Rules` protocol for every billiards game by way of a `Match`.
+
+A shot begins with a `Strike` and ends with the first step after which every ball is at rest. The rules collect the
+contacts of the shot, let the `Match` judge it, and answer with `Move` actions that respot or rerack balls. Balls that a
+player moves by hand between shots are accepted where they lie.
+
+A player acts by `Strike` and `Move` actions, or by controls. Decisions and calls are controls only. A recording that
+holds actions alone, without presses, is judged as if nothing had been called. A strike of a ball other than the cue
+ball of the player to shoot is not judged: the balls stay where they come to rest, and the turn does not change.
+"""
+
+import copy
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Self
+
+import numpy as np
+
+from sandbox.action import Action, Move, Strike
+from sandbox.games.billiards.match import Match
+from sandbox.games.billiards.rules.base import Decision, GameError, ShotCall, player_name
+from sandbox.games.billiards.table_geometry import TOUCH
+from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.surface import MISCUE, Stroke
+from sandbox.scene.scene import Scene
+from sandbox.trajectory import Contacts, Frame
+
+MIN_CUE_SPEED, MAX_CUE_SPEED = 0.05, 10.0
+"""m/s: the slowest stroke, and a hard break"""
+MAX_TIP_OFFSET = 0.999 * MISCUE
+"""greatest offset of the tip from the centre of the ball, in radii; just below where the tip slips"""
+REST_SPEED = 1e-9
+"""m/s and rad/s; a slower body is at rest. Engines set the velocity to zero at their rest cut, far above"""
+MAX_JOINED_CONTACTS = 1024
+"""steps whose contacts are kept apart before they are merged; a lasting contact has one row per step"""
+
+CONTROLS = (
+    Control("shoot", "strike the cue ball; the value is the speed", ("space",), analogue=True),
+    Control("aim", "direction of the cue, as a fraction of a turn", ("left",), analogue=True),
+    Control("left english", "hit the ball left of its centre", (), analogue=True, often=0.2),
+    Control("right english", "hit the ball right of its centre", (), analogue=True, often=0.2),
+    Control("follow", "hit the ball above its centre", (), analogue=True, often=0.2),
+    Control("draw", "hit the ball below its centre", (), analogue=True, often=0.2),
+    Control("place x", "x of the place of a ball in hand, as a fraction of the table", (), analogue=True),
+    Control("place y", "y of the place of a ball in hand, as a fraction of the table", (), analogue=True),
+    Control("place", "place the ball in hand", ()),
+    Control("call ball", "call a ball, by its index", (), analogue=True),
+    Control("call pocket", "call a pocket, by its index", (), analogue=True),
+    Control("call safety", "call a safety", (), often=0.1),
+    Control("push out", "announce a push-out", (), often=0.1),
+    Control("decide", "take one of the offered decisions, by its index", (), analogue=True),
+)
+"""Controls of every billiards game. Releasing a control, value 0, undoes english and announcements, and does nothing
+else. A control that selects an entry k of n takes a value from k/n to (k + 1)/n; `select_value` returns the middle."""
+
+
+def is_at_rest(frame: Frame) -> bool:
+    """Return whether no body of a frame moves or turns."""
+    rates = (frame.velocity, frame.angular_velocity, *(() if frame.roll is None else (frame.roll,)))
+    return all(float(np.abs(rate).max(initial=0.0)) <= REST_SPEED for rate in rates)
+
+
+def select_value(index: int, count: int) -> float:
+    """Return the value of a control that selects the entry `index` of `count`."""
+    return (index + 0.5) / count
+
+
+def selected_index(value: float, count: int) -> int | None:
+    """Return the index of the entry that a control's value selects; None for 0, and where there are no entries."""
+    return min(int(value * count), count - 1) if value > 0.0 and count > 0 else None
+
+
+class BilliardsRules:
+    """Rules and state of a running frame of billiards."""
+
+    controls = CONTROLS
+
+    def __init__(self, match: Match, shot_in_progress: bool = False) -> None:
+        """Start a frame.
+
+        Args:
+            match: its beginning.
+            shot_in_progress: whether the scene starts with a shot of its own, which is then the first player's.
+        """
+        self.match = match
+        """the match before the next shot; during a shot, before that shot"""
+        self.call = ShotCall()
+        """call for the next shot"""
+        self.log: list[tuple[float, str]] = []
+        """time, s, and text of decisions and of the results of shots"""
+        self._contacts: list[Contacts] = []
+        self._shot_time: float | None = 0.0 if shot_in_progress else None  # s; None between shots
+        self._is_judged = True  # False for a shot of another ball than the cue ball
+        self._is_resting = not shot_in_progress
+        self._time = 0.0
+        along = match.layout.along
+        self._aim = math.atan2(along[1], along[0])
+        self._english = dict.fromkeys(("left english", "right english", "follow", "draw"), 0.0)
+        self._place = [0.5, 0.5]
+        self._sounds: list[str] = []
+
+    @classmethod
+    def of_scene(cls, scene: Scene, bodies: Bodies) -> Self:  # noqa: ARG003, the factory's form
+        """Start the game that a scene names: free play alone, every other game with two players.
+
+        Raises:
+            UnsuitableSceneError: it cannot be played on this table.
+        """
+        try:
+            return cls(Match.begin(scene, players=1 if scene.play.game == "free" else 2), bool(scene.shots))
+        except GameError as error:
+            raise UnsuitableSceneError(str(error)) from None
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return a copy; matches and contacts are immutable, and shared."""
+        twin = copy.copy(self)
+        for name in ("log", "_contacts", "_english", "_place", "_sounds"):
+            setattr(twin, name, copy.copy(getattr(self, name)))
+        memo[id(self)] = twin
+        return twin
+
+    @property
+    def score(self) -> int:
+        """Score of the winner, or the best score."""
+        state = self.match.state
+        return state.scores[state.winner] if state.winner is not None else max(state.scores)
+
+    @property
+    def over(self) -> str | None:
+        """Who has won the frame; None while it runs."""
+        state = self.match.state
+        if not state.over:
+            return None
+        return "no winner" if state.winner is None else f"{player_name(state.winner)} wins"
+
+    @property
+    def waiting(self) -> bool:
+        """Whether every ball is at rest and the last shot is judged, so that nothing happens until a player acts."""
+        return self._is_resting and self._shot_time is None and not self.match.over
+
+    @property
+    def stroke(self) -> Stroke:
+        """The stroke that the controls set up, at the lowest speed."""
+        side = self._english["right english"] - self._english["left english"]
+        height = self._english["follow"] - self._english["draw"]
+        scale = MAX_TIP_OFFSET / max(math.hypot(side, height), 1.0)
+        return Stroke(aim=self._aim, speed=MIN_CUE_SPEED, side=side * scale, height=height * scale)
+
+    def look(self, seen: StepInfo) -> Sequence[Action]:
+        """Take note of strikes and moves, and judge the shot once every ball is at rest."""
+        started, self._time = self._time, seen.time
+        for action in seen.actions:
+            if isinstance(action, Strike):
+                self._begin_shot(action, max(action.time, started))
+            elif isinstance(action, Move) and self._shot_time is None and action.body in self.match.layout.number:
+                position = list(self.match.position)
+                position[self.match.layout.number[action.body]] = action.position
+                self.match = replace(self.match, position=tuple(position))
+        self._is_resting = is_at_rest(seen.frame)
+        if self._shot_time is None:
+            if self._is_resting:
+                self._accept_position(seen.frame)
+            return ()
+        if len(seen.contacts):
+            self._contacts.append(seen.contacts)
+            if len(self._contacts) == MAX_JOINED_CONTACTS:
+                self._contacts = [Contacts.joined(self._contacts).merged()]
+        return self._end_shot(seen.frame) if self._is_resting and seen.time > self._shot_time else ()
+
+    def _begin_shot(self, strike: Strike, time: float) -> None:
+        if self._shot_time is not None or self.match.over:
+            return
+        self._shot_time, self._is_judged = time, strike.ball == self.match.cue
+        self._contacts = []
+        self._sounds.append("shot")
+
+    def _accept_position(self, frame: Frame) -> None:
+        """Take over positions that something else than a shot has changed, such as a force."""
+        now, count = frame.position, len(self.match.position)
+        # An engine of single precision rounds the positions of moves, which does not make them other positions.
+        if np.abs(now[:count] - self.match.position).max(initial=0.0) > TOUCH:
+            self.match = replace(self.match, position=_points(now[:count]))
+
+    def _end_shot(self, frame: Frame) -> Sequence[Action]:
+        """Judge the shot, and return the moves that put the balls where the match has them."""
+        assert self._shot_time is not None
+        count = len(self.match.position)
+        position, began = frame.position[:count], self._shot_time
+        after = replace(self.match, position=_points(position))
+        if self._is_judged:
+            contacts = Contacts.joined(self._contacts).merged() if self._contacts else Contacts.none()
+            # Bodies that were added later take no part in the game.
+            contacts = contacts.some(np.max(contacts.pair, axis=1, initial=-1) < count)
+            try:
+                after = self.match.played(contacts, position, self.call, began)
+            except GameError as error:  # a call that could not be made, or a ball that was brought back by hand
+                self.log.append((self._time, f"not judged: {error}"))
+        self._contacts, self._shot_time, self.call = [], None, ShotCall()
+        return self._enter(after, position)
+
+    def _enter(self, match: Match, position: Any) -> Sequence[Action]:
+        """Continue with another match; return the moves that it asks for."""
+        self.match = match
+        if match.verdict is not None:
+            self.log += [(self._time, message) for message in match.messages]
+            self._sounds += ["foul"] if match.verdict.fouls else []
+        if match.over:
+            self._sounds.append("win")
+        return match.moves(np.asarray(position, dtype=float), self._time)
+
+    def control(self, name: str, value: float) -> Sequence[Action]:
+        """Set up the stroke, call, decide, place, or shoot. What the rules do not allow now is ignored."""
+        if name in self._english:
+            self._english[name] = min(max(value, 0.0), 1.0)
+        elif name in ("call safety", "push out"):
+            self._announce(name, value > 0.0)
+        elif value <= 0.0:
+            return ()
+        elif name == "aim":
+            self._aim = math.tau * value
+        elif name in ("place x", "place y"):
+            self._place[name == "place y"] = value
+        elif self.waiting:
+            return self._act(name, value)
+        return ()
+
+    def _announce(self, name: str, is_on: bool) -> None:
+        choices = self.match.choices
+        if name == "call safety":
+            self.call = replace(self.call, safety=is_on and self.waiting and choices.safety)
+        else:
+            self.call = replace(self.call, push_out=is_on and self.waiting and choices.push_out)
+
+    def _act(self, name: str, value: float) -> Sequence[Action]:
+        match = self.match
+        if name == "shoot":
+            speed = min(max(value * MAX_CUE_SPEED, MIN_CUE_SPEED), MAX_CUE_SPEED)
+            return (match.strike(self.stroke.model_copy(update={"speed": speed})),)
+        if name == "place":
+            return self.place(self._point())
+        if name == "decide":
+            options = match.choices.decisions
+            index = selected_index(value, len(options))
+            return () if index is None else self.decide(options[index])
+        names = match.layout.names if name == "call ball" else tuple(match.layout.pockets)
+        index = selected_index(value, len(names))
+        if name == "call ball" and index is not None and names[index] in match.choices.balls:
+            self.call = replace(self.call, ball=names[index])
+        elif name == "call pocket" and index is not None and match.choices.pocket:
+            self.call = replace(self.call, pocket=names[index])
+        return ()
+
+    def _point(self) -> Point:
+        (x0, y0), (x1, y1) = self.match.layout.area
+        return x0 + self._place[0] * (x1 - x0), y0 + self._place[1] * (y1 - y0)
+
+    def place(self, at: Point) -> Sequence[Action]:
+        """Put the cue ball, if it is in hand, at the allowed place nearest to a point, m."""
+        match = self.match
+        if match.state.in_hand is None:
+            return ()
+        before = np.array(match.position)
+        return self._enter(match.place(match.nearest(at)), before)
+
+    def decide(self, decision: Decision) -> Sequence[Action]:
+        """Take a decision.
+
+        Raises:
+            GameError: it is not offered now.
+        """
+        before = np.array(self.match.position)
+        self.log.append((self._time, f"{player_name(self.match.turn)} decides: {decision}"))
+        return self._enter(self.match.decide(decision), before)
+
+    def decision_input(self, decision: Decision) -> tuple[str, float]:
+        """Return the control and its value that take an offered decision."""
+        options = self.match.choices.decisions
+        return "decide", select_value(options.index(decision), len(options))
+
+    def call_inputs(self, call: ShotCall) -> tuple[tuple[str, float], ...]:
+        """Return the controls and their values that make a call."""
+        layout = self.match.layout
+        pockets = tuple(layout.pockets)
+        return (
+            *(
+                (("call ball", select_value(layout.number[call.ball], len(layout.names))),)
+                if call.ball is not None
+                else ()
+            ),
+            *(
+                (("call pocket", select_value(pockets.index(call.pocket), len(pockets))),)
+                if call.pocket is not None
+                else ()
+            ),
+            *((("call safety", 1.0),) if call.safety else ()),
+            *((("push out", 1.0),) if call.push_out else ()),
+        )
+
+    def place_inputs(self, at: Point) -> tuple[tuple[str, float], ...]:
+        """Return the controls and their values that place the cue ball at a point, m."""
+        (x0, y0), (x1, y1) = self.match.layout.area
+        return ("place x", (at[0] - x0) / (x1 - x0)), ("place y", (at[1] - y0) / (y1 - y0)), ("place", 1.0)
+
+    def stroke_inputs(self, stroke: Stroke) -> tuple[tuple[str, float], ...]:
+        """Return the controls and their values that play a stroke; its numbers are reproduced to rounding errors."""
+        side, height = stroke.side / MAX_TIP_OFFSET, stroke.height / MAX_TIP_OFFSET
+        return (
+            ("aim", (stroke.aim % math.tau) / math.tau or 1.0),
+            ("right english", max(side, 0.0)),
+            ("left english", max(-side, 0.0)),
+            ("follow", max(height, 0.0)),
+            ("draw", max(-height, 0.0)),
+            ("shoot", stroke.speed / MAX_CUE_SPEED),
+            ("shoot", 0.0),
+        )
+
+    def lines(self) -> Sequence[tuple[str, str]]:
+        """Return the scores of the players, the turn, and the result of the last shot."""
+        state = self.match.state
+        scores = [(player_name(number), str(score)) for number, score in enumerate(state.scores)]
+        if state.over:
+            return scores
+        turn = [("turn", player_name(state.turn))] if state.players > 1 else []
+        in_hand = [("ball in hand", state.in_hand)] if state.in_hand is not None else []
+        last = [("last shot", "; ".join(self.match.messages))] if self.match.messages else []
+        return [*scores, *turn, *in_hand, *last]
+
+    def cues(self) -> Sequence[str]:
+        """Return the names of the sounds since the last call."""
+        sounds, self._sounds = tuple(self._sounds), []
+        return sounds
+
+    def gauges(self) -> Sequence[tuple[str, float]]:
+        """Return the state of the match as numbers."""
+        state = self.match.state
+        return (
+            ("waiting", float(self.waiting)),
+            ("turn", float(state.turn)),
+            ("ball in hand", float(state.in_hand is not None)),
+            ("decisions offered", float(len(self.match.choices.decisions))),
+            *((f"score of {player_name(number)}", float(score)) for number, score in enumerate(state.scores)),
+        )
+
+
+def _points(position: Any) -> tuple[Point, ...]:
+    return tuple((x, y) for x, y in position.tolist())
